@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What every test stands on: a clean Blender, the add-on registered once, repeatable randomness.
+
+Tests of core and device never see bpy: it is imported only when a test of another folder runs.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+WITHOUT_BLENDER = {"core", "device"}
+
+# No deadline: a test must not depend on the clock. Derandomized: the same examples on each run.
+hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+hypothesis.settings.load_profile("repeatable")
+
+
+@pytest.fixture
+def shared_data() -> Callable[[str], Path]:
+    """Path of a file of the real-world collection, or a skip where the collection is absent.
+
+    The collection is `$OCTO_MOTION_DATA`, else `../shared/data` beside the repository.
+    """
+    folder = Path(os.environ.get("OCTO_MOTION_DATA") or REPOSITORY.parent / "shared" / "data")
+
+    def locate(relative_path: str) -> Path:
+        path = folder / relative_path
+        if not path.exists():
+            pytest.skip(f"real-world data is not here: {path} (set OCTO_MOTION_DATA)")
+        return path
+
+    return locate
+
+
+@pytest.fixture(scope="session")
+def add_on() -> Iterator[None]:
+    """The add-on, registered for the whole session."""
+    import octo_motion
+
+    octo_motion.register()
+    yield
+    # bpy 4.5 hangs at exit while an Operator class is registered.
+    octo_motion.unregister()
+
+
+@pytest.fixture(autouse=True)
+def clean_factory_state(request: pytest.FixtureRequest) -> None:
+    """Start each test that uses Blender from factory settings and an empty file."""
+    layer = request.path.relative_to(REPOSITORY / "tests").parts[0]
+    if layer in WITHOUT_BLENDER or layer.endswith(".py"):
+        return
+    import bpy
+
+    request.getfixturevalue("add_on")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
