@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The errors that a user can meet: what is wrong, and what to do about it."""
+
+
+class OctoMotionError(Exception):
+    """Something the user can put right.
+
+    ``problem`` says in one sentence what is wrong, ``remedy`` what to do; both start with a
+    capital letter and end with a full stop. The user interface shows them together.
+    """
+
+    def __init__(self, problem: str, remedy: str = "") -> None:
+        super().__init__(f"{problem} {remedy}".strip())
+        self.problem = problem
+        self.remedy = remedy
+
+
+class RigError(OctoMotionError):
+    """The armature, or its list of arms, cannot be used as it is."""
+
+
+class GaitError(OctoMotionError):
+    """A gait table is damaged or incomplete."""
+
+
+class RouteError(OctoMotionError):
+    """The route cannot be followed."""
+
+
+class SettingsError(OctoMotionError):
+    """A setting has a value that makes no sense, alone or with others."""
+
+
+class WriteError(OctoMotionError):
+    """The result has nowhere to go: read-only data, a missing folder, a full disk."""

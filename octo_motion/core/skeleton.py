@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A skeleton as plain arrays, and its forward kinematics in batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .rotations import Floats, from_matrix, multiply, rotate
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """The bones of an armature at rest, parents before children.
+
+    Lengths and positions are in the armature's own units, orientations in its own space.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    """Index of each bone's parent, −1 for a root."""
+    rest_matrices: Floats
+    """(bones, 4, 4), armature space; a bone points along its local +Y."""
+    lengths: Floats
+    """(bones,)"""
+    connected: tuple[bool, ...]
+    """Whether a bone's head is fixed to its parent's tail."""
+    deform: tuple[bool, ...]
+    inherits_rotation: tuple[bool, ...]
+    constrained: tuple[bool, ...]
+    """Whether something else than keys moves the bone: constraints or drivers."""
+    weighted: tuple[bool, ...]
+    """Whether some mesh has a vertex group of the bone's name."""
+    bendy_segments: tuple[int, ...]
+    sucker_axes: tuple[str, ...]
+    """Local axis that the suckers face ("-Z", "+X", …), or "" where the rig does not say."""
+
+    def __len__(self) -> int:
+        """Number of bones."""
+        return len(self.names)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Bone index by name."""
+        return {name: number for number, name in enumerate(self.names)}
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """Indices of each bone's children."""
+        lists: list[list[int]] = [[] for _ in self.names]
+        for bone, parent in enumerate(self.parents):
+            if parent >= 0:
+                lists[parent].append(bone)
+        return tuple(tuple(each) for each in lists)
+
+    @cached_property
+    def heads(self) -> Floats:
+        """(bones, 3), armature space."""
+        return self.rest_matrices[:, :3, 3].copy()
+
+    @cached_property
+    def tails(self) -> Floats:
+        """(bones, 3), armature space."""
+        return self.heads + self.rest_matrices[:, :3, 1] * self.lengths[:, None]
+
+    @cached_property
+    def rest_rotations(self) -> Floats:
+        """(bones, 4) quaternions, armature space."""
+        return from_matrix(self.rest_matrices[:, :3, :3])
+
+    def pose(self, basis: Floats, locations: Floats | None = None) -> tuple[Floats, Floats]:
+        """Forward kinematics of rotations (and locations) given in each bone's rest frame.
+
+        Args:
+            basis: (…, bones, 4) quaternions, what Blender calls ``matrix_basis``.
+            locations: (…, bones, 3) in the bone's rest frame, or none.
+
+        Returns:
+            Orientations (…, bones, 4) and heads (…, bones, 3) in armature space.
+        """
+        rotations = np.empty(basis.shape)
+        heads = np.empty((*basis.shape[:-1], 3))
+        for bone, parent in enumerate(self.parents):
+            rest = self.rest_rotations[bone]
+            head = self.heads[bone]
+            if parent < 0:
+                carried, position = np.broadcast_to(rest, basis[..., bone, :].shape), head
+            else:
+                # How the parent has moved from its rest pose moves its children.
+                turn = multiply(
+                    rotations[..., parent, :],
+                    _inverse(self.rest_rotations[parent]),
+                )
+                position = heads[..., parent, :] + rotate(turn, head - self.heads[parent])
+                carried = multiply(turn, rest) if self.inherits_rotation[bone] else rest
+                carried = np.broadcast_to(carried, basis[..., bone, :].shape)
+            if locations is not None:
+                position = position + rotate(carried, locations[..., bone, :])
+            heads[..., bone, :] = position
+            rotations[..., bone, :] = multiply(carried, basis[..., bone, :])
+        return rotations, heads
+
+
+def _inverse(quaternion: Floats) -> Floats:
+    return quaternion * np.array([1.0, -1.0, -1.0, -1.0])
