@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the extension's zip: fetch its wheels, stage its files, pack and validate with Blender.
 
-Run by `make build` with a Python that has the bpy wheel, whose packer is used. The zip's path is
-the last line printed.
+Run by `make build` with a Python that has the bpy wheel, whose packer is used. The zip goes to the
+folder given, else to dist; its path is the last line printed.
 """
 
 import importlib.util
@@ -12,12 +12,11 @@ import sys
 import tomllib
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 PINS = REPOSITORY / ".ci" / "requirements-wheels.txt"
 WHEELS = REPOSITORY / "build" / "wheels"
-STAGE = REPOSITORY / "build" / "extension"
-OUTPUT = REPOSITORY / "dist"
 
 
 def run(*command: str | Path) -> None:
@@ -30,28 +29,26 @@ def fetch_wheel(name: str) -> Path:
     if wheel.exists() and f"sha256:{sha256(wheel.read_bytes()).hexdigest()}" in PINS.read_text():
         return wheel
     _distribution, _version, python_tag, abi, platforms = name.removesuffix(".whl").split("-")
-    # fmt: off
     run(
-        sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check",
-        "--no-input", "--no-deps", "--only-binary", ":all:", "--require-hashes",
-        "--requirement", PINS, "--dest", WHEELS,
-        "--implementation", "cp", "--python-version", python_tag.removeprefix("cp"), "--abi", abi,
-        *(word for platform in platforms.split(".") for word in ("--platform", platform)),
+        *(sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"),
+        *("--no-input", "--no-deps", "--only-binary", ":all:", "--require-hashes"),
+        *("--requirement", PINS, "--dest", WHEELS, "--implementation", "cp"),
+        *("--python-version", python_tag.removeprefix("cp"), "--abi", abi),
+        *(f"--platform={platform}" for platform in platforms.split(".")),
     )
-    # fmt: on
     return wheel
 
 
-def stage(wheels: list[str]) -> None:
-    """Lay out the extension as it will be in the zip: manifest, code and licence side by side."""
-    shutil.rmtree(STAGE, ignore_errors=True)
-    ignore = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(REPOSITORY / "octo_motion", STAGE, ignore=ignore)
-    shutil.copy(REPOSITORY / "blender_manifest.toml", STAGE)
-    shutil.copy(REPOSITORY / "LICENSE", STAGE)
-    (STAGE / "wheels").mkdir()
+def lay_out(folder: Path, wheels: list[str]) -> None:
+    """Put the files side by side as they will be in the zip: manifest, licence, code, wheels."""
+    shutil.copytree(
+        REPOSITORY / "octo_motion", folder, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    shutil.copy(REPOSITORY / "blender_manifest.toml", folder)
+    shutil.copy(REPOSITORY / "LICENSE", folder)
+    (folder / "wheels").mkdir()
     for wheel in wheels:
-        shutil.copy(fetch_wheel(wheel), STAGE / "wheels")
+        shutil.copy(fetch_wheel(wheel), folder / "wheels")
 
 
 def packer() -> Path:
@@ -63,15 +60,20 @@ def packer() -> Path:
     return next(folder.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
 
 
-def main() -> None:
+def main(output: Path) -> None:
     manifest = tomllib.loads((REPOSITORY / "blender_manifest.toml").read_text(encoding="utf-8"))
-    stage([Path(wheel).name for wheel in manifest["wheels"]])
-    OUTPUT.mkdir(exist_ok=True)
-    archive = OUTPUT / f"{manifest['id']}-{manifest['version']}.zip"
-    run(sys.executable, packer(), "build", "--source-dir", STAGE, "--output-filepath", archive)
+    archive = output / f"{manifest['id']}-{manifest['version']}.zip"
+    output.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "extension"
+        lay_out(folder, [Path(wheel).name for wheel in manifest["wheels"]])
+        run(
+            *(sys.executable, packer(), "build"),
+            *("--source-dir", folder, "--output-filepath", archive),
+        )
     run(sys.executable, packer(), "validate", archive)
-    print(archive.relative_to(REPOSITORY))
+    print(archive)
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else REPOSITORY / "dist")

@@ -5,6 +5,7 @@ Tests of core and device never see bpy: it is imported only when a test of anoth
 """
 
 import os
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -17,6 +18,13 @@ WITHOUT_BLENDER = {"core", "device"}
 # No deadline: a test must not depend on the clock. Derandomized: the same examples on each run.
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("repeatable")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Give Blender an empty user folder: no one's preferences, presets or extensions matter."""
+    user_folder = tempfile.TemporaryDirectory(prefix="octo-motion-tests-")
+    config.add_cleanup(user_folder.cleanup)
+    os.environ["BLENDER_USER_RESOURCES"] = user_folder.name
 
 
 @pytest.fixture

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The project's own files agree with each other, and its set-up scripts say what is wrong."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+SET_UP = REPOSITORY / ".ci"
+REQUIREMENTS = sorted(SET_UP.glob("requirements-*.txt"))
+MANIFEST = tomllib.loads((REPOSITORY / "blender_manifest.toml").read_text(encoding="utf-8"))
+
+needs_posix_shell = pytest.mark.skipif(os.name == "nt", reason="the set-up scripts are POSIX shell")
+
+
+def pinned_version(requirements: Path, distribution: str) -> str:
+    text = requirements.read_text(encoding="utf-8")
+    match = re.search(rf"^{distribution}==(\S+)", text, re.MULTILINE)
+    assert match, f"{distribution} is not in {requirements.name}"
+    return match[1]
+
+
+@pytest.mark.parametrize("requirements", REQUIREMENTS, ids=lambda path: path.name)
+def test_every_requirement_is_pinned_to_one_version(requirements: Path) -> None:
+    joined = requirements.read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = [line for line in joined.splitlines() if line and not line.startswith("#")]
+    assert lines
+    assert [line for line in lines if not re.match(r"[\w.-]+==\d[\w.]*( |;|$)", line)] == []
+
+
+def test_oldest_blender_the_extension_accepts_is_the_oldest_one_tested() -> None:
+    tested = pinned_version(SET_UP / "requirements-4.5.txt", "bpy").split(".")
+    assert MANIFEST["blender_version_min"].split(".")[:2] == tested[:2]
+
+
+@pytest.mark.parametrize("blender", ["5.2", "4.5"])
+def test_bpy_is_of_the_blender_its_requirement_file_is_named_after(blender: str) -> None:
+    version = pinned_version(SET_UP / f"requirements-{blender}.txt", "bpy")
+    assert version.startswith(f"{blender}.")
+
+
+def test_a_device_works_on_every_python_and_system_that_blender_ships_for() -> None:
+    systems = ("manylinux_2_17_x86_64", "win_amd64", "macosx_11_0_arm64")
+    expected = {(python, system) for python in ("cp311", "cp313", "cp314") for system in systems}
+    expected.add(("cp311", "macosx_10_9_x86_64"))  # Blender 4.5 is the last for Intel Macs
+    tags = [Path(wheel).stem.split("-")[2:] for wheel in MANIFEST["wheels"]]
+    carried = [(python, platforms.split(".")[-1]) for python, _abi, platforms in tags]
+    assert sorted(carried) == sorted(expected)
+
+
+def test_every_wheel_in_the_manifest_has_a_pinned_version_and_a_hash() -> None:
+    requirements = SET_UP / "requirements-wheels.txt"
+    version = pinned_version(requirements, "hidapi")
+    hashes = re.findall(r"--hash=sha256:[0-9a-f]{64}\b", requirements.read_text(encoding="utf-8"))
+    assert {Path(wheel).name.split("-")[1] for wheel in MANIFEST["wheels"]} == {version}
+    assert len(set(hashes)) == len(hashes) == len(MANIFEST["wheels"])
+
+
+def test_licence_is_the_same_wherever_it_is_stated() -> None:
+    text = (REPOSITORY / "LICENSE").read_text(encoding="utf-8")
+    assert MANIFEST["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert "GNU GENERAL PUBLIC LICENSE\n                       Version 3, 29 June 2007" in text
+    folders = ("octo_motion", "tests", "docs", ".ci")
+    files = [path for folder in folders for path in (REPOSITORY / folder).rglob("*.py")]
+    header = "# SPDX-License-Identifier: GPL-3.0-or-later\n"
+    assert [path for path in files if not path.read_text(encoding="utf-8").startswith(header)] == []
+
+
+@needs_posix_shell
+def test_make_help_lists_every_target() -> None:
+    makefile = (REPOSITORY / "Makefile").read_text(encoding="utf-8")
+    phony = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)
+    assert phony
+    run = subprocess.run(
+        ["make", "--no-print-directory", "help"],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert [line.split()[1] for line in run.stdout.splitlines()] == phony[1].split()
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    """A machine with the project's set-up scripts and shell tools, but no Python at all."""
+    shutil.copytree(SET_UP, tmp_path / "project" / ".ci")
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for tool in ("cat", "cmp", "cp", "dirname", "grep", "rm", "sed", "sh", "tr"):
+        path = shutil.which(tool)
+        assert path, f"{tool} is not on PATH"
+        (tools / tool).symlink_to(path)
+    return tmp_path
+
+
+def run_on(machine: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command,
+        cwd=machine / "project",
+        env={"PATH": f"{machine / 'broken'}:{machine / 'tools'}", "HOME": str(machine)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def add_script(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    path.chmod(0o755)
+
+
+VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
+THIS_PYTHON = f'exec "{sys.executable}" "$@"'
+
+
+@needs_posix_shell
+@pytest.mark.parametrize(
+    "place",
+    [
+        f"tools/python{VERSION}",
+        "tools/python3",
+        f".pyenv/versions/{VERSION}.99/bin/python{VERSION}",
+    ],
+)
+def test_python_is_found_behind_a_shim_that_does_not_work(machine: Path, place: str) -> None:
+    add_script(machine / "broken" / f"python{VERSION}", "exit 127")
+    add_script(machine / place, THIS_PYTHON)
+
+    run = run_on(machine, ".ci/find-python", VERSION)
+
+    assert (run.returncode, run.stdout) == (0, f"{sys.executable}\n")
+
+
+@needs_posix_shell
+def test_python_is_found_through_uv(machine: Path) -> None:
+    add_script(machine / "tools" / "uv", f'[ "$*" = "python find {VERSION}" ] && echo "$0-python"')
+    add_script(machine / "tools" / "uv-python", THIS_PYTHON)
+
+    run = run_on(machine, ".ci/find-python", VERSION)
+
+    assert (run.returncode, run.stdout) == (0, f"{sys.executable}\n")
+
+
+@needs_posix_shell
+def test_python_of_another_version_is_not_taken(machine: Path) -> None:
+    add_script(machine / "tools" / "python3", THIS_PYTHON)
+    run = run_on(machine, ".ci/find-python", "3.99")
+    assert (run.returncode, run.stdout) == (1, "")
+
+
+@needs_posix_shell
+def test_without_any_python_the_tests_fail_and_say_what_to_install(machine: Path) -> None:
+    run = run_on(machine, ".ci/test")
+    assert run.returncode == 1
+    assert "No working Python 3.13 was found" in run.stderr
+    assert "uv python install 3.11" in run.stderr
+    assert run.stdout.count("NOT TESTED, its Python is missing") == 2
+
+
+@needs_posix_shell
+@pytest.mark.parametrize(("status", "verdict"), [(0, "passed"), (1, "FAILED")])
+def test_with_one_python_its_blender_is_tested_and_the_other_named_at_the_end(
+    machine: Path, status: int, verdict: str
+) -> None:
+    environment = machine / "project" / ".venv" / "bpy-4.5"
+    add_script(
+        environment / "bin" / "python",
+        f'case "$*" in "-m pytest"*) echo "tests: $*"; exit {status};; esac',
+    )
+    shutil.copy(SET_UP / "requirements-4.5.txt", environment / ".installed")
+
+    run = run_on(machine, ".ci/test", "-k", "gait")
+
+    assert run.returncode == status
+    assert "tests: -m pytest -k gait\n" in run.stdout
+    assert run.stdout.endswith(
+        f"Blender 5.2: NOT TESTED, its Python is missing (see above)\nBlender 4.5: {verdict}\n"
+    )
+
+
+@needs_posix_shell
+def test_environment_is_set_up_again_when_its_requirements_change(machine: Path) -> None:
+    requirements = machine / "project" / ".ci" / "requirements-4.5.txt"
+    python = machine / "project" / ".venv" / "bpy-4.5" / "bin" / "python"
+    add_script(python, 'echo "$*" >> installed')
+    add_script(machine / "tools" / "python3.11", f'echo "{python}"')
+    command = (".ci/venv", "bpy-5.2", "bpy-4.5")
+
+    first, second = run_on(machine, *command), run_on(machine, *command)
+    requirements.write_text("bpy==4.5.16\n", encoding="utf-8")
+    third = run_on(machine, *command)
+
+    assert [run.stdout for run in (first, second, third)] == [f"{python}\n"] * 3
+    assert [bool(run.stderr) for run in (first, second, third)] == [True, False, True]
+    assert (machine / "project" / "installed").read_text().count("pip install") == 2
