@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One life of the extension, run by test_extension.py in a Blender of its own.
+
+python -m tests.end_to_end.extension_life register
+python -m tests.end_to_end.extension_life install ZIP
+"""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import bpy
+
+NAME = "bl_ext.user_default.octo_motion"
+
+
+def traces() -> set[str]:
+    """Everything in this Blender that an add-on could have added."""
+    return set(list_traces())
+
+
+def list_traces() -> Iterator[str]:
+    for name in dir(bpy.types):
+        yield f"class {name}"
+        blender_class = getattr(bpy.types, name)
+        if rna := getattr(blender_class, "bl_rna", None):
+            yield from (f"property {name}.{key}" for key, _ in rna.properties.items())
+        for function in getattr(getattr(blender_class, "draw", None), "_draw_funcs", ()):
+            yield f"menu entry {name}: {function.__module__}.{function.__qualname__}"
+    for module in dir(bpy.ops):
+        yield from (f"operator {module}.{name}" for name in dir(getattr(bpy.ops, module)))
+    for name in dir(bpy.app.handlers):
+        if isinstance(functions := getattr(bpy.app.handlers, name), list):
+            yield from (f"handler {name}: {function.__module__}" for function in functions)
+    for configuration in bpy.context.window_manager.keyconfigs:
+        for keymap in configuration.keymaps:
+            yield from (f"key {keymap.name}: {item.idname}" for item in keymap.keymap_items)
+    yield from (f"add-on {add_on.module}" for add_on in bpy.context.preferences.addons)
+
+
+def register_twice() -> None:
+    import octo_motion
+
+    before = traces()
+    for _ in range(2):
+        octo_motion.register()
+        assert "operator octo_motion.add_octopus" in traces() - before
+        octo_motion.unregister()
+        assert traces() == before, traces() ^ before
+
+
+def install(archive: str) -> None:
+    """Install, disable, enable and uninstall; print the operators and hidapi's file."""
+    extensions = Path(bpy.utils.resource_path("USER")) / "extensions"
+    before = traces()
+
+    bpy.ops.extensions.package_install_files(
+        filepath=archive, repo="user_default", enable_on_install=True
+    )
+    installed = traces()
+    print(*dir(bpy.ops.octo_motion))
+    print(*(path.name for path in (extensions / ".local" / "lib").rglob("hid.*")))
+
+    bpy.ops.preferences.addon_disable(module=NAME)
+    assert traces() == before, traces() ^ before
+    bpy.ops.preferences.addon_enable(module=NAME)
+    assert traces() == installed, traces() ^ installed
+
+    bpy.ops.extensions.package_uninstall(
+        repo_directory=str(extensions / "user_default"), pkg_id="octo_motion"
+    )
+    assert traces() == before, traces() ^ before
+    assert not (extensions / "user_default" / "octo_motion").exists()
+
+
+if __name__ == "__main__":
+    {"register": register_twice, "install": install}[sys.argv[1]](*sys.argv[2:])

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension comes and goes without a trace, as source and as the zip that artists install."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent.parent
+
+
+def run_blender(*arguments: str | Path) -> str:
+    """Whole output of extension_life.py, with every warning of Python an error."""
+    run = subprocess.run(
+        [sys.executable, "-u", "-W", "error", "-m", "tests.end_to_end.extension_life", *arguments],
+        cwd=REPOSITORY,
+        env=dict(os.environ),  # Python's view of it: bpy in this process has added to C's
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+        timeout=120,  # Blender 4.5 hangs at exit where an operator, menu entry or timer is left
+    )
+    assert run.returncode == 0, run.stdout
+    return run.stdout
+
+
+def test_add_on_leaves_no_trace_however_often_it_is_registered() -> None:
+    assert run_blender("register") == ""
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The zip that `make build` makes, validated by Blender's own tool as it is built."""
+    folder = tmp_path_factory.mktemp("extension")
+    subprocess.run(
+        [sys.executable, REPOSITORY / ".ci" / "build.py", folder],
+        check=True,
+        stdin=subprocess.DEVNULL,
+    )
+    return next(folder.glob("*.zip"))
+
+
+def test_zip_installs_disables_enables_and_uninstalls_without_a_complaint_on_the_console(
+    archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BLENDER_USER_RESOURCES", str(tmp_path))
+
+    installed, operators, hidapi, removed = run_blender("install", archive).splitlines()
+
+    assert installed == 'STATUS Installed "octo_motion"'
+    assert {"add_octopus", "add_route", "detect_arms", "generate_locomotion"} <= set(
+        operators.split()
+    )
+    python = f"{sys.version_info.major}{sys.version_info.minor}"
+    assert hidapi.startswith((f"hid.cpython-{python}", f"hid.cp{python}"))
+    assert removed == 'STATUS Removed "octo_motion"'
