@@ -106,9 +106,11 @@ def shortest_arc(start: ArrayLike, end: ArrayLike) -> Floats:
     a, b = np.broadcast_arrays(
         np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     )
-    w = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
+    # 1 + a · b, without the cancellation where they are nearly opposite.
+    w = 0.5 * np.sum((a + b) ** 2, axis=-1, keepdims=True)
     q = np.concatenate([w, cross(a, b)], axis=-1)
-    opposite = w[..., 0] < 1e-9
+    # Opposite to within the accuracy of the cross product's direction.
+    opposite = (w[..., 0] < 1.0) & (np.sum(q[..., 1:] ** 2, axis=-1) < 1e-16)
     if np.any(opposite):
         least = np.eye(3)[np.argmin(np.abs(a[opposite]), axis=-1)]
         q[opposite, 0] = 0.0
@@ -182,20 +184,28 @@ def from_euler(angles: ArrayLike, order: str) -> Floats:
 
 
 def to_euler(quaternion: ArrayLike, order: str) -> Floats:
-    """Unit quaternions to Blender's Euler angles (x, y, z); the middle angle in [−π/2, π/2]."""
-    m = to_matrix(quaternion)
+    """Unit quaternions to Blender's Euler angles (x, y, z); the middle angle in [−π/2, π/2].
+
+    Straight from the quaternion, so it is exact near the poles of the middle angle as well; on a
+    pole, where first and last angle turn about one axis, the last is zero. After Bernardes and
+    Viollet, "Quaternion to Euler angles conversion" (2022).
+    """
+    q = np.asarray(quaternion, dtype=np.float64)
     i, j, k = ("XYZ".index(letter) for letter in order)
-    sign = 1.0 if (j - i) % 3 == 1 else -1.0
-    cosine = np.hypot(m[..., i, i], m[..., j, i])
-    regular = cosine > 1e-8
-    result = np.empty(m.shape[:-1])
-    result[..., i] = np.where(
-        regular,
-        sign * np.arctan2(m[..., k, j], m[..., k, k]),
-        sign * np.arctan2(-m[..., j, k], m[..., j, j]),
-    )
-    result[..., j] = sign * np.arctan2(-m[..., k, i], cosine)
-    result[..., k] = np.where(regular, sign * np.arctan2(m[..., j, i], m[..., i, i]), 0.0)
+    # An odd order is an even one seen in a mirror, where all turns go backwards.
+    mirror = 1.0 if (j - i) % 3 == 1 else -1.0
+    w = q[..., 0]
+    first, middle, last = (mirror * q[..., 1 + axis] for axis in (i, j, k))
+    with_sum = np.hypot(w - middle, last + first)
+    with_difference = np.hypot(w + middle, last - first)
+    half_sum = np.arctan2(last + first, w - middle)
+    half_difference = np.arctan2(last - first, w + middle)
+    half_difference = np.where(with_difference < _TINY, -half_sum, half_difference)
+    half_sum = np.where(with_sum < _TINY, -half_difference, half_sum)
+    result = np.empty((*q.shape[:-1], 3))
+    result[..., i] = mirror * _less_whole_turns(half_sum - half_difference)
+    result[..., j] = mirror * (2.0 * np.arctan2(with_difference, with_sum) - 0.5 * np.pi)
+    result[..., k] = mirror * _less_whole_turns(half_sum + half_difference)
     return result
 
 
@@ -203,32 +213,51 @@ def continuous_euler(angles: ArrayLike, order: str) -> Floats:
     """Of the equal triples of Euler angles, those closest to the frame before (first axis).
 
     Each rotation has two families of triples, apart by whole turns: the given one, and the one
-    with its first and last angle turned by π and its middle angle taken from π.
+    with its first and last angle turned by π and its middle angle taken from π. The first frame
+    gets the triple closest to zero, as Blender itself chooses.
     """
-    result = np.array(angles, dtype=np.float64)
-    if len(result) < 2:
-        return result
+    given = np.asarray(angles, dtype=np.float64)
     i, j, k = ("XYZ".index(letter) for letter in order)
-    other = result.copy()
-    other[..., i] += np.pi
+    other = given.copy()
+    other[..., (i, k)] += np.pi
     other[..., j] = np.pi - other[..., j]
-    other[..., k] += np.pi
-    # Which family to take depends on the frame before, so this runs frame by frame; each step
-    # handles all bones at once.
-    for frame in range(1, len(result)):
-        before = result[frame - 1]
-        best = None
-        for family in (result[frame], other[frame]):
-            near = family - 2.0 * np.pi * np.round((family - before) / (2.0 * np.pi))
-            cost = np.sum(np.abs(near - before), axis=-1, keepdims=True)
-            best = (
-                (near, cost)
-                if best is None
-                else (
-                    np.where(cost < best[1], near, best[0]),
-                    np.minimum(cost, best[1]),
-                )
-            )
-        assert best is not None
-        result[frame] = best[0]
-    return result
+    before = np.concatenate([np.zeros_like(given[:1]), given[:-1]])
+    # Changing family costs the same from either to the other, and so does staying in either.
+    # So whether to change at a frame hangs on its two triples alone, whatever came before.
+    staying = np.abs(_less_whole_turns(given - before)).sum(axis=-1)
+    changing = np.abs(_less_whole_turns(other - before)).sum(axis=-1)
+    in_other = np.cumsum(changing < staying, axis=0) % 2 == 1
+    chosen = np.where(in_other[..., None], other, given)
+    chosen[:1] = _less_whole_turns(chosen[:1])
+    return np.unwrap(chosen, axis=0)
+
+
+def continuous_axis_angle(quaternions: ArrayLike) -> Floats:
+    """Unit quaternions as ``(angle, x, y, z)``, close to the frame before (first axis).
+
+    Axis and angle keep their direction through the rest pose, where the angle changes sign, and
+    past the half turn, where it goes on growing. At rest itself the axis is that of the frame
+    before; before the first turn it is that of the first turn, or Y if there is none at all.
+    """
+    q = continuous(quaternions)
+    sine = np.linalg.norm(q[..., 1:], axis=-1)
+    turned = sine > _TINY
+    # The last frame that was turned, at or before each; before the first such, the first.
+    number = np.arange(len(q)).reshape((-1,) + (1,) * (q.ndim - 2))
+    source = np.maximum.accumulate(np.where(turned, number, 0), axis=0)
+    never = ~np.maximum.accumulate(turned, axis=0)
+    source = np.where(never, np.argmax(turned, axis=0), source)
+    axes = np.take_along_axis(normalized(q[..., 1:]), source[..., None], axis=0)
+    axes[np.broadcast_to(~turned.any(axis=0), turned.shape)] = (0.0, 1.0, 0.0)
+    backwards = np.sum(axes[1:] * axes[:-1], axis=-1) < 0.0
+    signs = np.where(np.cumsum(backwards, axis=0) % 2 == 1, -1.0, 1.0)
+    axes[1:] *= signs[..., None]
+    angle = 2.0 * np.arctan2(np.sum(axes * q[..., 1:], axis=-1), q[..., 0])
+    # The first frame within half a turn, all others next to the one before.
+    angle[:1] = _less_whole_turns(angle[:1])
+    return np.concatenate([np.unwrap(angle, axis=0)[..., None], axes], axis=-1)
+
+
+def _less_whole_turns(angle: Floats) -> Floats:
+    """The same angle within [−π, π]."""
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))

@@ -1,0 +1,472 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays to actions: keys in bulk, and never a key lost that an artist has set.
+
+An action made here carries a mark: whose it is, and a fingerprint of its keys as written. As long
+as the fingerprint still fits and nothing else uses the action, it may be written anew in place.
+Any other action is left exactly as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ..core.errors import RigError, WriteError
+from ..core.rotations import (
+    Floats,
+    conjugate,
+    continuous,
+    continuous_axis_angle,
+    continuous_euler,
+    from_euler,
+    from_matrix,
+    multiply,
+    normalized,
+    to_euler,
+)
+from .armature import armature_data
+
+MARK: Final = "octo_motion_generated"
+"""Custom property of an action made here: a group with the fields of ``_mark``."""
+
+_MARK_VERSION: Final = 1
+"""Counts up when the fingerprint is taken otherwise: older actions then count as edited."""
+
+_OBJECT_GROUP: Final = "Object Transforms"
+"""The channel group in which Blender itself keeps an object's transform keys."""
+
+_LEAST_SPACING: Final = 0.01
+"""Blender takes keys that are no further apart, in frames, for one and the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One animated property: as many F-curves as it has components."""
+
+    data_path: str
+    values: Floats
+    """(frames, components)"""
+    group: str
+
+
+def writable_armature(obj: bpy.types.Object) -> None:
+    """Make sure that an action can be given to this armature, and will be saved with the file.
+
+    Raises:
+        RigError: the object is no armature.
+        WriteError: it is linked, a library override that is not editable, or in NLA tweak mode.
+    """
+    armature_data(obj)
+    _writable_object(obj)
+
+
+def _writable_object(obj: bpy.types.Object) -> None:
+    # Python may assign an action to a linked object: it animates, and is gone when the file is
+    # opened again. Of a local object with linked armature data, and of an editable override, the
+    # action is saved.
+    if obj.library is not None:
+        problem = f"'{obj.name}' is linked from '{obj.library.name}' and is read-only here."
+        if all(scene.library is not None for scene in obj.users_scene):
+            raise WriteError(
+                problem,
+                "Link its collection into a scene of this file and make a library override "
+                "(Object > Library Override > Make).",
+            )
+        raise WriteError(problem, "Make a library override (Object > Library Override > Make).")
+    if obj.override_library is not None and obj.override_library.is_system_override:
+        raise WriteError(
+            f"'{obj.name}' is a library override that is not editable.",
+            "Make it editable: select it and choose Object > Library Override > Make.",
+        )
+    data = obj.animation_data
+    if data is not None and data.use_tweak_mode:
+        raise WriteError(
+            f"'{obj.name}' is in the tweak mode of the NLA editor.",
+            "Leave tweak mode there (Tab) and try again.",
+        )
+    if data is not None and data.is_property_readonly("action"):
+        raise WriteError(
+            f"The animation of '{obj.name}' is read-only.", "Choose an object that can be edited."
+        )
+
+
+def rotation_channels(
+    armature: bpy.types.Object, bones: Sequence[str], quaternions: Floats
+) -> list[Channel]:
+    """Bones' rotations, each in the rotation mode that its bone has; the mode stays as it is.
+
+    Each frame continues the one before: quaternions keep their sign, Euler angles and the angle
+    about an axis go on past the half turn instead of jumping.
+
+    Args:
+        armature: the armature object.
+        bones: names of its bones.
+        quaternions: (frames, bones, 4), rotations from rest, what Blender calls ``matrix_basis``.
+
+    Raises:
+        RigError: the armature has no such bone.
+    """
+    pose_bones = _pose_bones(armature, bones)
+    modes = [bone.rotation_mode for bone in pose_bones]
+    channels: dict[int, Channel] = {}
+    for mode in set(modes):
+        chosen = [number for number, each in enumerate(modes) if each == mode]
+        values = _in_rotation_mode(quaternions[:, chosen], mode)
+        for place, number in enumerate(chosen):
+            bone = pose_bones[number]
+            path = bone.path_from_id(_rotation_property(mode))
+            channels[number] = Channel(path, values[:, place], bone.name)
+    return [channels[number] for number in range(len(modes))]
+
+
+def location_channel(armature: bpy.types.Object, bone: str, locations: Floats) -> Channel:
+    """A bone's locations (frames, 3), in its rest frame.
+
+    Raises:
+        RigError: the armature has no such bone.
+    """
+    (pose_bone,) = _pose_bones(armature, [bone])
+    return Channel(pose_bone.path_from_id("location"), locations, pose_bone.name)
+
+
+def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
+    """An object's travel through the world, in its own channels; its scale stays as it is.
+
+    Parent, parent inverse, delta transforms and rotation mode are taken off, the parent as it
+    stands at the current frame. A parent with unequal scales shears what hangs on it: the
+    rotation is then the nearest there is.
+
+    Args:
+        obj: the object.
+        locations: (frames, 3), world.
+        quaternions: (frames, 4), world.
+
+    Raises:
+        RigError: the parent's scale is zero in some direction.
+    """
+    frame = _parent_frame(obj)
+    # The rotation within a frame that may scale, shear and mirror: its polar decomposition.
+    left, sizes, right = np.linalg.svd(frame[:3, :3])
+    if sizes[-1] < 1e-6 * sizes[0]:
+        raise RigError(f"The parent of '{obj.name}' is flat or has no size.", "Repair its scale.")
+    turn = left @ right
+    # Blender takes a mirrored frame's axes the other way round: so reads its matrix_world.
+    turn = from_matrix(turn if np.linalg.det(turn) > 0.0 else -turn)
+    mode = obj.rotation_mode
+    own_rotations = multiply(
+        multiply(conjugate(_delta_rotation(obj)), conjugate(turn)), normalized(quaternions)
+    )
+    own_locations = np.linalg.solve(frame[:3, :3], (locations - frame[:3, 3]).T).T
+    return [
+        Channel("location", own_locations - np.array(obj.delta_location), _OBJECT_GROUP),
+        Channel(_rotation_property(mode), _in_rotation_mode(own_rotations, mode), _OBJECT_GROUP),
+    ]
+
+
+def write_action(
+    obj: bpy.types.Object,
+    name: str,
+    frames: Floats,
+    channels: Sequence[Channel],
+    *,
+    previous: bpy.types.Action | None,
+    settings_note: str = "",
+) -> bpy.types.Action:
+    """Give an object an action with these channels, one linear key per frame.
+
+    ``previous`` is written anew in place, and keeps its name, slot and users, if it was made here
+    for this object, nobody has edited it since, and no other object, NLA strip or constraint uses
+    it. Otherwise it is left alone and a new action is made. The action that the object had until
+    now is never changed; if nothing else uses it, a fake user saves it from being purged.
+
+    Args:
+        obj: the object to animate.
+        name: name of a new action.
+        frames: (frames,), ascending; fractions are kept.
+        channels: values at these frames.
+        previous: the action to write anew, or none.
+        settings_note: kept with the action, for whoever wants to know how it was made.
+
+    Returns:
+        The action, assigned to the object together with its slot.
+
+    Raises:
+        WriteError: the object is read-only, or in NLA tweak mode. Nothing has changed then.
+    """
+    times = _checked(frames, channels)
+    _writable_object(obj)
+    data = obj.animation_data or obj.animation_data_create()
+    assert data is not None
+    assigned = data.action
+    if previous is not None and _may_replace(previous, obj):
+        action = previous
+    else:
+        action = _new_action(obj, name)
+    # Actions made here have one layer, one strip and one slot; with more, they count as edited.
+    (slot,), (layer,) = action.slots, action.layers
+    (strip,) = layer.strips
+    assert isinstance(strip, bpy.types.ActionKeyframeStrip)
+    channelbag = strip.channelbag(slot, ensure=True)
+    assert channelbag is not None
+    _write_curves(channelbag, times, channels)
+    action.use_frame_range = True
+    action.frame_start, action.frame_end = float(times[0]), float(times[-1])
+    data.action = action
+    data.action_slot = slot
+    if assigned is not None and assigned.library is None and assigned.users == 0:
+        assigned.use_fake_user = True
+    _mark(action, obj, settings_note)
+    return action
+
+
+def is_generated(action: bpy.types.Action) -> bool:
+    """Whether the action was made here, or is a copy of one that was."""
+    return MARK in action
+
+
+def is_edited(action: bpy.types.Action) -> bool:
+    """Whether the action is not, or no longer, what was generated.
+
+    Keys, modifiers and further curves count, so do a muted or locked curve, markers and the frame
+    range. A name, a colour, a selection and a fake user do not.
+    """
+    mark = action.get(MARK)
+    if mark is None or mark.get("version") != _MARK_VERSION:
+        return True
+    return mark.get("fingerprint") != _fingerprint(action)
+
+
+def _may_replace(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+    """Whether this action is the object's alone, and all that is in it was generated."""
+    if action.library is not None or action.override_library is not None:
+        return False
+    if not is_generated(action) or action.asset_data is not None:
+        return False
+    if not _made_for(action, obj) or _used_elsewhere(action, obj):
+        return False
+    return not is_edited(action)
+
+
+def _made_for(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+    mark = action[MARK]
+    if mark.get("owner") == obj.name:
+        return True
+    # The mark of another: an action that was handed over, and still is the other's, or what an
+    # object has when it was renamed, appended, or duplicated together with its action.
+    data = obj.animation_data
+    if data is None or data.action != action:
+        return False
+    return mark.get("owner") not in bpy.data.objects or mark.get("name") != action.name
+
+
+def _used_elsewhere(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+    """Whether the action moves anything but this object, or this object by other ways too."""
+    for user in bpy.data.user_map(subset=[action])[action]:
+        data = getattr(user, "animation_data", None)
+        if data is not None:
+            if user != obj and action in (data.action, data.action_tweak_storage):
+                return True
+            strips = (strip for track in data.nla_tracks for strip in track.strips)
+            if any(strip.action == action for strip in _flattened(strips)):
+                return True
+        if isinstance(user, bpy.types.Object) and action in _constraint_actions(user):
+            return True
+    return False
+
+
+def _flattened(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
+    """The strips, and those inside meta strips."""
+    for strip in strips:
+        yield strip
+        yield from _flattened(strip.strips)
+
+
+def _constraint_actions(obj: bpy.types.Object) -> list[bpy.types.Action | None]:
+    bones = obj.pose.bones if obj.pose is not None else ()
+    return [
+        constraint.action
+        for owner in (obj, *bones)
+        for constraint in owner.constraints
+        if isinstance(constraint, bpy.types.ActionConstraint)
+    ]
+
+
+def _new_action(obj: bpy.types.Object, name: str) -> bpy.types.Action:
+    action = bpy.data.actions.new(name)
+    action.slots.new("OBJECT", obj.name)
+    action.layers.new("Layer").strips.new(type="KEYFRAME")
+    return action
+
+
+def _checked(frames: Floats, channels: Sequence[Channel]) -> np.ndarray:
+    """Frames in Blender's precision. A ValueError here is a fault of the caller's, not a user's."""
+    times = np.ascontiguousarray(frames, dtype=np.float32)
+    if times.ndim != 1 or len(times) == 0:
+        raise ValueError(f"frames must be one row of at least one frame, not {times.shape}")
+    if not np.isfinite(times).all() or (np.diff(times) <= _LEAST_SPACING).any():
+        raise ValueError(f"frames must ascend by more than {_LEAST_SPACING}")
+    for channel in channels:
+        if channel.values.ndim != 2 or len(channel.values) != len(times):
+            raise ValueError(f"{channel.data_path}: {channel.values.shape} for {len(times)} frames")
+        if not np.isfinite(channel.values).all():
+            raise ValueError(f"{channel.data_path} has values that are no numbers")
+    if len({channel.data_path for channel in channels}) != len(channels):
+        raise ValueError("two channels for one property")
+    return times
+
+
+def _write_curves(
+    channelbag: bpy.types.ActionChannelbag, times: np.ndarray, channels: Sequence[Channel]
+) -> None:
+    """Make the curves what the channels say. Curves that are there already are filled anew, so
+    that their colours, selection and place in the editors stay.
+    """
+    curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
+    groups = {group.name: group for group in channelbag.groups}
+    # Everything goes through the same few buffers: memory stays modest, however many the bones.
+    points = np.empty((len(times), 2), dtype=np.float32)
+    points[:, 0] = times
+    linear = _filled(len(times), "interpolation", "LINEAR")
+    # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
+    generated = _filled(len(times), "type", "GENERATED")
+    for channel in channels:
+        if channel.group not in groups:
+            groups[channel.group] = channelbag.groups.new(channel.group)
+        for component in range(channel.values.shape[1]):
+            curve = curves.pop((channel.data_path, component), None)
+            if curve is None:
+                curve = channelbag.fcurves.new(channel.data_path, index=component)
+                curve.group = groups[channel.group]
+            keys = curve.keyframe_points
+            if len(keys) != len(times):
+                keys.clear()
+                keys.add(len(times))
+            points[:, 1] = channel.values[:, component]
+            keys.foreach_set("co", points.ravel())
+            keys.foreach_set("interpolation", linear)
+            keys.foreach_set("type", generated)
+            curve.update()
+    for curve in curves.values():
+        channelbag.fcurves.remove(curve)
+    for group in groups.values():
+        if not len(group.channels):
+            channelbag.groups.remove(group)
+
+
+def _filled(count: int, name: str, item: str) -> np.ndarray:
+    """A keyframe's enumeration value, as many times as there are keys."""
+    definition = bpy.types.Keyframe.bl_rna.properties[name]
+    assert isinstance(definition, bpy.types.EnumProperty)
+    return np.full(count, definition.enum_items[item].value, dtype=np.int32)
+
+
+def _mark(action: bpy.types.Action, obj: bpy.types.Object, settings_note: str) -> None:
+    action[MARK] = {
+        "owner": obj.name,
+        "name": action.name,
+        "version": _MARK_VERSION,
+        "fingerprint": _fingerprint(action),
+        "note": settings_note,
+    }
+
+
+def _fingerprint(action: bpy.types.Action) -> str:
+    """A hash of all in an action that an artist can have set on purpose.
+
+    Handles are left out: they have no effect on linear keys, and a key that is made Bézier
+    changes its interpolation.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+
+    def add(*values: object) -> None:
+        digest.update(repr(values).encode())
+
+    add(action.use_frame_range, action.frame_start, action.frame_end, action.use_cyclic)
+    add([(marker.name, marker.frame) for marker in action.pose_markers])
+    add([slot.handle for slot in action.slots])
+    add([len(layer.strips) for layer in action.layers])
+    for channelbag in _channelbags(action):
+        add(channelbag.slot_handle)
+        # An artist may move channels up and down in the list.
+        for curve in sorted(
+            channelbag.fcurves, key=lambda each: (each.data_path, each.array_index)
+        ):
+            add(curve.data_path, curve.array_index, curve.extrapolation, curve.mute, curve.lock)
+            keys = curve.keyframe_points
+            add(len(keys), len(curve.modifiers))
+            points = np.empty(2 * len(keys), dtype=np.float32)
+            kinds = np.empty((2, len(keys)), dtype=np.int32)
+            keys.foreach_get("co", points)
+            keys.foreach_get("interpolation", kinds[0])
+            keys.foreach_get("type", kinds[1])
+            digest.update(points)
+            digest.update(kinds)
+    return digest.hexdigest()
+
+
+def _channelbags(action: bpy.types.Action) -> Iterator[bpy.types.ActionChannelbag]:
+    for layer in action.layers:
+        for strip in layer.strips:
+            if isinstance(strip, bpy.types.ActionKeyframeStrip):
+                yield from strip.channelbags
+
+
+def _pose_bones(armature: bpy.types.Object, bones: Sequence[str]) -> list[bpy.types.PoseBone]:
+    armature_data(armature)
+    if armature.pose is None:
+        # An armature that was made a moment ago gets its pose with the next update.
+        bpy.context.view_layer.update()
+    if armature.pose is None:
+        raise RigError(
+            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+        )
+    found = armature.pose.bones
+    missing = [name for name in bones if name not in found]
+    if missing:
+        raise RigError(
+            f"'{armature.name}' has no bone '{missing[0]}' in its pose.",
+            "Leave edit mode, or detect the arms again.",
+        )
+    return [found[name] for name in bones]
+
+
+def _rotation_property(mode: str) -> str:
+    if mode in ("QUATERNION", "AXIS_ANGLE"):
+        return f"rotation_{mode.lower()}"
+    return "rotation_euler"
+
+
+def _in_rotation_mode(quaternions: Floats, mode: str) -> Floats:
+    """Quaternions (frames, …, 4) as values of a rotation mode, continuous over the frames."""
+    if mode == "QUATERNION":
+        result = continuous(quaternions)
+        # Rest is (1, 0, 0, 0): start on its side.
+        return np.where(result[:1, ..., :1] < 0.0, -result, result)
+    if mode == "AXIS_ANGLE":
+        return continuous_axis_angle(quaternions)
+    return continuous_euler(to_euler(quaternions, mode), mode)
+
+
+def _parent_frame(obj: bpy.types.Object) -> Floats:
+    """The frame (4, 4) in which the object's own channels stand, at the current frame."""
+    if obj.parent is None:
+        return np.eye(4)
+    bpy.context.view_layer.update()
+    # Whatever kind of parent it is (object, bone, vertex, path), Blender has taken it off in
+    # matrix_local. Constraints stand in both matrices and cancel.
+    parent = obj.matrix_world @ obj.matrix_local.inverted_safe()
+    return np.array(parent @ obj.matrix_parent_inverse, dtype=np.float64)
+
+
+def _delta_rotation(obj: bpy.types.Object) -> Floats:
+    if obj.rotation_mode == "QUATERNION":
+        return normalized(obj.delta_rotation_quaternion)
+    if obj.rotation_mode == "AXIS_ANGLE":
+        # Blender has such a delta, but no way to see or set it.
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    return from_euler(obj.delta_rotation_euler, obj.rotation_mode)
