@@ -11,13 +11,14 @@ derivatives of eq. 3.19; :meth:`Route.velocity` and :meth:`Route.acceleration` h
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import RouteError
 from ..rotations import Floats, normalized
@@ -221,9 +222,7 @@ class Route:
     def _derivatives(self, s: ArrayLike, highest: int) -> list[Floats]:
         """Position and its derivatives by s up to the ``highest`` (0, 1 or 2), each ``(…, 3)``."""
         at = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
-        last = len(self.controls) - 1
-        segment = np.clip(np.searchsorted(self.breaks, at, "right") - 1, 0, last)
-        share = self.breaks[segment + 1] - self.breaks[segment]
+        segment, share = self._segment(at)
         t = ((at - self.breaks[segment]) / share)[..., None]
         homogeneous = _bernstein(self.controls, segment, t, highest)
         weight = homogeneous[0][..., 3:]
@@ -241,11 +240,37 @@ class Route:
     def _arc(self, start: Floats, end: Floats) -> Floats:
         """Metres from parameters ``start`` to ``end``, both within one piece, by Gauss–Legendre."""
         half, middle = 0.5 * (end - start), 0.5 * (end + start)
+        speed = self._speed_within(middle)
         # Summed node by node: a matrix product rounds differently for each number of rows.
         total = np.zeros_like(half)
         for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            total += weight * _norm(self.velocity(middle + node * half))
+            total += weight * speed(middle + node * half)
         return total * half
+
+    def _speed_within(self, middle: Floats) -> Callable[[Floats], Floats]:
+        """Speeds at parameters within the segments that the parameters ``middle`` lie in."""
+        if np.any(self.controls[..., 3] != 1.0):
+            return lambda s: _norm(self.velocity(s))
+        # Quadrature asks for little else: without weights, the derivative is a Bézier curve of
+        # one degree less, whose control points are gathered once for all nodes.
+        segment, share = self._segment(middle)
+        start, hodograph = self.breaks[segment], np.diff(self.controls[..., :3], axis=1)
+        corners = [hodograph[segment, corner] for corner in range(hodograph.shape[1])]
+
+        def speed(s: Floats) -> Floats:
+            t = ((s - start) / share)[..., None]
+            values = corners
+            while len(values) > 1:
+                values = [a + t * (b - a) for a, b in pairwise(values)]
+            return len(corners) / share * _norm(values[0])
+
+        return speed
+
+    def _segment(self, s: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """Which segment parameters ``(…,)`` lie in, and its share of the route's parameter."""
+        last = len(self.controls) - 1
+        segment = np.clip(np.searchsorted(self.breaks, s, "right") - 1, 0, last)
+        return segment, self.breaks[segment + 1] - self.breaks[segment]
 
     @cached_property
     def _pieces(self) -> Floats:
