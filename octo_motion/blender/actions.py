@@ -137,9 +137,9 @@ def location_channel(armature: bpy.types.Object, bone: str, locations: Floats) -
 def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
     """An object's travel through the world, in its own channels; its scale stays as it is.
 
-    Parent, parent inverse, delta transforms and rotation mode are taken off, the parent as it
-    stands at the current frame. A parent with unequal scales shears what hangs on it: the
-    rotation is then the nearest there is.
+    Parent, parent inverse, delta transforms and rotation mode are taken off. The parent is taken
+    as it stands at the current frame; if it moves, it carries the object along. A parent with
+    unequal scales shears what hangs on it: the rotation is then the nearest there is.
 
     Args:
         obj: the object.
@@ -352,10 +352,8 @@ def _write_curves(
             keys.foreach_set("type", generated)
             curve.update()
     for curve in curves.values():
+        # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
-    for group in groups.values():
-        if not len(group.channels):
-            channelbag.groups.remove(group)
 
 
 def _filled(count: int, name: str, item: str) -> np.ndarray:
@@ -456,10 +454,11 @@ def _parent_frame(obj: bpy.types.Object) -> Floats:
     """The frame (4, 4) in which the object's own channels stand, at the current frame."""
     if obj.parent is None:
         return np.eye(4)
-    bpy.context.view_layer.update()
     # Whatever kind of parent it is (object, bone, vertex, path), Blender has taken it off in
-    # matrix_local. Constraints stand in both matrices and cancel.
-    parent = obj.matrix_world @ obj.matrix_local.inverted_safe()
+    # matrix_local. Constraints stand in both matrices and cancel. A path is known only to
+    # evaluated objects.
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    parent = evaluated.matrix_world @ evaluated.matrix_local.inverted_safe()
     return np.array(parent @ obj.matrix_parent_inverse, dtype=np.float64)
 
 
