@@ -389,7 +389,6 @@ def _fingerprint(action: bpy.types.Action) -> str:
     add([slot.handle for slot in action.slots])
     add([len(layer.strips) for layer in action.layers])
     for channelbag in _channelbags(action):
-        add(channelbag.slot_handle)
         # An artist may move channels up and down in the list.
         for curve in sorted(
             channelbag.fcurves, key=lambda each: (each.data_path, each.array_index)

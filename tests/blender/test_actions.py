@@ -171,6 +171,9 @@ def test_keys_stand_at_the_frames_given_with_their_fractions(frames: list[float]
         np.testing.assert_allclose(values, locations[:, curve.array_index], atol=1e-6)
         assert {key.interpolation for key in keys} == {"LINEAR"}
         assert {key.type for key in keys} == {"GENERATED"}
+        # Ready for an artist who makes them Bézier.
+        for key in keys:
+            assert key.handle_left.x < key.co.x < key.handle_right.x
     assert action.use_frame_range
     assert (action.frame_start, action.frame_end) == (frames[0], frames[-1])
 

@@ -217,6 +217,16 @@ def test_slot_that_the_artist_unassigned_is_assigned_again() -> None:
     assert animation(obj).action_slot == first.slots[0]
 
 
+def test_renamed_slot_is_found_again() -> None:
+    obj = make_armature()
+    first = generate(obj)
+    first.slots[0].name_display = "Octopus"
+    idle(obj)
+    assert generate(obj, first, height=2.0) == first
+    assert animation(obj).action_slot == first.slots[0]
+    assert height_at(obj, 5) == 2.0
+
+
 def test_renamed_object_keeps_its_action() -> None:
     obj = make_armature()
     first = generate(obj)
@@ -292,6 +302,14 @@ def test_eye_keyed_by_the_artist_in_the_same_action_is_kept() -> None:
     kept = curve(first, 1, path).keyframe_points
     assert [(key.co.x, key.co.y) for key in kept] == [(5.0, 0.5)]
     assert first.use_fake_user
+
+
+def test_action_whose_layer_is_gone_is_kept_even_if_it_had_no_keys() -> None:
+    obj = make_armature()
+    first = actions.write_action(obj, "Walk", np.ones(1), [], previous=None)
+    assert not actions.is_edited(first)
+    first.layers.remove(first.layers[0])
+    assert generate(obj, first) != first
 
 
 def test_an_edit_taken_back_is_no_edit() -> None:
@@ -683,6 +701,21 @@ def test_generated_action_that_is_linked_is_not_written_to(library: Path) -> Non
     made = generate(obj, linked, height=2.0)
     assert made != linked
     assert everything(linked) | {"users": 0} == before | {"users": 0}
+
+
+def test_generated_action_that_is_linked_alone_is_not_written_to(library: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(library))
+    generate(bpy.data.objects["Rig"])
+    bpy.ops.wm.save_as_mainfile(filepath=str(library))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    obj = make_armature()
+    linked = link(library, "actions", "Walk")
+    animation(obj).action = linked
+    before = everything(linked)
+    made = generate(obj, linked, height=2.0)
+    assert made.library is None
+    assert everything(linked) | {"users": 0} == before | {"users": 0}
+    assert height_at(obj, 5) == 2.0
 
 
 # Undo
