@@ -303,6 +303,30 @@ class Route:
         return np.concatenate([[0.0], np.cumsum(arcs)])
 
 
+def s_bend(start: ArrayLike, front: ArrayLike, reach: float) -> Floats:
+    """Control points (4, 3) of a level S that suits a creature which has none yet.
+
+    It leaves straight ahead, bends to the left and back, and ends facing as it began, so that a
+    walk shows a turn to either side.
+
+    Args:
+        start: (3,) where it begins.
+        front: (3,) direction in which it leaves, of any length.
+        reach: metres from the middle of the creature to its arms' tips.
+    """
+    origin = np.asarray(start, dtype=np.float64)
+    ahead = normalized(front)
+    left = np.cross([0.0, 0.0, 1.0], ahead)
+    return np.stack(
+        [
+            origin,
+            origin + 5.0 * reach * ahead,
+            origin + 3.0 * reach * ahead + 4.0 * reach * left,
+            origin + 8.0 * reach * ahead + 4.0 * reach * left,
+        ]
+    )
+
+
 def _bernstein(controls: Floats, segment: np.ndarray, t: Floats, highest: int) -> list[Floats]:
     """Bézier segments and their derivatives by their own parameter t, by de Casteljau.
 
