@@ -154,7 +154,7 @@ def _check_type(curve: bpy.types.Object) -> None:
     if curve.type == "CURVES":
         raise RouteError(
             f"'{curve.name}' is a hair curves object, which cannot be a route.",
-            "Convert it (Object › Convert › Curve).",
+            "Convert it to a mesh, and the mesh to a curve (Object › Convert).",
         )
     kind = curve.type.replace("_", " ").lower()
     raise RouteError(f"'{curve.name}' is not a curve but of type {kind}.", _DRAW_ONE)
