@@ -3,18 +3,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import bpy
 
-CLASSES: tuple[type, ...] = ()
+from . import settings
+from .locomotion import add_route, gait_properties, properties
+
+Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
+
+MENUS: tuple[tuple[Any, Draw], ...] = ((bpy.types.VIEW3D_MT_curve_add, add_route.draw_in_add_menu),)
+
+CLASSES: tuple[type, ...] = (
+    *gait_properties.CLASSES,
+    *properties.CLASSES,
+    *settings.CLASSES,
+    add_route.OCTO_MOTION_OT_add_route,
+)
 
 
 def register() -> None:
     """Register all classes and menus; an error surfaces."""
     for each in CLASSES:
         bpy.utils.register_class(each)
+    settings.register()
+    for menu, draw in MENUS:
+        menu.append(draw)
 
 
 def unregister() -> None:
     """Take back what ``register`` did, in reverse order."""
+    for menu, draw in reversed(MENUS):
+        menu.remove(draw)
+    settings.unregister()
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

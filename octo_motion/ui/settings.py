@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``Object.octo_motion``: the one property that the add-on gives to objects."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import bpy
+from bpy.props import PointerProperty
+
+from .locomotion.properties import OCTO_MOTION_PG_locomotion
+
+
+class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
+    """All settings of an object, by feature."""
+
+    locomotion: PointerProperty(
+        name="Locomotion",
+        description="How the armature walks or swims",
+        type=OCTO_MOTION_PG_locomotion,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+
+
+CLASSES: Final = (OCTO_MOTION_PG_object,)
+
+
+def register() -> None:
+    """Give objects their settings."""
+    bpy.types.Object.octo_motion = PointerProperty(  # type: ignore[attr-defined]
+        name="Octo Motion",
+        description="Settings of Octo Motion",
+        type=OCTO_MOTION_PG_object,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+
+
+def unregister() -> None:
+    """Take the settings away."""
+    del bpy.types.Object.octo_motion  # type: ignore[attr-defined]
