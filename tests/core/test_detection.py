@@ -21,6 +21,7 @@ from octo_motion.core.locomotion.chains import (
     name_side,
     natural_key,
     nearest_axis,
+    place_added,
 )
 from octo_motion.core.locomotion.detection import Detection, control_chain, detect_arms
 from octo_motion.core.rotations import Floats
@@ -635,3 +636,33 @@ def test_an_arm_that_something_drives_says_so() -> None:
     found = detect_arms(held, UP, FRONT)
     assert [arm.bones[0] for arm in found.arms if arm.driven] == ["tentacle2_0"]
     assert "Constraints or drivers move 1 arm," in found.notes[0]
+
+
+def test_an_added_arm_gets_its_partners_pair() -> None:
+    skeleton = octopus().skeleton()
+    found = detect_arms(skeleton, UP, FRONT)
+    for arm in found.arms:
+        # The artist has numbered the pairs the other way round.
+        others = [(each.bones, each.side, 5 - each.pair) for each in found.arms if each != arm]
+        added = place_added(skeleton, arm.bones, others, found.body)
+        assert (added.side, added.pair) == (arm.side, 5 - arm.pair)
+        assert added.name == f"Arm {5 - arm.pair} {arm.side[0]}"
+
+
+def test_an_added_arm_never_doubles_a_side_and_pair() -> None:
+    skeleton = octopus([30.0, 80.0, 130.0]).skeleton()
+    found = detect_arms(skeleton, UP, FRONT)
+    first, *others = found.arms
+    listed = [(each.bones, each.side, 1 + number) for number, each in enumerate(others)]
+    added = place_added(skeleton, first.bones, listed, found.body)
+    assert (added.side, added.pair) == ("LEFT", 3)
+    alone = place_added(skeleton, first.bones, [], found.body)
+    assert (alone.side, alone.pair) == (first.side, 1)
+
+
+def test_a_bone_belongs_to_one_arm_only() -> None:
+    skeleton = octopus().skeleton()
+    found = detect_arms(skeleton, UP, FRONT)
+    others = [(each.bones, each.side, each.pair) for each in found.arms]
+    with pytest.raises(RigError, match=r"'tentacle0_1' belongs to another arm.*Remove that arm"):
+        place_added(skeleton, ("tentacle0_1", "tentacle0_2", "tentacle0_3"), others, found.body)

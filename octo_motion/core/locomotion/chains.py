@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final, Literal
 
@@ -225,6 +225,40 @@ def arrange(
         for number, pair in enumerate(pairs, start=1)
         for arm in sorted(pair, key=lambda arm: side_order.index(sides[arm]))
     )
+
+
+def place_added(
+    skeleton: Skeleton,
+    bones: Sequence[str],
+    others: Sequence[tuple[Sequence[str], Side, int]],
+    body: BodyFrame,
+) -> ArmChain:
+    """Side and pair of an arm that joins others, whose sides and pairs stay as they are.
+
+    Args:
+        skeleton: the rig.
+        bones: the new arm's, root to tip.
+        others: bones, side and pair of the arms that are there.
+        body: which way the body faces.
+
+    Raises:
+        RigError: a bone does not exist, or belongs to another arm already.
+    """
+    taken = {bone for arm, _, _ in others for bone in arm}
+    for bone in bones:
+        if bone in taken:
+            raise RigError(
+                f"'{bone}' belongs to another arm of the list.",
+                "Remove that arm from the list first, or select other bones.",
+            )
+    arranged = arrange(skeleton, [bones, *(arm for arm, _, _ in others)], body)
+    added = next(arm for arm in arranged if arm.bones == tuple(bones))
+    mates = {arm.bones for arm in arranged if arm.pair == added.pair and arm.bones != added.bones}
+    used = {(side, pair) for _, side, pair in others}
+    wanted = [pair for arm, _, pair in others if tuple(arm) in mates]
+    free = [pair for pair in (*wanted, added.pair) if (added.side, pair) not in used]
+    pair = free[0] if free else max(pair for _, pair in used) + 1
+    return replace(added, name=arm_name(added.side, pair), pair=pair)
 
 
 def arm_name(side: Side, pair: int) -> str:
