@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a gait to bone rotations: what moves the arms of one body.
+
+A frame's result depends on that frame's phase and turn alone, never on other frames. Everything
+is solved in each arm's own frame, x outward and z up as the body has them, with the length of the
+arm for unit; so neither rest pose nor bone roll nor scale of the rig matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from ..errors import RigError, SettingsError
+from ..rotations import Floats, from_axis_angle, from_matrix, multiply, rotate
+from ..skeleton import Skeleton
+from .arm import GROUPS, group_lengths, split_groups
+from .ccd import Chain, asked_shape, solve
+from .chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
+from .gait import GaitCurve, GaitTable, evaluate, variation
+from .poses import arm_rest, bone_rotations
+from .targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
+
+_UP: Final = np.array([0.0, 0.0, 1.0])
+_CHUNK: Final = 4096
+"""Arms solved at a time, counted over frames: what stays within a processor's cache."""
+_CYCLE_SAMPLES: Final = 96
+"""Phases at which a cycle is looked at as a whole."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One arm as the generator is given it."""
+
+    name: str
+    bones: tuple[str, ...]
+    """Root to tip, at least three."""
+    side: Side
+    pair: int
+    phase: float = 0.0
+    """Radians that it is ahead of what the gait says."""
+    flip: bool = False
+    """Whether "towards the front" and the sense of bank are mirrored."""
+
+    @property
+    def handedness(self) -> float:
+        """+1 where "towards the front" is anticlockwise seen from above (right side), else −1."""
+        return (-1.0 if self.side == "LEFT" else 1.0) * (-1.0 if self.flip else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class GaitSettings:
+    """How the arms move. Angles in radians."""
+
+    gait: GaitTable
+    contraction: float = 1.0
+    """Factor on the contraction of the links; 1 as in the source, 0 none."""
+    weights: tuple[float, ...] = (0.4,)
+    """Weights a of the joints, at even steps from the arm's root to its tip, each in (0, 1]."""
+    softness: float = 0.5
+    """0 leaves bends where CCD puts them; towards 1 they are spread over neighbouring joints."""
+    sway: float = np.radians(10.0)
+    """Bend across the gait's own that each group starts with, so that no group passes through a
+    straight line."""
+    phase_spread: float = 1.0
+    """Factor on the gait's phase offsets; 0 moves all arms together."""
+    variation: tuple[float, float] = (0.0, 0.0)
+    """Limits j, k of the random additions to head and pitch [Octopus, §3.4]."""
+    seed: int = 0
+    turning: float = 0.5
+    """Share of the turn that lies ahead which the arms take on as pitch [Octopus, §3.5]."""
+
+    def __post_init__(self) -> None:
+        numbers = (
+            *(self.contraction, self.softness, self.sway, self.phase_spread, self.turning),
+            *(*self.weights, *self.variation),
+        )
+        if not np.all(np.isfinite(numbers)):
+            raise SettingsError("A setting of the gait is not a number.", "Set it anew.")
+        if not self.weights or min(self.weights) <= 0.0 or max(self.weights) > 1.0:
+            raise SettingsError(
+                "A joint's weight is not between 0 and 1.", "Give weights above 0, 1 at most."
+            )
+        if self.variation[0] > self.variation[1]:
+            raise SettingsError(
+                "The variation's minimum is greater than its maximum.", "Exchange the two."
+            )
+        if self.contraction < 0.0:
+            raise SettingsError(
+                f"The contraction is {self.contraction:g}.", "Give 0 (none) or more."
+            )
+        if not 0.0 <= self.softness <= 1.0:
+            raise SettingsError(f"The softness is {self.softness:g}.", "Give a value from 0 to 1.")
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPoses:
+    """Arms at some frames."""
+
+    rotations: Floats
+    """(frames, bones, 4) unit quaternions in each bone's rest frame (Blender's matrix_basis)."""
+    misses: Floats
+    """(frames, arms, groups) distance of each group's end from its target, in arm lengths."""
+    lowest: Floats
+    """(frames,) height of the lowest joint over the body's centre, in armature units."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Build:
+    """Arms whose segments have the same proportions, solved together."""
+
+    arms: tuple[int, ...]
+    chain: Chain
+    widths: Floats
+    """(links,) rest lengths H_g, in arm lengths."""
+
+
+class Generator:
+    """Moves the arms of one body.
+
+    Raises:
+        RigError: there are no arms, arms share bones, or a bone does not exist.
+    """
+
+    def __init__(
+        self, skeleton: Skeleton, arms: Sequence[Arm], body: BodyFrame, settings: GaitSettings
+    ) -> None:
+        if not arms:
+            raise RigError("The list of arms is empty.", "Detect the arms, or add one.")
+        self._arms = tuple(arms)
+        self._settings = settings
+        _check_disjoint(self._arms)
+        for arm in self._arms:
+            chain_of(skeleton, arm.bones)
+        self._rests = [arm_rest(skeleton, arm.bones) for arm in self._arms]
+        joints = [body.to_body(joint_positions(skeleton, arm.bones)) for arm in self._arms]
+        segments = [np.linalg.norm(np.diff(each, axis=0), axis=1) for each in joints]
+        self._lengths = np.array([float(each.sum()) for each in segments])
+        self._roots = np.array([each[0] for each in joints])
+        # From an arm's own frame to the body's: azimuth counts from the front, −Y.
+        azimuths = arm_azimuths(skeleton, [arm.bones for arm in self._arms], body)
+        self._outward = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
+        self._to_armature = from_matrix(body.rotation)
+        self._hands = np.array([arm.handedness for arm in self._arms])
+        self._pairs = tuple(arm.pair for arm in self._arms)
+        gait = settings.gait
+        spread = [gait.offset(arm.side, arm.pair, max(self._pairs)) for arm in self._arms]
+        self._offsets = settings.phase_spread * np.array(spread) + [arm.phase for arm in arms]
+        sway = np.array([_across(gait.curve(pair)) for pair in self._pairs])
+        sway[:, PITCH] *= self._hands
+        self._sway = settings.sway * sway
+        self._builds = self._group(segments)
+
+    @property
+    def bones(self) -> tuple[str, ...]:
+        """Names of the bones that are turned, in the order of ``ArmPoses.rotations``."""
+        return tuple(bone for arm in self._arms for bone in arm.bones)
+
+    @property
+    def arm_length(self) -> float:
+        """Mean length of the arms, in the armature's units: what strides are counted in."""
+        return float(self._lengths.mean())
+
+    @cached_property
+    def clearance(self) -> float:
+        """Height of the body's centre over the lowest joint of a whole cycle, armature units.
+
+        It is the gait's own, whatever variation and turning add: the same for every shot.
+        """
+        phase = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
+        angles = evaluate(self._settings.gait, phase[:, None] + self._offsets, self._pairs)
+        _, _, lowest = self._pose(angles, np.zeros((len(phase), len(self._arms))))
+        return max(0.0, -float(lowest.min()))
+
+    def arm_phases(self, phase: Floats) -> Floats:
+        """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
+        return phase[:, None] + self._offsets
+
+    def pose(self, phase: Floats, turn: Floats) -> ArmPoses:
+        """The arms at some frames.
+
+        Args:
+            phase: (frames,) of the body's gait, radians.
+            turn: (frames, 2) turn that lies ahead, in the body's XY plane (``Travel.turn``).
+        """
+        settings = self._settings
+        phases = self.arm_phases(np.asarray(phase, dtype=np.float64))
+        angles = evaluate(settings.gait, phases, self._pairs) + variation(
+            settings.gait, phases, self._pairs, settings.variation, settings.seed
+        )
+        # Towards the goal: by the part of the turn that lies across the arm.
+        across = rotate(self._outward, np.array([0.0, 1.0, 0.0]))[:, :2]
+        steering = settings.turning * np.asarray(turn, dtype=np.float64) @ across.T
+        step = max(1, _CHUNK // len(self._arms))
+        parts = [
+            self._pose(angles[start : start + step], steering[start : start + step])
+            for start in range(0, len(phases), step)
+        ]
+        if not parts:
+            parts = [self._pose(angles, steering)]
+        return ArmPoses(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+    def _pose(self, angles: Floats, steering: Floats) -> tuple[Floats, Floats, Floats]:
+        """Rotations, misses and lowest heights from angles and steering (frames, arms)."""
+        frames = len(angles)
+        angles = angles.copy()
+        angles[..., PITCH] *= self._hands[:, None]
+        angles[..., BANK] *= self._hands[:, None]
+        ends = np.cumsum([0] + [len(arm.bones) for arm in self._arms])
+        rotations = np.empty((frames, ends[-1], 4))
+        misses = np.empty((frames, len(self._arms), GROUPS))
+        lowest = np.zeros(frames)
+        for build in self._builds:
+            columns = list(build.arms)
+            directions, missed = self._solve(build, angles[:, columns], steering[:, columns])
+            misses[:, columns] = missed
+            for place, arm in enumerate(columns):
+                own = rotate(self._outward[arm], directions[:, :, place])
+                height = np.cumsum(build.chain.lengths[:, None] * own[..., 2], axis=0).min(axis=0)
+                height = self._roots[arm, 2] + self._lengths[arm] * np.minimum(height, 0.0)
+                lowest = np.minimum(lowest, height)
+                bank = np.concatenate(
+                    [
+                        np.repeat(angles[None, :, arm, link, BANK] / size, size, axis=0)
+                        for link, size in enumerate(build.chain.sizes)
+                    ]
+                )
+                turned = bone_rotations(self._rests[arm], rotate(self._to_armature, own), bank)
+                rotations[:, ends[arm] : ends[arm + 1]] = np.moveaxis(turned, 0, 1)
+        return rotations, misses, lowest
+
+    def _solve(self, build: _Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        """Directions (segments, frames, arms, 3) in the arms' frames; misses (frames, arms, 3)."""
+        frames, arms = angles.shape[:2]
+        batch = frames * arms
+        width = build.widths * (1.0 + contraction(angles, self._settings.contraction)) ** (
+            # A group of a single bone cannot shorten.
+            np.array(build.chain.sizes) > 1
+        )
+        steered = angles.copy()
+        steered[..., 0, PITCH] += steering
+        links = link_rotations(steered).reshape(batch, GROUPS, 4)
+        targets = pseudo_targets(links, width.reshape(batch, GROUPS))
+        sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
+        shape = asked_shape(
+            build.chain, steered[..., [HEAD, PITCH]].reshape(batch, GROUPS, 2), sway
+        )
+        directions = solve(build.chain, shape, links, targets, self._settings.softness)
+        joints = np.cumsum(build.chain.lengths[:, None, None] * directions, axis=0)
+        ends = joints[np.cumsum(build.chain.sizes) - 1]
+        missed = np.linalg.norm(ends - np.moveaxis(targets[:, 1:], 1, 0), axis=-1)
+        return (
+            directions.reshape(len(build.chain.lengths), frames, arms, 3),
+            np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1),
+        )
+
+    def _group(self, segments: Sequence[Floats]) -> tuple[_Build, ...]:
+        """Arms that are built alike, so that one solution in batch serves them."""
+        alike: dict[tuple[float, ...], list[int]] = {}
+        for arm, lengths in enumerate(segments):
+            shares = lengths / self._lengths[arm]
+            # Bones' lengths are single precision.
+            alike.setdefault(tuple(np.round(shares, 6).tolist()), []).append(arm)
+        builds = []
+        weights = self._settings.weights
+        for arms in alike.values():
+            shares = segments[arms[0]] / self._lengths[arms[0]]
+            sizes = split_groups(shares)
+            along = np.cumsum(shares) - shares
+            sampled = np.interp(along, np.linspace(0.0, 1.0, len(weights)), weights)
+            chain = Chain(shares, sizes, sampled)
+            builds.append(_Build(tuple(arms), chain, group_lengths(shares, sizes)))
+        return tuple(builds)
+
+
+def _check_disjoint(arms: Sequence[Arm]) -> None:
+    owner: dict[str, str] = {}
+    for arm in arms:
+        for bone in arm.bones:
+            if bone in owner:
+                raise RigError(
+                    f"Bone '{bone}' is in two arms, '{owner[bone]}' and '{arm.name}'.",
+                    "Remove one of the two from the list.",
+                )
+            owner[bone] = arm.name
+
+
+def _across(curve: GaitCurve) -> Floats:
+    """Head and pitch (2,) of a unit bend across the one that a curve's angles mostly make."""
+    samples = curve.angles[..., [HEAD, PITCH]].reshape(-1, 2)
+    # Principal axes; of a table of zeros, whose axes are arbitrary, the sideways one.
+    _, axes = np.linalg.eigh(samples.T @ samples + np.diag([1e-12, 0.0]))
+    least = axes[:, 0]
+    return least if least[PITCH] > 0.0 or (least[PITCH] == 0.0 and least[HEAD] > 0.0) else -least

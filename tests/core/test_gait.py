@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gait tables: the paper's numbers, variation, files."""
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from octo_motion.core.errors import GaitError
+from octo_motion.core.locomotion import gait
+from octo_motion.core.rotations import Floats
+from tests.core import oracle
+
+HEAD, PITCH, BANK = range(3)
+PRESETS = gait.presets()
+seeds = st.integers(0, 2**31)
+
+
+def angles_of(name: str, phases: Floats) -> Floats:
+    return gait.evaluate(PRESETS[name], np.asarray(phases)[:, None], (1,))[:, 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "angle", "expected"),
+    [
+        ("walk", HEAD, oracle.WALK_ANGLES),
+        ("walk_literal", PITCH, oracle.WALK_ANGLES),
+        ("swim", HEAD, oracle.SWIM_ANGLES),
+    ],
+)
+def test_presets_have_the_angles_of_the_paper(
+    name: str, angle: int, expected: list[list[float]]
+) -> None:
+    angles = angles_of(name, np.array(oracle.PHASES))
+
+    assert np.max(np.abs(angles[..., angle] - np.array(expected).T)) <= 1e-9
+    others = [each for each in (HEAD, PITCH, BANK) if each != angle]
+    assert not np.any(angles[..., others])
+
+
+@given(st.floats(-50.0, 50.0), st.integers(-5, 5))
+def test_every_cycle_is_like_the_first(phase: float, cycles: int) -> None:
+    here = angles_of("walk", np.array([phase]))
+    there = angles_of("walk", np.array([phase + 2.0 * np.pi * cycles]))
+
+    # The steepest angle turns 2.2 rad a radian of phase, and the phase is exact to 1e-14.
+    assert np.max(np.abs(here - there)) <= 1e-12
+
+
+def test_walking_arms_fill_the_cycle_and_swimming_arms_move_together() -> None:
+    arms = [(side, pair) for pair in range(1, 5) for side in ("LEFT", "RIGHT")]
+
+    walk = {round(PRESETS["walk"].offset(*arm, 4) / (2 * np.pi) % 1.0, 6) for arm in arms}
+    swim = {PRESETS["swim"].offset(*arm, 4) for arm in arms}
+
+    assert walk == {0.0, 0.25, 0.5, 0.75}
+    assert swim == {0.0}
+
+
+def test_an_offset_given_for_one_arm_replaces_the_spread() -> None:
+    table = dataclasses.replace(PRESETS["walk"], offsets={(2, "LEFT"): 0.3})
+
+    assert table.offset("LEFT", 2, 4) == 0.3
+    assert table.offset("RIGHT", 2, 4) == PRESETS["walk"].offset("RIGHT", 2, 4)
+
+
+def test_a_pair_may_have_a_curve_of_its_own() -> None:
+    own = gait.curve_from_degrees([0, 180, 360], head=[[0, 30, 0], [0, 0, 0], [0, 0, 0]])
+    table = dataclasses.replace(PRESETS["walk"], curves={**PRESETS["walk"].curves, 4: own})
+
+    angles = gait.evaluate(table, np.full((1, 2), np.pi), (1, 4))
+
+    assert np.degrees(angles[0, 0, 0, HEAD]) == pytest.approx(-50.0)
+    assert np.degrees(angles[0, 1, 0, HEAD]) == pytest.approx(30.0)
+    assert np.degrees(angles[0, 1, 1, HEAD]) == pytest.approx(0.0)
+
+
+# --- Variation -----------------------------------------------------------------------------------
+
+
+def varied(
+    phases: Floats, seed: int, limits: tuple[float, float] = (-0.2, 0.3), arms: int = 3
+) -> Floats:
+    columns = np.broadcast_to(np.asarray(phases)[:, None], (len(phases), arms))
+    return gait.variation(PRESETS["walk"], columns, (1,) * arms, limits, seed)
+
+
+def test_no_range_is_no_variation() -> None:
+    assert not np.any(varied(np.linspace(0, 40, 100), 5, (0.0, 0.0)))
+
+
+@given(seeds)
+def test_variation_keeps_its_limits_reaches_for_them_and_leaves_bank(seed: int) -> None:
+    values = varied(np.linspace(0, 200, 400), seed)
+
+    assert values[..., :2].min() >= -0.2
+    assert values[..., :2].max() < 0.3
+    # 128 knots in 18 series: the chance that all stay out of the outer fifth is nil.
+    assert values[..., :2].min() < -0.1
+    assert values[..., :2].max() > 0.2
+    assert not np.any(values[..., BANK])
+
+
+@given(seeds)
+def test_variation_is_continuous_over_knots_and_cycles(seed: int) -> None:
+    knots = np.arange(0, 12) * 0.5 * np.pi
+
+    before, after = varied(knots - 1e-9, seed), varied(knots + 1e-9, seed)
+
+    # At most 0.5 rad in a quarter of a cycle.
+    assert np.max(np.abs(before - after)) <= 2e-9
+
+
+@given(seeds, st.integers(0, 50))
+def test_a_frame_varies_alike_whichever_frames_are_asked_for(seed: int, first: int) -> None:
+    phases = np.linspace(0, 60, 51)
+
+    assert np.array_equal(varied(phases, seed)[first], varied(phases[[first]], seed)[0])
+
+
+def test_arms_links_cycles_and_seeds_vary_apart() -> None:
+    values = varied(np.array([0.0, 2.0 * np.pi]), 1)[..., :2]
+
+    assert len(np.unique(values)) == values.size
+    assert not np.any(values == varied(np.array([0.0, 2.0 * np.pi]), 2)[..., :2])
+
+
+# --- Files ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(PRESETS))
+def test_a_saved_gait_loads_as_it_was(name: str) -> None:
+    table = dataclasses.replace(PRESETS[name], offsets={(1, "LEFT"): 0.5, (2, "CENTER"): -1.0})
+
+    loaded = gait.from_json(gait.to_json(table))
+
+    for field in dataclasses.fields(table):
+        if field.name not in {"curves", "offsets"}:
+            assert getattr(loaded, field.name) == getattr(table, field.name)
+    assert loaded.offsets.keys() == table.offsets.keys()
+    assert all(abs(loaded.offsets[key] - table.offsets[key]) < 1e-12 for key in table.offsets)
+    assert loaded.curves.keys() == table.curves.keys()
+    for pair, curve in table.curves.items():
+        assert np.max(np.abs(loaded.curves[pair].phases - curve.phases)) <= 1e-12
+        assert np.max(np.abs(loaded.curves[pair].angles - curve.angles)) <= 1e-12
+
+
+def damaged(**changes: Any) -> str:
+    content = json.loads(gait.to_json(PRESETS["walk"]))
+    curve = content["pairs"]["all"]
+    for key, value in changes.items():
+        if key in curve:
+            curve[key] = value
+        else:
+            content[key] = value
+    return json.dumps(content)
+
+
+FLAT = [0.0] * 5
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("walk", "The gait file is not JSON (line 1: Expecting value). Choose a gait file."),
+        ("[]", "The gait file is not a gait of Octo Motion. Choose a gait file."),
+        (damaged(version=7), "format version 7, not 1. Update Octo Motion"),
+        (damaged(manner="fly"), "has the manner 'FLY'. It must be walk or swim."),
+        (damaged(pairs={}), "has no curve for all arms"),
+        (damaged(pairs=3), "is damaged"),
+        (damaged(stride=0.0), "has a stride of 0. It must be above zero."),
+        (damaged(stride=float("nan")), "has a number that is not finite. Correct it."),
+        (damaged(offsets={"1 up": 0.0}), "is damaged (ValueError: no side is called 'UP')"),
+        (damaged(phase=[0, 90, 80, 270, 360]), "has knots that do not ascend. Sort them by phase."),
+        (damaged(phase=[10, 90, 180, 270, 360]), "does not start at phase 0. Add a knot there."),
+        (damaged(phase=[0, 90, 180, 270, 350]), "does not end at phase 360°. Add a knot there."),
+        (damaged(phase=[0, 90, float("inf"), 270, 360]), "has a number that is not finite."),
+        (damaged(head=[[0, 1, 2, 3, 4], FLAT, FLAT]), "ends at other angles than it starts with."),
+        (damaged(head=[FLAT, FLAT, [0, float("nan"), 0, 0, 0]]), "a number that is not finite."),
+        (damaged(head=[FLAT, FLAT]), "is damaged"),
+        (damaged(head=[[0, 1], FLAT, FLAT]), "is damaged"),
+        (damaged(head="up"), "is damaged"),
+    ],
+)
+def test_a_damaged_gait_file_says_what_is_wrong_with_it(text: str, message: str) -> None:
+    with pytest.raises(GaitError) as caught:
+        gait.from_json(text)
+
+    assert message in str(caught.value)
