@@ -9,7 +9,14 @@ from typing import Any
 import bpy
 
 from . import settings
-from .locomotion import add_route, gait_properties, properties
+from .locomotion import (
+    add_route,
+    arm_properties,
+    gait_properties,
+    gait_table,
+    generate,
+    properties,
+)
 
 Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
 
@@ -17,9 +24,12 @@ MENUS: tuple[tuple[Any, Draw], ...] = ((bpy.types.VIEW3D_MT_curve_add, add_route
 
 CLASSES: tuple[type, ...] = (
     *gait_properties.CLASSES,
+    *arm_properties.CLASSES,
     *properties.CLASSES,
     *settings.CLASSES,
     add_route.OCTO_MOTION_OT_add_route,
+    *gait_table.CLASSES,
+    generate.OCTO_MOTION_OT_generate_locomotion,
 )
 
 

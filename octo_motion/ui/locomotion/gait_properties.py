@@ -124,14 +124,18 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
 
 
 class OCTO_MOTION_PG_gait_note(bpy.types.PropertyGroup):
-    """A remark that travels with the table; ``name`` is its subject."""
+    """A remark that travels with the table."""
 
+    subject: StringProperty(name="Subject", override=OVERRIDE)
     text: StringProperty(name="Text", override=OVERRIDE)
 
 
 class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
-    """A gait table; its ``name`` is the gait's."""
+    """A gait table."""
 
+    name: StringProperty(
+        name="Name", description="Name of the gait that was loaded", override=OVERRIDE
+    )
     description: StringProperty(
         name="Description", description="What this gait is for", override=OVERRIDE
     )
@@ -237,11 +241,11 @@ def fill_table(group: OCTO_MOTION_PG_gait_table, table: GaitTable) -> None:
     group.active_curve = group.active_offset = 0
     for curve, (pair, values) in _matched(group.curves, sorted(table.curves.items())):
         curve.pair = pair
-        _fill_curve(curve, values)
+        fill_curve(curve, values)
     for offset, ((pair, side), phase) in _matched(group.offsets, sorted(table.offsets.items())):
         offset.pair, offset.side, offset.phase = pair, side, phase
     for note, (subject, text) in _matched(group.notes, table.notes.items()):
-        note.name, note.text = subject, text
+        note.subject, note.text = subject, text
 
 
 def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None) -> GaitTable:
@@ -255,7 +259,7 @@ def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None
         GaitError: two curves are for one pair, two knots at one phase, a number is not finite.
     """
     if group.curves:
-        description, notes = group.description, {note.name: note.text for note in group.notes}
+        description, notes = group.description, {note.subject: note.text for note in group.notes}
         curves = {curve.pair: read_curve(curve) for curve in group.curves}
         if len(curves) < len(group.curves):
             raise GaitError(
@@ -302,7 +306,8 @@ def read_curve(curve: OCTO_MOTION_PG_gait_curve) -> GaitCurve:
     return GaitCurve(np.append(phases, CYCLE), np.concatenate([angles, start[None]]))
 
 
-def _fill_curve(curve: OCTO_MOTION_PG_gait_curve, values: GaitCurve) -> None:
+def fill_curve(curve: OCTO_MOTION_PG_gait_curve, values: GaitCurve) -> None:
+    """Make one curve's properties say what the curve says."""
     curve.active_knot = 0
     open_knots = zip(values.phases[:-1], values.angles[:-1], strict=True)
     for knot, (phase, angles) in _matched(curve.knots, open_knots):

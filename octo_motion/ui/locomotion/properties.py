@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     IntProperty,
@@ -26,9 +27,11 @@ from ...core.errors import GaitError
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import GaitSettings
 from ...core.locomotion.travel import TravelSettings
+from .arm_properties import ArmItem
 from .gait_properties import (
     DEFAULT_GAIT,
     OVERRIDE,
+    OVERRIDE_LIST,
     OCTO_MOTION_PG_gait_table,
     fill_table,
     read_table,
@@ -74,6 +77,13 @@ class OCTO_MOTION_PG_locomotion(bpy.types.PropertyGroup):
 
     # --- The rig -------------------------------------------------------------------------------
 
+    arms: CollectionProperty(
+        name="Arms",
+        description="The arms that are moved; without any, they are detected when generating",
+        type=ArmItem,
+        override=OVERRIDE_LIST,
+    )
+    active_arm: IntProperty(name="Active Arm", options={"HIDDEN"}, override=OVERRIDE)
     body_front: EnumProperty(
         name="Front",
         description="Which way the body faces, as an axis of the armature",
@@ -239,9 +249,18 @@ class OCTO_MOTION_PG_locomotion(bpy.types.PropertyGroup):
         step=5,
         override=OVERRIDE,
     )
+    softness: FloatProperty(
+        name="Softness",
+        description="How far a bend spreads over neighbouring joints: 0 leaves it where it falls",
+        subtype="FACTOR",
+        default=GaitSettings.softness,
+        min=0.0,
+        max=1.0,
+        override=OVERRIDE,
+    )
     sway: FloatProperty(
         name="Sway",
-        description="Sideways bend that keeps an arm from becoming a straight line",
+        description="Bend across the gait's own that keeps an arm from becoming a straight line",
         subtype="ANGLE",
         default=GaitSettings.sway,
         min=0.0,

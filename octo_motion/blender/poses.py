@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses that stay behind: bones keep what an action gave them when it no longer does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+
+def animated_bones(action: bpy.types.Action) -> set[str]:
+    """Names of the bones whose location or rotation the action keys."""
+    names: set[str] = set()
+    for layer in action.layers:
+        for strip in layer.strips:
+            if not isinstance(strip, bpy.types.ActionKeyframeStrip):
+                continue
+            for channelbag in strip.channelbags:
+                for curve in channelbag.fcurves:
+                    start, _, rest = curve.data_path.partition('pose.bones["')
+                    name, _, channel = rest.partition('"].')
+                    if not start and channel.startswith(("location", "rotation_")):
+                        names.add(bpy.utils.unescape_identifier(name))
+    return names
+
+
+def rest_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
+    """Put bones back to their rest location and rotation; names that are no bone's are passed."""
+    if armature.pose is None:
+        return
+    for name in names:
+        bone = armature.pose.bones.get(name)
+        if bone is None:
+            continue
+        bone.location = (0.0, 0.0, 0.0)
+        if bone.rotation_mode == "QUATERNION":
+            bone.rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
+        elif bone.rotation_mode == "AXIS_ANGLE":
+            bone.rotation_axis_angle = (0.0, 0.0, 1.0, 0.0)
+        else:
+            bone.rotation_euler = (0.0, 0.0, 0.0)

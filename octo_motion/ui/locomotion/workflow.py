@@ -1,0 +1,501 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One shot from settings to keys: read → plain arrays → compute → write.
+
+:func:`prepare` reads everything and finds everything that is wrong; :meth:`Shot.compute` works on
+plain arrays alone, in steps, and may be dropped between any two; :meth:`Shot.write` changes the
+file. So whoever runs it, an operator with a progress bar or a batch without a window, can stop
+before anything has changed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final, cast
+
+import bpy
+import numpy as np
+
+from ...blender import actions
+from ...blender.armature import armature_data, read_skeleton, world_matrix
+from ...blender.curves import read_route
+from ...blender.poses import animated_bones, rest_bones
+from ...blender.weight_curve import sample_weight_curve
+from ...core.errors import RigError, RouteError, SettingsError, WriteError
+from ...core.locomotion.chains import BodyFrame, Side, body_frame
+from ...core.locomotion.detection import Detection, detect_arms
+from ...core.locomotion.gait import GaitTable
+from ...core.locomotion.generator import Arm, GaitSettings, Generator
+from ...core.locomotion.placement import object_transforms, root_bone_transforms
+from ...core.locomotion.route import Route
+from ...core.locomotion.travel import TravelSettings, duration, plan_travel, strides
+from ...core.rotations import Floats, rotate
+from ...core.skeleton import Skeleton
+from ..plain import plain
+from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
+
+MOST_FRAMES: Final = 100_000
+"""A journey of more is a slip of the hand: over an hour at 24 frames a second."""
+
+LAST_FRAME: Final = 1_048_574
+"""The last frame that Blender knows."""
+
+MISS: Final = 1e-3
+"""Arm lengths by which a target may be missed without a word."""
+
+_WEIGHT_SAMPLES: Final = 33
+_UNEQUAL: Final = 1e-3
+_BONES_AT_ONCE: Final = 24_000
+"""Bones times frames of one step of the work: some tens of megabytes."""
+
+_UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What was made, for people and for reports."""
+
+    gait: str
+    action: str
+    """Name of the action."""
+    frames: int
+    frame_start: int
+    frame_end: int
+    seconds: float
+    """Length of the motion."""
+    miss: float
+    """Largest distance of a group of joints from its target, in arm lengths."""
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    """Things that happened as they should, but that one may want to know."""
+
+    @property
+    def message(self) -> str:
+        """One sentence, and the notes."""
+        name = self.gait.replace("_", " ").capitalize()
+        told = f"{name} of {self.frames} frames ({self.seconds:.1f} s): '{self.action}'."
+        return " ".join([told, *self.notes])
+
+
+@dataclass(eq=False)
+class Shot:
+    """All that one journey needs, as plain data; see :func:`prepare`."""
+
+    armature: str
+    """Name of the object: references to Blender's data do not outlive a modal operator's tick."""
+    scene: str
+    skeleton: Skeleton
+    arms: tuple[Arm, ...]
+    detection: Detection | None
+    """What was found, if the settings had no arms."""
+    body: BodyFrame
+    gait: GaitTable
+    generator: Generator
+    route: Route
+    travel: TravelSettings
+    world: Floats
+    """(4, 4) of the object, of uniform scale."""
+    scale: float
+    height: float
+    """Metres from the route to the body's centre."""
+    frames: Floats
+    """(frames,) whole numbers."""
+    times: Floats
+    """(frames,) share of the journey's time, 0…1."""
+    seconds: float
+    root_bone: str
+    """Bone that takes the travel, "" for the object."""
+    extend_scene_range: bool
+    note: str
+    """The settings as JSON, kept with the action."""
+    warnings: list[str] = field(default_factory=list)
+    rotations: Floats | None = None
+    locations: Floats | None = None
+    orientations: Floats | None = None
+    misses: Floats | None = None
+    """(arms,) largest of each arm."""
+
+    def compute(self) -> Iterator[float]:
+        """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
+        travel = plan_travel(self.route, self.travel, self.times)
+        up = rotate(travel.rotations, _UP) if self.gait.manner == "WALK" else _UP
+        locations, orientations = object_transforms(
+            self.body, self.scale, travel.positions + self.height * up, travel.rotations
+        )
+        count, bones = len(self.frames), len(self.generator.bones)
+        rotations = np.empty((count, bones, 4))
+        misses = np.zeros(len(self.arms))
+        step = max(1, _BONES_AT_ONCE // max(bones, 1))
+        for start in range(0, count, step):
+            part = slice(start, min(start + step, count))
+            poses = self.generator.pose(travel.phase[part], travel.turn[part])
+            rotations[part] = poses.rotations
+            misses = np.maximum(misses, poses.misses.max(axis=(0, 2)))
+            if part.stop < count:
+                yield part.stop / count
+        self.rotations, self.misses = rotations, misses
+        self.locations, self.orientations = locations, orientations
+        yield 1.0
+
+    def write(self) -> Summary:
+        """Give the armature its action, in place of the one that was generated before.
+
+        Raises:
+            WriteError: the object is gone, or has become read-only.
+        """
+        armature = _local_object(self.armature)
+        actions.writable_armature(armature)
+        settings = locomotion_settings(armature)
+        channels = self._channels(armature)
+        previous = _previous_action(armature, settings)
+        left_behind = animated_bones(previous) if previous is not None else set[str]()
+        # The settings' own pointer must not count as a user when it comes to saving an edited
+        # action from being purged.
+        settings.result = None
+        try:
+            action = actions.write_action(
+                armature,
+                f"{armature.name} Locomotion",
+                self.frames,
+                channels,
+                previous=previous,
+                settings_note=self.note,
+            )
+        except WriteError:
+            settings.result = previous
+            raise
+        settings.result = action
+        rest_bones(armature, left_behind - animated_bones(action))
+        notes = self._extend_range()
+        assert self.misses is not None
+        return Summary(
+            gait=self.gait.name,
+            action=action.name,
+            frames=len(self.frames),
+            frame_start=int(self.frames[0]),
+            frame_end=int(self.frames[-1]),
+            seconds=self.seconds,
+            miss=float(self.misses.max()),
+            warnings=(*self.warnings, *self._missed()),
+            notes=notes,
+        )
+
+    def _channels(self, armature: bpy.types.Object) -> list[actions.Channel]:
+        assert self.rotations is not None
+        assert self.locations is not None
+        assert self.orientations is not None
+        bones = self.generator.bones
+        turned = actions.rotation_channels(armature, bones, self.rotations)
+        if not self.root_bone:
+            moved = actions.object_channels(armature, self.locations, self.orientations)
+            return [*moved, *turned]
+        locations, rotations = root_bone_transforms(
+            self.skeleton, self.root_bone, self.world, self.locations, self.orientations
+        )
+        return [
+            actions.location_channel(armature, self.root_bone, locations),
+            *actions.rotation_channels(armature, [self.root_bone], rotations[:, None]),
+            *turned,
+        ]
+
+    def _missed(self) -> list[str]:
+        assert self.misses is not None
+        worst = int(self.misses.argmax())
+        if self.misses[worst] <= MISS:
+            return []
+        many = int((self.misses > MISS).sum())
+        told = (
+            f"{many} of {len(self.arms)} arms cannot follow the gait everywhere: "
+            f"'{self.arms[worst].name}' stays {self.misses[worst]:.2g} arm lengths away."
+        )
+        return [told]
+
+    def _extend_range(self) -> tuple[str, ...]:
+        scene = bpy.data.scenes.get(self.scene)
+        last = int(self.frames[-1])
+        if scene is None or last <= scene.frame_end:
+            return ()
+        if self.extend_scene_range and scene.is_editable:
+            scene.frame_end = last
+            return (f"The scene now ends at frame {last}.",)
+        return (f"It lasts to frame {last}, the scene ends at {scene.frame_end}.",)
+
+
+def generate(armature: bpy.types.Object, context: bpy.types.Context) -> Summary:
+    """Prepare, compute and write in one go.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right; nothing has changed.
+    """
+    shot = prepare(armature, context)
+    for _ in shot.compute():
+        pass
+    return shot.write()
+
+
+def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
+    """Read all that the journey of an armature needs. Nothing is changed.
+
+    Args:
+        armature: the armature object, with its settings.
+        context: for the scene, its frame rate and its evaluated state.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    settings = locomotion_settings(armature)
+    actions.writable_armature(armature)
+    if settings.route is None:
+        raise RouteError(
+            f"'{armature.name}' has no route.", "Choose a curve as its route, or add one."
+        )
+    scene = context.scene
+    assert scene is not None
+    depsgraph = context.evaluated_depsgraph_get()
+    skeleton = read_skeleton(armature)
+    world = world_matrix(armature)
+    scale = _uniform_scale(armature, world)
+    arms, body, detection = _arms(settings, skeleton, world)
+    gait = read_gait(settings)
+    generator = Generator(skeleton, arms, body, _gait_settings(settings, gait))
+    route = read_route(settings.route, depsgraph, settings.spline)
+    travel = _travel_settings(settings, gait, gait.stride * generator.arm_length * scale)
+    seconds, frames, times = _timing(settings, route, travel, scene.render)
+    return Shot(
+        armature=armature.name,
+        scene=scene.name,
+        skeleton=skeleton,
+        arms=arms,
+        detection=detection,
+        body=body,
+        gait=gait,
+        generator=generator,
+        route=route,
+        travel=travel,
+        world=world,
+        scale=scale,
+        height=_height(settings, gait, generator.clearance * scale),
+        frames=frames,
+        times=times,
+        seconds=seconds,
+        root_bone=_root_bone(settings, armature, detection),
+        extend_scene_range=settings.extend_scene_range,
+        note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
+        warnings=_warnings(settings, armature, skeleton, arms),
+    )
+
+
+def _local_object(name: str) -> bpy.types.Object:
+    try:
+        return bpy.data.objects[name, None]  # type: ignore[index]
+    except KeyError:
+        raise WriteError(f"'{name}' is gone.", "Generate again.") from None
+
+
+def _previous_action(
+    armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion
+) -> bpy.types.Action | None:
+    """The action to make anew: the one that plays if it was generated, else the last result."""
+    data = armature.animation_data
+    if data is not None and data.action is not None and actions.is_generated(data.action):
+        return data.action
+    return settings.result
+
+
+# --- The rig ---------------------------------------------------------------------------------
+
+
+def _uniform_scale(armature: bpy.types.Object, world: Floats) -> float:
+    axes = world[:3, :3]
+    sizes = np.linalg.norm(axes, axis=0)
+    name = f"'{armature.name}'"
+    if not np.isfinite(world).all() or sizes.min() < 1e-9:
+        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
+    scale = float(np.cbrt(abs(np.linalg.det(axes))))
+    if np.abs(sizes / scale - 1.0).max() > _UNEQUAL:
+        shown = ", ".join(f"{size:.4g}" for size in sizes)
+        raise RigError(
+            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
+        )
+    if np.abs(axes.T @ axes / scale**2 - np.eye(3)).max() > _UNEQUAL:
+        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
+    if np.linalg.det(axes) < 0.0:
+        raise RigError(
+            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
+        )
+    return scale
+
+
+def _arms(
+    settings: OCTO_MOTION_PG_locomotion, skeleton: Skeleton, world: Floats
+) -> tuple[tuple[Arm, ...], BodyFrame, Detection | None]:
+    """Arms of the list, or those that are found where it is empty."""
+    if len(settings.arms) == 0:
+        # Directions of the world, in armature space: rows of its rotation.
+        found = detect_arms(skeleton, world[2, :3], -world[1, :3])
+        arms = tuple(Arm(each.name, each.bones, each.side, each.pair) for each in found.arms)
+        return arms, found.body, found
+    arms = tuple(
+        Arm(
+            name=item.name,
+            bones=tuple(bone.name for bone in item.bones),
+            side=cast("Side", item.side),
+            pair=item.pair,
+            phase=item.phase,
+            flip=item.flip,
+        )
+        for item in settings.arms
+        if item.enabled
+    )
+    if not arms:
+        raise RigError("All arms are switched off.", "Switch on at least one in the list.")
+    # The body stays where it is, whichever arms are switched off.
+    bones = [tuple(bone.name for bone in item.bones) for item in settings.arms if item.bones]
+    return arms, body_frame(skeleton, bones, settings.body_up, settings.body_front), None
+
+
+def _root_bone(
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, detection: Detection | None
+) -> str:
+    if settings.travel_on != "BONE":
+        return ""
+    name = settings.root_bone or (detection.root_bone if detection else "")
+    if not name:
+        raise RigError(
+            f"'{armature.name}' has no root bone.",
+            "Choose the bone that carries the body, or let the object travel.",
+        )
+    bone = armature_data(armature).bones.get(name)
+    if bone is None:
+        raise RigError(
+            f"'{armature.name}' has no bone '{name}' to travel on.", "Choose another root bone."
+        )
+    if bone.use_connect and bone.parent is not None:
+        raise RigError(
+            f"The root bone '{name}' is connected to its parent and cannot move.",
+            "Disconnect it, or choose the topmost bone.",
+        )
+    if not bone.use_local_location and bone.parent is not None:
+        raise RigError(
+            f"The root bone '{name}' does not move along its own axes.",
+            "Switch on Local Location in its Relations, or choose the topmost bone.",
+        )
+    return name
+
+
+def _warnings(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    arms: tuple[Arm, ...],
+) -> list[str]:
+    driven = {
+        name for name, moved in zip(skeleton.names, skeleton.constrained, strict=True) if moved
+    }
+    told: list[str] = []
+    if held := [arm.name for arm in arms if not driven.isdisjoint(arm.bones)]:
+        told.append(
+            f"Constraints or drivers move {len(held)} of the {len(arms)} arms ('{held[0]}'): "
+            "keys on their bones have no effect while those are on."
+        )
+    if settings.travel_on == "BONE" and settings.root_bone in driven:
+        told.append(
+            f"Constraints or drivers move the root bone '{settings.root_bone}': its keys have no "
+            "effect while those are on."
+        )
+    if settings.travel_on == "OBJECT" and any(
+        not each.mute and each.influence > 0.0 for each in armature.constraints
+    ):
+        told.append(f"Constraints move '{armature.name}' away from its route.")
+    return told
+
+
+# --- Settings to core's --------------------------------------------------------------------------
+
+
+def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> GaitSettings:
+    if settings.use_weight_curve:
+        drawn = sample_weight_curve(settings.weight_curve, _WEIGHT_SAMPLES)
+        weights = tuple(float(each) for each in np.clip(drawn, 0.01, 1.0))
+    else:
+        weights = (settings.weight_root, settings.weight_tip)
+    return GaitSettings(
+        gait=gait,
+        contraction=settings.contraction,
+        weights=weights,
+        softness=settings.softness,
+        sway=settings.sway,
+        phase_spread=settings.phase_spread,
+        variation=(settings.variation_min, settings.variation_max),
+        seed=settings.seed,
+        turning=settings.turning,
+    )
+
+
+def _travel_settings(
+    settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, stride: float
+) -> TravelSettings:
+    return TravelSettings(
+        manner=gait.manner,
+        speed=settings.speed_mode,
+        ease_in=settings.ease_in,
+        ease_out=settings.ease_out,
+        stride=stride,
+        heading=settings.heading,
+        heading_angle=settings.heading_angle,
+        burst=settings.burst,
+        stroke_phase=gait.power_phase,
+        look_ahead=settings.look_ahead,
+        bank=settings.bank_in_turns,
+        keep_upright=settings.keep_upright,
+        corner=settings.corner,
+    )
+
+
+def _height(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, clearance: float) -> float:
+    if settings.height_mode == "MANUAL":
+        return settings.height
+    return clearance if gait.manner == "WALK" else 0.0
+
+
+def _timing(
+    settings: OCTO_MOTION_PG_locomotion,
+    route: Route,
+    travel: TravelSettings,
+    render: bpy.types.RenderSettings,
+) -> tuple[float, Floats, Floats]:
+    """Seconds that the journey takes, its frames, and the share of its time at each."""
+    rate = render.fps / render.fps_base
+    start = settings.frame_start
+    if settings.timing == "RANGE":
+        length = settings.frame_end - start
+        if length < 1:
+            raise SettingsError(
+                f"The motion ends at frame {settings.frame_end} and starts at {start}.",
+                "Let it end after its start.",
+            )
+        exact = float(length)
+    elif settings.timing == "SPEED":
+        exact = duration(route, travel, settings.speed) * rate
+    else:
+        # At full speed a cycle takes the cycle time; so many cycles make the route.
+        cycles = strides(route, travel)
+        cruising = route.length / (cycles * settings.cycle_time)
+        exact = duration(route, travel, cruising) * rate
+    if exact > MOST_FRAMES:
+        raise SettingsError(
+            f"The motion would take {exact:,.0f} frames, more than {MOST_FRAMES:,}.",
+            "Shorten the route, or make the body faster.",
+        )
+    # The motion is the same at any frame rate: it ends when it ends, and the frame after that
+    # holds the end. A length that is whole but for rounding does not need that frame.
+    count = max(math.ceil(exact - 1e-4), 1) + 1
+    if start + count - 1 > LAST_FRAME:
+        raise SettingsError(
+            f"The motion would end at frame {start + count - 1:,}, after Blender's last.",
+            "Let it start earlier.",
+        )
+    steps = np.arange(count, dtype=np.float64)
+    return exact / rate, start + steps, np.minimum(steps / exact, 1.0)

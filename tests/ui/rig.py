@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A small octopus and a route in Blender, for tests of what the artist does with them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+import numpy as np
+
+from octo_motion.blender.curves import add_route_curve
+
+ROUTE = ((0.0, 0.0, 0.0), (0.0, -2.0, 0.0), (1.0, -3.0, 0.5), (3.0, -3.0, 0.5))
+
+
+def make_octopus(
+    name: str = "Octopus", *, arms: int = 4, joints: int = 6, length: float = 1.0
+) -> Any:
+    """An active armature: a root bone, and arms all round it that mirror by name."""
+    armature: Any = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    armature.select_set(state=True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    edit_bones = armature.data.edit_bones
+    root = edit_bones.new("Root")
+    root.head, root.tail = (0.0, 0.0, 0.1 * length), (0.0, 0.0, 0.3 * length)
+    for number in range(arms):
+        side = "L" if number % 2 == 0 else "R"
+        angle = np.pi * (number // 2 + 0.5) / (arms // 2) * (1.0 if side == "L" else -1.0)
+        outward = np.array([np.sin(angle), -np.cos(angle), 0.0])
+        parent = root
+        for joint in range(joints):
+            bone = edit_bones.new(f"Arm{number // 2 + 1}_{joint + 1}.{side}")
+            start = np.array([0.0, 0.0, 0.1 * length]) + 0.1 * length * outward
+            bone.head = start + length * joint / joints * outward
+            bone.tail = start + length * (joint + 1) / joints * outward
+            bone.parent = parent
+            bone.use_connect = joint > 0
+            parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return armature
+
+
+def give_route(armature: Any, points: Sequence[Sequence[float]] = ROUTE) -> Any:
+    """A route of four control points for the armature."""
+    route = add_route_curve("Route", np.array(points), bpy.context.scene.collection)
+    armature.octo_motion.locomotion.route = route
+    return route
+
+
+def generate(armature: Any) -> Any:
+    """The action that the button makes."""
+    bpy.context.view_layer.objects.active = armature
+    operators: Any = bpy.ops.octo_motion
+    assert operators.generate_locomotion() == {"FINISHED"}
+    return armature.animation_data.action
+
+
+def keys(action: Any) -> dict[tuple[str, int], np.ndarray]:
+    """All keys of an action, (n, 2) frame and value, by path and component."""
+    found = {}
+    for layer in action.layers:
+        for strip in layer.strips:
+            for channelbag in strip.channelbags:
+                for curve in channelbag.fcurves:
+                    values = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
+                    curve.keyframe_points.foreach_get("co", values)
+                    found[curve.data_path, curve.array_index] = values.reshape(-1, 2)
+    return found
+
+
+def joints_in_world(armature: Any, frame: float) -> np.ndarray:
+    """World positions of all bones' heads and tails at a frame, (bones, 2, 3)."""
+    scene = bpy.context.scene
+    whole = int(np.floor(frame))
+    scene.frame_set(whole, subframe=frame - whole)
+    evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    world = evaluated.matrix_world
+    return np.array([[world @ bone.head, world @ bone.tail] for bone in evaluated.pose.bones])
