@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Add › Armature › Octopus: the default rig and its skin, proportions in the redo panel."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, IntProperty
+from bpy_extras.object_utils import AddObjectHelper, add_object_align_init
+
+from ...blender.octopus import add_octopus
+from ...core.locomotion.octopus_shape import ARMS, JOINTS, OctopusShape
+from ..operator_base import OctoOperator
+
+_DEFAULT: Final = OctopusShape()
+
+
+class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operator):
+    bl_idname = "octo_motion.add_octopus"
+    bl_label = "Octopus"
+    bl_description = (
+        "Add an octopus to animate: an armature whose arms mirror by name, facing -Y at the 3D "
+        "cursor, with a skin that bends with it"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    arms: IntProperty(
+        name="Arms",
+        description=(
+            "Number of arms, evenly spread. Pairs count from the front; an odd arm is at the back"
+        ),
+        default=_DEFAULT.arms,
+        min=ARMS[0],
+        max=ARMS[1],
+        soft_max=16,
+    )
+    joints: IntProperty(
+        name="Joints per Arm",
+        description="Number of bones in each arm. More bend more finely and cost more keys",
+        default=_DEFAULT.joints,
+        min=JOINTS[0],
+        max=JOINTS[1],
+        soft_max=48,
+    )
+    arm_length: FloatProperty(
+        name="Arm Length",
+        description="Length of an arm from its root to its tip",
+        subtype="DISTANCE",
+        default=_DEFAULT.arm_length,
+        min=0.01,
+        soft_min=0.1,
+        soft_max=10.0,
+        precision=3,
+        step=1,
+    )
+    first_diameter: FloatProperty(
+        name="First Diameter",
+        description="Thickness of an arm at its root. Head and mantle grow with it",
+        subtype="DISTANCE",
+        default=_DEFAULT.first_diameter,
+        min=0.001,
+        soft_min=0.01,
+        soft_max=1.0,
+        precision=3,
+        step=1,
+    )
+    taper: FloatProperty(
+        name="Taper",
+        description=(
+            "How much thinner and shorter the bones get towards the tip: 0 keeps all alike, "
+            "1 makes a cone"
+        ),
+        subtype="FACTOR",
+        default=_DEFAULT.taper,
+        min=0.0,
+        max=1.0,
+    )
+    with_mesh: BoolProperty(
+        name="Mesh",
+        description="Add the skin too, weighted to the bones. Without it the armature comes alone",
+        default=True,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Switch to object mode first")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> None:
+        shape = OctopusShape(
+            arms=self.arms,
+            joints=self.joints,
+            arm_length=self.arm_length,
+            first_diameter=self.first_diameter,
+            taper=self.taper,
+        )
+        matrix = add_object_align_init(context, self)
+        armature = add_octopus(context, shape, matrix, with_skin=self.with_mesh)
+        _show_in_local_view(context, armature)
+
+
+def draw_in_add_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
+    """Entry for Add › Armature."""
+    layout = self.layout
+    assert layout is not None
+    layout.operator(OCTO_MOTION_OT_add_octopus.bl_idname, icon="OUTLINER_OB_ARMATURE")
+
+
+def _show_in_local_view(context: bpy.types.Context, armature: bpy.types.Object) -> None:
+    """Where a view shows a few objects alone, what is added there joins them."""
+    space = context.space_data
+    if isinstance(space, bpy.types.SpaceView3D) and space.local_view:
+        for each in (armature, *armature.children):
+            each.local_view_set(space, state=True)
