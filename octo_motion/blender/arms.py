@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
 import numpy as np
@@ -44,32 +45,62 @@ def require_editable(armature: bpy.types.Object) -> None:
         )
 
 
+def linked_arm_names(settings: bpy.types.PropertyGroup) -> frozenset[str]:
+    """Names of the arms that a library override has from its linked file.
+
+    Blender allows to change their settings, but neither to rename, remove nor reorder them; arms
+    added in this file are free.
+
+    Args:
+        settings: the object's settings, with its list of arms.
+    """
+    override = settings.id_data.override_library if settings.id_data else None
+    if override is None or override.reference is None:
+        return frozenset()
+    original: Any = override.reference.path_resolve(settings.path_from_id())
+    return frozenset(arm.name for arm in original.arms)
+
+
+def hidden_bones(armature: bpy.types.Object, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of the bones that pose mode does not show.
+
+    Raises:
+        RigError: a bone does not exist.
+    """
+    bones = _pose_bones(armature, names)
+    return tuple(bone.name for bone in bones if not _is_shown(bone))
+
+
 def select_pose_bones(
     armature: bpy.types.Object, names: Iterable[str], *, extend: bool = False
-) -> int:
-    """Select bones in pose mode, the first of them active; returns how many are hidden.
+) -> None:
+    """Select bones in pose mode, the first of them active.
 
     Hidden bones stay unselected: they could be keyed by mistake.
 
     Raises:
         RigError: a bone does not exist.
     """
-    data, pose = armature_data(armature), armature.pose
-    chosen = list(names)
-    if pose is None:
-        return len(chosen)
-    for name in chosen:
-        if name not in pose.bones:
-            raise RigError(f"The armature has no bone '{name}'.", "Detect the arms again.")
-    if not extend:
-        for bone in pose.bones:
+    chosen = [bone for bone in _pose_bones(armature, names) if _is_shown(bone)]
+    if not extend and armature.pose is not None:
+        for bone in armature.pose.bones:
             versions.select(bone, state=False)
-    shown = [name for name in chosen if _is_shown(pose.bones[name])]
-    for name in shown:
-        versions.select(pose.bones[name], state=True)
-    if shown:
-        data.bones.active = data.bones[shown[0]]
-    return len(chosen) - len(shown)
+    for bone in chosen:
+        versions.select(bone, state=True)
+    if chosen:
+        bones = armature_data(armature).bones
+        bones.active = bones[chosen[0].name]
+
+
+def _pose_bones(armature: bpy.types.Object, names: Iterable[str]) -> list[bpy.types.PoseBone]:
+    bones = armature.pose.bones if armature.pose is not None else {}
+    found: list[bpy.types.PoseBone] = []
+    for name in names:
+        bone = bones.get(name)
+        if bone is None:
+            raise RigError(f"The armature has no bone '{name}'.", "Detect the arms again.")
+        found.append(bone)
+    return found
 
 
 def _is_shown(bone: bpy.types.PoseBone) -> bool:
