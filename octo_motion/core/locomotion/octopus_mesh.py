@@ -169,11 +169,12 @@ def _add_tips(surface: Surface, layout: ArmLayout, loops: Indices, points: Float
     """Grids that close the tubes' last rings (arms, columns)."""
     shape = layout.shape
     first_side, _ = cap_size(loops.shape[-1])
-    shift = first_side // 2 - layout.columns.dorsal // 2
+    # Seen from outside the ring runs clockwise.
+    order = layout.columns.dorsal // 2 + first_side // 2 - np.arange(loops.shape[-1])
     arm = np.arange(shape.arms)[:, None, None]
     surface.add_cap(
-        np.roll(loops, shift, axis=-1),
-        np.roll(points, shift, axis=-2),
+        loops[:, order],
+        points[:, order],
         along_arm(shape, arm, np.full(arm.shape, shape.arm_length)),
         Material.SKIN,
         first_side=first_side,
