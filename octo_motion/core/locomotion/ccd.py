@@ -21,14 +21,23 @@ import numpy as np
 
 from ..rotations import Floats, cross, from_rotation_vector, normalized, rotate, shortest_arc
 
-SWEEPS: Final = 8
-SOFTENINGS: Final = 3
+SWEEPS: Final = 4
+SOFTENINGS: Final = 8
 
 # Stretching a group to its full length is the singular point of any inverse kinematics: its bend
 # grows like the square root of what is left. Rounding the corner off costs half of this at most,
 # in group lengths.
 _ROUNDING: Final = 2.0e-3
-_NEWTON_STEPS: Final = 12
+# A joint turns the less, the shorter its lever: of a lever of √0.05 of the group, half. So the
+# last joints do not curl, and an arm of many bones takes the shape of one of few.
+_SHORT_LEVER: Final = 0.05
+_JOINTS_OF_A_WEIGHT: Final = 4
+# Where a gait bends a group much more than this, the group does not need to sway.
+_SLIGHT: Final = np.radians(8.0)
+# No segment is bent further away from the chord when a group folds up.
+_FARTHEST_BEND: Final = 1.5 * np.pi
+_NEWTON_STEPS: Final = 6
+_NEWTON_STEPS_BETWEEN: Final = 3
 _TINY: Final = 1e-12
 
 
@@ -57,7 +66,7 @@ def solve(
     shape: Floats,
     links: Floats,
     targets: Floats,
-    softness: float = 0.5,
+    softness: float = 1.0,
 ) -> Floats:
     """Directions (segments, batch, 3) of arms whose groups end at their targets.
 
@@ -80,12 +89,15 @@ def solve(
             own = swept(own, lengths, chain.weights[segments], goal)
         directions[segments] = closed(own, lengths, goal)
         root = root + chord(directions[segments], lengths)
-    for _ in range(SOFTENINGS if softness > 0.0 else 0):
+    rounds = SOFTENINGS if softness > 0.0 else 0
+    for number in range(1, rounds + 1):
         directions = softened(directions, softness)
+        # Only the last closing has to be exact.
+        steps = _NEWTON_STEPS if number == rounds else _NEWTON_STEPS_BETWEEN
         root = np.zeros_like(root)
         for group, segments in enumerate(chain.groups):
             lengths, goal = chain.lengths[segments], targets[:, group + 1] - root
-            directions[segments] = closed(directions[segments], lengths, goal)
+            directions[segments] = closed(directions[segments], lengths, goal, steps)
             root = root + chord(directions[segments], lengths)
     return directions
 
@@ -100,14 +112,16 @@ def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
     Args:
         chain: the arms' build.
         angles: (batch, 3, 2) head and pitch of each link.
-        sway: (batch, 2) head and pitch of the bend that is added at the root of the first group;
-            it changes sides along each group.
+        sway: (batch, 2) head and pitch of the bend that is added at the root of the first group
+            where it is nearly straight; it changes sides along each group.
     """
-    before = -0.5 * angles
-    before[:, 0] *= 2.0
-    after = np.concatenate([0.5 * angles[:, 1:], 0.5 * angles[:, :1] * 0.0], axis=1)
-    after[:, 2] = 0.5 * angles[:, 2]
+    # The first group leaves the body straight, and nothing pulls at the last one's end: there it
+    # goes on as it came.
+    before = -0.5 * angles * np.array([2.0, 1.0, 1.0])[:, None]
+    after = 0.5 * np.concatenate([angles[:, 1:], angles[:, 2:]], axis=1)
     shape = np.empty((len(chain.lengths), len(angles), 3))
+    asked = np.sum(before**2 + after**2, axis=-1)[..., None]
+    swaying = sway[:, None] * _SLIGHT**2 / (_SLIGHT**2 + asked)
     for group, segments in enumerate(chain.groups):
         lengths = chain.lengths[segments]
         reach = np.cumsum(lengths)
@@ -115,7 +129,7 @@ def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
         turn = (
             before[:, group] * (1.0 - 4.0 * along + 3.0 * along**2)
             + after[:, group] * (3.0 * along**2 - 2.0 * along)
-            + (-1.0) ** group * sway * (1.0 - 2.0 * along)
+            + (-1.0) ** group * swaying[:, group] * (1.0 - 2.0 * along)
         )
         if len(lengths) == 1:
             turn = np.zeros_like(turn)
@@ -149,10 +163,12 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
     steps = lengths[:, None, None] * directions
     to_goal = goal - np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps[:-1], axis=0)])
     turns = np.empty((*directions.shape[:-1], 4))
+    whole = float(np.sum(lengths))
+    scale = min(1.0, _JOINTS_OF_A_WEIGHT / count)
     end = np.zeros_like(goal)
     for joint in range(count - 1, -1, -1):
         end = end + steps[joint]
-        turns[joint] = _partial_arc(end, to_goal[joint], weights[joint], lengths[joint])
+        turns[joint] = _partial_arc(end, to_goal[joint], weights[joint] * scale, whole)
         end = rotate(turns[joint], end)
     result = np.empty_like(directions)
     turn = turns[0]
@@ -163,7 +179,7 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
     return result
 
 
-def closed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
+def closed(directions: Floats, lengths: Floats, goal: Floats, steps: int = _NEWTON_STEPS) -> Floats:
     """A group bent as much as it takes for its end to be at the goal, in the shape it has.
 
     The bends are the angles between the segments and the chord. All are scaled by one factor,
@@ -174,8 +190,8 @@ def closed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
     distance = np.sqrt(np.sum(goal * goal, axis=-1))
     if len(lengths) > 1:
         slack = 1.0 - distance / whole
-        slack = 0.5 * (slack + np.sqrt(slack * slack + 4.0 * _ROUNDING**2 / 4.0))
-        directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0))
+        slack = 0.5 * (slack + np.sqrt(slack * slack + _ROUNDING**2))
+        directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0), steps)
     return aimed(directions, lengths, goal)
 
 
@@ -193,10 +209,11 @@ def softened(directions: Floats, amount: float) -> Floats:
     return mean / np.maximum(size, _TINY)[..., None]
 
 
-def _scaled(directions: Floats, lengths: Floats, wanted: Floats) -> Floats:
+def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> Floats:
     """A group whose bends are scaled so that its chord is as long as wanted (batch,)."""
     axis = chord(directions, lengths)
-    axis = axis / np.maximum(np.sqrt(np.sum(axis * axis, axis=-1)), _TINY)[:, None]
+    found = np.sqrt(np.sum(axis * axis, axis=-1))
+    axis = axis / np.maximum(found, _TINY)[:, None]
     along = np.einsum("sbc,bc->sb", directions, axis)
     across = directions - along[..., None] * axis
     sine = np.sqrt(np.einsum("sbc,sbc->sb", across, across))
@@ -205,9 +222,11 @@ def _scaled(directions: Floats, lengths: Floats, wanted: Floats) -> Floats:
     # The squared chord is nearly linear in the square of the factor, so Newton's method takes
     # that as its unknown; a bracket keeps it safe.
     low = np.zeros_like(wanted)
-    high = (np.pi / np.maximum(np.max(bend, axis=0), _TINY)) ** 2
-    square = np.minimum(np.ones_like(wanted), high)
-    for _ in range(_NEWTON_STEPS):
+    high = (_FARTHEST_BEND / np.maximum(np.max(bend, axis=0), _TINY)) ** 2
+    whole = float(np.sum(lengths))
+    square = _squared_arc(wanted / whole) / np.maximum(_squared_arc(found / whole), _TINY)
+    square = np.minimum(square, 0.9 * high)
+    for _ in range(steps):
         factor = np.sqrt(square)
         angle = factor * bend
         cosine, sinus = np.cos(angle), np.sin(angle)
@@ -222,16 +241,22 @@ def _scaled(directions: Floats, lengths: Floats, wanted: Floats) -> Floats:
             factor, _TINY
         )
         step = square - excess / np.where(np.abs(slope) > _TINY, slope, -_TINY)
-        square = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        square = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
     angle = np.sqrt(square) * bend
     return np.cos(angle)[..., None] * axis + np.sin(angle)[..., None] * across
 
 
-def _partial_arc(start: Floats, goal: Floats, share: float, scale: float) -> Floats:
+def _squared_arc(ratio: Floats) -> Floats:
+    """About the square of half the angle of a circle's arc, from the ratio of chord to arc."""
+    missing = 1.0 - ratio
+    return missing * (6.0 + (np.pi**2 - 6.0) * missing)
+
+
+def _partial_arc(start: Floats, goal: Floats, share: float, whole: float) -> Floats:
     """Quaternions (batch, 4) of a share of the smallest turn from one vector to another.
 
     Where the turn has no definite axis it fades out: near half a turn, and where the vectors are
-    short against ``scale``.
+    short against the ``whole`` group.
     """
     normal = cross(start, goal)
     sine = np.sqrt(np.sum(normal * normal, axis=-1))
@@ -239,7 +264,7 @@ def _partial_arc(start: Floats, goal: Floats, share: float, scale: float) -> Flo
     angle = np.arctan2(sine, cosine)
     angle = angle * share * np.clip(4.0 * (1.0 - angle / np.pi), 0.0, 1.0)
     size = np.sqrt(sine * sine + cosine * cosine)
-    angle = angle * size / (size + 0.01 * scale * scale)
+    angle = angle * size / (size + _SHORT_LEVER * whole * whole)
     return from_rotation_vector(normal * (angle / np.maximum(sine, _TINY))[:, None])
 
 

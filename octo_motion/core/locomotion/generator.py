@@ -61,7 +61,7 @@ class GaitSettings:
     """Factor on the contraction of the links; 1 as in the source, 0 none."""
     weights: tuple[float, ...] = (0.4,)
     """Weights a of the joints, at even steps from the arm's root to its tip, each in (0, 1]."""
-    softness: float = 0.5
+    softness: float = 0.8
     """0 leaves bends where CCD puts them; towards 1 they are spread over neighbouring joints."""
     sway: float = np.radians(10.0)
     """Bend across the gait's own that each group starts with, so that no group passes through a

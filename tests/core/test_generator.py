@@ -1,0 +1,470 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms of any build follow their gait: on target, in one piece, without a pop or a twist."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from octo_motion.core.errors import RigError, SettingsError
+from octo_motion.core.locomotion import gait
+from octo_motion.core.locomotion.generator import Arm, ArmPoses, GaitSettings, Generator
+from octo_motion.core.rotations import (
+    Floats,
+    angle_between,
+    from_axis_angle,
+    normalized,
+    rotate,
+)
+from octo_motion.core.skeleton import Skeleton
+from tests.core.rigs import UP, body_with_arms, posed_joints
+
+PRESETS = gait.presets()
+BUILDS = (3, 7, 12, 30)
+every_preset = pytest.mark.parametrize("name", sorted(PRESETS))
+every_build = pytest.mark.parametrize("joints", BUILDS)
+few = settings(max_examples=12)
+
+
+def cycle(frames: int) -> Floats:
+    return np.linspace(0.0, 2.0 * np.pi, frames + 1)
+
+
+def straight(frames: int) -> Floats:
+    return np.zeros((frames, 2))
+
+
+def posed(generator: Generator, frames: int = 48) -> ArmPoses:
+    phases = cycle(frames)
+    return generator.pose(phases, straight(len(phases)))
+
+
+# --- What it must reach (on every preset and build) -------------------------------------------
+
+
+@every_preset
+@every_build
+def test_groups_end_within_a_thousandth_of_the_arm_from_their_targets(
+    name: str, joints: int
+) -> None:
+    skeleton, arms, body = body_with_arms(8, joints)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+
+    assert posed(generator, 360).misses.max() <= 1e-3
+
+
+@every_preset
+@every_build
+def test_bones_keep_their_lengths_and_stay_joined(name: str, joints: int) -> None:
+    skeleton, arms, body = body_with_arms(8, joints, 0.6)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+
+    poses = posed(generator)
+
+    for arm in arms:
+        solved = posed_joints(skeleton, arm, poses.rotations, generator.bones)
+        lengths = np.linalg.norm(np.diff(solved, axis=1), axis=-1)
+        rest = skeleton.lengths[[skeleton.index[bone] for bone in arm.bones]]
+        assert np.max(np.abs(lengths - rest)) <= 1e-6 * 0.6
+
+
+@every_preset
+@every_build
+def test_no_bone_pops(name: str, joints: int) -> None:
+    # A pop keeps its size however small the time step; all else shrinks with the step. Steps
+    # are fine enough to see the fastest moment, when a group passes through its full length.
+    skeleton, arms, body = body_with_arms(1, joints)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+
+    largest = [
+        angle_between(turns[:-1], turns[1:]).max(axis=0)
+        for turns in (posed(generator, frames).rotations for frames in (1536, 3072, 6144))
+    ]
+
+    for coarse, fine in zip(largest, largest[1:], strict=False):
+        moving = coarse > 1e-6
+        assert np.all(fine[moving] <= 0.75 * coarse[moving])
+        assert fine.max() <= 0.55 * coarse.max()
+
+
+@every_preset
+def test_the_reported_miss_is_the_one_that_the_bones_show(name: str) -> None:
+    skeleton, arms, body = body_with_arms(4, 12)
+    with_gait = GaitSettings(PRESETS[name])
+    generator = Generator(skeleton, arms, body, with_gait)
+    poses = posed(generator)
+
+    # Arm 0 points halfway between front and left. Seen in its frame, x outward:
+    arm = arms[0]
+    solved = posed_joints(skeleton, arm, poses.rotations, generator.bones)
+    local = rotate(from_axis_angle(UP, 0.25 * np.pi), solved - solved[:, :1])
+
+    from octo_motion.core.locomotion.targets import contraction, link_rotations, pseudo_targets
+
+    angles = PRESETS[name].curve(1).evaluate(generator.arm_phases(cycle(48))[:, 0])
+    angles[..., 1] *= -1.0  # left: towards the front is clockwise
+    lengths = skeleton.lengths[[skeleton.index[bone] for bone in arm.bones]]
+    groups = np.add.reduceat(lengths, [0, *np.cumsum(generator_sizes(lengths))[:2]])
+    targets = pseudo_targets(link_rotations(angles), groups * (1.0 + contraction(angles)))
+    ends = local[:, np.cumsum(generator_sizes(lengths))]
+    missed = np.linalg.norm(ends - targets[:, 1:], axis=-1) / lengths.sum()
+    assert np.allclose(missed, poses.misses[:, 0], atol=1e-6)
+    assert missed.max() <= 1e-3
+
+
+def generator_sizes(lengths: Floats) -> tuple[int, int, int]:
+    from octo_motion.core.locomotion.arm import split_groups
+
+    return split_groups(lengths)
+
+
+# --- A frame depends on that frame alone ---------------------------------------------------------
+
+
+@few
+@given(st.integers(0, 2**31), st.sampled_from(sorted(PRESETS)))
+def test_frames_come_out_alike_in_any_order_and_alone(seed: int, name: str) -> None:
+    skeleton, arms, body = body_with_arms(3, 7)
+    generator = Generator(
+        skeleton, arms, body, GaitSettings(PRESETS[name], variation=(-0.2, 0.2), seed=seed)
+    )
+    random = np.random.default_rng(seed)
+    phases = random.uniform(0.0, 60.0, 40)
+    turn = random.normal(0.0, 0.5, (40, 2))
+
+    together = generator.pose(phases, turn).rotations
+
+    order = random.permutation(40)
+    shuffled = generator.pose(phases[order], turn[order]).rotations
+    alone = generator.pose(phases[7:8], turn[7:8]).rotations
+    # Sums over other batches are rounded otherwise.
+    assert np.max(angle_between(shuffled, together[order])) <= 1e-7
+    assert np.max(angle_between(alone[0], together[7])) <= 1e-7
+
+
+def test_long_shots_do_not_differ_from_short_ones() -> None:
+    skeleton, arms, body = body_with_arms(8, 3)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    phases = np.linspace(0.0, 100.0, 1500)  # more than are solved at a time
+
+    whole = generator.pose(phases, straight(1500)).rotations
+    part = generator.pose(phases[700:720], straight(20)).rotations
+
+    assert np.max(angle_between(whole[700:720], part)) <= 1e-9
+
+
+def test_no_frames_are_no_poses() -> None:
+    skeleton, arms, body = body_with_arms(2, 3)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+
+    assert generator.pose(np.empty(0), np.empty((0, 2))).rotations.shape == (0, 6, 4)
+
+
+# --- Any rig -------------------------------------------------------------------------------------
+
+
+@few
+@given(st.integers(0, 2**31), st.sampled_from(BUILDS))
+def test_rest_pose_and_bone_roll_do_not_change_where_the_joints_go(seed: int, joints: int) -> None:
+    random = np.random.default_rng(seed)
+    bent = np.array([1.0, 0.0, 0.0]) + random.normal(0.0, 0.4, (joints, 3))
+    settings_ = GaitSettings(PRESETS["walk"], variation=(-0.2, 0.2), seed=seed)
+    plain = body_with_arms(4, joints)
+    # Bent within the vertical plane, so that the arm points the same way seen from above.
+    bent[:, 1] = 0.0
+    odd = body_with_arms(4, joints, rest=normalized(bent), rolls=random)
+
+    found = []
+    for skeleton, arms, body in (plain, odd):
+        generator = Generator(skeleton, arms, body, settings_)
+        poses = posed(generator, 24)
+        joints_of = [posed_joints(skeleton, arm, poses.rotations, generator.bones) for arm in arms]
+        found.append(np.stack([each - each[:, :1] for each in joints_of]))
+
+    assert np.max(np.abs(found[0] - found[1])) <= 1e-6
+
+
+@pytest.mark.parametrize(("arms", "joints"), [(1, 3), (1, 200), (5, 4), (64, 5), (6, 11)])
+def test_any_number_of_arms_and_bones_reaches_its_targets(arms: int, joints: int) -> None:
+    skeleton, listed, body = body_with_arms(arms, joints)
+    generator = Generator(skeleton, listed, body, GaitSettings(PRESETS["walk"]))
+
+    poses = posed(generator, 40)
+
+    assert poses.rotations.shape == (41, arms * joints, 4)
+    assert poses.misses.max() <= 1e-3
+
+
+def test_arms_of_different_builds_are_each_solved_with_their_own() -> None:
+    skeleton, arms, body = body_with_arms(2, 12)
+    shorter = (arms[0], dataclasses.replace(arms[1], bones=arms[1].bones[:8]))
+    both = Generator(skeleton, shorter, body, GaitSettings(PRESETS["walk"]))
+    alone = Generator(skeleton, shorter[1:], body, GaitSettings(PRESETS["walk"]))
+
+    mixed = posed(both).rotations[:, 12:]
+
+    assert np.max(angle_between(mixed, posed(alone).rotations)) <= 1e-9
+
+
+def test_the_size_of_the_rig_does_not_change_its_rotations() -> None:
+    small = body_with_arms(2, 12, 0.01)
+    large = body_with_arms(2, 12, 100.0)
+
+    one, other = (
+        posed(Generator(*rig, GaitSettings(PRESETS["swim"]))).rotations for rig in (small, large)
+    )
+
+    # Segments are compared as shares of the arm, to six digits.
+    assert np.max(angle_between(one, other)) <= 1e-5
+
+
+# --- What the settings do ------------------------------------------------------------------------
+
+
+def generated(skeleton_arms_body: tuple[Skeleton, tuple[Arm, ...], object], **changes: object):  # noqa: ANN202
+    skeleton, arms, body = skeleton_arms_body
+    chosen = {"gait": PRESETS["walk"], **changes}
+    return Generator(skeleton, arms, body, GaitSettings(**chosen))  # type: ignore[arg-type]
+
+
+def test_zero_variation_is_the_table_itself_whatever_the_seed() -> None:
+    rig = body_with_arms(4, 6)
+
+    plain = posed(generated(rig)).rotations
+    seeded = posed(generated(rig, variation=(0.0, 0.0), seed=7)).rotations
+
+    assert np.array_equal(plain, seeded)
+
+
+def test_the_same_seed_gives_the_same_keys_and_another_seed_others() -> None:
+    rig = body_with_arms(4, 6)
+
+    first, again, other = (
+        posed(generated(rig, variation=(-0.2, 0.2), seed=seed)).rotations for seed in (1, 1, 2)
+    )
+
+    assert np.array_equal(first, again)
+    assert np.max(angle_between(first, other)) > 0.05
+
+
+@pytest.mark.parametrize("name", ["walk", "walk_literal"])
+def test_left_and_right_mirror_each_other(name: str) -> None:
+    table = dataclasses.replace(PRESETS[name], spread_sides=0.0)
+    skeleton, arms, body = body_with_arms(6, 9)
+    generator = Generator(skeleton, arms, body, GaitSettings(table))
+    poses = posed(generator)
+
+    left, right = (
+        posed_joints(skeleton, arm, poses.rotations, generator.bones) for arm in (arms[0], arms[5])
+    )
+
+    assert np.max(np.abs(left * [-1.0, 1.0, 1.0] - right)) <= 1e-9
+
+
+def test_positive_pitch_turns_arms_of_both_sides_to_the_front() -> None:
+    table = dataclasses.replace(
+        PRESETS["walk_literal"],
+        curves={0: gait.curve_from_degrees([0, 180, 360], pitch=[[30] * 3, [0] * 3, [0] * 3])},
+    )
+    skeleton, arms, body = body_with_arms(2, 6)  # to the left and to the right
+    generator = Generator(skeleton, arms, body, GaitSettings(table))
+    poses = posed(generator, 2)
+
+    for arm in arms:
+        joints = posed_joints(skeleton, arm, poses.rotations, generator.bones)
+        assert np.all(joints[:, -1, 1] < -0.3)  # the front is -Y
+
+
+def test_flip_mirrors_what_an_arm_takes_for_the_front() -> None:
+    skeleton, arms, body = body_with_arms(2, 6)
+    plain = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk_literal"]))
+    flipped = Generator(
+        skeleton,
+        (dataclasses.replace(arms[0], flip=True), arms[1]),
+        body,
+        GaitSettings(PRESETS["walk_literal"]),
+    )
+
+    one, other = (
+        posed_joints(skeleton, arms[0], posed(each).rotations, each.bones)
+        for each in (plain, flipped)
+    )
+
+    assert np.max(np.abs(one * [1.0, -1.0, 1.0] - other)) <= 1e-9
+
+
+def test_an_arms_own_phase_puts_it_ahead() -> None:
+    skeleton, arms, body = body_with_arms(2, 6)
+    ahead = (dataclasses.replace(arms[0], phase=0.5 * np.pi), arms[1])
+    plain = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    shifted = Generator(skeleton, ahead, body, GaitSettings(PRESETS["walk"]))
+
+    now = shifted.pose(np.array([1.0]), straight(1)).rotations
+    later = plain.pose(np.array([1.0 + 0.5 * np.pi]), straight(1)).rotations
+
+    assert np.max(angle_between(now[:, :6], later[:, :6])) <= 1e-9
+
+
+def test_without_phase_spread_all_arms_move_together() -> None:
+    skeleton, arms, body = body_with_arms(8, 6)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], phase_spread=0.0))
+
+    heights = [
+        posed_joints(skeleton, arm, posed(generator).rotations, generator.bones)[..., 2]
+        for arm in arms
+    ]
+
+    assert np.max(np.ptp(heights, axis=0)) <= 1e-9
+
+
+def test_arms_turn_towards_the_goal_by_the_share_asked_for() -> None:
+    skeleton, arms, body = body_with_arms(4, 12)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["swim"], turning=0.5))
+    left = np.array([[0.4, 0.0]])
+    phase = np.array([0.2])
+
+    plain = posed_pitches(skeleton, arms, generator, phase, np.zeros((1, 2)))
+    turned = posed_pitches(skeleton, arms, generator, phase, left)
+
+    # Arms at ±45° and ±135° from the front: all lie halfway across the turn to the left. Those
+    # in front swing to it anticlockwise, those behind clockwise.
+    expected = 0.5 * 0.4 * np.cos(0.25 * np.pi) * np.array([1.0, -1.0, -1.0, 1.0])
+    # The solver steers the target exactly, and ends within its tolerance of it.
+    assert np.allclose(turned - plain, expected, atol=2e-3)
+
+
+def posed_pitches(
+    skeleton: Skeleton, arms: tuple[Arm, ...], generator: Generator, phase: Floats, turn: Floats
+) -> Floats:
+    """Compass angle of each arm's tip, seen from its root."""
+    poses = generator.pose(phase, turn)
+    tips = []
+    for arm in arms:
+        joints = posed_joints(skeleton, arm, poses.rotations, generator.bones)[0]
+        tips.append(joints[-1] - joints[0])
+    return np.array([np.arctan2(tip[1], tip[0]) for tip in tips])
+
+
+def test_weights_move_the_bend_along_the_arm() -> None:
+    rig = body_with_arms(1, 12)
+    towards_root = posed(generated(rig, weights=(1.0, 0.02), softness=0.0)).rotations
+    towards_tip = posed(generated(rig, weights=(0.02, 1.0), softness=0.0)).rotations
+
+    assert np.max(angle_between(towards_root, towards_tip)) > np.radians(1.0)
+    for weights in ((1.0, 0.02), (0.02, 1.0), (0.15,), (0.6,), (1.0,)):
+        assert posed(generated(rig, weights=weights)).misses.max() <= 1e-3
+
+
+def test_softness_takes_the_sharpest_bends_off() -> None:
+    rig = body_with_arms(1, 12)
+
+    def bends(softness: float) -> Floats:
+        turns = posed(generated(rig, softness=softness)).rotations
+        return angle_between(turns, np.array([1.0, 0.0, 0.0, 0.0]))
+
+    sharp, softer, soft = (bends(softness) for softness in (0.0, 0.5, 1.0))
+    assert np.max(soft) < 0.9 * np.max(sharp)
+    assert np.mean(soft**2) < np.mean(softer**2) < np.mean(sharp**2)
+
+
+def test_walking_and_swimming_arms_do_not_wring_themselves() -> None:
+    # Twist about its own bone: what a straight arm carried along the same way would not have.
+    for name in ("walk", "swim"):
+        skeleton, arms, body = body_with_arms(2, 12)
+        generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+        turns = posed(generator).rotations
+        twist = 2.0 * np.arctan2(np.abs(turns[..., 2]), np.abs(turns[..., 0]))
+        assert np.max(twist) <= 1e-9
+
+
+def test_bank_twists_each_group_by_its_own_angle() -> None:
+    curve = gait.curve_from_degrees([0, 180, 360], bank=[[30, 30, 30], [0, 0, 0], [-12, -12, -12]])
+    table = dataclasses.replace(PRESETS["swim"], curves={0: curve})
+    skeleton, arms, body = body_with_arms(2, 12, taper=0.0)
+    generator = Generator(skeleton, arms, body, GaitSettings(table, sway=0.0))
+
+    turns = posed(generator, 2).rotations[0].reshape(2, 12, 4)
+    twist = np.degrees(2.0 * np.arctan2(turns[..., 2], turns[..., 0]))
+
+    expected = np.repeat([30 / 4, 0.0, -12 / 4], 4)
+    assert np.allclose(twist, expected * np.array([[-1.0], [1.0]]), atol=1e-6)
+
+
+def test_suckers_stay_below_while_walking() -> None:
+    # Local -Z is the sucker side of a rig whose bones are rolled with Z up.
+    skeleton, arms, body = body_with_arms(8, 12)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    basis = np.zeros((97, len(skeleton), 4))
+    basis[..., 0] = 1.0
+    basis[:, [skeleton.index[bone] for bone in generator.bones]] = posed(generator, 96).rotations
+    orientations, _ = skeleton.pose(basis)
+    order = [skeleton.index[bone] for bone in generator.bones]
+    along = rotate(orientations[:, order], np.array([0.0, 1.0, 0.0]))
+    suckers = rotate(orientations[:, order], np.array([0.0, 0.0, -1.0]))
+    # Wherever the arm goes outward. Where it is folded back under itself it lies on its back.
+    outward = normalized(skeleton.heads[order] * [1.0, 1.0, 0.0])
+    lying = np.sum(along * outward, axis=-1) > 0.5
+
+    assert np.count_nonzero(lying) > 0.5 * lying.size
+    assert np.all(suckers[..., 2][lying] < -0.4)
+
+
+def test_clearance_is_how_deep_a_whole_cycle_reaches() -> None:
+    skeleton, arms, body = body_with_arms(8, 12)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], variation=(0.0, 0.1)))
+    plain = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+
+    lowest = min(
+        posed_joints(skeleton, arm, posed(plain, 96).rotations, plain.bones)[..., 2].min()
+        for arm in arms
+    )
+
+    assert generator.clearance == plain.clearance
+    assert plain.clearance == pytest.approx(-lowest, abs=1e-9)
+
+
+# --- Faults --------------------------------------------------------------------------------------
+
+
+def test_no_arms_are_a_clear_error() -> None:
+    skeleton, _, body = body_with_arms(2, 3)
+
+    with pytest.raises(RigError, match=r"The list of arms is empty\. Detect the arms"):
+        Generator(skeleton, (), body, GaitSettings(PRESETS["walk"]))
+
+
+def test_arms_that_share_a_bone_are_a_clear_error() -> None:
+    skeleton, arms, body = body_with_arms(2, 6)
+    sharing = (arms[0], dataclasses.replace(arms[1], bones=arms[0].bones[2:]))
+
+    with pytest.raises(RigError, match=r"Bone 'arm0\.2' is in two arms, 'Arm 0' and 'Arm 1'\."):
+        Generator(skeleton, sharing, body, GaitSettings(PRESETS["walk"]))
+
+
+def test_a_bone_that_is_gone_is_a_clear_error() -> None:
+    skeleton, arms, body = body_with_arms(2, 6)
+    gone = (dataclasses.replace(arms[0], bones=(*arms[0].bones, "lost")),)
+
+    with pytest.raises(RigError, match="has no bone 'lost'"):
+        Generator(skeleton, gone, body, GaitSettings(PRESETS["walk"]))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sway": float("nan")}, "A setting of the gait is not a number."),
+        ({"weights": (0.5, 0.0)}, "A joint's weight is not between 0 and 1."),
+        ({"weights": (1.5,)}, "A joint's weight is not between 0 and 1."),
+        ({"weights": ()}, "A joint's weight is not between 0 and 1."),
+        ({"variation": (0.2, 0.1)}, "The variation's minimum is greater than its maximum."),
+        ({"contraction": -0.5}, "The contraction is -0.5."),
+        ({"softness": 1.5}, "The softness is 1.5."),
+    ],
+)
+def test_a_senseless_setting_is_a_clear_error(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(SettingsError) as caught:
+        GaitSettings(PRESETS["walk"], **changes)  # type: ignore[arg-type]
+
+    assert message in str(caught.value)
