@@ -10,7 +10,7 @@ from typing import Any, Final, cast
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ...blender.armature import active_armature, read_skeleton, selected_bones
+from ...blender.armature import active_armature, armature_data, read_skeleton, selected_bones
 from ...blender.arms import (
     hidden_bones,
     linked_arm_names,
@@ -26,7 +26,6 @@ from ...core.locomotion.chains import (
     place_added,
 )
 from ...core.locomotion.detection import detect_arms
-from ..operator_base import OctoOperator
 from . import arm_properties
 from .arm_items import (
     active_arm,
@@ -39,6 +38,7 @@ from .arm_items import (
     write_arms,
     write_body,
 )
+from .armature_operator import ArmatureOperator
 from .properties import AXES, OCTO_MOTION_PG_locomotion, locomotion_settings
 
 _SIDE_LETTERS: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": "-"}
@@ -71,36 +71,18 @@ class OCTO_MOTION_UL_arms(bpy.types.UIList):
         columns = layout.split(factor=0.5)
         row = columns.row(align=True)
         row.prop(item, "enabled", text="")
-        armature = data.id_data.data
         # Red: bones were renamed or removed since.
-        row.alert = any(bone.name not in armature.bones for bone in item.bones)
+        row.alert = any(bone.name not in data.id_data.data.bones for bone in item.bones)
         row.prop(item, "name", text="", emboss=False)
         row = columns.row()
         row.active = item.enabled
-        row.label(text=str(len(item.bones)), icon="BONE_DATA")
+        row.label(text=str(len(item.bones)))
         row.label(text=_SIDE_LETTERS[item.side] + str(item.pair))
         row.label(text=f"{math.degrees(item.phase):.0f}°")
 
 
-class _ArmListOperator(OctoOperator):
+class _ArmListOperator(ArmatureOperator):
     """An operator on the list of the active armature."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode not in {"OBJECT", "POSE"}:
-            # Undo in other modes takes back what was done in that mode, and nothing else.
-            cls.poll_message_set("Go to object mode or pose mode first")  # type: ignore[attr-defined]
-            return False
-        return cls._has_armature(context)
-
-    @classmethod
-    def _has_armature(cls, context: bpy.types.Context) -> bool:
-        try:
-            active_armature(context)
-        except RigError as error:
-            cls.poll_message_set(str(error).rstrip("."))  # type: ignore[attr-defined]
-            return False
-        return True
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
@@ -195,7 +177,7 @@ class OCTO_MOTION_OT_arm_add(_ArmListOperator, bpy.types.Operator):
         if context.mode not in {"POSE", "EDIT_ARMATURE"}:
             cls.poll_message_set("Select the arm's bones in pose mode or edit mode first")
             return False
-        return cls._has_armature(context)
+        return True
 
     def edit(
         self,
@@ -371,12 +353,20 @@ def draw_arms(
     layout.operator(OCTO_MOTION_OT_detect_arms.bl_idname, icon="VIEWZOOM")
     row = layout.row()
     row.template_list(
-        OCTO_MOTION_UL_arms.__name__, "", settings, "arms", settings, "active_arm", rows=5
+        OCTO_MOTION_UL_arms.__name__,
+        "",
+        settings,
+        "arms",
+        settings,
+        "active_arm",
+        # As high as the buttons beside it, or as an octopus needs.
+        rows=7,
+        maxrows=8,
     )
     _draw_buttons(row.column(align=True))
     arm = active_arm(settings)
     if arm is not None:
-        _draw_details(layout, arm)
+        _draw_details(layout, arm, list_owner(settings))
     column = layout.column()
     column.use_property_split, column.use_property_decorate = True, False
     column.prop(settings, "body_front")
@@ -397,11 +387,15 @@ def _draw_buttons(column: bpy.types.UILayout) -> None:
     column.operator(OCTO_MOTION_OT_arm_flip.bl_idname, text="", icon="ARROW_LEFTRIGHT")
 
 
-def _draw_details(layout: bpy.types.UILayout, arm: Any) -> None:
+def _draw_details(layout: bpy.types.UILayout, arm: Any, armature: bpy.types.Object) -> None:
     column = layout.column()
     column.use_property_split, column.use_property_decorate = True, False
     if arm.bones:
-        column.label(text=f"{arm.bones[0].name} … {arm.bones[-1].name}", icon="BONE_DATA")
+        told = f"{len(arm.bones)} bones, {arm.bones[0].name} … {arm.bones[-1].name}"
+        column.label(text=told, icon="BONE_DATA")
+    missing = [bone.name for bone in arm.bones if bone.name not in armature_data(armature).bones]
+    if missing:
+        column.label(text=f"No bone '{missing[0]}': detect again", icon="ERROR")
     for name in ("side", "pair", "phase", "flip"):
         column.prop(arm, name)
 
