@@ -2,6 +2,7 @@
 """Arms of any build follow their gait: on target, in one piece, without a pop or a twist."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 
 from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.core.locomotion import gait
+from octo_motion.core.locomotion.chains import BodyFrame
 from octo_motion.core.locomotion.generator import Arm, ArmPoses, GaitSettings, Generator
 from octo_motion.core.rotations import (
     Floats,
@@ -83,7 +85,7 @@ def test_no_bone_pops(name: str, joints: int) -> None:
         for turns in (posed(generator, frames).rotations for frames in (1536, 3072, 6144))
     ]
 
-    for coarse, fine in zip(largest, largest[1:], strict=False):
+    for coarse, fine in itertools.pairwise(largest):
         moving = coarse > 1e-6
         assert np.all(fine[moving] <= 0.75 * coarse[moving])
         assert fine.max() <= 0.55 * coarse.max()
@@ -223,8 +225,8 @@ def test_the_size_of_the_rig_does_not_change_its_rotations() -> None:
 # --- What the settings do ------------------------------------------------------------------------
 
 
-def generated(skeleton_arms_body: tuple[Skeleton, tuple[Arm, ...], object], **changes: object):  # noqa: ANN202
-    skeleton, arms, body = skeleton_arms_body
+def generated(rig: tuple[Skeleton, tuple[Arm, ...], BodyFrame], **changes: object) -> Generator:
+    skeleton, arms, body = rig
     chosen = {"gait": PRESETS["walk"], **changes}
     return Generator(skeleton, arms, body, GaitSettings(**chosen))  # type: ignore[arg-type]
 

@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from ..errors import RigError, SettingsError
-from ..rotations import Floats, from_axis_angle, from_matrix, multiply, rotate
+from ..rotations import Floats, from_axis_angle, from_matrix, rotate
 from ..skeleton import Skeleton
 from .arm import GROUPS, group_lengths, split_groups
 from .ccd import Chain, asked_shape, solve
