@@ -93,8 +93,9 @@ def _new_armature(
     if collection != root:
         collection.objects.link(armature)
         root.objects.unlink(armature)
-        context.view_layer.objects.active = armature
-        armature.select_set(state=True)
+        if armature in context.view_layer.objects.values():
+            context.view_layer.objects.active = armature
+            armature.select_set(state=True)
     # The skin would hide the bones.
     armature.show_in_front = True
     return armature

@@ -8,6 +8,7 @@ from typing import Final
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 from bpy_extras.object_utils import AddObjectHelper, add_object_align_init
+from mathutils import Matrix
 
 from ...blender.octopus import add_octopus
 from ...core.locomotion.octopus_shape import ARMS, JOINTS, OctopusShape
@@ -97,9 +98,18 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
             first_diameter=self.first_diameter,
             taper=self.taper,
         )
-        matrix = add_object_align_init(context, self)
-        armature = add_octopus(context, shape, matrix, with_skin=self.with_mesh)
+        armature = add_octopus(context, shape, self._place(context), with_skin=self.with_mesh)
         _show_in_local_view(context, armature)
+
+    def _place(self, context: bpy.types.Context) -> Matrix:
+        """Where Blender puts new objects; without a 3D view there is none to align them to."""
+        if not isinstance(context.space_data, bpy.types.SpaceView3D):
+            preferred = context.preferences.edit.object_align
+            if self.align == "VIEW":
+                self.align = "WORLD"
+            if preferred == "VIEW" and not self.properties.is_property_set("rotation"):
+                self.rotation = (0.0, 0.0, 0.0)
+        return add_object_align_init(context, self)
 
 
 def draw_in_add_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
