@@ -70,8 +70,8 @@ def test_six_arms_with_helpers_and_odd_names_at_a_hundredth_of_the_scale(
         ("joint37_L_034", "LEFT", 3),
         ("joint37_R_04", "RIGHT", 3),
     ]
-    # As the roots stand round the body; the arms hang down.
-    np.testing.assert_allclose(degrees(found.arms), [13.5, -13.5, 109, -109, 161, -161], atol=0.5)
+    # As the arms leave the body; further on they hang down.
+    np.testing.assert_allclose(degrees(found.arms), [11.7, -11.7, 110, -110, 164, -164], atol=0.5)
     for arm in found.arms:
         assert len(arm.bones) == 10
         assert not any("scaleCompensation" in bone for bone in arm.bones)
@@ -142,10 +142,12 @@ def test_64_chains_that_lie_over_one_another(shared_data: Data) -> None:
 def test_two_chains_one_behind_the_other(shared_data: Data) -> None:
     (armature,) = load(shared_data("octo/assimp_animation_with_skeleton.fbx")).values()
     found = detect(armature)
-    assert [arm.bones for arm in found.arms] == [
+    assert {arm.bones for arm in found.arms} == {
         ("Bone", *(f"Bone.{number:03}" for number in range(1, 7))),
         tuple(f"Bone.{number:03}" for number in range(7, 14)),
-    ]
+    }
+    # Both point along +X.
+    assert {arm.side for arm in found.arms} == {"LEFT"}
 
 
 # Blender's importer of BVH leaves its file open.

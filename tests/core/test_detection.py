@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from octo_motion.core.errors import RigError
 from octo_motion.core.locomotion.chains import (
+    ArmChain,
+    Side,
     arrange,
     body_frame,
     body_rotation,
@@ -151,6 +153,13 @@ def humanoid(arm: Sequence[str], leg: Sequence[str]) -> Rig:
     return rig
 
 
+def placed(
+    arms: Iterable[ArmChain], pair: Callable[[int], int] = int
+) -> list[tuple[tuple[str, ...], Side, int]]:
+    """Bones, side and pair of arms, their pairs renumbered."""
+    return [(arm.bones, arm.side, pair(arm.pair)) for arm in arms]
+
+
 # --- What is found ------------------------------------------------------------------------------
 
 
@@ -190,6 +199,34 @@ def test_the_order_of_bones_in_the_rig_does_not_matter(order: list[int]) -> None
     np.testing.assert_allclose(
         degrees, [22.5, -22.5, 67.5, -67.5, 112.5, -112.5, 157.5, -157.5], atol=1e-6
     )
+
+
+@given(
+    arms=st.sampled_from([2, 4, 6, 8, 12]),
+    bones=st.integers(4, 16),
+    slope=st.floats(-60.0, 40.0),
+    curl=st.floats(-150.0, 150.0),
+)
+def test_arms_that_hang_and_curl_keep_their_sides_and_pairs(
+    arms: int, bones: int, slope: float, curl: float
+) -> None:
+    """Slope at the root and turn over the whole length, up and down, in degrees."""
+    rig = Rig()
+    rig.bone("body", (0, 0, 0), (0, 0, 0.5))
+    for arm, azimuth in enumerate(angles(arms)):
+        direction, parent = outward(azimuth), "body"
+        head = 0.3 * direction
+        for number in range(bones):
+            angle = np.radians(slope + curl * number / bones)
+            tail = head + 2.0 / bones * (np.cos(angle) * direction + np.sin(angle) * UP)
+            parent = rig.bone(f"x{number}_{arm}", head, tail, parent)
+            head = tail
+    found = detect(rig)
+    pairs = arms // 2
+    assert [(arm.side, arm.pair) for arm in found.arms] == [
+        (side, pair) for pair in range(1, pairs + 1) for side in ("LEFT", "RIGHT")
+    ]
+    assert [arm.bones[0] for arm in found.arms[::2]] == [f"x0_{arm}" for arm in range(pairs)]
 
 
 def test_an_odd_arm_at_the_back_has_no_side() -> None:
@@ -643,7 +680,7 @@ def test_an_added_arm_gets_its_partners_pair() -> None:
     found = detect_arms(skeleton, UP, FRONT)
     for arm in found.arms:
         # The artist has numbered the pairs the other way round.
-        others = [(each.bones, each.side, 5 - each.pair) for each in found.arms if each != arm]
+        others = placed((each for each in found.arms if each != arm), lambda pair: 5 - pair)
         added = place_added(skeleton, arm.bones, others, found.body)
         assert (added.side, added.pair) == (arm.side, 5 - arm.pair)
         assert added.name == f"Arm {5 - arm.pair} {arm.side[0]}"
@@ -653,7 +690,7 @@ def test_an_added_arm_never_doubles_a_side_and_pair() -> None:
     skeleton = octopus([30.0, 80.0, 130.0]).skeleton()
     found = detect_arms(skeleton, UP, FRONT)
     first, *others = found.arms
-    listed = [(each.bones, each.side, 1 + number) for number, each in enumerate(others)]
+    listed = placed(others, lambda pair: pair - 1)
     added = place_added(skeleton, first.bones, listed, found.body)
     assert (added.side, added.pair) == ("LEFT", 3)
     alone = place_added(skeleton, first.bones, [], found.body)
@@ -663,6 +700,6 @@ def test_an_added_arm_never_doubles_a_side_and_pair() -> None:
 def test_a_bone_belongs_to_one_arm_only() -> None:
     skeleton = octopus().skeleton()
     found = detect_arms(skeleton, UP, FRONT)
-    others = [(each.bones, each.side, each.pair) for each in found.arms]
+    others = placed(found.arms)
     with pytest.raises(RigError, match=r"'tentacle0_1' belongs to another arm.*Remove that arm"):
         place_added(skeleton, ("tentacle0_1", "tentacle0_2", "tentacle0_3"), others, found.body)

@@ -38,6 +38,8 @@ AXES: Final[dict[str, tuple[int, int, int]]] = {
 COINCIDENT: Final = 1e-4
 # Shapes are compared at this many points along each arm.
 _SHAPE_POINTS: Final = 9
+# The point up to which an arm leads away from the body before it may turn anywhere.
+_FIRST_PART: Final = 3
 # Mean distance, in arm lengths, up to which one arm still is another's mirror image.
 _MIRROR_TOLERANCE: Final = 0.2
 # Sines of the azimuth: on the mid plane for certain; close to it; how far a name may be wrong.
@@ -337,10 +339,10 @@ _SIDE_IN_NAME: Final = re.compile(
 def _azimuths(shapes: Floats) -> Floats:
     """Direction of each arm seen from above, (arms,); NaN for one that stands on the body's axis.
 
-    A straight arm's direction is that of its tip, seen from the centre; a coiled or bent one
-    counts by where most of it lies.
+    It is where the arm's first part leads to, seen from the centre, however the rest is curled.
     """
-    direction = shapes.mean(axis=1) + 0.5 * (shapes[:, -1] - shapes[:, 0])
+    root, part = shapes[:, 0], shapes[:, _FIRST_PART]
+    direction = root + 2.0 * (part - root)
     azimuths = np.arctan2(direction[:, 0], -direction[:, 1])
     azimuths[np.hypot(direction[:, 0], direction[:, 1]) < 1e-3] = np.nan
     return azimuths

@@ -25,6 +25,7 @@ from .arm_family import best_family
 from .bone_tree import REMEDY, BoneTree, Chain, candidate_chains, is_control_name
 from .chains import (
     AXES,
+    COINCIDENT,
     MOST_ARMS,
     ArmChain,
     BodyFrame,
@@ -127,18 +128,21 @@ def control_chain(skeleton: Skeleton, bones: Sequence[str]) -> tuple[str, ...]:
     joints = joint_positions(skeleton, bones)
     reach = float(np.linalg.norm(np.diff(joints, axis=0), axis=1).sum())
     own = set(bones)
-    layers: list[list[int]] = []
-    for joint in joints[:-1]:
-        at_joint = np.linalg.norm(skeleton.heads - joint, axis=1) < 1e-4 * reach
-        layers.append(
-            [bone for bone in np.flatnonzero(at_joint).tolist() if skeleton.names[bone] not in own]
-        )
-    twins = [[root] for root in layers[0] if not skeleton.constrained[root]]
-    for layer in layers[1:]:
-        # A child at the next joint that itself leads on; a tweak bone sits there alone.
-        twins = [
-            [*twin, bone] for twin in twins for bone in layer if skeleton.parents[bone] == twin[-1]
+
+    def at(joint: Floats, candidates: Sequence[int]) -> list[int]:
+        distances = np.linalg.norm(skeleton.heads[list(candidates)] - joint, axis=1)
+        near = (distances < COINCIDENT * reach).tolist()
+        return [
+            bone
+            for bone, is_near in zip(candidates, near, strict=True)
+            if is_near and skeleton.names[bone] not in own
         ]
+
+    roots = at(joints[0], range(len(skeleton)))
+    twins = [[root] for root in roots if not skeleton.constrained[root]]
+    for joint in joints[1:-1]:
+        # A child at the next joint that itself leads on; a tweak bone sits there alone.
+        twins = [[*twin, bone] for twin in twins for bone in at(joint, skeleton.children[twin[-1]])]
     if not twins:
         return ()
     best = min(
