@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is measured: an octopus on a route, and where its arms' groups shall be at each frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from octo_motion.blender.curves import add_route_curve
+from octo_motion.core.locomotion.gait import evaluate
+from octo_motion.core.locomotion.generator import _Build
+from octo_motion.core.locomotion.targets import BANK, PITCH, contraction, link_rotations
+from octo_motion.core.locomotion.targets import pseudo_targets as chain_of_targets
+from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.core.rotations import Floats, rotate
+from octo_motion.ui.locomotion.workflow import Shot, prepare
+
+_CYCLE_FRAMES = 48
+"""Two seconds at 24 frames a second: the default of the settings."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """A third of an arm: the bones that converge to one pseudo-target."""
+
+    bones: tuple[str, ...]
+    """Root to end."""
+    arm_length: float
+    targets: Floats
+    """(frames, 3) in armature space."""
+
+
+def build(arms: int, joints: int, frames: int, gait: str, *, skin: bool) -> bpy.types.Object:
+    """An octopus and its settings, on a route so long that the gait has its usual tempo."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.octo_motion.add_octopus(arms=arms, joints=joints, with_mesh=skin)
+    armature = bpy.context.object
+    assert armature is not None
+    settings = armature.octo_motion.locomotion
+    settings.gait = gait
+    # Half an arm length of travel for each cycle: the stride does not matter to the cost.
+    reach = 0.3 * max(1.0, frames / _CYCLE_FRAMES)
+    controls = reach * np.array([(0, 0, 0), (0, -0.4, 0), (0.3, -0.6, 0), (0.3, -1, 0)])
+    settings.route = add_route_curve("Route", controls, bpy.context.scene.collection)
+    settings.timing = "RANGE"
+    settings.frame_start, settings.frame_end = 1, frames
+    # Steering would move the targets by a rule of our own; the comparison is about reaching them.
+    settings.turning = 0.0
+    return armature
+
+
+def groups(armature: bpy.types.Object) -> list[Group]:
+    """All groups of all arms with their pseudo-targets, by the formulas of the gait alone."""
+    shot = prepare(armature, bpy.context)
+    generator = shot.generator
+    phases = generator.arm_phases(plan_travel(shot.route, shot.travel, shot.times).phase)
+    angles = evaluate(shot.gait, phases, tuple(arm.pair for arm in shot.arms))
+    hands = np.array([arm.handedness for arm in shot.arms])
+    angles[..., PITCH] *= hands[:, None]
+    angles[..., BANK] *= hands[:, None]
+    return [group for build in generator._builds for group in _groups_of(shot, build, angles)]
+
+
+def _groups_of(shot: Shot, build: _Build, angles: Floats) -> list[Group]:
+    generator = shot.generator
+    result: list[Group] = []
+    for arm in build.arms:
+        sizes = build.chain.sizes
+        widths = build.widths * (1.0 + contraction(angles[:, arm])) ** (np.array(sizes) > 1)
+        own = chain_of_targets(link_rotations(angles[:, arm]), widths)
+        length = float(generator._lengths[arm])
+        outward = rotate(generator._outward[arm], own[:, 1:])
+        places = shot.body.center + rotate(
+            generator._to_armature, generator._roots[arm] + length * outward
+        )
+        ends = np.cumsum((0, *sizes))
+        result += [
+            Group(shot.arms[arm].bones[ends[each] : ends[each + 1]], length, places[:, each])
+            for each in range(len(sizes))
+        ]
+    return result
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What an animation is like, as Blender plays it."""
+
+    largest_error: float
+    """Largest distance of a group's end from its target, in arm lengths."""
+    mean_error: float
+    largest_turn: float
+    """Degrees that a bone of an arm turns against its parent from one frame to the next, at
+    most: where it is large, the animation pops."""
+
+
+def quality(armature: bpy.types.Object, wanted: list[Group], frames: int) -> Quality:
+    """Play the animation anew, all of it or two frames running at 500 places."""
+    places = min(frames - 1, 999 if frames <= 1000 else 500)
+    starts = np.unique(np.linspace(1, frames - 1, places).astype(int))
+    # What is looked at is the bones; deforming the skin would only take time.
+    for child in armature.children:
+        child.modifiers.clear()
+    bones = [bone for group in wanted for bone in group.bones]
+    misses: list[float] = []
+    turns: list[float] = []
+    rotations: dict[int, Floats] = {}
+    for start in starts.tolist():
+        for number in (start, start + 1):
+            if number in rotations:
+                continue
+            bpy.context.scene.frame_set(number)
+            pose = armature.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose
+            assert pose is not None
+            rotations[number] = np.array([pose.bones[bone].rotation_quaternion for bone in bones])
+            for group in wanted:
+                tail = np.array(pose.bones[group.bones[-1]].tail)
+                missed = np.linalg.norm(tail - group.targets[number - 1])
+                misses.append(float(missed) / group.arm_length)
+        cosine = np.abs(np.sum(rotations[start] * rotations[start + 1], axis=-1)).clip(0.0, 1.0)
+        turns.append(float(np.degrees(2.0 * np.arccos(cosine.min()))))
+    return Quality(max(misses), sum(misses) / len(misses), max(turns))
