@@ -468,6 +468,17 @@ def test_undo_takes_a_change_of_the_list_back_in_one_step(
     assert found == before
 
 
+def test_undo_of_selecting_an_arm_leads_back_to_object_mode() -> None:
+    armature = new_octopus()
+    call("detect_arms")
+    push()
+    call("arm_select")
+    assert bpy.context.mode == "POSE"
+    armature = undone(armature)
+    assert bpy.context.mode == "OBJECT"
+    assert len(listed(armature)) == 8
+
+
 def test_undo_takes_an_arm_added_in_pose_mode_back() -> None:
     armature = new_octopus()
     select(armature, bones_of(0))
