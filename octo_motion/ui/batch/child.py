@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One shot in a Blender of its own, and how to start that Blender."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import bpy
+
+from ...core.errors import OctoMotionError
+from .entry import ShotEntry
+from .outputs import remove_staged, write_json
+from .processes import dying_with_parent
+from .stage import perform
+
+RUN_SHOT: Final = "--run-shot"
+"""First argument of a process that makes one shot; the paths of request and answer follow."""
+
+COMMAND: Final = "octo_motion"
+"""Name of the command in ``blender --command octo_motion``."""
+
+_PACKAGE: Final = __name__.removesuffix(".ui.batch.child")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a process says about its shot."""
+
+    error: str = ""
+    frames: int | None = None
+    frame_start: int | None = None
+    frame_end: int | None = None
+    warnings: tuple[str, ...] = ()
+    libraries: tuple[str, ...] = ()
+
+
+def child_command(request: Path, answer: Path) -> list[str]:
+    """The command that makes one shot in another Blender like this one."""
+    arguments = [RUN_SHOT, str(request), str(answer)]
+    if not bpy.app.binary_path:
+        return [sys.executable, "-m", _PACKAGE, *arguments]
+    factory = ["--factory-startup"] if bpy.app.factory_startup else []
+    # Named once more: it may have been enabled for this session alone.
+    add_on = ["--addons", _PACKAGE]
+    return [
+        bpy.app.binary_path,
+        "--background",
+        *factory,
+        *add_on,
+        "--command",
+        COMMAND,
+        *arguments,
+    ]
+
+
+def child_environment() -> dict[str, str]:
+    """Environment in which another Python finds this package."""
+    root = Path(__file__).resolve().parents[2 + len(_PACKAGE.split("."))]
+    paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH", "")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1"}
+
+
+def write_request(path: Path, entry: ShotEntry, places: Mapping[Path, Path]) -> None:
+    """Write down what a process is to do; ``run_shot`` does it."""
+    plain = {str(output): str(place) for output, place in places.items()}
+    write_json(path, {"entry": entry.to_plain(), "places": plain})
+
+
+def read_answer(path: Path) -> Answer | None:
+    """What a process has said, or None if it ended before it could."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    return Answer(**content)
+
+
+def run_shot(request: Path, answer: Path) -> int:
+    """Make the shot that is asked for, in the process of its own; the exit status."""
+    asked = json.loads(request.read_text(encoding="utf-8"))
+    entry = ShotEntry.from_plain(asked["entry"])
+    places = {Path(output): Path(place) for output, place in asked["places"].items()}
+
+    def clean_up() -> None:
+        for place in places.values():
+            remove_staged(place)
+
+    try:
+        with dying_with_parent(clean_up):
+            performed = perform(entry, places)
+    except OctoMotionError as error:
+        write_json(answer, {"error": str(error)})
+        return 1
+    except Exception as error:  # noqa: BLE001 - a fault of ours is one shot's, and is told
+        traceback.print_exc()
+        write_json(answer, {"error": f"{type(error).__name__}: {error}"})
+        return 1
+    summary = performed.summary
+    said: dict[str, Any] = {
+        "frames": summary.frames,
+        "frame_start": summary.frame_start,
+        "frame_end": summary.frame_end,
+        "warnings": summary.warnings,
+        "libraries": performed.libraries,
+    }
+    write_json(answer, said)
+    return 0

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``blender --command octo_motion``: what the words of the command line do."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import bpy
+
+from ...core.errors import OctoMotionError, SettingsError, WriteError
+from ...core.locomotion import gait
+from .bake import STOPPED, BakeOptions, bake
+from .child import COMMAND, RUN_SHOT, run_shot
+from .command_line import parse
+from .entry import ShotEntry
+from .job import Known, export_fault, is_gait_file, read_gait_file
+from .known import known, object_names
+from .outputs import commit, staged
+from .processes import stoppable
+from .setting_values import check_settings, parse_assignments
+from .stage import perform
+
+IN_BLENDER: Final = f"blender --background [FILE] --command {COMMAND}"
+
+_WRONG: Final = 2
+
+_handles: list[Any] = []
+
+
+def register() -> None:
+    """Make the command known to Blender."""
+    _handles.append(bpy.utils.register_cli_command(COMMAND, _execute))
+
+
+def unregister() -> None:
+    """Take the command away."""
+    while _handles:
+        bpy.utils.unregister_cli_command(_handles.pop())
+
+
+def _execute(arguments: list[str]) -> int:
+    return main(arguments, IN_BLENDER, has_open_file=True)
+
+
+def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
+    """Do what the command line says; the exit status."""
+    if len(arguments) == 3 and arguments[0] == RUN_SHOT:
+        return run_shot(Path(arguments[1]), Path(arguments[2]))
+    options = parse(arguments, program, has_open_file=has_open_file)
+    if isinstance(options, int):
+        return options
+    try:
+        with stoppable():
+            if options.command == "bake":
+                return _bake(options)
+            return _generate(options)
+    except KeyboardInterrupt:
+        print("Stopped.", file=sys.stderr)
+        return STOPPED
+
+
+def _bake(options: argparse.Namespace) -> int:
+    wanted = BakeOptions(
+        job=options.job,
+        report=options.report.resolve() if options.report else None,
+        jobs=options.jobs,
+        force=options.force,
+        check=options.check,
+        only=tuple(options.only),
+    )
+    try:
+        return bake(wanted, known(), object_names, _say)
+    except OctoMotionError as error:
+        return _complain(error, _WRONG)
+
+
+def _generate(options: argparse.Namespace) -> int:
+    try:
+        entry = _entry(options, known())
+    except OctoMotionError as error:
+        return _complain(error, _WRONG)
+    try:
+        with staged(entry.outputs) as places:
+            performed = perform(entry, places)
+            commit(places)
+    except OctoMotionError as error:
+        return _complain(error, 1)
+    for warning in performed.summary.warnings:
+        _say(f"Warning: {warning}")
+    _say(f"{performed.armature}: {performed.summary.message}")
+    for path in entry.outputs:
+        _say(f"Written: {path}")
+    return 0
+
+
+def _entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
+    """What the arguments ask for.
+
+    Raises:
+        OctoMotionError: they make no sense.
+    """
+    source = options.file.resolve() if options.file else None
+    read = source or (Path(bpy.data.filepath).resolve() if bpy.data.filepath else None)
+    if read is None:
+        raise OctoMotionError("No file is open.", "Give the .blend file to read.")
+    output = options.output.resolve() if options.output else None
+    if output is None and options.overwrite:
+        output = read
+    exports = tuple(path.resolve() for path in options.export)
+    if output is None and not exports:
+        raise WriteError(
+            "There is nothing to write.",
+            "Give --output, --export, or --overwrite for the file itself.",
+        )
+    if output is not None and output.suffix.lower() != ".blend":
+        raise WriteError(f"The output '{output.name}' is no .blend file.", "Let it end in .blend.")
+    for path in exports:
+        if fault := export_fault(path):
+            raise WriteError(fault)
+    outputs = (*((output,) if output else ()), *exports)
+    if len(set(outputs)) < len(outputs):
+        raise WriteError("Two outputs have the same path.", "Give each its own.")
+    for path in outputs:
+        if path.exists() and not options.overwrite:
+            what = "is the file that is read" if path == read else "is there already"
+            raise WriteError(f"'{path}' {what}.", "Give another path, or --overwrite.")
+    values, faults = check_settings(may_name.settings, parse_assignments(options.settings))
+    if faults:
+        raise SettingsError("\n".join(faults))
+    return ShotEntry(
+        name=read.stem,
+        file=source,
+        armature=options.armature,
+        route=options.route,
+        gait=_gait(options.gait, may_name),
+        settings=values,
+        fps=options.fps,
+        output=output,
+        exports=exports,
+    )
+
+
+def _gait(name: str, may_name: Known) -> str:
+    if not name:
+        return ""
+    table = read_gait_file(Path(name)) if is_gait_file(name) else may_name.gait(name)
+    return gait.to_json(table)
+
+
+def _complain(error: OctoMotionError, status: int) -> int:
+    print(f"Error: {error}", file=sys.stderr, flush=True)
+    return status
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)

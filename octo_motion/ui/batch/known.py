@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What shots may name, asked of Blender: settings, gaits, objects of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...blender import presets
+from ...core.errors import OctoMotionError
+from ..locomotion.properties import OCTO_MOTION_PG_locomotion
+from .job import Known
+from .setting_values import Setting
+
+_OWN_KEYS = {"name", "gait"}
+"""No settings: Blender's own name of a group, and the gait, which a shot names itself."""
+
+
+def known() -> Known:
+    """What shots may name in this Blender."""
+    return Known(
+        settings={setting.name: setting for setting in _settings(OCTO_MOTION_PG_locomotion)},
+        gait=presets.load_gait,
+    )
+
+
+def _settings(group: Any, before: str = "") -> Iterator[Setting]:
+    """Plain values of a group of properties, and of the groups within."""
+    properties: Any = group.bl_rna.properties  # of many types, which the stubs do not tell apart
+    for each in properties:
+        if each.identifier in {"rna_type", *_OWN_KEYS} or each.is_hidden:
+            continue
+        name = before + each.identifier
+        if each.type == "POINTER":
+            inner = bpy.types.PropertyGroup.bl_rna_get_subclass_py(each.fixed_type.identifier, None)
+            if inner is not None:
+                yield from _settings(inner, f"{name}.")
+        elif each.type in {"BOOLEAN", "INT", "FLOAT"} and each.is_array:
+            continue
+        elif each.type in {"INT", "FLOAT"}:
+            yield Setting(
+                name,
+                each.type,
+                minimum=each.hard_min,
+                maximum=each.hard_max,
+                is_angle=each.unit == "ROTATION",
+            )
+        elif each.type == "ENUM":
+            choices = tuple(item.identifier for item in each.enum_items)
+            yield Setting(name, "ENUM", choices=choices)
+        elif each.type in {"BOOLEAN", "STRING"}:
+            yield Setting(name, each.type)
+
+
+def object_names(file: Path) -> set[str]:
+    """Names of the objects in a file, which is not opened.
+
+    Raises:
+        OctoMotionError: there is no such file, or Blender cannot read it.
+    """
+    if not file.is_file():
+        raise OctoMotionError(f"There is no file '{file}'.", "Give the path of a .blend file.")
+    try:
+        library: Any = bpy.data.libraries.load(str(file))  # the stubs know no context manager
+        with library as (inside, _taken):
+            return set(inside.objects)
+    except OSError as error:
+        raise OctoMotionError(
+            f"'{file}' is not a file that this Blender can read.", "Give a .blend file."
+        ) from error

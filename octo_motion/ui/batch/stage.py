@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One shot in this Blender: open or make the scene, generate, write."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import bpy
+from mathutils import Matrix
+
+from ...blender import actions
+from ...blender.armature import read_skeleton, world_matrix
+from ...blender.curves import add_route_curve
+from ...blender.octopus import add_octopus
+from ...core.errors import OctoMotionError, RigError, RouteError, WriteError
+from ...core.locomotion import gait
+from ...core.locomotion.detection import detect_arms
+from ..locomotion.properties import locomotion_settings, set_gait
+from ..locomotion.workflow import Summary, generate
+from .entry import NewRoute, ShotEntry, frame_rate
+from .exports import export
+
+_ROUTE_NAME: Final = "Octopus Route"
+_COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
+"""How files compressed with Zstandard and with gzip begin."""
+
+
+@dataclass(frozen=True)
+class Performed:
+    """What came of a shot."""
+
+    summary: Summary
+    armature: str
+    libraries: tuple[str, ...]
+    """Paths of the files that the scene is linked from."""
+
+
+def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
+    """Make a shot and write its outputs.
+
+    Args:
+        entry: the shot.
+        places: where each of its outputs is to be written.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    compress = _open(entry)
+    scene = bpy.context.scene
+    assert scene is not None
+    if entry.octopus is not None:
+        armature = add_octopus(
+            bpy.context, entry.octopus.shape, Matrix(), with_skin=entry.octopus.with_mesh
+        )
+    else:
+        armature = find_armature(entry.armature, scene)
+        scene = _scene_of(armature, scene)
+    libraries = tuple(bpy.path.abspath(each.filepath) for each in bpy.data.libraries)
+    with bpy.context.temp_override(scene=scene, view_layer=_view_layer(scene, armature)):
+        if entry.fps is not None:
+            scene.render.fps, scene.render.fps_base = frame_rate(entry.fps)
+        _apply(entry, armature, scene)
+        summary = generate(armature, bpy.context)
+        if entry.octopus is not None:
+            scene.frame_start, scene.frame_end = summary.frame_start, summary.frame_end
+        if entry.output is not None:
+            _save(places[entry.output], compress=compress)
+        # Whatever the exports need of the scene, the file has been saved before.
+        for path in entry.exports:
+            export(places[path], armature, scene, summary.frame_start, summary.frame_end)
+    return Performed(summary, armature.name, libraries)
+
+
+def _open(entry: ShotEntry) -> bool:
+    """Have the scene open; whether its file is compressed."""
+    if entry.octopus is not None:
+        bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+        return False
+    if entry.file is None:
+        return _is_compressed(Path(bpy.data.filepath))
+    if not entry.file.is_file():
+        raise OctoMotionError(
+            f"There is no file '{entry.file}'.", "Give the path of a .blend file."
+        )
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(entry.file), load_ui=False)
+    except RuntimeError as error:
+        raise OctoMotionError(
+            f"'{entry.file}' cannot be opened: {_said(error)}", "Give a .blend file."
+        ) from error
+    return _is_compressed(entry.file)
+
+
+def _is_compressed(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return file.read(4).startswith(_COMPRESSED)
+    except OSError:
+        return False
+
+
+def find_armature(name: str, scene: bpy.types.Scene) -> bpy.types.Object:
+    """The armature of that name, or the one that has arms.
+
+    Where several have arms, the scene's active object decides. Linked armatures count only where
+    there is no other: nothing could be written on them.
+
+    Raises:
+        RigError: there is none, or it is not clear which.
+    """
+    if name:
+        found = [each for each in bpy.data.objects if each.name == name]
+        if not found:
+            raise RigError(f"There is no object '{name}'.", _choose(bpy.data.objects))
+        local = [each for each in found if each.library is None]
+        return _checked((local or found)[0])
+    every = [each for each in scene.objects if each.type == "ARMATURE"]
+    armatures = [each for each in every if each.library is None] or every
+    if not armatures:
+        raise RigError(f"The scene '{scene.name}' has no armature.", "Give a file that has one.")
+    with_arms = [each for each in armatures if _has_arms(each)]
+    if len(with_arms) == 1:
+        return with_arms[0]
+    active = scene.view_layers[0].objects.active
+    candidates = with_arms or armatures
+    if active in candidates:
+        return active
+    if len(candidates) == 1:
+        return candidates[0]
+    raise RigError(f"{len(candidates)} armatures could be meant.", _choose(candidates))
+
+
+def _choose(objects: Any) -> str:
+    names = sorted(each.name for each in objects if each.type == "ARMATURE")
+    if not names:
+        return "Give a file that has an armature."
+    return f"Name the armature: {', '.join(names)}."
+
+
+def _checked(armature: bpy.types.Object) -> bpy.types.Object:
+    if armature.type != "ARMATURE":
+        raise RigError(f"'{armature.name}' is not an armature.", _choose(bpy.data.objects))
+    return armature
+
+
+def _has_arms(armature: bpy.types.Object) -> bool:
+    if len(locomotion_settings(armature).arms):
+        return True
+    world = world_matrix(armature)
+    try:
+        detect_arms(read_skeleton(armature), world[2, :3], -world[1, :3])
+    except RigError:
+        return False
+    return True
+
+
+def _scene_of(armature: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Scene:
+    """The scene given if the armature is in it, else the first that has it."""
+    if armature.name in scene.objects:
+        return scene
+    for other in bpy.data.scenes:
+        if armature.name in other.objects:
+            return other
+    raise RigError(f"'{armature.name}' is in no scene.", "Link it to a scene.")
+
+
+def _view_layer(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.ViewLayer:
+    layers = list(scene.view_layers)
+    return next((each for each in layers if armature.name in each.objects), layers[0])
+
+
+def _apply(entry: ShotEntry, armature: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Write what the shot asks for into the armature's settings."""
+    actions.writable_armature(armature)
+    settings: Any = locomotion_settings(armature)
+    if entry.gait:
+        set_gait(settings, gait.from_json(entry.gait))
+    for name, value in entry.settings.items():
+        *groups, last = name.split(".")
+        group = settings
+        for each in groups:
+            group = getattr(group, each)
+        setattr(group, last, value)
+    if isinstance(entry.route, NewRoute):
+        settings.route = _draw(entry.route, scene)
+    elif entry.route:
+        settings.route = _curve(entry.route)
+
+
+def _draw(route: NewRoute, scene: bpy.types.Scene) -> bpy.types.Object:
+    if not scene.is_editable:
+        raise WriteError(f"The scene '{scene.name}' is linked.", "Name a curve as the route.")
+    if route.is_bezier:
+        return add_route_curve(_ROUTE_NAME, route.points, scene.collection)
+    data = bpy.data.curves.new(_ROUTE_NAME, "CURVE")
+    data.dimensions = "3D"
+    spline = data.splines.new("BEZIER")
+    spline.bezier_points.add(len(route.points) - 1)
+    spline.use_cyclic_u = route.cyclic
+    for point, place in zip(spline.bezier_points, route.points, strict=True):
+        point.co = place
+        point.handle_left_type = point.handle_right_type = "AUTO"
+    curve = bpy.data.objects.new(_ROUTE_NAME, data)
+    scene.collection.objects.link(curve)
+    return curve
+
+
+def _curve(name: str) -> bpy.types.Object:
+    found = [each for each in bpy.data.objects if each.name == name]
+    curves = [each for each in found if each.type == "CURVE"]
+    if curves:
+        return curves[0]
+    problem = f"'{name}' is not a curve." if found else f"There is no curve '{name}'."
+    names = sorted(each.name for each in bpy.data.objects if each.type == "CURVE")
+    raise RouteError(
+        problem, f"Name one of {', '.join(names)}." if names else "Give a route by its points."
+    )
+
+
+def _save(place: Path, *, compress: bool) -> None:
+    # As a copy: the file that is open stays what it is. Paths in it that are relative are made so
+    # for the new folder.
+    _run(
+        lambda: bpy.ops.wm.save_as_mainfile(
+            filepath=str(place),
+            check_existing=False,
+            compress=compress,
+            relative_remap=True,
+            copy=True,
+        ),
+        "The file",
+    )
+
+
+def _run(operator: Callable[[], Any], what: str) -> None:
+    try:
+        operator()
+    except RuntimeError as error:
+        raise WriteError(
+            f"{what} cannot be written: {_said(error)}", "Choose another place."
+        ) from error
+
+
+def _said(error: RuntimeError) -> str:
+    """The first line of what an operator of Blender's reported."""
+    text = str(error).strip().splitlines() or [""]
+    return text[0].removeprefix("Error: ").strip() or "Blender does not say why."
