@@ -13,7 +13,7 @@ from ..rotations import Floats, normalized
 from .octopus_body import EYE_ANGLE, EYE_STATION, MANTLE_WIDEST, SIPHON_STATION, BodyForm
 from .octopus_rig import EYE_LEFT, EYE_RIGHT, HEAD, SIPHON
 from .octopus_sheets import END_ROWS, HEAD_ROWS, Sheet
-from .octopus_skin import mixed, rigid
+from .octopus_skin import Influences, mixed, rigid
 from .octopus_surface import Material, Surface
 from .octopus_topology import Indices, cap_size, patch_border
 
@@ -68,7 +68,7 @@ def add_head_details(
     middle = round(EYE_ANGLE * count / math.tau)
     rows, columns = _patch(sheet.points, EYE_STATION, middle, _EYE_PATCH * form.eye_radius)
     loop = patch_border(vertices[np.ix_(rows, columns)])
-    around = _Border(_at_border(sheet.points, rows, columns), _at_border(normals, rows, columns))
+    around = _border(sheet, normals, rows, columns)
     _add_eye(surface, form, loop, around, len(rows) - 1, bone=EYE_LEFT)
     with surface.mirrored():
         # The right eye's vertices, in the order of the left eye's.
@@ -79,7 +79,7 @@ def add_head_details(
 
     rows, columns = _patch(sheet.points, SIPHON_STATION, count // 2, _SIPHON_PATCH * form.unit)
     loop = patch_border(vertices[np.ix_(rows, columns)])
-    around = _Border(_at_border(sheet.points, rows, columns), _at_border(normals, rows, columns))
+    around = _border(sheet, normals, rows, columns)
     _add_siphon(surface, form, loop, around, len(rows) - 1)
     wanted[np.ix_(rows[:-1], columns[:-1])] = False
     return wanted
@@ -97,16 +97,19 @@ def _patch(points: Floats, station: float, column: int, reach: float) -> tuple[I
 
 
 class _Border(NamedTuple):
-    """What is round a patch, (n, 3) each."""
+    """The sheet on the loop round a patch: points and outward normals, (n, 3)."""
 
     points: Floats
     normals: Floats
+    influences: Influences
+    """(n, k)"""
 
 
-def _at_border(grid: Floats, rows: Indices, columns: Indices) -> Floats:
-    """Values (n, 3) on the loop round a patch."""
+def _border(sheet: Sheet, normals: Floats, rows: Indices, columns: Indices) -> _Border:
     row, column = np.meshgrid(rows, columns, indexing="ij")
-    return grid[patch_border(row), patch_border(column)]
+    loop = patch_border(row), patch_border(column)
+    bones, weights = sheet.influences
+    return _Border(sheet.points[loop], normals[loop], Influences(bones[loop], weights[loop]))
 
 
 def _normals(points: Floats) -> Floats:
@@ -138,18 +141,30 @@ def _add_eye(
     upwards = np.maximum(outward @ _frame(gaze)[1], 0.0)
     polar = np.radians(angle - drop * upwards)[..., None]
     lids = centre + radius * distance[..., None] * (np.sin(polar) * outward + np.cos(polar) * gaze)
-    rings = np.concatenate([_slope(*around, lids[0]), lids])
-    last = surface.add_rings(loop, rings, rigid(HEAD, (1, 1)), [Material.SKIN] * len(rings))
+    rings = np.concatenate([_slope(around, lids[0]), lids])
+    # The head's skin may bend towards the mantle; the lids must fit the ball.
+    shares = np.array([*_SLOPE_STEPS, *np.ones(len(lids))])
+    influences = _from_border(around, HEAD, shares)
+    last = surface.add_rings(loop, rings, influences, [Material.SKIN] * len(rings))
     surface.add_cap(last, rings[-1], rigid(HEAD, (1, 1)), Material.SKIN, first_side=first_side)
     _add_eyeball(surface, form, bone)
 
 
-def _slope(foot: Floats, normals: Floats, edge: Floats) -> Floats:
-    """Rings (r, n, 3) from a foot to an edge, (n, 3), that leave the surface without a crease."""
-    way = edge - foot
-    bend = foot + 0.6 * (way - np.sum(way * normals, axis=-1, keepdims=True) * normals)
+def _slope(foot: _Border, edge: Floats) -> Floats:
+    """Rings (r, n, 3) from a border to an edge (n, 3) that leave the surface without a crease."""
+    way = edge - foot.points
+    rise = np.sum(way * foot.normals, axis=-1, keepdims=True) * foot.normals
+    bend = foot.points + 0.6 * (way - rise)
     t = np.array(_SLOPE_STEPS)[:, None, None]
-    return (1.0 - t) ** 2 * foot + 2.0 * t * (1.0 - t) * bend + t**2 * edge
+    return (1.0 - t) ** 2 * foot.points + 2.0 * t * (1.0 - t) * bend + t**2 * edge
+
+
+def _from_border(around: _Border, bone: int, shares: Floats) -> Influences:
+    """Influences of rings (r, n, k): a bone gets the shares (r,), the border's bones the rest."""
+    bones, weights = around.influences
+    grid = (len(shares), *weights.shape)
+    border = Influences(np.broadcast_to(bones, grid), np.broadcast_to(weights, grid))
+    return mixed(border, rigid(bone, grid[:-1]), np.broadcast_to(shares[:, None], grid[:-1]))
 
 
 def _add_eyeball(surface: Surface, form: BodyForm, bone: int) -> None:
@@ -188,8 +203,7 @@ def _add_siphon(
     outward = _directions_round(axis, around.points - np.mean(around.points, axis=0))
     along, radius = form.unit * _SIPHON[:, :1, None], form.unit * _SIPHON[:, 1:, None]
     tube = root + along * axis + radius * outward
-    rings = np.concatenate([_slope(*around, tube[0]), tube])
-    one_each = (len(rings), 1)
-    influences = mixed(rigid(HEAD, one_each), rigid(SIPHON, one_each), _SIPHON_SHARES[:, None])
+    rings = np.concatenate([_slope(around, tube[0]), tube])
+    influences = _from_border(around, SIPHON, _SIPHON_SHARES)
     last = surface.add_rings(loop, rings, influences, [Material.SKIN] * len(rings))
     surface.add_cap(last, rings[-1], rigid(SIPHON, (1, 1)), Material.BEAK, first_side=first_side)

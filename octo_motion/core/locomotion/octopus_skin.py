@@ -73,8 +73,8 @@ def along_arm(shape: OctopusShape, arm: Indices, distance: Floats) -> Influences
 
 def along_body(station: Floats) -> Influences:
     """Influences (…, 3) of body, head and mantle at stations of the body's axis."""
-    head = smooth_step(-0.6, HEAD_MIDDLE - 0.6, station)
-    mantle = smooth_step(NECK - 0.9, MANTLE_EDGE + 0.2, station)
+    head = smooth_step(-1.0, HEAD_MIDDLE, station)
+    mantle = smooth_step(NECK - 0.7, MANTLE_EDGE + 1.0, station)
     bones = np.broadcast_to(np.array([BODY, HEAD, MANTLE]), (*station.shape, 3))
     return Influences(bones, np.stack([1.0 - head, head * (1.0 - mantle), head * mantle], axis=-1))
 
