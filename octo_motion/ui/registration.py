@@ -9,27 +9,35 @@ from typing import Any
 import bpy
 
 from . import settings
+from .batch import registration as command_line
 from .locomotion import (
+    add_octopus,
     add_route,
-    arm_properties,
+    arm_list,
     gait_properties,
     gait_table,
     generate,
+    panels,
     properties,
 )
 
 Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
 
-MENUS: tuple[tuple[Any, Draw], ...] = ((bpy.types.VIEW3D_MT_curve_add, add_route.draw_in_add_menu),)
+MENUS: tuple[tuple[Any, Draw], ...] = (
+    (bpy.types.VIEW3D_MT_armature_add, add_octopus.draw_in_add_menu),
+    (bpy.types.VIEW3D_MT_curve_add, add_route.draw_in_add_menu),
+)
 
 CLASSES: tuple[type, ...] = (
     *gait_properties.CLASSES,
-    *arm_properties.CLASSES,
+    *arm_list.CLASSES,
     *properties.CLASSES,
     *settings.CLASSES,
+    add_octopus.OCTO_MOTION_OT_add_octopus,
     add_route.OCTO_MOTION_OT_add_route,
     *gait_table.CLASSES,
     generate.OCTO_MOTION_OT_generate_locomotion,
+    *panels.CLASSES,
 )
 
 
@@ -40,10 +48,12 @@ def register() -> None:
     settings.register()
     for menu, draw in MENUS:
         menu.append(draw)
+    command_line.register()
 
 
 def unregister() -> None:
     """Take back what ``register`` did, in reverse order."""
+    command_line.unregister()
     for menu, draw in reversed(MENUS):
         menu.remove(draw)
     settings.unregister()

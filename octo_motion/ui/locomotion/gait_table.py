@@ -13,10 +13,10 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 from ...blender import presets
 from ...blender.actions import writable_armature
 from ...blender.armature import active_armature
-from ...core.errors import GaitError, RigError, WriteError
+from ...core.errors import GaitError
 from ...core.locomotion import gait
 from ...core.locomotion.gait import CYCLE
-from ..operator_base import OctoOperator
+from .armature_operator import ArmatureOperator
 from .gait_properties import SIDES, fill_curve, read_curve
 from .properties import (
     OCTO_MOTION_PG_locomotion,
@@ -30,21 +30,15 @@ if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
 
 
-class _GaitOperator(OctoOperator):
-    """What all of them need: settings that can be written."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        try:
-            writable_armature(active_armature(context))
-        except (RigError, WriteError) as error:
-            cls.poll_message_set(f"{error.problem} {error.remedy}")  # type: ignore[attr-defined]
-            return False
-        return True
-
-
 def _settings(context: bpy.types.Context) -> OCTO_MOTION_PG_locomotion:
-    return locomotion_settings(active_armature(context))
+    """Settings that can be written.
+
+    Raises:
+        WriteError: the armature is linked.
+    """
+    armature = active_armature(context)
+    writable_armature(armature)
+    return locomotion_settings(armature)
 
 
 def _editable(settings: OCTO_MOTION_PG_locomotion) -> Any:
@@ -64,7 +58,7 @@ def _active(collection: Any, index: int, what: str) -> Any:
 # --- Presets -------------------------------------------------------------------------------------
 
 
-class OCTO_MOTION_OT_gait_load(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_load(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_load"
     bl_label = "Load Gait"
     bl_description = "Load a gait into the table, in place of what is there"
@@ -82,7 +76,7 @@ class OCTO_MOTION_OT_gait_load(_GaitOperator, bpy.types.Operator):
         load_gait(settings, self.name or settings.gait)
 
 
-class OCTO_MOTION_OT_gait_save(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_save(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_save"
     bl_label = "Save Gait as Preset"
     bl_description = "Keep the table among your own gaits, for this and all other files"
@@ -103,7 +97,7 @@ class OCTO_MOTION_OT_gait_save(_GaitOperator, bpy.types.Operator):
         event: bpy.types.Event,  # noqa: ARG002
     ) -> set[OperatorReturnItems]:
         """Ask for the name."""
-        current = _settings(context).gait
+        current = locomotion_settings(active_armature(context)).gait
         own = current in presets.user_gait_names()
         self.name = current if own else f"my {current}"
         self.overwrite = own
@@ -118,7 +112,7 @@ class OCTO_MOTION_OT_gait_save(_GaitOperator, bpy.types.Operator):
         self.report({"INFO"}, f"Saved the gait '{table.name}'.")
 
 
-class OCTO_MOTION_OT_gait_remove(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_remove"
     bl_label = "Remove Gait Preset"
     bl_description = (
@@ -150,7 +144,7 @@ class OCTO_MOTION_OT_gait_remove(_GaitOperator, bpy.types.Operator):
         self.report({"INFO"}, f"Removed the gait '{name}'.")
 
 
-class _FileOperator(_GaitOperator):
+class _FileOperator(ArmatureOperator):
     """Asks for a file."""
 
     filename_ext: Final = presets.SUFFIX
@@ -188,7 +182,7 @@ class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
     ) -> set[OperatorReturnItems]:
         """Propose the gait's name, in the file browser."""
         if not self.filepath:
-            name = bpy.path.clean_name(_settings(context).gait)
+            name = bpy.path.clean_name(locomotion_settings(active_armature(context)).gait)
             self.filepath = f"{name}{presets.SUFFIX}"
         return super().invoke(context, event)
 
@@ -201,7 +195,8 @@ class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
         return True
 
     def run(self, context: bpy.types.Context) -> None:
-        table = read_gait(_settings(context))
+        # Of a linked armature as well.
+        table = read_gait(locomotion_settings(active_armature(context)))
         path = self._path()
         presets.write_gait(table, path)
         self.report({"INFO"}, f"Wrote the gait '{table.name}' to '{path.name}'.")
@@ -220,7 +215,7 @@ class OCTO_MOTION_OT_gait_import(_FileOperator, bpy.types.Operator):
 # --- The table -----------------------------------------------------------------------------------
 
 
-class OCTO_MOTION_OT_gait_curve_add(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_curve_add(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_curve_add"
     bl_label = "Add Pair"
     bl_description = "Give one pair of arms angles of its own, to begin with those it has now"
@@ -247,7 +242,7 @@ class OCTO_MOTION_OT_gait_curve_add(_GaitOperator, bpy.types.Operator):
         group.active_curve = len(group.curves) - 1
 
 
-class OCTO_MOTION_OT_gait_curve_remove(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_curve_remove(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_curve_remove"
     bl_label = "Remove Pair"
     bl_description = "Let the chosen pair move like all others again"
@@ -263,7 +258,7 @@ class OCTO_MOTION_OT_gait_curve_remove(_GaitOperator, bpy.types.Operator):
         group.active_curve = max(group.active_curve - 1, 0)
 
 
-class OCTO_MOTION_OT_gait_knot_add(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_knot_add"
     bl_label = "Add Knot"
     bl_description = "Add a knot half-way to the next one, without changing the motion"
@@ -304,7 +299,7 @@ class OCTO_MOTION_OT_gait_knot_add(_GaitOperator, bpy.types.Operator):
         curve.active_knot = gap + 1
 
 
-class OCTO_MOTION_OT_gait_knot_remove(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_knot_remove"
     bl_label = "Remove Knot"
     bl_description = "Remove this knot: the angles then run evenly between its neighbours"
@@ -336,7 +331,7 @@ class OCTO_MOTION_OT_gait_knot_remove(_GaitOperator, bpy.types.Operator):
         curve.active_knot = min(curve.active_knot, count - 2)
 
 
-class OCTO_MOTION_OT_gait_offset_add(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_offset_add(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_offset_add"
     bl_label = "Add Offset"
     bl_description = "Give one arm a phase of its own, whatever the spread says"
@@ -359,7 +354,7 @@ class OCTO_MOTION_OT_gait_offset_add(_GaitOperator, bpy.types.Operator):
         group.active_offset = len(group.offsets) - 1
 
 
-class OCTO_MOTION_OT_gait_offset_remove(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_offset_remove(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_offset_remove"
     bl_label = "Remove Offset"
     bl_description = "Let this arm follow the spread again"
@@ -379,6 +374,25 @@ class OCTO_MOTION_OT_gait_offset_remove(_GaitOperator, bpy.types.Operator):
         _active(group.offsets, index, "offset")
         group.offsets.remove(index)
         group.active_offset = max(min(group.active_offset, len(group.offsets) - 1), 0)
+
+
+class OCTO_MOTION_MT_gait_offset(bpy.types.Menu):
+    bl_idname = "OCTO_MOTION_MT_gait_offset"
+    bl_label = "Add Offset"
+    bl_description = "Give one arm a phase of its own, whatever the spread says"
+
+    def draw(self, context: bpy.types.Context | None) -> None:
+        layout = self.layout
+        assert layout is not None
+        assert context is not None
+        settings = locomotion_settings(active_armature(context))
+        taken = {(each.pair, each.side) for each in settings.table.offsets}
+        for pair, side, name in sorted({(arm.pair, arm.side, arm.name) for arm in settings.arms}):
+            if (pair, side) not in taken:
+                chosen: Any = layout.operator(OCTO_MOTION_OT_gait_offset_add.bl_idname, text=name)
+                chosen.pair, chosen.side = pair, side
+        if not settings.arms:
+            layout.label(text="Detect the arms first", icon="INFO")
 
 
 class OCTO_MOTION_MT_gait(bpy.types.Menu):
@@ -410,5 +424,6 @@ CLASSES: Final = (
     OCTO_MOTION_OT_gait_knot_remove,
     OCTO_MOTION_OT_gait_offset_add,
     OCTO_MOTION_OT_gait_offset_remove,
+    OCTO_MOTION_MT_gait_offset,
     OCTO_MOTION_MT_gait,
 )

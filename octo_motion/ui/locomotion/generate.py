@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 import bpy
 
 from ...blender.armature import active_armature
-from ...core.errors import OctoMotionError, RigError
+from ...core.errors import OctoMotionError
 from ..job import Job
-from ..operator_base import OctoOperator
+from .armature_operator import ArmatureOperator
 from .workflow import Shot, Summary, generate, prepare
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ _TURN: Final = 0.1
 """Seconds of work between two looks at the keyboard."""
 
 
-class OCTO_MOTION_OT_generate_locomotion(OctoOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_generate_locomotion(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.generate_locomotion"
     bl_label = "Generate Locomotion"
     bl_description = (
@@ -35,18 +35,6 @@ class OCTO_MOTION_OT_generate_locomotion(OctoOperator, bpy.types.Operator):
     _shot: Shot | None = None
     _job: Job | None = None
     _timer: bpy.types.Timer | None = None
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode.startswith("EDIT"):
-            cls.poll_message_set("Leave edit mode first")
-            return False
-        try:
-            active_armature(context)
-        except RigError as error:
-            cls.poll_message_set(f"{error.problem} {error.remedy}")
-            return False
-        return True
 
     def run(self, context: bpy.types.Context) -> None:
         self._tell(generate(active_armature(context), context))

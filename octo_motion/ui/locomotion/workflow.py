@@ -20,11 +20,12 @@ import numpy as np
 
 from ...blender import actions
 from ...blender.armature import armature_data, read_skeleton, world_matrix
+from ...blender.arms import world_directions
 from ...blender.curves import read_route
 from ...blender.poses import animated_bones, rest_bones
 from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
-from ...core.locomotion.chains import BodyFrame, Side, body_frame
+from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.detection import Detection, detect_arms
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
@@ -34,6 +35,7 @@ from ...core.locomotion.travel import TravelSettings, duration, plan_travel, str
 from ...core.rotations import Floats, rotate
 from ...core.skeleton import Skeleton
 from ..plain import plain
+from .arm_items import bones_of, write_arms, write_body
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
 
 MOST_FRAMES: Final = 100_000
@@ -151,6 +153,9 @@ class Shot:
         channels = self._channels(armature)
         previous = _previous_action(armature, settings)
         left_behind = animated_bones(previous) if previous is not None else set[str]()
+        # An arm that was switched off is left to the artist, in the pose that it has.
+        for item in settings.arms:
+            left_behind.difference_update(() if item.enabled else bones_of(item))
         # The settings' own pointer must not count as a user when it comes to saving an edited
         # action from being purged.
         settings.result = None
@@ -167,6 +172,10 @@ class Shot:
             settings.result = previous
             raise
         settings.result = action
+        if self.detection is not None:
+            # What was moved is what the list shows from now on.
+            write_arms(settings, self.detection.arms)
+            write_body(settings, self.detection)
         rest_bones(armature, left_behind - animated_bones(action))
         notes = self._extend_range()
         assert self.misses is not None
@@ -257,7 +266,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     skeleton = read_skeleton(armature)
     world = world_matrix(armature)
     scale = _uniform_scale(armature, world)
-    arms, body, detection = _arms(settings, skeleton, world)
+    arms, body, detection = _arms(settings, armature, skeleton)
     gait = read_gait(settings)
     generator = Generator(skeleton, arms, body, _gait_settings(settings, gait))
     route = read_route(settings.route, depsgraph, settings.spline)
@@ -283,7 +292,11 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         root_bone=_root_bone(settings, armature, detection),
         extend_scene_range=settings.extend_scene_range,
         note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
-        warnings=_warnings(settings, armature, skeleton, arms),
+        # Detection has looked for constraints itself.
+        warnings=[
+            *(detection.notes if detection else _held(skeleton, arms)),
+            *_warnings(settings, armature, skeleton),
+        ],
     )
 
 
@@ -329,18 +342,17 @@ def _uniform_scale(armature: bpy.types.Object, world: Floats) -> float:
 
 
 def _arms(
-    settings: OCTO_MOTION_PG_locomotion, skeleton: Skeleton, world: Floats
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, skeleton: Skeleton
 ) -> tuple[tuple[Arm, ...], BodyFrame, Detection | None]:
     """Arms of the list, or those that are found where it is empty."""
     if len(settings.arms) == 0:
-        # Directions of the world, in armature space: rows of its rotation.
-        found = detect_arms(skeleton, world[2, :3], -world[1, :3])
+        found = detect_arms(skeleton, *world_directions(armature))
         arms = tuple(Arm(each.name, each.bones, each.side, each.pair) for each in found.arms)
         return arms, found.body, found
     arms = tuple(
         Arm(
             name=item.name,
-            bones=tuple(bone.name for bone in item.bones),
+            bones=bones_of(item),
             side=cast("Side", item.side),
             pair=item.pair,
             phase=item.phase,
@@ -352,7 +364,7 @@ def _arms(
     if not arms:
         raise RigError("All arms are switched off.", "Switch on at least one in the list.")
     # The body stays where it is, whichever arms are switched off.
-    bones = [tuple(bone.name for bone in item.bones) for item in settings.arms if item.bones]
+    bones = [bones_of(item) for item in settings.arms if item.bones]
     return arms, body_frame(skeleton, bones, settings.body_up, settings.body_front), None
 
 
@@ -385,24 +397,25 @@ def _root_bone(
     return name
 
 
+def _held(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
+    held = [arm.name for arm in arms if is_driven(skeleton, arm.bones)]
+    if not held:
+        return []
+    told = (
+        f"Constraints or drivers move {len(held)} of the {len(arms)} arms ('{held[0]}'): "
+        "keys on their bones have no effect while those are on."
+    )
+    return [told]
+
+
 def _warnings(
-    settings: OCTO_MOTION_PG_locomotion,
-    armature: bpy.types.Object,
-    skeleton: Skeleton,
-    arms: tuple[Arm, ...],
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, skeleton: Skeleton
 ) -> list[str]:
-    driven = {
-        name for name, moved in zip(skeleton.names, skeleton.constrained, strict=True) if moved
-    }
     told: list[str] = []
-    if held := [arm.name for arm in arms if not driven.isdisjoint(arm.bones)]:
+    root = settings.root_bone
+    if settings.travel_on == "BONE" and root in skeleton.index and is_driven(skeleton, [root]):
         told.append(
-            f"Constraints or drivers move {len(held)} of the {len(arms)} arms ('{held[0]}'): "
-            "keys on their bones have no effect while those are on."
-        )
-    if settings.travel_on == "BONE" and settings.root_bone in driven:
-        told.append(
-            f"Constraints or drivers move the root bone '{settings.root_bone}': its keys have no "
+            f"Constraints or drivers move the root bone '{root}': its keys have no "
             "effect while those are on."
         )
     if settings.travel_on == "OBJECT" and any(

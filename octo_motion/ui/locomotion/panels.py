@@ -1,0 +1,373 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab, in the order of the work: rig, arms, route, gait, generate."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import bpy
+
+from ...blender.armature import active_armature
+from ...blender.weight_curve import NODE, curve_node
+from ...core.errors import RigError
+from .add_octopus import OCTO_MOTION_OT_add_octopus
+from .add_route import OCTO_MOTION_OT_add_route
+from .arm_list import draw_arms
+from .gait_properties import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table
+from .gait_table import (
+    OCTO_MOTION_MT_gait,
+    OCTO_MOTION_MT_gait_offset,
+    OCTO_MOTION_OT_gait_curve_add,
+    OCTO_MOTION_OT_gait_curve_remove,
+    OCTO_MOTION_OT_gait_knot_add,
+    OCTO_MOTION_OT_gait_knot_remove,
+    OCTO_MOTION_OT_gait_load,
+    OCTO_MOTION_OT_gait_offset_remove,
+)
+from .generate import OCTO_MOTION_OT_generate_locomotion
+from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+
+_SIDES: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
+
+
+class _Panel:
+    """A panel of the tab. Those that need an armature are not there without one."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Octo Motion"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _armature(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        armature = _armature(context)
+        assert armature is not None
+        layout = cast("Any", self).layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        # Greyed out where nothing that is set would be saved.
+        layout.enabled = armature.is_editable
+        self.show(context, layout, locomotion_settings(armature))
+
+    def show(
+        self, context: bpy.types.Context, layout: Any, settings: OCTO_MOTION_PG_locomotion
+    ) -> None:
+        raise NotImplementedError
+
+
+def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
+    try:
+        return active_armature(context)
+    except RigError:
+        return None
+
+
+class OCTO_MOTION_PT_rig(bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_rig"
+    bl_label = "Rig"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Octo Motion"
+    bl_order = 0
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        assert layout is not None
+        armature = _armature(context)
+        if armature is None:
+            column = layout.column(align=True)
+            column.label(text="No armature is active.", icon="INFO")
+            column.label(text="Select one, or add an octopus:", icon="BLANK1")
+        else:
+            layout.label(text=armature.name, icon="OUTLINER_OB_ARMATURE")
+            if not armature.is_editable:
+                column = layout.column(align=True)
+                column.label(text="Linked and read-only.", icon="LIBRARY_DATA_DIRECT")
+                column.label(text="Make a library override.", icon="BLANK1")
+        layout.operator(
+            OCTO_MOTION_OT_add_octopus.bl_idname, text="Add Octopus", icon="OUTLINER_OB_ARMATURE"
+        )
+
+
+class OCTO_MOTION_PT_arms(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_arms"
+    bl_label = "Arms"
+    bl_order = 1
+
+    def show(
+        self, context: bpy.types.Context, layout: Any, settings: OCTO_MOTION_PG_locomotion
+    ) -> None:
+        layout.use_property_split = False
+        draw_arms(layout, context, settings)
+
+
+class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_route"
+    bl_label = "Route"
+    bl_order = 2
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        layout.prop(settings, "route", text="Curve")
+        if settings.route is None:
+            layout.operator(
+                OCTO_MOTION_OT_add_route.bl_idname, text="Add Route", icon="CURVE_BEZCURVE"
+            )
+            return
+        splines = getattr(settings.route.data, "splines", ())
+        if len(splines) > 1 or settings.spline >= 0:
+            layout.prop(settings, "spline")
+        layout.row().prop(settings, "speed_mode", expand=True)
+        column = layout.column(align=True)
+        column.prop(settings, "ease_in")
+        column.prop(settings, "ease_out", text="Out")
+
+
+class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_heading"
+    bl_label = "Heading and Height"
+    bl_parent_id = OCTO_MOTION_PT_route.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        if settings.table.manner == "WALK":
+            layout.row().prop(settings, "heading", expand=True)
+            layout.prop(settings, "heading_angle")
+            layout.prop(settings, "keep_upright")
+        else:
+            layout.prop(settings, "bank_in_turns")
+        column = layout.column(align=True)
+        column.prop(settings, "look_ahead")
+        column.prop(settings, "corner")
+        column = layout.column()
+        column.row().prop(settings, "height_mode", expand=True)
+        if settings.height_mode == "MANUAL":
+            column.prop(settings, "height", text=" ")
+
+
+class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_gait"
+    bl_label = "Gait"
+    bl_order = 3
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        table = settings.table
+        row = layout.row(align=True)
+        row.alert = bool(table.curves) and table.name != settings.gait
+        row.prop(settings, "gait")
+        row.menu(OCTO_MOTION_MT_gait.bl_idname, text="", icon="DOWNARROW_HLT")
+        layout.prop(table, "stride")
+        layout.prop(settings, "contraction")
+        layout.prop(settings, "turning")
+        if table.manner == "SWIM":
+            layout.prop(settings, "burst")
+
+
+class OCTO_MOTION_PT_table(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_table"
+    bl_label = "Table"
+    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        table = settings.table
+        layout.row().prop(table, "manner", expand=True)
+        if table.manner == "SWIM":
+            layout.prop(table, "power_phase")
+        column = layout.column(align=True)
+        column.prop(table, "spread_pairs", text="Spread Pairs")
+        column.prop(table, "spread_sides")
+        _draw_offsets(layout, table)
+        if not table.curves:
+            layout.operator(
+                OCTO_MOTION_OT_gait_load.bl_idname, text="Edit Angles", icon="GREASEPENCIL"
+            )
+            return
+        row = layout.row()
+        row.template_list(
+            OCTO_MOTION_UL_gait_curves.__name__, "", table, "curves", table, "active_curve", rows=2
+        )
+        column = row.column(align=True)
+        column.operator(OCTO_MOTION_OT_gait_curve_add.bl_idname, text="", icon="ADD")
+        column.operator(OCTO_MOTION_OT_gait_curve_remove.bl_idname, text="", icon="REMOVE")
+        if 0 <= table.active_curve < len(table.curves):
+            _draw_knots(layout, table, table.curves[table.active_curve])
+
+
+def _draw_offsets(layout: Any, table: OCTO_MOTION_PG_gait_table) -> None:
+    column = layout.column(align=True)
+    for number, offset in enumerate(table.offsets):
+        row = column.row(align=True)
+        row.prop(offset, "phase", text=f"Arm {offset.pair} {_SIDES[offset.side]}")
+        remove = row.operator(
+            OCTO_MOTION_OT_gait_offset_remove.bl_idname, text="", icon="X", emboss=False
+        )
+        remove.offset = number
+    layout.menu(OCTO_MOTION_MT_gait_offset.bl_idname, icon="ADD")
+
+
+def _draw_knots(
+    layout: Any, table: OCTO_MOTION_PG_gait_table, curve: OCTO_MOTION_PG_gait_curve
+) -> None:
+    layout.use_property_split = False
+    layout.row().prop(table, "shown_angle", expand=True)
+    angle = table.shown_angle.lower()
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    for title in ("Phase", "Root", "Middle", "Tip"):
+        row.label(text=title)
+    row.label(text="", icon="BLANK1")
+    for number, knot in enumerate(curve.knots):
+        row = column.row(align=True)
+        row.prop(knot, "phase", text="")
+        for link in range(3):
+            row.prop(knot, angle, index=link, text="")
+        remove = row.operator(
+            OCTO_MOTION_OT_gait_knot_remove.bl_idname, text="", icon="X", emboss=False
+        )
+        remove.knot = number
+    layout.operator(OCTO_MOTION_OT_gait_knot_add.bl_idname, icon="ADD")
+
+
+class OCTO_MOTION_UL_gait_curves(bpy.types.UIList):
+    """A row for the angles of all arms, and one for each pair that has its own."""
+
+    def draw_item(  # noqa: PLR0917 - Blender's order
+        self,
+        context: bpy.types.Context | None,  # noqa: ARG002
+        layout: bpy.types.UILayout,
+        data: Any,  # noqa: ARG002
+        item: Any,
+        icon: int | None,  # noqa: ARG002
+        active_data: Any,  # noqa: ARG002
+        active_property: str | None,  # noqa: ARG002
+        index: int | None = 0,  # noqa: ARG002
+        flt_flag: int | None = 0,  # noqa: ARG002
+    ) -> None:
+        if item.pair == 0:
+            layout.label(text="All Arms", icon="FCURVE")
+        else:
+            row = layout.row()
+            row.label(text="Only Pair", icon="FCURVE")
+            row.prop(item, "pair", text="", emboss=False)
+
+
+class OCTO_MOTION_PT_variation(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_variation"
+    bl_label = "Variation"
+    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        layout.prop(settings, "phase_spread")
+        column = layout.column(align=True)
+        column.prop(settings, "variation_min", text="Random Min")
+        column.prop(settings, "variation_max", text="Max")
+        column = layout.column()
+        column.active = settings.variation_min != 0.0 or settings.variation_max != 0.0
+        column.prop(settings, "seed")
+
+
+class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_weights"
+    bl_label = "Joint Weights"
+    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        layout.prop(settings, "use_weight_curve")
+        group = settings.weight_curve
+        if not settings.use_weight_curve:
+            column = layout.column(align=True)
+            column.prop(settings, "weight_root", text="Root")
+            column.prop(settings, "weight_tip", text="Tip")
+        elif group is not None and curve_node(group) is not None:
+            layout.template_curve_mapping(group.nodes[NODE], "mapping")
+        else:
+            layout.label(text="The curve is gone: switch it off and on.", icon="ERROR")
+        layout.prop(settings, "softness")
+        layout.prop(settings, "sway")
+
+
+class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_generate"
+    bl_label = "Generate"
+    bl_order = 4
+
+    def show(
+        self, context: bpy.types.Context, layout: Any, settings: OCTO_MOTION_PG_locomotion
+    ) -> None:
+        layout.row().prop(settings, "timing", expand=True)
+        column = layout.column(align=True)
+        if settings.timing == "CADENCE":
+            column.prop(settings, "cycle_time", text="Cycle Time")
+        elif settings.timing == "SPEED":
+            column.prop(settings, "speed", text="Speed")
+        column = layout.column(align=True)
+        column.prop(settings, "frame_start", text="Frame Start")
+        if settings.timing == "RANGE":
+            column.prop(settings, "frame_end")
+        layout.prop(settings, "extend_scene_range")
+        layout.row().prop(settings, "travel_on", expand=True)
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator(OCTO_MOTION_OT_generate_locomotion.bl_idname, icon="PLAY", text="Generate")
+        _draw_result(layout, context, settings)
+
+
+def _draw_result(
+    layout: Any, context: bpy.types.Context, settings: OCTO_MOTION_PG_locomotion
+) -> None:
+    action = settings.result
+    if action is None:
+        return
+    scene = cast("bpy.types.Scene", context.scene)
+    length = (action.frame_end - action.frame_start) / scene.render.fps * scene.render.fps_base
+    row = layout.row()
+    row.label(text=action.name, icon="ACTION")
+    row.label(text=f"{action.frame_end - action.frame_start + 1:.0f} frames, {length:.1f} s")
+
+
+CLASSES: Final = (
+    OCTO_MOTION_UL_gait_curves,
+    OCTO_MOTION_PT_rig,
+    OCTO_MOTION_PT_arms,
+    OCTO_MOTION_PT_route,
+    OCTO_MOTION_PT_heading,
+    OCTO_MOTION_PT_gait,
+    OCTO_MOTION_PT_table,
+    OCTO_MOTION_PT_variation,
+    OCTO_MOTION_PT_weights,
+    OCTO_MOTION_PT_generate,
+)
