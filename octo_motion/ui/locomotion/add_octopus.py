@@ -15,6 +15,8 @@ from ...core.locomotion.octopus_shape import ARMS, JOINTS, OctopusShape
 from ..operator_base import OctoOperator
 
 _DEFAULT: Final = OctopusShape()
+_FORM: Final = ("arms", "joints", "arm_length", "first_diameter", "taper", "with_mesh")
+_PLACE: Final = ("align", "location", "rotation")
 
 
 class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operator):
@@ -82,6 +84,16 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         description="Add the skin too, weighted to the bones. Without it the armature comes alone",
         default=True,
     )
+
+    def draw(self, context: bpy.types.Context) -> None:  # noqa: ARG002 - Blender's signature
+        layout = self.layout
+        assert layout is not None
+        layout.use_property_split = True
+        # What it is first, where it is last, as in Blender's own Add operators.
+        for names in (_FORM, _PLACE):
+            column = layout.column()
+            for name in names:
+                column.prop(self, name)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
