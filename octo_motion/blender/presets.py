@@ -61,6 +61,8 @@ def load_gait(name: str) -> GaitTable:
         GaitError: there is none, or its file is damaged.
     """
     built_in = gait.presets()
+    if not name:
+        raise GaitError("No gait is chosen.", f"Choose one of {', '.join(gait_names())}.")
     if name in built_in:
         return built_in[name]
     path = _path_of(name)

@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import Final
 
 import bpy
+from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
-from .locomotion.properties import OCTO_MOTION_PG_locomotion
+from .locomotion.properties import OCTO_MOTION_PG_locomotion, make_overridable
 
 
 class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
@@ -25,6 +26,13 @@ class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
 CLASSES: Final = (OCTO_MOTION_PG_object,)
 
 
+@persistent
+def _before_saving(*_: object) -> None:
+    for each in bpy.data.objects:
+        if each.override_library is not None:
+            make_overridable(each)
+
+
 def register() -> None:
     """Give objects their settings."""
     bpy.types.Object.octo_motion = PointerProperty(  # type: ignore[attr-defined]
@@ -33,8 +41,10 @@ def register() -> None:
         type=OCTO_MOTION_PG_object,
         override={"LIBRARY_OVERRIDABLE"},
     )
+    bpy.app.handlers.save_pre.append(_before_saving)
 
 
 def unregister() -> None:
     """Take the settings away."""
+    bpy.app.handlers.save_pre.remove(_before_saving)
     del bpy.types.Object.octo_motion  # type: ignore[attr-defined]

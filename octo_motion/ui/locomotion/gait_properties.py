@@ -10,12 +10,13 @@ first. So whatever an artist does with them, the table closes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import bpy
 import numpy as np
 from bpy.props import (
+    BoolProperty,
     CollectionProperty,
     EnumProperty,
     FloatProperty,
@@ -56,6 +57,15 @@ _DEGREE_DIGITS: Final = 4
 _NUMBER_DIGITS: Final = 6
 
 
+def _unused() -> Any:
+    return BoolProperty(
+        name="Unused",
+        description="Left out. Items of a linked file can be changed here, but not removed",
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+
+
 def _link_angles(name: str, description: str) -> Any:
     return FloatVectorProperty(
         name=name,
@@ -86,6 +96,7 @@ class OCTO_MOTION_PG_gait_knot(bpy.types.PropertyGroup):
     head: _link_angles("Head", "Up and down; above zero raises")
     pitch: _link_angles("Pitch", "Left and right; above zero turns to the body's front")
     bank: _link_angles("Bank", "Twist about the arm")
+    unused: _unused()
 
 
 class OCTO_MOTION_PG_gait_curve(bpy.types.PropertyGroup):
@@ -104,6 +115,7 @@ class OCTO_MOTION_PG_gait_curve(bpy.types.PropertyGroup):
         override=OVERRIDE_LIST,
     )
     active_knot: IntProperty(name="Active Knot", options={"HIDDEN"}, override=OVERRIDE)
+    unused: _unused()
 
 
 class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
@@ -121,6 +133,7 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
         soft_max=2.0 * np.pi,
         override=OVERRIDE,
     )
+    unused: _unused()
 
 
 class OCTO_MOTION_PG_gait_note(bpy.types.PropertyGroup):
@@ -128,6 +141,7 @@ class OCTO_MOTION_PG_gait_note(bpy.types.PropertyGroup):
 
     subject: StringProperty(name="Subject", override=OVERRIDE)
     text: StringProperty(name="Text", override=OVERRIDE)
+    unused: _unused()
 
 
 class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
@@ -230,22 +244,45 @@ CLASSES: Final = (
 )
 
 
+def used(collection: Any) -> list[Any]:
+    """The items of one of the table's lists that count."""
+    return [item for item in collection if not item.unused]
+
+
 def fill_table(group: OCTO_MOTION_PG_gait_table, table: GaitTable) -> None:
     """Make the properties say what the table says."""
-    group.name = table.name
-    group.description = table.description
-    group.manner = table.manner
-    group.stride = table.stride
-    group.spread_pairs, group.spread_sides = table.spread_pairs, table.spread_sides
-    group.power_phase = table.power_phase
-    group.active_curve = group.active_offset = 0
-    for curve, (pair, values) in _matched(group.curves, sorted(table.curves.items())):
-        curve.pair = pair
+    for name in ("name", "description", "manner", "stride", "spread_pairs", "spread_sides"):
+        assign(group, name, getattr(table, name))
+    assign(group, "power_phase", table.power_phase)
+    assign(group, "active_curve", 0)
+    for curve, (pair, values) in matched(group, "curves", sorted(table.curves.items())):
+        assign(curve, "pair", pair)
         fill_curve(curve, values)
-    for offset, ((pair, side), phase) in _matched(group.offsets, sorted(table.offsets.items())):
-        offset.pair, offset.side, offset.phase = pair, side, phase
-    for note, (subject, text) in _matched(group.notes, table.notes.items()):
-        note.subject, note.text = subject, text
+    fill_offsets(group, table.offsets)
+    for note, (subject, text) in matched(group, "notes", table.notes.items()):
+        assign(note, "subject", subject)
+        assign(note, "text", text)
+
+
+def fill_offsets(
+    group: OCTO_MOTION_PG_gait_table, offsets: Mapping[tuple[int, str], float]
+) -> None:
+    """Make the table's offsets these."""
+    assign(group, "active_offset", 0)
+    for item, ((pair, side), phase) in matched(group, "offsets", sorted(offsets.items())):
+        assign(item, "pair", pair)
+        assign(item, "side", side)
+        assign(item, "phase", phase)
+
+
+def fill_curve(curve: OCTO_MOTION_PG_gait_curve, values: GaitCurve) -> None:
+    """Make one curve's properties say what the curve says."""
+    assign(curve, "active_knot", 0)
+    open_knots = zip(values.phases[:-1], values.angles[:-1], strict=True)
+    for knot, (phase, angles) in matched(curve, "knots", open_knots):
+        assign(knot, "phase", phase)
+        for number, name in enumerate(ANGLES):
+            assign(knot, name, angles[:, number])
 
 
 def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None) -> GaitTable:
@@ -258,10 +295,12 @@ def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None
     Raises:
         GaitError: two curves are for one pair, two knots at one phase, a number is not finite.
     """
-    if group.curves:
-        description, notes = group.description, {note.subject: note.text for note in group.notes}
-        curves = {curve.pair: read_curve(curve) for curve in group.curves}
-        if len(curves) < len(group.curves):
+    listed = used(group.curves)
+    if listed:
+        description = group.description
+        notes = {note.subject: note.text for note in used(group.notes)}
+        curves = {curve.pair: read_curve(curve) for curve in listed}
+        if len(curves) < len(listed):
             raise GaitError(
                 f"Gait '{group.name}' has two curves for one pair of arms.",
                 "Remove one, or change its pair.",
@@ -269,13 +308,15 @@ def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None
     else:
         description, notes = (preset.description, preset.notes) if preset else ("", {})
         curves = preset.curves if preset else {}
+    offsets = preset.offsets if preset and not listed else {}
+    own = {(each.pair, each.side): _angle(each.phase) for each in used(group.offsets)}
     table = GaitTable(
         name=group.name or (preset.name if preset else ""),
         manner=group.manner,
         curves=curves,
         spread_pairs=_number(group.spread_pairs),
         spread_sides=_number(group.spread_sides),
-        offsets={(each.pair, each.side): _angle(each.phase) for each in group.offsets},
+        offsets={**offsets, **own},
         stride=_number(group.stride),
         power_phase=_angle(group.power_phase),
         description=description,
@@ -286,13 +327,13 @@ def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None
 
 def read_curve(curve: OCTO_MOTION_PG_gait_curve) -> GaitCurve:
     """One curve, its knots sorted and closed; not yet checked."""
-    phases = np.array([_angle(knot.phase) for knot in curve.knots])
-    angles = np.array(
-        [[_angles(getattr(knot, name)) for name in ANGLES] for knot in curve.knots]
-    ).reshape(len(phases), len(ANGLES), LINKS)
-    angles = angles.transpose(0, 2, 1)
-    if len(phases) == 0:
+    knots = used(curve.knots)
+    if not knots:
         return GaitCurve(np.array([0.0, CYCLE]), np.zeros((2, LINKS, len(ANGLES))))
+    phases = np.array([_angle(knot.phase) for knot in knots])
+    angles = np.stack(
+        [np.stack([_angles(getattr(knot, name)) for name in ANGLES], axis=1) for knot in knots]
+    )
     # A knot at 360° is the next cycle's first; one at 0° as well would be a second of the kind.
     phases = np.where(phases >= CYCLE - 1e-9, 0.0, phases)
     order = np.argsort(phases, kind="stable")
@@ -306,28 +347,41 @@ def read_curve(curve: OCTO_MOTION_PG_gait_curve) -> GaitCurve:
     return GaitCurve(np.append(phases, CYCLE), np.concatenate([angles, start[None]]))
 
 
-def fill_curve(curve: OCTO_MOTION_PG_gait_curve, values: GaitCurve) -> None:
-    """Make one curve's properties say what the curve says."""
-    curve.active_knot = 0
-    open_knots = zip(values.phases[:-1], values.angles[:-1], strict=True)
-    for knot, (phase, angles) in _matched(curve.knots, open_knots):
-        knot.phase = phase
-        for number, name in enumerate(ANGLES):
-            setattr(knot, name, angles[:, number])
+def matched(group: Any, name: str, values: Iterable[Any]) -> Iterable[tuple[Any, Any]]:
+    """Each value with an item of a list for it: those that are there, in order, then new ones.
 
-
-def _matched(collection: Any, values: Iterable[Any]) -> Iterable[tuple[Any, Any]]:
-    """Each value with an item for it: the items that are there, in order, then new ones.
-
-    Items are written anew rather than removed, for those that come from a linked file can be
-    changed in a library override but not taken away.
+    Items left over are removed, or marked as unused where they come from a linked file: in a
+    library override they can be changed but not taken away.
     """
-    wanted = list(values)
-    while len(collection) > len(wanted):
+    collection, wanted = getattr(group, name), list(values)
+    least = max(len(wanted), _linked_count(group, name))
+    while len(collection) > least:
         collection.remove(len(collection) - 1)
     while len(collection) < len(wanted):
         collection.add()
-    return zip(collection, wanted, strict=True)
+    for number, item in enumerate(collection):
+        assign(item, "unused", number >= len(wanted))
+    return zip(collection, wanted, strict=False)
+
+
+def _linked_count(group: Any, name: str) -> int:
+    """How many items of a list a library override has from its linked file."""
+    override = group.id_data.override_library if group.id_data else None
+    if override is None or override.reference is None:
+        return 0
+    try:
+        original = override.reference.path_resolve(group.path_from_id())
+    except ValueError:
+        # Within an item that was added here.
+        return 0
+    return len(getattr(original, name))
+
+
+def assign(group: Any, name: str, value: Any) -> None:
+    """Set a property only if it differs: in a library override, what is set no longer follows."""
+    before = getattr(group, name)
+    if np.any(np.asarray(before) != np.asarray(value)):
+        setattr(group, name, value)
 
 
 def _angle(radians: float) -> float:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +18,7 @@ from ...core.errors import GaitError
 from ...core.locomotion import gait
 from ...core.locomotion.gait import CYCLE
 from .armature_operator import ArmatureOperator
-from .gait_properties import SIDES, fill_curve, read_curve
+from .gait_properties import SIDES, fill_curve, fill_offsets, fill_table, read_curve, used
 from .properties import (
     OCTO_MOTION_PG_locomotion,
     load_gait,
@@ -44,7 +45,7 @@ def _settings(context: bpy.types.Context) -> OCTO_MOTION_PG_locomotion:
 def _editable(settings: OCTO_MOTION_PG_locomotion) -> Any:
     """The table, filled from its preset if it was not yet."""
     table = read_gait(settings)
-    if not settings.table.curves:
+    if not used(settings.table.curves):
         set_gait(settings, table)
     return settings.table
 
@@ -234,12 +235,10 @@ class OCTO_MOTION_OT_gait_curve_add(ArmatureOperator, bpy.types.Operator):
         pair = self.pair or next(each for each in range(1, len(taken) + 2) if each not in taken)
         if pair in taken:
             raise GaitError(f"Pair {pair} has angles of its own already.", "Choose another pair.")
-        group = _editable(settings)
-        curve = group.curves.add()
-        curve.pair = pair
-        shared = next(each for each in group.curves if each.pair == 0)
-        fill_curve(curve, read_curve(shared))
-        group.active_curve = len(group.curves) - 1
+        table = read_gait(settings)
+        curves = {**table.curves, pair: table.curves[0]}
+        fill_table(_editable(settings), replace(table, curves=curves))
+        settings.table.active_curve = sorted(curves).index(pair)
 
 
 class OCTO_MOTION_OT_gait_curve_remove(ArmatureOperator, bpy.types.Operator):
@@ -250,12 +249,14 @@ class OCTO_MOTION_OT_gait_curve_remove(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         settings = _settings(context)
-        group = settings.table
-        curve = _active(group.curves, group.active_curve, "pair")
-        if curve.pair == 0:
+        table, group = read_gait(settings), settings.table
+        pair = _active(used(group.curves), group.active_curve, "pair").pair
+        if pair == 0:
             raise GaitError("The angles for all arms cannot be removed.", "Choose a pair.")
-        group.curves.remove(group.active_curve)
-        group.active_curve = max(group.active_curve - 1, 0)
+        before = group.active_curve
+        curves = {each: curve for each, curve in table.curves.items() if each != pair}
+        fill_table(group, replace(table, curves=curves))
+        group.active_curve = before - 1
 
 
 class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
@@ -274,14 +275,15 @@ class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         group = _editable(_settings(context))
-        curve = _active(group.curves, group.active_curve, "pair")
-        if self.knot >= len(curve.knots):
+        curve = _active(used(group.curves), group.active_curve, "pair")
+        knots = used(curve.knots)
+        if self.knot >= len(knots):
             raise GaitError(f"There is no row {self.knot}.", "Choose a knot of the table.")
         shape = read_curve(curve)
         if self.knot < 0:
             gap = int(np.argmax(np.diff(shape.phases)))
         else:
-            phase = curve.knots[self.knot].phase % CYCLE
+            phase = knots[self.knot].phase % CYCLE
             gap = int(np.clip(np.searchsorted(shape.phases, phase + 1e-4) - 1, 0, None))
             gap = min(gap, len(shape.phases) - 2)
         middle = 0.5 * (shape.phases[gap] + shape.phases[gap + 1])
@@ -315,20 +317,20 @@ class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         settings = _settings(context)
-        group = settings.table if settings.table.curves else None
-        count = 0
-        if group is not None:
-            count = len(_active(group.curves, group.active_curve, "pair").knots)
-        else:
-            count = len(read_gait(settings).curve(0).phases) - 1
-        if self.knot >= count:
-            raise GaitError(f"There is no row {self.knot}.", "Choose a knot of the table.")
-        if count <= 1:
-            raise GaitError("The last knot cannot be removed.", "Change its angles instead.")
+        table = read_gait(settings)
+        pair = 0
+        if listed := used(settings.table.curves):
+            pair = _active(listed, settings.table.active_curve, "pair").pair
+        shape = table.curves[pair]
+        count = len(shape.phases) - 1
+        knot = self.knot if self.knot >= 0 else count - 1
+        if knot >= count:
+            raise GaitError(f"There is no row {knot}.", "Choose a knot of the table.")
+        if knot == 0:
+            raise GaitError("A cycle cannot do without its first knot.", "Change its angles.")
+        shape = gait.GaitCurve(np.delete(shape.phases, knot), np.delete(shape.angles, knot, axis=0))
         group = _editable(settings)
-        curve = _active(group.curves, group.active_curve, "pair")
-        curve.knots.remove(self.knot if self.knot >= 0 else count - 1)
-        curve.active_knot = min(curve.active_knot, count - 2)
+        fill_curve(used(group.curves)[sorted(table.curves).index(pair)], shape)
 
 
 class OCTO_MOTION_OT_gait_offset_add(ArmatureOperator, bpy.types.Operator):
@@ -348,10 +350,9 @@ class OCTO_MOTION_OT_gait_offset_add(ArmatureOperator, bpy.types.Operator):
                 f"Pair {self.pair} {self.side.lower()} has an offset already.",
                 "Change that one, or choose another arm.",
             )
-        group = _editable(settings)
-        offset = group.offsets.add()
-        offset.pair, offset.side = self.pair, self.side
-        group.active_offset = len(group.offsets) - 1
+        offsets = {**table.offsets, (self.pair, self.side): 0.0}
+        fill_offsets(_editable(settings), offsets)
+        settings.table.active_offset = sorted(offsets).index((self.pair, self.side))
 
 
 class OCTO_MOTION_OT_gait_offset_remove(ArmatureOperator, bpy.types.Operator):
@@ -369,11 +370,12 @@ class OCTO_MOTION_OT_gait_offset_remove(ArmatureOperator, bpy.types.Operator):
     )
 
     def run(self, context: bpy.types.Context) -> None:
-        group = _settings(context).table
-        index = self.offset if self.offset >= 0 else len(group.offsets) - 1
-        _active(group.offsets, index, "offset")
-        group.offsets.remove(index)
-        group.active_offset = max(min(group.active_offset, len(group.offsets) - 1), 0)
+        settings = _settings(context)
+        offsets = sorted(read_gait(settings).offsets.items())
+        number = self.offset if self.offset >= 0 else len(offsets) - 1
+        _active(offsets, number, "offset")
+        del offsets[number]
+        fill_offsets(_editable(settings), dict(offsets))
 
 
 class OCTO_MOTION_MT_gait_offset(bpy.types.Menu):
@@ -386,7 +388,7 @@ class OCTO_MOTION_MT_gait_offset(bpy.types.Menu):
         assert layout is not None
         assert context is not None
         settings = locomotion_settings(active_armature(context))
-        taken = {(each.pair, each.side) for each in settings.table.offsets}
+        taken = {(each.pair, each.side) for each in used(settings.table.offsets)}
         for pair, side, name in sorted({(arm.pair, arm.side, arm.name) for arm in settings.arms}):
             if (pair, side) not in taken:
                 chosen: Any = layout.operator(OCTO_MOTION_OT_gait_offset_add.bl_idname, text=name)

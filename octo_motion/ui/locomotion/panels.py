@@ -13,7 +13,7 @@ from ...core.errors import RigError
 from .add_octopus import OCTO_MOTION_OT_add_octopus
 from .add_route import OCTO_MOTION_OT_add_route
 from .arm_list import draw_arms
-from .gait_properties import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table
+from .gait_properties import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table, used
 from .gait_table import (
     OCTO_MOTION_MT_gait,
     OCTO_MOTION_MT_gait_offset,
@@ -169,7 +169,7 @@ class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
     ) -> None:
         table = settings.table
         row = layout.row(align=True)
-        row.alert = bool(table.curves) and table.name != settings.gait
+        row.alert = bool(used(table.curves)) and table.name != settings.gait
         row.prop(settings, "gait")
         row.menu(OCTO_MOTION_MT_gait.bl_idname, text="", icon="DOWNARROW_HLT")
         layout.prop(table, "stride")
@@ -199,7 +199,8 @@ class OCTO_MOTION_PT_table(_Panel, bpy.types.Panel):
         column.prop(table, "spread_pairs", text="Spread Pairs")
         column.prop(table, "spread_sides")
         _draw_offsets(layout, table)
-        if not table.curves:
+        curves = used(table.curves)
+        if not curves:
             layout.operator(
                 OCTO_MOTION_OT_gait_load.bl_idname, text="Edit Angles", icon="GREASEPENCIL"
             )
@@ -211,13 +212,13 @@ class OCTO_MOTION_PT_table(_Panel, bpy.types.Panel):
         column = row.column(align=True)
         column.operator(OCTO_MOTION_OT_gait_curve_add.bl_idname, text="", icon="ADD")
         column.operator(OCTO_MOTION_OT_gait_curve_remove.bl_idname, text="", icon="REMOVE")
-        if 0 <= table.active_curve < len(table.curves):
-            _draw_knots(layout, table, table.curves[table.active_curve])
+        if 0 <= table.active_curve < len(curves):
+            _draw_knots(layout, table, curves[table.active_curve])
 
 
 def _draw_offsets(layout: Any, table: OCTO_MOTION_PG_gait_table) -> None:
     column = layout.column(align=True)
-    for number, offset in enumerate(table.offsets):
+    for number, offset in enumerate(used(table.offsets)):
         row = column.row(align=True)
         row.prop(offset, "phase", text=f"Arm {offset.pair} {_SIDES[offset.side]}")
         remove = row.operator(
@@ -238,7 +239,7 @@ def _draw_knots(
     for title in ("Phase", "Root", "Middle", "Tip"):
         row.label(text=title)
     row.label(text="", icon="BLANK1")
-    for number, knot in enumerate(curve.knots):
+    for number, knot in enumerate(used(curve.knots)):
         row = column.row(align=True)
         row.prop(knot, "phase", text="")
         for link in range(3):
@@ -265,7 +266,10 @@ class OCTO_MOTION_UL_gait_curves(bpy.types.UIList):
         index: int | None = 0,  # noqa: ARG002
         flt_flag: int | None = 0,  # noqa: ARG002
     ) -> None:
-        if item.pair == 0:
+        if item.unused:
+            layout.active = False
+            layout.label(text="Unused, of the linked file")
+        elif item.pair == 0:
             layout.label(text="All Arms", icon="FCURVE")
         else:
             row = layout.row()

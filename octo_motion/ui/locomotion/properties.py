@@ -35,6 +35,7 @@ from .gait_properties import (
     OCTO_MOTION_PG_gait_table,
     fill_table,
     read_table,
+    used,
 )
 
 AXES: Final = (
@@ -56,7 +57,7 @@ def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
 
 
 def _load_gait(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.Context) -> None:
-    if settings.table.curves and settings.table.name == settings.gait:
+    if used(settings.table.curves) and settings.table.name == settings.gait:
         return
     try:
         load_gait(settings, settings.gait)
@@ -457,7 +458,28 @@ def locomotion_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion
         RigError: the object is no armature.
     """
     armature_data(armature)
+    make_overridable(armature)
     return cast("OCTO_MOTION_PG_locomotion", armature.octo_motion.locomotion)  # type: ignore[attr-defined]
+
+
+def make_overridable(armature: bpy.types.Object) -> None:
+    """Let a library override keep its settings where the linked object has none.
+
+    Blender 5.2 compares groups of properties with those of the linked object. Where that has
+    never had any, it saves an override of the group as a whole, which it cannot read back. A
+    group comes into being when it is looked at.
+    """
+    override = armature.override_library
+    if override is not None and isinstance(override.reference, bpy.types.Object):
+        _look_at(override.reference.octo_motion)  # type: ignore[attr-defined]
+
+
+def _look_at(group: bpy.types.PropertyGroup) -> None:
+    for definition in group.bl_rna.properties:
+        if definition.type == "POINTER" and definition.identifier != "rna_type":
+            value = getattr(group, definition.identifier)
+            if isinstance(value, bpy.types.PropertyGroup):
+                _look_at(value)
 
 
 def load_gait(settings: OCTO_MOTION_PG_locomotion, name: str) -> None:
@@ -482,10 +504,10 @@ def read_gait(settings: OCTO_MOTION_PG_locomotion) -> GaitTable:
     Raises:
         GaitError: no gait of the chosen name could be loaded, or the table is no gait.
     """
-    if settings.table.curves and settings.table.name == settings.gait:
+    if used(settings.table.curves) and settings.table.name == settings.gait:
         return read_table(settings.table)
     preset = presets.load_gait(settings.gait)
-    if settings.table.curves:
+    if used(settings.table.curves):
         raise GaitError(
             f"The gait '{settings.gait}' is not loaded, '{settings.table.name}' is.",
             "Choose the gait anew.",
