@@ -23,6 +23,22 @@ Colour = tuple[float, float, float]
 _WATER: Colour = (0.045, 0.135, 0.19)
 _TILES: tuple[Colour, Colour] = ((0.50, 0.43, 0.31), (0.44, 0.375, 0.27))
 _ROUTE: Colour = (0.95, 0.62, 0.08)
+_OCTAHEDRON = np.array(
+    [
+        (0, 0, 0),
+        (0.16, 0.2, 0.16),
+        (0.16, 0.2, -0.16),
+        (-0.16, 0.2, -0.16),
+        (-0.16, 0.2, 0.16),
+        (0, 1, 0),
+    ]
+)
+"""A bone of length 1, along Y."""
+_FACETS = [
+    facet
+    for first, second in ((1, 2), (2, 3), (3, 4), (4, 1))
+    for facet in ((0, first, second), (5, second, first))
+]
 _SIDE_BY_SIDE = 20
 """Ground tiles across the shorter side of the animation."""
 
@@ -67,8 +83,23 @@ def set_light(scene: bpy.types.Scene) -> None:
     shading.cavity_valley_factor = 1.2
     shading.curvature_ridge_factor = 0.6
     shading.curvature_valley_factor = 0.8
-    world = bpy.data.worlds.new("Water")
-    world.color = _WATER
+    _set_background(scene, _WATER)
+
+
+def set_flat_light(scene: bpy.types.Scene, background: Colour) -> None:
+    """Workbench: nothing but the materials' own colours."""
+    set_light(scene)
+    assert scene.display is not None
+    shading = scene.display.shading
+    assert shading is not None
+    shading.light = "FLAT"
+    shading.show_shadows = shading.show_cavity = False
+    _set_background(scene, background)
+
+
+def _set_background(scene: bpy.types.Scene, colour: Colour) -> None:
+    world = bpy.data.worlds.new("Background")
+    world.color = colour
     scene.world = world
 
 
@@ -138,7 +169,7 @@ def add_ground(points: Points, height: float, margin: float = 0.8) -> bpy.types.
     mesh = bpy.data.meshes.new("Ground")
     mesh.from_pydata(vertices.tolist(), [], faces.tolist())
     for colour in _TILES:
-        mesh.materials.append(_material("Ground", colour, roughness=1.0))
+        mesh.materials.append(new_material("Ground", colour, roughness=1.0))
     across, along = np.meshgrid(np.arange(counts[0]), np.arange(counts[1]))
     mesh.polygons.foreach_set("material_index", ((across + along) % 2).ravel().astype(np.int32))
     ground = bpy.data.objects.new("Ground", mesh)
@@ -155,14 +186,45 @@ def show_route(route: bpy.types.Object, thickness: float) -> bpy.types.Object:
     data.bevel_resolution = 2
     data.use_fill_caps = True
     data.materials.clear()
-    data.materials.append(_material("Route", _ROUTE, roughness=0.6))
+    data.materials.append(new_material("Route", _ROUTE, roughness=0.6))
     tube = bpy.data.objects.new("Route Tube", data)
     tube.matrix_world = route.matrix_world
     the_scene().collection.objects.link(tube)
     return tube
 
 
-def _material(name: str, colour: Colour, roughness: float) -> bpy.types.Material:
+def leave_copy(armature: bpy.types.Object) -> None:
+    """Leave the skin standing where it is now, in the pose it has now."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for child in armature.children:
+        if child.type != "MESH":
+            continue
+        evaluated = child.evaluated_get(depsgraph)
+        mesh = bpy.data.meshes.new_from_object(evaluated, depsgraph=depsgraph)
+        copy = bpy.data.objects.new(f"{child.name} Copy", mesh)
+        copy.matrix_world = evaluated.matrix_world
+        the_scene().collection.objects.link(copy)
+
+
+def show_bones(armature: bpy.types.Object) -> None:
+    """Bones as the 3D view draws them, octahedra in their own colours: renders leave bones out."""
+    assert isinstance(armature.data, bpy.types.Armature)
+    for bone in armature.data.bones:
+        mesh = bpy.data.meshes.new(bone.name)
+        mesh.from_pydata((_OCTAHEDRON * bone.length).tolist(), [], _FACETS)
+        assert bone.color is not None
+        assert bone.color.custom is not None
+        colour = bone.color.custom.normal
+        mesh.materials.append(
+            new_material(bone.name, (colour.r, colour.g, colour.b), roughness=0.5)
+        )
+        shown = bpy.data.objects.new(bone.name, mesh)
+        shown.matrix_world = armature.matrix_world @ bone.matrix_local
+        the_scene().collection.objects.link(shown)
+
+
+def new_material(name: str, colour: Colour, roughness: float = 1.0) -> bpy.types.Material:
+    """A material as Workbench shows it; the colour is linear."""
     material = bpy.data.materials.new(name)
     material.diffuse_color = (*colour, 1.0)
     material.roughness = roughness
@@ -247,7 +309,7 @@ def set_note(render: bpy.types.RenderSettings, note: str) -> None:
             setattr(render, name, name == "use_stamp_note")
     render.use_stamp = bool(note)
     render.stamp_note_text = note
-    render.stamp_font_size = max(10, render.resolution_y // 20)
+    render.stamp_font_size = max(10, min(render.resolution_x, render.resolution_y) // 20)
     render.stamp_foreground = (1.0, 1.0, 1.0, 1.0)
     render.stamp_background = (0.0, 0.0, 0.0, 0.35)
 
@@ -264,13 +326,17 @@ def load_pixels(path: Path) -> Pixels:
 
 
 def save_pixels(pixels: Pixels, path: Path) -> None:
-    """Write pixels (height, width, 3), from the top row down, into a PNG file."""
+    """Write pixels (height, width, 3), from the top row down, into a PNG file, well packed."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(path.stem, width, height)
     whole = np.ones((height, width, 4), dtype=np.float32)
     whole[..., :3] = pixels[::-1]
     image.pixels.foreach_set(whole.ravel())  # type: ignore[arg-type]
-    image.file_format = "PNG"
-    image.filepath_raw = str(path)
-    image.save()
+    scene = the_scene()
+    assert scene.view_settings is not None
+    scene.view_settings.view_transform = "Standard"
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode, settings.compression = "PNG", "RGB", 100
+    # Packs harder than the image's own save(), and leaves values as they are.
+    image.save_render(str(path), scene=scene)
     bpy.data.images.remove(image)
