@@ -179,7 +179,8 @@ def test_suckers_face_the_ground() -> None:
     suckers = mesh.quads[mesh.materials == Material.SUCKER]
     a, b, c, d = (mesh.vertices[suckers[:, corner]] for corner in range(4))
     normals = 0.5 * np.cross(c - a, d - b)
-    assert np.sum(normals[:, 2]) < -0.5 * np.sum(np.linalg.norm(normals, axis=1)) * 0.5
+    # Rims have walls and cups have slopes; together they look down by far.
+    assert np.sum(normals[:, 2]) < -0.25 * np.sum(np.linalg.norm(normals, axis=1))
     assert np.max(mesh.vertices[suckers][..., 2]) < OctopusShape().arm_height
 
 

@@ -118,9 +118,7 @@ def test_the_redo_panels_numbers_arrive_at_the_rig() -> None:
 
 
 def test_the_defaults_are_the_shapes_own() -> None:
-    properties = OCTO_MOTION_OT_add_octopus.bl_rna.properties
     rna: Any = bpy.ops.octo_motion.add_octopus.get_rna_type().properties
-    assert properties is not None
     default = OctopusShape()
     for name in ("arms", "joints", "arm_length", "first_diameter", "taper"):
         assert rna[name].default == pytest.approx(getattr(default, name))

@@ -19,6 +19,8 @@ from .octopus_topology import Indices
 
 MOST_INFLUENCES: Final = 4
 """What game engines and real-time viewers take."""
+_NEGLIGIBLE: Final = 1e-3
+"""Smaller weights are left out."""
 
 
 class Influences(NamedTuple):
@@ -103,6 +105,3 @@ def strongest(influences: Influences) -> Influences:
         kept = kept - weights[..., MOST_INFLUENCES, None]
     kept = np.where(kept > _NEGLIGIBLE, kept, 0.0)
     return Influences(bones[..., :MOST_INFLUENCES], kept / np.sum(kept, axis=-1, keepdims=True))
-
-
-_NEGLIGIBLE: Final = 1e-3

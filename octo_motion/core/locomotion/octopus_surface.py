@@ -58,8 +58,10 @@ class Surface:
     def mirrored(self) -> Iterator[None]:
         """Within it, what is added on the left is added on the right."""
         self._mirrored = True
-        yield
-        self._mirrored = False
+        try:
+            yield
+        finally:
+            self._mirrored = False
 
     def add_vertices(self, points: Floats, influences: Influences) -> Indices:
         """New vertices at points (…, 3); their indices (…)."""
