@@ -18,13 +18,11 @@ from ...core.errors import OctoMotionError
 from .entry import ShotEntry
 from .outputs import remove_staged, write_json
 from .processes import dying_with_parent
+from .registration import COMMAND
 from .stage import perform
 
 RUN_SHOT: Final = "--run-shot"
 """First argument of a process that makes one shot; the paths of request and answer follow."""
-
-COMMAND: Final = "octo_motion"
-"""Name of the command in ``blender --command octo_motion``."""
 
 _PACKAGE: Final = __name__.removesuffix(".ui.batch.child")
 

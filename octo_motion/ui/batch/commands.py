@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``blender --command octo_motion``: what the words of the command line do."""
+"""What the words of the command line do."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import bpy
 
 from ...core.errors import OctoMotionError, SettingsError, WriteError
 from ...core.locomotion import gait
 from .bake import STOPPED, BakeOptions, bake
-from .child import COMMAND, RUN_SHOT, run_shot
+from .child import RUN_SHOT, run_shot
 from .command_line import parse
 from .entry import ShotEntry
 from .job import Known, export_fault, is_gait_file, read_gait_file
@@ -24,26 +24,7 @@ from .processes import stoppable
 from .setting_values import check_settings, parse_assignments
 from .stage import perform
 
-IN_BLENDER: Final = f"blender --background [FILE] --command {COMMAND}"
-
 _WRONG: Final = 2
-
-_handles: list[Any] = []
-
-
-def register() -> None:
-    """Make the command known to Blender."""
-    _handles.append(bpy.utils.register_cli_command(COMMAND, _execute))
-
-
-def unregister() -> None:
-    """Take the command away."""
-    while _handles:
-        bpy.utils.unregister_cli_command(_handles.pop())
-
-
-def _execute(arguments: list[str]) -> int:
-    return main(arguments, IN_BLENDER, has_open_file=True)
 
 
 def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:

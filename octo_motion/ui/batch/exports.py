@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Final
 
 import bpy
 
 from ...core.errors import RigError, WriteError
+from .blender_said import blender_said
 
 
 def export(
@@ -36,17 +37,19 @@ def export(
         raise RigError(
             f"'{armature.name}' has no mesh, and Alembic keeps no bones.", "Export to .glb or .fbx."
         )
+    group, name, exporter = _EXPORTERS[path.suffix.lower()]
+    if name not in dir(getattr(bpy.ops, group)):
+        raise WriteError(
+            f"This Blender has no exporter for {path.suffix}.",
+            "Enable its add-on in the preferences, or take an official build of Blender.",
+        )
     _select(creature, armature)
     try:
-        _EXPORTERS[path.suffix.lower()](path, first, last)
-    except AttributeError as error:
-        raise WriteError(
-            f"This Blender has no exporter for {path.suffix}.", "Enable it in the preferences."
-        ) from error
+        exporter(path, first, last)
     except RuntimeError as error:
-        said = (str(error).strip().splitlines() or [""])[0].removeprefix("Error: ")
         raise WriteError(
-            f"The export to {path.suffix} failed: {said}", "Open the .blend file and export there."
+            f"The export to {path.suffix} failed: {blender_said(error)}",
+            "Open the .blend file and export there.",
         ) from error
 
 
@@ -109,4 +112,9 @@ def _alembic(path: Path, first: int, last: int) -> None:
     )
 
 
-_EXPORTERS: Any = {".glb": _gltf, ".fbx": _fbx, ".abc": _alembic}
+_EXPORTERS: Final[dict[str, tuple[str, str, Callable[[Path, int, int], None]]]] = {
+    ".glb": ("export_scene", "gltf", _gltf),
+    ".fbx": ("export_scene", "fbx", _fbx),
+    ".abc": ("wm", "alembic_export", _alembic),
+}
+"""The operator of each format, by its group and name, and what calls it."""

@@ -63,6 +63,9 @@ def object_names(file: Path) -> set[str]:
     """
     if not file.is_file():
         raise OctoMotionError(f"There is no file '{file}'.", "Give the path of a .blend file.")
+    if bpy.data.filepath and file.samefile(bpy.data.filepath):
+        # Blender does not look into the file that is open; a command has not changed it.
+        return {each.name for each in bpy.data.objects}
     try:
         library: Any = bpy.data.libraries.load(str(file))  # the stubs know no context manager
         with library as (inside, _taken):

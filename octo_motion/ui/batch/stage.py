@@ -20,6 +20,7 @@ from ...core.locomotion import gait
 from ...core.locomotion.detection import detect_arms
 from ..locomotion.properties import locomotion_settings, set_gait
 from ..locomotion.workflow import Summary, generate
+from .blender_said import blender_said
 from .entry import NewRoute, ShotEntry, frame_rate
 from .exports import export
 
@@ -59,7 +60,7 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
         armature = find_armature(entry.armature, scene)
         scene = _scene_of(armature, scene)
     libraries = tuple(bpy.path.abspath(each.filepath) for each in bpy.data.libraries)
-    with bpy.context.temp_override(scene=scene, view_layer=_view_layer(scene, armature)):
+    with _context(scene, armature):
         if entry.fps is not None:
             scene.render.fps, scene.render.fps_base = frame_rate(entry.fps)
         _apply(entry, armature, scene)
@@ -89,7 +90,7 @@ def _open(entry: ShotEntry) -> bool:
         bpy.ops.wm.open_mainfile(filepath=str(entry.file), load_ui=False)
     except RuntimeError as error:
         raise OctoMotionError(
-            f"'{entry.file}' cannot be opened: {_said(error)}", "Give a .blend file."
+            f"'{entry.file}' cannot be opened: {blender_said(error)}", "Give a .blend file."
         ) from error
     return _is_compressed(entry.file)
 
@@ -167,9 +168,17 @@ def _scene_of(armature: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.S
     raise RigError(f"'{armature.name}' is in no scene.", "Link it to a scene.")
 
 
-def _view_layer(scene: bpy.types.Scene, armature: bpy.types.Object) -> bpy.types.ViewLayer:
+def _context(scene: bpy.types.Scene, armature: bpy.types.Object) -> Any:
+    """A context manager: Blender's context, with the scene and a view layer that has the armature.
+
+    A command that Blender runs with a file has no window in its context, but exporters need one.
+    """
     layers = list(scene.view_layers)
-    return next((each for each in layers if armature.name in each.objects), layers[0])
+    layer = next((each for each in layers if armature.name in each.objects), layers[0])
+    window_manager: Any = bpy.context.window_manager
+    window = bpy.context.window or next(iter(window_manager.windows), None)
+    given = {"window": window} if window else {}
+    return bpy.context.temp_override(**given, scene=scene, view_layer=layer)
 
 
 def _apply(entry: ShotEntry, armature: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -240,11 +249,5 @@ def _run(operator: Callable[[], Any], what: str) -> None:
         operator()
     except RuntimeError as error:
         raise WriteError(
-            f"{what} cannot be written: {_said(error)}", "Choose another place."
+            f"{what} cannot be written: {blender_said(error)}", "Choose another place."
         ) from error
-
-
-def _said(error: RuntimeError) -> str:
-    """The first line of what an operator of Blender's reported."""
-    text = str(error).strip().splitlines() or [""]
-    return text[0].removeprefix("Error: ").strip() or "Blender does not say why."
