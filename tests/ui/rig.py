@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from octo_motion.blender.curves import add_route_curve
+from octo_motion.ui.plain import plain
 
 ROUTE = ((0.0, 0.0, 0.0), (0.0, -2.0, 0.0), (1.0, -3.0, 0.5), (3.0, -3.0, 0.5))
 
@@ -77,3 +78,32 @@ def joints_in_world(armature: Any, frame: float) -> np.ndarray:
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     world = evaluated.matrix_world
     return np.array([[world @ bone.head, world @ bone.tail] for bone in evaluated.pose.bones])
+
+
+def click(name: str, **properties: Any) -> set[str]:
+    """Call an operator as a click does: with an undo step of its own."""
+    operator = getattr(bpy.ops.octo_motion, name)
+    return operator("EXEC_DEFAULT", True, **properties)  # noqa: FBT003
+
+
+def scene_contents() -> dict[str, Any]:
+    """All that an operator of locomotion can change, as plain data."""
+    kinds = ("objects", "actions", "curves", "armatures", "node_groups", "meshes")
+    contents: dict[str, Any] = {kind: getattr(bpy.data, kind).keys() for kind in kinds}
+    contents["range"] = (bpy.context.scene.frame_start, bpy.context.scene.frame_end)
+    contents["frame"] = bpy.context.scene.frame_current
+    contents["mode"] = bpy.context.mode
+    for action in bpy.data.actions:
+        contents[f"users of {action.name}"] = (action.users, action.use_fake_user)
+        contents[f"keys of {action.name}"] = {
+            key: values.tobytes() for key, values in keys(action).items()
+        }
+    objects: Any = bpy.data.objects
+    for each in objects:
+        contents[f"settings of {each.name}"] = plain(each.octo_motion)
+        contents[f"place of {each.name}"] = [tuple(row) for row in each.matrix_basis]
+        data = each.animation_data
+        contents[f"action of {each.name}"] = data and data.action and data.action.name
+        for bone in each.pose.bones if each.pose else ():
+            contents[f"pose of {each.name} {bone.name}"] = [tuple(r) for r in bone.matrix_basis]
+    return contents

@@ -358,9 +358,10 @@ def _draw_result(
         return
     scene = cast("bpy.types.Scene", context.scene)
     length = (action.frame_end - action.frame_start) / scene.render.fps * scene.render.fps_base
-    row = layout.row()
-    row.label(text=action.name, icon="ACTION")
-    row.label(text=f"{action.frame_end - action.frame_start + 1:.0f} frames, {length:.1f} s")
+    column = layout.column(align=True)
+    column.label(text=action.name, icon="ACTION")
+    frames = action.frame_end - action.frame_start + 1.0
+    column.label(text=f"{frames:.0f} frames, {length:.1f} s", icon="BLANK1")
 
 
 CLASSES: Final = (

@@ -326,8 +326,8 @@ def _uniform_scale(armature: bpy.types.Object, world: Floats) -> float:
     name = f"'{armature.name}'"
     if not np.isfinite(world).all() or sizes.min() < 1e-9:
         raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
-    scale = float(np.cbrt(abs(np.linalg.det(axes))))
-    if np.abs(sizes / scale - 1.0).max() > _UNEQUAL:
+    scale = float(sizes.mean())
+    if np.ptp(sizes) > _UNEQUAL * scale:
         shown = ", ".join(f"{size:.4g}" for size in sizes)
         raise RigError(
             f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
