@@ -80,7 +80,7 @@ def joints_in_world(armature: Any, frame: float) -> np.ndarray:
     return np.array([[world @ bone.head, world @ bone.tail] for bone in evaluated.pose.bones])
 
 
-def click(name: str, **properties: Any) -> set[str]:
+def click(name: str, /, **properties: Any) -> set[str]:
     """Call an operator as a click does: with an undo step of its own."""
     operator = getattr(bpy.ops.octo_motion, name)
     return operator("EXEC_DEFAULT", True, **properties)  # noqa: FBT003

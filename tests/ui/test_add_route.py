@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Add › Curve › Octopus Route, and the button: four control points for the active armature."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import bpy
@@ -9,20 +8,8 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.curves import read_route
-from octo_motion.ui.locomotion.add_route import OCTO_MOTION_OT_add_route
 
 POINTS = {"b0": (1, 2, 3), "b1": (2, 4, 3), "b2": (4, 4, 4), "b3": (5, 2, 4)}
-
-
-@pytest.fixture(autouse=True)
-def operator() -> Iterator[None]:
-    """The operator, registered by the add-on or here."""
-    if hasattr(bpy.types, "OCTO_MOTION_OT_add_route"):
-        yield
-        return
-    bpy.utils.register_class(OCTO_MOTION_OT_add_route)
-    yield
-    bpy.utils.unregister_class(OCTO_MOTION_OT_add_route)
 
 
 def add_route(**points: tuple[float, float, float]) -> Any:
@@ -79,8 +66,6 @@ def test_the_armature_stays_active_and_selected_for_the_next_click() -> None:
 
 
 def test_the_route_becomes_the_armatures() -> None:
-    if not hasattr(bpy.types.Object, "octo_motion"):
-        pytest.skip("the add-on has no settings yet")
     armature = new_armature()
     route = add_route()
     assert armature.octo_motion.locomotion.route == route

@@ -12,6 +12,7 @@ from ...blender.curves import add_route_curve, suggested_control_points
 from ...core.errors import RigError, WriteError
 from ...core.locomotion.route import Route
 from ..operator_base import OctoOperator
+from .properties import locomotion_settings
 
 _POINTS = ("b0", "b1", "b2", "b3")
 
@@ -85,9 +86,7 @@ def _assign(armature: bpy.types.Object, route: bpy.types.Object) -> bool:
     """Make the curve the armature's route; False if the armature cannot be written."""
     if not armature.is_editable:
         return False
-    settings = getattr(getattr(armature, "octo_motion", None), "locomotion", None)
-    if settings is not None and hasattr(settings, "route"):
-        settings.route = route
+    locomotion_settings(armature).route = route
     return True
 
 

@@ -358,7 +358,8 @@ def matched(group: Any, name: str, values: Iterable[Any]) -> Iterable[tuple[Any,
     while len(collection) > least:
         collection.remove(len(collection) - 1)
     while len(collection) < len(wanted):
-        collection.add()
+        # Library overrides tell items apart by name, and lose some of those that have none.
+        collection.add().name = str(len(collection))
     for number, item in enumerate(collection):
         assign(item, "unused", number >= len(wanted))
     return zip(collection, wanted, strict=False)

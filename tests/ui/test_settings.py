@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The settings that scripts set: names, defaults, explanations, overrides."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import pytest
+
+from octo_motion.core.errors import RigError
+from octo_motion.core.locomotion.generator import GaitSettings
+from octo_motion.core.locomotion.travel import TravelSettings
+from octo_motion.ui import registration
+from octo_motion.ui.job import Job
+from octo_motion.ui.locomotion.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from octo_motion.ui.plain import plain
+from tests.ui.rig import give_route, make_octopus
+
+# What scripts rely on: a name is never changed or removed.
+NAMES = {
+    *("arms", "active_arm", "body_front", "body_up", "root_bone"),
+    *("route", "spline", "speed_mode", "ease_in", "ease_out"),
+    *("heading", "heading_angle", "keep_upright", "look_ahead", "corner"),
+    *("height_mode", "height"),
+    *("gait", "table", "contraction", "softness", "sway", "phase_spread", "turning"),
+    *("burst", "bank_in_turns"),
+    *("variation_min", "variation_max", "seed"),
+    *("weight_root", "weight_tip", "use_weight_curve", "weight_curve"),
+    *("timing", "cycle_time", "speed", "frame_start", "frame_end"),
+    *("travel_on", "extend_scene_range", "result"),
+}
+
+
+def groups() -> Iterator[Any]:
+    for each in registration.CLASSES:
+        if issubclass(each, bpy.types.PropertyGroup):
+            yield each
+
+
+def properties(group: Any) -> Iterator[Any]:
+    """What a group of properties defines itself; its own come after those of all groups."""
+    found = {each.identifier: each for each in group.bl_rna.properties}
+    yield from (found[name] for name in group.__annotations__)
+
+
+def test_the_names_are_those_that_scripts_use() -> None:
+    assert {each.identifier for each in properties(OCTO_MOTION_PG_locomotion)} == NAMES
+
+
+def test_every_setting_explains_itself() -> None:
+    for group in groups():
+        for definition in properties(group):
+            if definition.is_hidden or group.__name__ == "OCTO_MOTION_PG_gait_note":
+                continue
+            assert definition.name, definition
+            assert len(definition.description) > 10, (group, definition.identifier)
+            assert not definition.description.endswith("."), definition.identifier
+
+
+def test_every_setting_can_be_overridden_except_names_of_list_items() -> None:
+    for group in groups():
+        for definition in properties(group):
+            if group.__name__ in {"ArmItem", "ArmBoneItem"} and definition.identifier == "name":
+                continue
+            assert definition.is_overridable, (group, definition.identifier)
+
+
+def test_defaults_are_those_of_core() -> None:
+    settings = locomotion_settings(make_octopus())
+    for name in ("contraction", "softness", "sway", "phase_spread", "seed", "turning"):
+        assert getattr(settings, name) == pytest.approx(getattr(GaitSettings, name)), name
+    for name in ("heading", "heading_angle", "burst", "look_ahead", "keep_upright", "corner"):
+        assert getattr(settings, name) == pytest.approx(getattr(TravelSettings, name)), name
+
+
+def test_settings_of_something_else_than_an_armature_are_refused() -> None:
+    with pytest.raises(RigError, match="not an armature"):
+        locomotion_settings(bpy.data.objects.new("Empty", None))
+
+
+def test_only_a_curve_can_be_the_route() -> None:
+    settings = locomotion_settings(make_octopus())
+    empty = bpy.data.objects.new("Empty", None)
+    curve = give_route(settings.id_data)
+    assert settings.route == curve
+    # Scripts may set any object, as Blender lets them; generating says what is wrong with it.
+    settings.route = empty
+    bpy.context.view_layer.objects.active = settings.id_data
+    with pytest.raises(RuntimeError, match="not a curve"):
+        bpy.ops.octo_motion.generate_locomotion()
+
+
+def test_settings_are_plain_data_for_json() -> None:
+    armature = make_octopus()
+    give_route(armature)
+    bpy.ops.octo_motion.detect_arms()
+    settings = locomotion_settings(armature)
+    settings.gait = "swim"
+    data = json.loads(json.dumps(plain(settings)))
+    assert set(data) >= NAMES
+    assert data["route"] == "Route"
+    assert data["result"] is None
+    assert data["arms"][0]["bones"][0]["name"] == "Arm1_1.L"
+    assert data["table"]["curves"][0]["knots"][1]["head"] == pytest.approx(
+        list(settings.table.curves[0].knots[1].head)
+    )
+    assert "route" not in plain(settings, without=frozenset({"route"}))
+
+
+def test_the_weight_curve_is_made_when_it_is_switched_on_and_kept_when_off() -> None:
+    settings = locomotion_settings(make_octopus())
+    settings.weight_root, settings.weight_tip = 0.9, 0.3
+    settings.use_weight_curve = True
+    group = settings.weight_curve
+    assert group is not None
+    settings.use_weight_curve = False
+    settings.use_weight_curve = True
+    assert settings.weight_curve == group
+
+
+def test_the_weight_curve_moves_the_arms_as_weights_do() -> None:
+    from octo_motion.ui.locomotion.workflow import _gait_settings, read_gait
+
+    settings = locomotion_settings(make_octopus())
+    settings.weight_root, settings.weight_tip = 0.9, 0.3
+    straight = _gait_settings(settings, read_gait(settings)).weights
+    settings.use_weight_curve = True
+    drawn = _gait_settings(settings, read_gait(settings)).weights
+    assert straight == pytest.approx((0.9, 0.3))
+    assert len(drawn) == 33
+    assert (drawn[0], drawn[16], drawn[-1]) == pytest.approx((0.9, 0.6, 0.3), abs=1e-4)
+
+
+def test_a_job_works_at_least_a_step_and_stops_when_its_time_is_over() -> None:
+    now = 0.0
+
+    def steps() -> Iterator[float]:
+        nonlocal now
+        for number in range(5):
+            now += 1.0
+            yield (number + 1) / 5
+
+    job = Job(steps(), clock=lambda: now)
+    assert not job.work(0.0)
+    assert job.progress == pytest.approx(0.2)
+    assert not job.work(2.0)
+    assert job.progress == pytest.approx(0.6)
+    assert job.work(100.0)
+    assert job.progress == 1.0
+    assert job.work(0.0)
