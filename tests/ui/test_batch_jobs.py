@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Job files: what they mean, and that everything wrong with one is told before anything runs."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+
+from octo_motion.core.errors import GaitError, SettingsError
+from octo_motion.core.locomotion import gait
+from octo_motion.core.locomotion.octopus_shape import OctopusShape
+from octo_motion.ui.batch.entry import NewRoute, ShotEntry, frame_rate
+from octo_motion.ui.batch.fingerprint import fingerprint, version
+from octo_motion.ui.batch.job import Job, JobError, Known, load_gait_file, read_job
+from octo_motion.ui.batch.known import known
+from octo_motion.ui.batch.setting_values import Setting, check_settings, parse_assignments
+
+REPOSITORY = Path(__file__).resolve().parent.parent.parent
+
+
+def read(folder: Path, text: str) -> Job:
+    path = folder / "job.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_job(path, known(), folder / "job.report.json")
+
+
+def faults(folder: Path, text: str) -> tuple[str, ...]:
+    with pytest.raises(JobError) as caught:
+        read(folder, text)
+    return caught.value.faults
+
+
+WALK = '[[shots]]\nname = "walk"\nfile = "reef.blend"\noutput = "out/walk.blend"\n'
+NEW = '[[shots]]\nname = "new"\noutput = "new.blend"\n'
+ROUTE = "route = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]\n"
+
+
+def test_shot_has_what_its_table_says_with_paths_beside_the_job(tmp_path: Path) -> None:
+    text = WALK + (
+        'armature = "Octopus"\nroute = "Wall"\ngait = "swim"\nfps = 25\n'
+        'settings = { seed = 3, table.stride = 2, sway = "30°" }\nexport = "out/walk.glb"\n'
+    )
+    (shot,) = read(tmp_path, text).shots
+    entry = shot.entry
+    assert (entry.name, entry.armature, entry.route, entry.fps) == ("walk", "Octopus", "Wall", 25.0)
+    assert entry.file == tmp_path / "reef.blend"
+    assert entry.outputs == (tmp_path / "out/walk.blend", tmp_path / "out/walk.glb")
+    assert gait.from_json(entry.gait).name == "swim"
+    assert entry.settings == {
+        "seed": 3,
+        "table.stride": 2.0,
+        "sway": pytest.approx(math.radians(30)),
+    }
+
+
+def test_defaults_are_shared_and_each_shot_may_say_otherwise(tmp_path: Path) -> None:
+    job = read(
+        tmp_path,
+        '[defaults]\nfile = "reef.blend"\nfps = 24\noutput = "{name}.blend"\n'
+        "settings = { seed = 1, burst = 0.5 }\n"
+        '[[shots]]\nname = "a"\nsettings = { seed = 2 }\n'
+        '[[shots]]\nname = "b"\nfps = 30\noctopus = { arms = 6 }\n' + ROUTE,
+    )
+    a, b = (shot.entry for shot in job.shots)
+    assert (a.settings, b.settings) == ({"seed": 2, "burst": 0.5}, {"seed": 1, "burst": 0.5})
+    assert (a.fps, b.fps) == (24.0, 30.0)
+    assert (a.output, b.output) == (tmp_path / "a.blend", tmp_path / "b.blend")
+    assert (a.file, b.file) == (tmp_path / "reef.blend", None)
+    assert b.octopus
+    assert b.octopus.shape == OctopusShape(arms=6)
+
+
+def test_route_is_four_control_points_or_leads_through_points(tmp_path: Path) -> None:
+    points = "[[0, 0, 0], [1, 0, 0], [1, 1, 0.5]]"
+    job = read(
+        tmp_path,
+        "[defaults]\noctopus = {}\noutput = '{name}.blend'\n"
+        '[[shots]]\nname = "a"\n' + ROUTE + '[[shots]]\nname = "b"\n'
+        "route = { control_points = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]] }\n"
+        f'[[shots]]\nname = "c"\nroute = {{ points = {points}, cyclic = true }}\n',
+    )
+    a, b, c = (shot.entry.route for shot in job.shots)
+    assert a == b == NewRoute(((0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)), is_bezier=True)
+    assert c == NewRoute(((0, 0, 0), (1, 0, 0), (1, 1, 0.5)), is_bezier=False, cyclic=True)
+
+
+def test_gait_file_is_read_beside_the_job(tmp_path: Path) -> None:
+    table = gait.renamed(gait.presets()["swim"], "sneak")
+    (tmp_path / "sneak.json").write_text(gait.to_json(table), encoding="utf-8")
+    (shot,) = read(tmp_path, WALK + 'gait = "sneak.json"\n').shots
+    assert gait.from_json(load_gait_file(shot).gait).name == "sneak"
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (None, "No such file"),
+        (b"\xff\xfe\xff", "it is not text"),
+        (b"{", "is not JSON"),
+        (b"{}", "is not a gait"),
+    ],
+)
+def test_gait_file_that_is_none_is_told_by_its_path(
+    tmp_path: Path, content: bytes | None, reason: str
+) -> None:
+    if content is not None:
+        (tmp_path / "sneak.json").write_bytes(content)
+    (shot,) = read(tmp_path, WALK + 'gait = "sneak.json"\n').shots
+    with pytest.raises(GaitError, match=r"sneak\.json") as caught:
+        load_gait_file(shot)
+    assert reason in str(caught.value)
+
+
+def test_all_faults_are_told_at_once_with_their_shots(tmp_path: Path) -> None:
+    told = faults(
+        tmp_path,
+        '[[shots]]\nname = "a"\nfile = "x.blend"\noutput = "a.blend"\nsettings = { speeed = 1 }\n'
+        '[[shots]]\nname = "b"\noctopus = { arms = 0 }\noutput = "b.blend"\ngait = "hop"\n',
+    )
+    assert len(told) == 4
+    assert told[0].startswith(
+        "shot 'a': There is no setting 'speeed'. Did you mean 'speed'? Valid:"
+    )
+    assert "cycle_time" in told[0]
+    assert told[1:] == (
+        "shot 'b': octopus: Arms is 0. Choose a value from 1 to 64.",
+        "shot 'b': There is no gait 'hop'. Choose one of " + ", ".join(gait.presets()) + ".",
+        "shot 'b': A new octopus has no route: give the route's points.",
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("", "There are no shots"),
+        ("shots = 3\n", "Write each shot as a table of its own, [[shots]]."),
+        ("shot = []\n" + WALK, "There is no table 'shot'. Did you mean 'shots'?"),
+        ("defaults = 3\n" + WALK, "defaults: It must be a table"),
+        ('[defaults]\nname = "x"\n' + WALK, "defaults: A name belongs to one shot."),
+        ("[[shots]]\n", "shot number 1: It has no name"),
+        (WALK + WALK.replace("out", "other"), "shot 'walk': 2 shots have this name."),
+        (WALK + "colour = 3\n", "There is no key 'colour'. Valid: name, file, octopus"),
+        ('[[shots]]\nname = "walk"\noutput = "w.blend"\n', "It has no creature: give file"),
+        (WALK + "octopus = {}\n" + ROUTE, "It has a file and a new octopus"),
+        ('[[shots]]\nname = "walk"\nfile = "x.blend"\n', "It writes nothing"),
+        (WALK.replace("out/walk.blend", "out/walk.abc"), "'walk.abc' must end in .blend."),
+        (WALK.replace('"reef.blend"', "3"), "file must be a text, not 3."),
+        (WALK.replace("reef.blend", ""), "file must be a text, not ''."),
+        (WALK.replace("out/walk.blend", "reef.blend"), "is an input of shot 'walk'"),
+        (WALK.replace("out/walk.blend", "./out/../reef.blend"), "is an input of shot 'walk'"),
+        (WALK + 'export = "job.toml"\n', "is no format to export to. Valid: .glb, .fbx, .abc."),
+        (WALK + 'export = "a.gltf"\n', "export to .glb, the same in one."),
+        (WALK + "export = 3\n", "export must be a path or a list of paths, not 3."),
+        (WALK + 'export = ["a.glb", "a.glb"]\n', "is an output of shot 'walk' too"),
+        (WALK + 'gait = "sub/hop"\n', "There is no gait 'sub/hop'."),
+        (WALK + "fps = 0\n", "fps must be a number from 1 to 32767, not 0."),
+        (WALK + "fps = true\n", "fps must be a number"),
+        (WALK + "settings = 3\n", "settings must be a table, not 3."),
+        (WALK + "settings = { burst = 1.5 }\n", "'burst' cannot be 1.5. Give a value from 0 to 1."),
+        (WALK + 'settings = { gait = "swim" }\n', "There is no setting 'gait'."),
+        (WALK + "settings = { route = 1 }\n", "There is no setting 'route'."),
+        (WALK + "settings = { table.strid = 1 }\n", "Did you mean 'table.stride'?"),
+        (WALK + "route = 3\n", "route must be a text, not 3."),
+        (
+            WALK + "route = [[0, 0], [1, 1]]\n",
+            "a list of points, each of three numbers, [x, y, z].",
+        ),
+        (WALK + "route = [[0, 0, nan], [1, 1, 1]]\n", "a list of points"),
+        (WALK + "route = [[0, 0, 0], [1, 1, 1]]\n", "control points are four, not 2."),
+        (WALK + "route = [[0,0,0],[0,0,0],[0,0,0],[0,0,0]]\n", "are all the same"),
+        (WALK + "route = { points = [[0, 0, 0]] }\n", "at least two that lie apart"),
+        (
+            WALK + "route = { points = [[0, 0, 0], [1, 0, 0]], cyclic = true }\n",
+            "at least three that lie apart",
+        ),
+        (WALK + "route = { cyclic = true }\n", "give either control_points (four) or points"),
+        (WALK + "route = { points = [], close = 1 }\n", "There is no key 'close'. Valid:"),
+        (WALK + "route = { points = [[0,0,0],[1,0,0]], cyclic = 1 }\n", "cyclic must be true or"),
+        (
+            WALK
+            + ROUTE.replace("[[", "{ cyclic = true, control_points = [[").replace("]]", "]] }"),
+            "four control points make no cyclic route",
+        ),
+        (NEW + 'octopus = {}\nroute = "Wall"\n', "A new octopus has no curve 'Wall'"),
+        (NEW + "octopus = 8\n" + ROUTE, "octopus must be a table, such as { arms = 8 }, not 8."),
+        (NEW + "octopus = { legs = 8 }\n" + ROUTE, "There is no parameter 'legs'. Valid: arms"),
+        (NEW + "octopus = { arms = 8.5 }\n" + ROUTE, "arms must be a whole number, not 8.5."),
+        (NEW + 'octopus = { taper = "x" }\n' + ROUTE, "taper must be a number, not 'x'."),
+        (NEW + "octopus = { with_mesh = 1 }\n" + ROUTE, "with_mesh must be true or false, not 1."),
+        ("[[shots]\n", "It is not TOML"),
+    ],
+)
+def test_fault_is_told(tmp_path: Path, text: str, fault: str) -> None:
+    told = faults(tmp_path, text)
+    assert any(fault in each for each in told), told
+
+
+def test_job_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    known_names = Known({}, gait.presets().__getitem__)
+    with pytest.raises(JobError, match="It cannot be read: No such file"):
+        read_job(tmp_path / "none.toml", known_names, tmp_path / "report.json")
+    (tmp_path / "odd.toml").write_bytes(b"\xff")
+    with pytest.raises(JobError, match="not a text in UTF-8"):
+        read_job(tmp_path / "odd.toml", known_names, tmp_path / "report.json")
+
+
+def test_output_must_not_be_the_report(tmp_path: Path) -> None:
+    (tmp_path / "job.toml").write_text(WALK, encoding="utf-8")
+    with pytest.raises(JobError, match="is the report: give another"):
+        read_job(tmp_path / "job.toml", known(), tmp_path / "out" / "walk.blend")
+
+
+def test_entry_survives_its_way_to_another_process(tmp_path: Path) -> None:
+    job = read(
+        tmp_path,
+        WALK + 'gait = "walk"\nfps = 29.97\nsettings = { heading = "fixed" }\nexport = "a.fbx"\n'
+        "[[shots]]\nname = 'b'\noctopus = { taper = 0.2, with_mesh = false }\n"
+        "output = 'b.blend'\n" + ROUTE,
+    )
+    for shot in job.shots:
+        text = json.dumps(shot.entry.to_plain())
+        assert ShotEntry.from_plain(json.loads(text)) == shot.entry
+
+
+def test_example_of_the_documentation_is_in_order(tmp_path: Path) -> None:
+    path = shutil.copy(REPOSITORY / "docs/examples/shots.toml", tmp_path)
+    job = read_job(Path(path), known(), tmp_path / "report.json")
+    assert [shot.entry.name for shot in job.shots] == ["walk", "sideways", "swim"]
+    assert job.shots[2].entry.octopus
+    assert job.shots[2].entry.octopus.shape == OctopusShape(arm_length=0.4)
+
+
+@pytest.mark.parametrize(
+    ("fps", "kept"),
+    [
+        (25.0, (25, 1.0)),
+        (23.976, (24, 1.001)),
+        (29.97, (30, 1.001)),
+        (59.94, (60, 1.001)),
+        (12.5, (13, 1.04)),
+    ],
+)
+def test_frame_rate_is_kept_as_blender_and_broadcasters_have_it(
+    fps: float, kept: tuple[int, float]
+) -> None:
+    assert frame_rate(fps) == (kept[0], pytest.approx(kept[1], abs=1e-12))
+
+
+# --- Values of settings ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("setting", "given", "value"),
+    [
+        (Setting("a", "FLOAT"), "0.5", 0.5),
+        (Setting("a", "FLOAT"), 2, 2.0),
+        (Setting("a", "FLOAT", is_angle=True), "90 deg", math.pi / 2),
+        (Setting("a", "FLOAT", is_angle=True), "-90°", -math.pi / 2),
+        (Setting("a", "FLOAT", is_angle=True), "0.5", 0.5),
+        (Setting("a", "INT"), "3", 3),
+        (Setting("a", "INT"), 3.0, 3),
+        (Setting("a", "BOOLEAN"), "Yes", True),
+        (Setting("a", "BOOLEAN"), "off", False),
+        (Setting("a", "BOOLEAN"), True, True),
+        (Setting("a", "ENUM", choices=("ALONG", "FIXED")), "fixed", "FIXED"),
+        (Setting("a", "STRING"), "0", "0"),
+    ],
+)
+def test_value_is_read_as_meant(setting: Setting, given: object, value: object) -> None:
+    read_value = setting.value(given)
+    assert read_value == pytest.approx(value) if isinstance(value, float) else read_value == value
+    assert type(read_value) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("setting", "given", "remedy"),
+    [
+        (Setting("a", "FLOAT"), "fast", "Give a number."),
+        (Setting("a", "FLOAT"), "30°", "Give a number."),
+        (Setting("a", "FLOAT"), math.nan, "Give a number."),
+        (Setting("a", "FLOAT"), "inf", "Give a number."),
+        (Setting("a", "FLOAT"), True, "Give a number."),
+        (Setting("a", "FLOAT", is_angle=True), "x°", "such as '30°'"),
+        (Setting("a", "FLOAT", minimum=0), -1, "Give 0 or more."),
+        (Setting("a", "FLOAT", maximum=1), 2, "Give 1 or less."),
+        (Setting("a", "FLOAT", 0, 2, is_angle=True), "180°", "a value from 0 to 2 radians."),
+        (Setting("a", "INT"), 2.5, "Give a whole number."),
+        (Setting("a", "BOOLEAN"), "maybe", "Give true or false."),
+        (Setting("a", "BOOLEAN"), 1, "Give true or false."),
+        (Setting("a", "ENUM", choices=("X", "Y")), "Z", "Choose one of X, Y."),
+        (Setting("a", "ENUM", choices=("X", "Y")), 1, "Choose one of X, Y."),
+        (Setting("a", "STRING"), 1, "Give a text."),
+    ],
+)
+def test_value_that_makes_no_sense_is_refused(setting: Setting, given: object, remedy: str) -> None:
+    with pytest.raises(SettingsError, match="The setting 'a' cannot be") as caught:
+        setting.value(given)
+    assert remedy in str(caught.value)
+
+
+def test_every_setting_can_be_given_its_own_default() -> None:
+    settings = known().settings
+    assert {"speed", "timing", "heading_angle", "table.stride", "root_bone"} <= set(settings)
+    assert settings["heading_angle"].is_angle
+    assert not {"name", "gait", "route", "result", "arms", "table.name"} & set(settings)
+    assert settings["timing"].choices == ("CADENCE", "SPEED", "RANGE")
+
+
+def test_assignments_of_the_command_line() -> None:
+    assert parse_assignments(["speed=2", " a.b = c=d ", "speed=3"]) == {"speed": "3", "a.b": "c=d"}
+    for text in ("speed", "=3"):
+        with pytest.raises(SettingsError, match="Write --set name=value"):
+            parse_assignments([text])
+
+
+def test_settings_of_groups_are_named_with_their_group() -> None:
+    one = {"table.stride": Setting("table.stride", "FLOAT")}
+    nested, dotted = {"table": {"stride": 2}}, {"table.stride": "2"}
+    assert check_settings(one, nested) == check_settings(one, dotted) == ({"table.stride": 2.0}, [])
+
+
+# --- Fingerprints ----------------------------------------------------------------------------
+
+
+def test_fingerprint_changes_with_the_entry_and_the_gait_alone() -> None:
+    asked = {"name": "a", "settings": {"seed": 1, "burst": 0.5}}
+    same = {"settings": {"burst": 0.5, "seed": 1}, "name": "a"}
+    assert fingerprint(asked, "{}") == fingerprint(same, "{}")
+    assert fingerprint(asked, "{}") != fingerprint(asked, "")
+    assert fingerprint(asked, "{}") != fingerprint({**asked, "settings": {"seed": 2}}, "{}")
+
+
+def test_version_is_the_manifests() -> None:
+    assert f'version = "{version()}"' in (REPOSITORY / "blender_manifest.toml").read_text()

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a run of a job is made of: what is skipped, whole outputs, processes, errors in one line."""
+
+import errno
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from octo_motion.core.errors import OctoMotionError, WriteError
+from octo_motion.ui.batch.blender_said import blender_said
+from octo_motion.ui.batch.command_line import parse
+from octo_motion.ui.batch.outputs import commit, remove_staged, staged, write_json
+from octo_motion.ui.batch.processes import (
+    Ended,
+    Task,
+    check_jobs,
+    last_lines,
+    processors,
+    run_processes,
+    stoppable,
+)
+from octo_motion.ui.batch.report import ShotRecord, Verdict, judge, read_report, write_report
+
+# --- What is skipped -----------------------------------------------------------------------------
+
+DONE = ShotRecord(
+    "walk",
+    "done",
+    outputs={"walk.blend": "1"},
+    inputs={"reef.blend": "2", "rig.blend": "3"},
+    fingerprint="f",
+)
+FILES = {"walk.blend": "1", "reef.blend": "2", "rig.blend": "3"}
+
+
+def judged(
+    record: ShotRecord | None = DONE,
+    *,
+    fingerprint: str = "f",
+    outputs: tuple[str, ...] = ("walk.blend",),
+    **changed: str,
+) -> Verdict:
+    files = {**FILES, **{name.replace("_", "."): value for name, value in changed.items()}}
+    return judge(record, fingerprint, ["reef.blend"], outputs, lambda path: files.get(path, ""))
+
+
+def test_shot_that_is_done_and_unchanged_is_skipped() -> None:
+    assert judged() == Verdict(skip=True)
+    assert judged(replace(DONE, status="skipped")).skip
+
+
+@pytest.mark.parametrize(
+    "verdict",
+    [
+        lambda: judged(fingerprint="g"),
+        lambda: judged(reef_blend="9"),
+        lambda: judged(rig_blend="9"),  # a library that the scene is linked from
+        lambda: judged(rig_blend=""),
+        lambda: judged(walk_blend=""),
+        lambda: judged(outputs=("walk.blend", "walk.glb")),
+        lambda: judged(None, walk_blend=""),
+        lambda: judged(ShotRecord("walk", "failed", earlier_outputs={"walk.blend": "1"})),
+    ],
+)
+def test_shot_is_made_again_when_anything_that_it_depends_on_has_changed(
+    verdict: Callable[[], Verdict],
+) -> None:
+    assert verdict() == Verdict(skip=False)
+
+
+def test_result_that_somebody_has_worked_on_is_never_lost() -> None:
+    assert judged(walk_blend="9") == Verdict(skip=True, kept=("walk.blend",))
+    refused = judged(walk_blend="9", reef_blend="8")
+    assert not refused.skip
+    assert refused.reason == (
+        "'walk.blend' has been changed since it was baked. "
+        "Move it away, or give --force to overwrite it."
+    )
+
+
+def test_file_that_is_not_the_jobs_work_is_not_overwritten() -> None:
+    assert judged(None).reason.startswith("'walk.blend' is there already.")
+
+
+def test_report_keeps_what_a_later_run_needs(tmp_path: Path) -> None:
+    path = tmp_path / "job.report.json"
+    failed = ShotRecord("b", "failed", error="Why. What to do.", log="line")
+    write_report(path, tmp_path / "job.toml", [DONE, failed])
+    assert read_report(path) == {"walk": DONE, "b": failed}
+    content = json.loads(path.read_text(encoding="utf-8"))
+    assert (content["done"], content["skipped"], content["failed"]) == (1, 0, 1)
+    assert content["job"] == "job.toml"
+
+
+def test_file_that_is_no_report_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "job.report.json"
+    assert read_report(path) == {}
+    for text in ("{", "{}", "[]", '{"format": "octo_motion.report", "format_version": 99}', "null"):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(OctoMotionError, match="is not a report"):
+            read_report(path)
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(OctoMotionError, match="cannot be read"):
+        read_report(path)
+
+
+# --- Outputs -------------------------------------------------------------------------------------
+
+
+def test_outputs_take_their_places_together_and_nothing_else_is_left(tmp_path: Path) -> None:
+    first, second = tmp_path / "out" / "a.blend", tmp_path / "out" / "a.glb"
+    with staged([first, second]) as places:
+        for path, place in places.items():
+            assert (place.parent, place.suffix) == (path.parent, path.suffix)
+            place.write_text(path.name)
+        commit(places)
+    assert sorted(path.name for path in first.parent.iterdir()) == ["a.blend", "a.glb"]
+    assert second.read_text() == "a.glb"
+
+
+def test_unfinished_outputs_leave_what_was_there_before(tmp_path: Path) -> None:
+    first, second = tmp_path / "a.blend", tmp_path / "a.glb"
+    first.write_text("before")
+    with staged([first, second]) as places:
+        places[first].write_text("after")
+        places[first].with_name(places[first].name + "@").write_text("half")
+        with pytest.raises(WriteError, match="was not written"):
+            commit(places)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.blend"]
+    assert first.read_text() == "before"
+
+
+def test_output_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "folder.blend").mkdir()
+    (tmp_path / "file").touch()
+    with pytest.raises(WriteError, match="is a folder"), staged([tmp_path / "folder.blend"]):
+        pass
+    with pytest.raises(WriteError, match="cannot be written"), staged([tmp_path / "file/a.blend"]):
+        pass
+
+
+def test_full_disk_is_told_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_arguments: object, **_options: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    with pytest.raises(WriteError, match="No space left on device"):
+        write_json(tmp_path / "report.json", {})
+    monkeypatch.undo()
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(WriteError, match="No space left on device"):
+        write_json(tmp_path / "report.json", {})
+    assert list(tmp_path.iterdir()) == []
+    remove_staged(tmp_path)  # which cannot be deleted as a file; that is no error
+
+
+# --- Processes -----------------------------------------------------------------------------------
+
+
+def task(name: str, folder: Path, program: str) -> Task:
+    return Task(name, [sys.executable, "-c", program], dict(os.environ), folder / f"{name}.txt")
+
+
+def test_processes_run_to_their_ends_and_a_crash_is_ones_own(tmp_path: Path) -> None:
+    programs = {
+        "good": "print('fine')",
+        "bad": "import sys; print('odd'); sys.exit(3)",
+        "crash": "import os; os.abort()",
+    }
+    tasks = [task(name, tmp_path, program) for name, program in programs.items()]
+    ended = {each.name: each for each in run_processes(tasks, 2)}
+    assert ended["good"].status == 0
+    assert ended["bad"].reason == "Blender ended early, with status 3."
+    assert last_lines(tmp_path / "bad.txt") == "odd"
+    if os.name == "posix":
+        assert ended["crash"].reason == "Blender crashed or was ended (SIGABRT)."
+
+
+def test_program_that_is_not_there_is_one_shots_failure(tmp_path: Path) -> None:
+    missing = Task("a", [str(tmp_path / "none")], {}, tmp_path / "a.txt")
+    assert [each.name for each in run_processes([missing, task("b", tmp_path, "")], 1)] == [
+        "a",
+        "b",
+    ]
+    assert "No such file" in last_lines(tmp_path / "a.txt")
+
+
+def test_no_more_processes_run_at_a_time_than_asked_for(tmp_path: Path) -> None:
+    started = []
+
+    def tasks() -> Iterator[Task]:
+        for number in range(4):
+            started.append(number)
+            yield task(str(number), tmp_path, "")
+
+    seen = [len(started) for _ in run_processes(tasks(), 2)]
+    assert seen[0] == 2
+    assert seen[-1] == 4
+
+
+def test_processes_end_when_the_run_is_stopped(tmp_path: Path) -> None:
+    held = "import sys; sys.stdin.read()"
+    running = run_processes(
+        [task("a", tmp_path, ""), task("b", tmp_path, held), task("c", tmp_path, held)], 3
+    )
+    assert next(running).name == "a"
+    running.close()  # as an exception does; returns when all processes have ended
+
+
+def test_stop_signals_interrupt_even_where_blender_takes_them_for_itself() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    for each in (signal.SIGINT, signal.SIGTERM):
+        with pytest.raises(KeyboardInterrupt), stoppable():
+            signal.raise_signal(each)
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_strange_signals_are_told_by_their_number() -> None:
+    assert Ended("a", -250, 0.0).reason == "Blender crashed or was ended (signal 250)."
+
+
+def test_number_of_processes() -> None:
+    assert check_jobs(3, 100) == 3
+    assert check_jobs(None, 1) == check_jobs(None, 0) == 1
+    assert 1 <= check_jobs(None, 100) <= min(4, processors())
+    with pytest.raises(OctoMotionError, match="--jobs 1 or more"):
+        check_jobs(0, 1)
+
+
+def test_missing_log_has_no_lines(tmp_path: Path) -> None:
+    assert last_lines(tmp_path / "none") == ""
+
+
+# --- Words ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("said", "reason"),
+    [
+        ("Error: Cannot read file\n", "Cannot read file."),
+        ("Error: Cannot read file.\nmore", "Cannot read file."),
+        ("Error: Python: Traceback:\n  File\n    ^^^\nKeyError: 'x'\nmore\n", "KeyError: 'x'."),
+        ("Error: Python: Traceback (most recent call last):\n", "Blender does not say why."),
+        ("", "Blender does not say why."),
+    ],
+)
+def test_what_blender_says_fits_one_line(said: str, reason: str) -> None:
+    assert blender_said(RuntimeError(said)) == reason
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ([], "COMMAND"),
+        (["dance"], "invalid choice: 'dance'"),
+        (["bake"], "JOB.toml"),
+        (["bake", "x.toml", "--jobs", "0"], "'0' is not a whole number above 0"),
+        (["generate", "x.blend", "--fps", "slow"], "'slow' is not a number from 1 to 32767"),
+        (["generate"], "FILE"),
+    ],
+)
+def test_wrong_arguments_are_told(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], complaint: str
+) -> None:
+    assert parse(arguments, "octo", has_open_file=False) == 2
+    assert complaint in capsys.readouterr().err
+
+
+def test_file_may_be_left_out_where_one_is_open() -> None:
+    options = parse(["generate"], "octo", has_open_file=True)
+    assert not isinstance(options, int)
+    assert options.file is None
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["bake", "--help"], ["generate", "--help"]])
+def test_help_is_told(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> None:
+    assert parse(arguments, "octo", has_open_file=True) == 0
+    assert "Exit status: 0" in capsys.readouterr().out
