@@ -26,7 +26,9 @@ def list_traces() -> Iterator[str]:
         if rna := getattr(blender_class, "bl_rna", None):
             yield from (f"property {name}.{key}" for key, _ in rna.properties.items())
         for function in getattr(getattr(blender_class, "draw", None), "_draw_funcs", ()):
-            yield f"menu entry {name}: {function.__module__}.{function.__qualname__}"
+            # Where an entry was ever appended, Blender keeps the menu's own in the same list.
+            if function.__qualname__ != f"{name}.draw":
+                yield f"menu entry {name}: {function.__module__}.{function.__qualname__}"
     for module in dir(bpy.ops):
         yield from (f"operator {module}.{name}" for name in dir(getattr(bpy.ops, module)))
     for name in dir(bpy.app.handlers):
