@@ -51,7 +51,7 @@ class _Plan:
 def bake(
     options: BakeOptions,
     known: Known,
-    object_names: Callable[[Path], set[str]],
+    check_file: Callable[[Path], None],
     say: Callable[[str], None],
 ) -> int:
     """Run a job.
@@ -59,7 +59,7 @@ def bake(
     Args:
         options: which, and how.
         known: what shots may name.
-        object_names: names of the objects in a file; raises OctoMotionError if it cannot be read.
+        check_file: raises OctoMotionError if Blender cannot read a file.
         say: takes lines about the progress.
 
     Returns:
@@ -74,8 +74,8 @@ def bake(
     chosen = _chosen(job, options.only)
     records = read_report(report)
     run = _Run(job, records, report, say, len(chosen))
-    looked = _Looked(object_names)
-    plans = [_plan(shot, run, looked, force=options.force) for shot in chosen]
+    problems = _problems(chosen, check_file)
+    plans = [_plan(shot, run, problems, force=options.force) for shot in chosen]
     jobs = check_jobs(options.jobs, sum(not (plan.problem or plan.skip) for plan in plans))
     if options.check:
         for plan in plans:
@@ -92,40 +92,26 @@ def _chosen(job: Job, only: Sequence[str]) -> list[JobShot]:
     return [shot for shot in job.shots if not only or shot.entry.name in only]
 
 
-class _Looked:
-    """Names of the objects in files, each of which is looked into once."""
-
-    def __init__(self, object_names: Callable[[Path], set[str]]) -> None:
-        self._object_names = object_names
-        self._found: dict[Path, set[str] | OctoMotionError] = {}
-
-    def problem(self, entry: ShotEntry) -> str:
-        """What is wrong with the file that a shot names, or with what it names within."""
-        if entry.file is None:
-            return ""
-        if entry.file not in self._found:
-            try:
-                self._found[entry.file] = self._object_names(entry.file)
-            except OctoMotionError as error:
-                self._found[entry.file] = error
-        found = self._found[entry.file]
-        if isinstance(found, OctoMotionError):
-            return str(found)
-        route = entry.route if isinstance(entry.route, str) else ""
-        for name in (entry.armature, route):
-            if name and name not in found:
-                listed = ", ".join(sorted(found))
-                return f"'{entry.file.name}' has no object '{name}'. Its objects: {listed}."
-        return ""
+def _problems(
+    shots: Sequence[JobShot], check_file: Callable[[Path], None]
+) -> dict[Path | None, str]:
+    """What is wrong with the files of shots; many shots may be of one file."""
+    problems: dict[Path | None, str] = {}
+    for file in {shot.entry.file for shot in shots if shot.entry.file is not None}:
+        try:
+            check_file(file)
+        except OctoMotionError as error:
+            problems[file] = str(error)
+    return problems
 
 
-def _plan(shot: JobShot, run: _Run, looked: _Looked, *, force: bool) -> _Plan:
+def _plan(shot: JobShot, run: _Run, problems: Mapping[Path | None, str], *, force: bool) -> _Plan:
     """Look at a shot, without changing anything."""
     named = (shot.entry.file, shot.gait_file)
     inputs = tuple(path for path in named if path is not None)
     try:
         entry = load_gait_file(shot)
-        problem = looked.problem(entry)
+        problem = problems.get(entry.file, "")
     except OctoMotionError as error:
         entry, problem = shot.entry, str(error)
     plan = _Plan(entry, fingerprint(shot.asked, entry.gait), inputs, problem)

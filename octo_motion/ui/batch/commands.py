@@ -18,7 +18,7 @@ from .child import RUN_SHOT, run_shot
 from .command_line import parse
 from .entry import ShotEntry
 from .job import Known, export_fault, is_gait_file, read_gait_file
-from .known import known, object_names
+from .known import check_file, known
 from .outputs import commit, staged
 from .processes import stoppable
 from .setting_values import check_settings, parse_assignments
@@ -54,7 +54,7 @@ def _bake(options: argparse.Namespace) -> int:
         only=tuple(options.only),
     )
     try:
-        return bake(wanted, known(), object_names, _say)
+        return bake(wanted, known(), check_file, _say)
     except OctoMotionError as error:
         return _complain(error, _WRONG)
 

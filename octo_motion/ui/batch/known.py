@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What shots may name, asked of Blender: settings, gaits, objects of a file."""
+"""What shots may name, asked of Blender: settings, gaits, files."""
 
 from __future__ import annotations
 
@@ -55,21 +55,21 @@ def _settings(group: Any, before: str = "") -> Iterator[Setting]:
             yield Setting(name, each.type)
 
 
-def object_names(file: Path) -> set[str]:
-    """Names of the objects in a file, which is not opened.
+def check_file(file: Path) -> None:
+    """Make sure that Blender can read a file, without opening it.
 
     Raises:
-        OctoMotionError: there is no such file, or Blender cannot read it.
+        OctoMotionError: there is no such file, or it is not Blender's.
     """
     if not file.is_file():
         raise OctoMotionError(f"There is no file '{file}'.", "Give the path of a .blend file.")
     if bpy.data.filepath and file.samefile(bpy.data.filepath):
-        # Blender does not look into the file that is open; a command has not changed it.
-        return {each.name for each in bpy.data.objects}
+        # Blender does not look into the file that is open.
+        return
     try:
         library: Any = bpy.data.libraries.load(str(file))  # the stubs know no context manager
-        with library as (inside, _taken):
-            return set(inside.objects)
+        with library:
+            pass
     except OSError as error:
         raise OctoMotionError(
             f"'{file}' is not a file that this Blender can read.", "Give a .blend file."
