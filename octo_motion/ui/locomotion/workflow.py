@@ -60,6 +60,8 @@ class Summary:
     """What was made, for people and for reports."""
 
     gait: str
+    manner: str
+    """"WALK" or "SWIM"."""
     action: str
     """Name of the action."""
     frames: int
@@ -76,8 +78,10 @@ class Summary:
     @property
     def message(self) -> str:
         """One sentence, and the notes."""
-        name = self.gait.replace("_", " ").capitalize()
-        told = f"{name} of {self.frames} frames ({self.seconds:.1f} s): '{self.action}'."
+        told = (
+            f"{self.manner.capitalize()} of {self.frames} frames ({self.seconds:.1f} s): "
+            f"'{self.action}'."
+        )
         return " ".join([told, *self.notes])
 
 
@@ -181,6 +185,7 @@ class Shot:
         assert self.misses is not None
         return Summary(
             gait=self.gait.name,
+            manner=self.gait.manner,
             action=action.name,
             frames=len(self.frames),
             frame_start=int(self.frames[0]),

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab: every panel draws, in every state, with properties and operators that exist.
+
+Blender draws panels in a window only. A layout of our own takes its place and checks what real
+ones complain about on the console.
+"""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import pytest
+
+from octo_motion.ui.locomotion import panels
+from octo_motion.ui.locomotion.properties import locomotion_settings
+from tests.ui.rig import give_route, make_octopus
+
+PANELS = [each for each in panels.CLASSES if issubclass(each, bpy.types.Panel)]
+ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
+
+
+class Layout:
+    """Writes down what is drawn."""
+
+    def __init__(self, drawn: list[str] | None = None) -> None:
+        self.drawn: list[str] = [] if drawn is None else drawn
+
+    def _part(self, **_: Any) -> "Layout":
+        return Layout(self.drawn)
+
+    row = column = split = box = _part
+
+    def label(self, *, text: str, icon: str = "NONE") -> None:
+        assert icon in ICONS
+        self.drawn.append(text)
+
+    def prop(self, data: Any, name: str, *, icon: str = "NONE", index: int = -1, **_: Any) -> None:
+        assert icon in ICONS
+        definition = data.bl_rna.properties[name]
+        assert index < max(getattr(definition, "array_length", 0), 1)
+        self.drawn.append(name)
+
+    def prop_search(self, data: Any, name: str, where: Any, what: str, **_: Any) -> None:
+        assert where.bl_rna.properties[what].type == "COLLECTION"
+        self.prop(data, name)
+
+    def operator(self, name: str, *, icon: str = "NONE", **_: Any) -> Any:
+        assert icon in ICONS
+        module, _, operator = name.partition(".")
+        rna = getattr(getattr(bpy.ops, module), operator).get_rna_type()
+        self.drawn.append(name)
+
+        class Properties:
+            def __setattr__(self, key: str, value: Any) -> None:
+                assert key in rna.properties, key
+
+        return Properties()
+
+    def menu(self, name: str, *, icon: str = "NONE", **_: Any) -> None:
+        assert icon in ICONS
+        self.drawn.append(name)
+        getattr(bpy.types, name).draw(SimpleNamespace(layout=self), bpy.context)
+
+    def template_list(  # noqa: PLR0917 - Blender's order
+        self, kind: str, _name: str, data: Any, items: str, other: Any, active: str, **_: Any
+    ) -> None:
+        assert active in other.bl_rna.properties
+        for number, item in enumerate(getattr(data, items)):
+            row = getattr(bpy.types, kind).draw_item
+            row(SimpleNamespace(), bpy.context, self, data, item, 0, other, active, number)
+
+    def template_curve_mapping(self, data: Any, name: str) -> None:
+        assert data.bl_rna.properties[name].fixed_type.identifier == "CurveMapping"
+        self.drawn.append(name)
+
+    def separator(self, **_: Any) -> None:
+        pass
+
+
+class Tab(dict[str, list[str]]):
+    """What is drawn, by panel; those that their poll hides are missing."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        for panel in PANELS:
+            if hasattr(panel, "poll") and not panel.poll(bpy.context):
+                continue
+            layout = Layout()
+            kept: Any = panel
+            stand_in = SimpleNamespace(layout=layout)
+            if hasattr(kept, "show"):
+                stand_in.show = kept.show.__get__(stand_in)
+            kept.draw(stand_in, bpy.context)
+            self[panel.__name__.removeprefix("OCTO_MOTION_PT_")] = layout.drawn
+
+
+def test_without_an_armature_the_tab_says_what_to_do() -> None:
+    tab = Tab()
+    assert list(tab) == ["rig"]
+    assert tab["rig"][0] == "No armature is active."
+    assert "octo_motion.add_octopus" in tab["rig"]
+
+
+def test_panels_come_in_the_order_of_the_work() -> None:
+    make_octopus()
+    top = [each for each in PANELS if not hasattr(each, "bl_parent_id")]
+    assert [each.bl_label for each in top] == ["Rig", "Arms", "Route", "Gait", "Generate"]
+    assert [each.bl_order for each in top] == [0, 1, 2, 3, 4]
+    assert {each.bl_category for each in PANELS} == {"Octo Motion"}
+
+
+def test_advanced_parts_are_closed() -> None:
+    for each in PANELS:
+        if hasattr(each, "bl_parent_id"):
+            assert each.bl_options == {"DEFAULT_CLOSED"}
+
+
+def test_a_route_is_offered_and_then_its_settings() -> None:
+    octopus = make_octopus()
+    assert Tab()["route"] == ["route", "octo_motion.add_route"]
+    give_route(octopus)
+    assert "speed_mode" in Tab()["route"]
+    assert "spline" not in Tab()["route"]
+    octopus.octo_motion.locomotion.route.data.splines.new("BEZIER")
+    assert "spline" in Tab()["route"]
+
+
+@pytest.mark.parametrize("gait", ["walk", "swim"])
+def test_a_gait_shows_what_it_needs(gait: str) -> None:
+    settings = locomotion_settings(make_octopus())
+    assert "octo_motion.gait_load" in Tab()["table"]
+    settings.gait = "swim" if gait == "walk" else "walk"
+    settings.gait = gait
+    bpy.ops.octo_motion.detect_arms()
+    bpy.ops.octo_motion.gait_offset_add(pair=1, side="LEFT")
+    bpy.ops.octo_motion.gait_curve_add(pair=7)
+    settings.height_mode = "MANUAL"
+    settings.use_weight_curve = True
+    tab = Tab()
+    assert ("burst" in tab["gait"]) == (gait == "swim")
+    assert ("keep_upright" in tab["heading"]) == (gait == "walk")
+    assert "octo_motion.gait_knot_remove" in tab["table"]
+    assert "octo_motion.gait_offset_remove" in tab["table"]
+    assert "mapping" in tab["weights"]
+    assert "height" in tab["heading"]
+    bpy.data.node_groups.remove(settings.weight_curve)
+    assert "The curve is gone: switch it off and on." in Tab()["weights"]
+
+
+@pytest.mark.parametrize("timing", ["CADENCE", "SPEED", "RANGE"])
+def test_timing_shows_its_own_settings_and_the_result(timing: str) -> None:
+    octopus = make_octopus()
+    give_route(octopus)
+    settings = locomotion_settings(octopus)
+    settings.timing, settings.frame_end = "RANGE", 25
+    bpy.ops.octo_motion.generate_locomotion()
+    settings.timing = timing
+    drawn = Tab()["generate"]
+    own = {"CADENCE": "cycle_time", "SPEED": "speed", "RANGE": "frame_end"}
+    assert {name for name in own.values() if name in drawn} == {own[timing]}
+    assert drawn[-2:] == ["Octopus Locomotion", "25 frames, 1.0 s"]
+
+
+def test_of_a_linked_armature_the_tab_says_that_it_is_read_only(tmp_path: Path) -> None:
+    make_octopus()
+    library = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=library)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    libraries: Any = bpy.data.libraries
+    with libraries.load(library, link=True) as (_, wanted):
+        wanted.objects = ["Octopus"]
+    linked = bpy.data.objects["Octopus"]
+    bpy.context.scene.collection.objects.link(linked)
+    bpy.context.view_layer.objects.active = linked
+    assert "Linked and read-only." in Tab()["rig"]
