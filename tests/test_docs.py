@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The documentation is right: examples run, tables agree with Blender, links lead somewhere."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+SCRIPTING = REPOSITORY / "docs" / "scripting.md"
+BATCH = REPOSITORY / "docs" / "batch.md"
+
+UNITS = {
+    "ROTATION": "radians",
+    "LENGTH": "metres",
+    "TIME_ABSOLUTE": "seconds",
+    "VELOCITY": "m/s",
+}
+"""What the tables call Blender's units."""
+
+
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(REPOSITORY).as_posix()
+
+
+def code_blocks(page: Path, language: str) -> list[Any]:
+    """Blocks of a language, each with the place where it begins, for pytest."""
+    text = text_of(page)
+    found = re.finditer(rf"^```{language}\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return [
+        pytest.param(block[1], id=f"{name_of(page)}:{text[: block.start()].count(chr(10)) + 1}")
+        for block in found
+    ]
+
+
+def without_code(page: Path) -> str:
+    return re.sub(r"^```.*?^```$|`[^`\n]*`", "", text_of(page), flags=re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture
+def clean_blender(
+    add_on: None,  # noqa: ARG001 - registered
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> Path:
+    """A new file in a folder of its own, which is the working folder too."""
+    import bpy
+
+    monkeypatch.chdir(tmp_path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "untitled.blend"))
+    return tmp_path
+
+
+# --- Examples ------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("clean_blender")
+@pytest.mark.parametrize(
+    "block", [block for page in PAGES for block in code_blocks(page, "python")]
+)
+def test_example_runs_in_a_new_file_and_leaves_a_motion(block: str) -> None:
+    import bpy
+
+    exec(compile(block, "example", "exec"), {"__name__": "__main__"})  # noqa: S102 - our own text
+
+    armatures: list[Any] = [each for each in bpy.data.objects if each.type == "ARMATURE"]
+    assert armatures
+    for armature in armatures:
+        action = armature.octo_motion.locomotion.result
+        assert armature.animation_data.action == action
+        assert action.frame_end > action.frame_start
+
+
+@pytest.mark.parametrize("block", code_blocks(SCRIPTING, "json"))
+def test_gait_file_that_is_shown_can_be_imported(block: str, clean_blender: Path) -> None:
+    import bpy
+
+    file = clean_blender / "gait.json"
+    file.write_text(block, encoding="utf-8")
+    bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    bpy.ops.octo_motion.add_route()
+    bpy.ops.octo_motion.gait_import(filepath=str(file))
+    assert bpy.ops.octo_motion.generate_locomotion() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("block", code_blocks(BATCH, "toml"))
+def test_job_that_is_shown_has_no_faults(block: str, clean_blender: Path) -> None:
+    from octo_motion.ui.batch.job import read_job
+    from octo_motion.ui.batch.known import known
+
+    file = clean_blender / "job.toml"
+    file.write_text(block, encoding="utf-8")
+    assert read_job(file, known(), clean_blender / "job.report.json").shots
+
+
+# --- Reference -----------------------------------------------------------------------------------
+
+
+def rows(text: str) -> dict[str, list[str]]:
+    """Cells of all tables in a text, by the name in the first one."""
+    found: dict[str, list[str]] = {}
+    for line in tables(text).splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        name = re.fullmatch(r"`(\w+)`", cells[0])
+        if name:
+            assert name[1] not in found, f"{name[1]} is described twice"
+            found[name[1]] = cells[1:]
+    return found
+
+
+def tables(text: str) -> str:
+    return "\n".join(line for line in text.splitlines() if line.startswith("|"))
+
+
+def section(heading: str, page: Path = SCRIPTING) -> str:
+    """What stands below a heading, its subsections included."""
+    level = len(heading.split(" ", 1)[0])
+    text = re.sub(r"^```.*?^```$", "", text_of(page), flags=re.MULTILINE | re.DOTALL)
+    found = re.search(
+        rf"^{re.escape(heading)}\n(.*?)(?=^#{{1,{level}}} |\Z)", text, re.MULTILINE | re.DOTALL
+    )
+    assert found, f"there is no heading '{heading}'"
+    return found[1]
+
+
+def after(opening: str, heading: str) -> str:
+    """The table that follows a sentence of a section."""
+    text = section(heading)
+    assert opening in text
+    return text.split(opening, 1)[1].strip().split("\n\n", 1)[0]
+
+
+def described(group: str) -> dict[str, list[str]]:
+    arms, table = "## The list of arms", "## The gait table"
+    match group:
+        case "locomotion":
+            return rows(section("## Settings"))
+        case "arm":
+            return rows(after("An item of `arms`:", arms))
+        case "bone":
+            return rows(after("An item of its `bones`:", arms))
+        case "table":
+            return rows(section(table).split("An item of", 1)[0])
+        case "knot":
+            return rows(after("An item of its `knots`:", table))
+        case _:
+            return rows(after(f"An item of `{group}s`:", table))
+
+
+def group_class(group: str) -> Any:
+    from octo_motion.ui.locomotion import arm_properties, gait_properties, properties
+
+    own = {
+        "locomotion": properties.OCTO_MOTION_PG_locomotion,
+        "arm": arm_properties.ArmItem,
+        "bone": arm_properties.ArmBoneItem,
+    }
+    return own.get(group) or getattr(gait_properties, f"OCTO_MOTION_PG_gait_{group}")
+
+
+def type_of(definition: Any) -> str:
+    """Type, unit and range as the tables write them."""
+    match definition.type:
+        case "ENUM":
+            return " ".join(f'`"{item.identifier}"`' for item in definition.enum_items)
+        case "BOOLEAN":
+            return "bool"
+        case "STRING":
+            return "str"
+        case "COLLECTION":
+            return "list"
+        case "POINTER":
+            kinds = {"Object": "object", "Action": "action", "NodeTree": "node group"}
+            return kinds.get(definition.fixed_type.identifier, "group")
+        case "INT":
+            words = ["int"]
+        case _:
+            words = ["3 floats" if definition.is_array else "float"]
+            words += [UNITS[definition.unit]] if definition.unit != "NONE" else []
+    lowest, highest = definition.hard_min, definition.hard_max
+    if lowest > -2e9:
+        least, most = number(lowest, definition), number(highest, definition)
+        words.append(f"{least} or more" if highest > 2e9 else f"{least} to {most}")
+    return ", ".join(words)
+
+
+def default_of(definition: Any) -> str:
+    """The default as the tables write it."""
+    match definition.type:
+        case "ENUM" | "STRING":
+            return f'`"{definition.default}"`'
+        case "BOOLEAN":
+            return f"`{definition.default}`"
+        case "COLLECTION":
+            return "empty"
+        case "POINTER":
+            return "" if type_of(definition) == "group" else "`None`"
+        case _ if definition.is_array:
+            return ", ".join(number(value, definition) for value in definition.default_array)
+        case _:
+            return number(definition.default, definition)
+
+
+def number(value: float, definition: Any) -> str:
+    """A number, angles in degrees; properties are of single precision."""
+    if definition.unit == "ROTATION":
+        return f"{math.degrees(value):.5g}°"
+    return f"{value:.6g}"
+
+
+@pytest.mark.usefixtures("clean_blender")
+@pytest.mark.parametrize(
+    "group", ["locomotion", "arm", "bone", "table", "curve", "knot", "offset", "note"]
+)
+def test_every_setting_is_described_with_its_type_and_its_default(group: str) -> None:
+    owner = group_class(group)
+    definitions = {name: owner.bl_rna.properties[name] for name in owner.__annotations__}
+    expected = {
+        name: [type_of(each), default_of(each)] for name, each in sorted(definitions.items())
+    }
+    found = {name: cells[:2] for name, cells in sorted(described(group).items())}
+    assert found == expected
+    assert all(len(cells) == 3 and cells[2] for cells in described(group).values())
+
+
+def shown_operators() -> dict[str, ast.Call]:
+    """Operators as they are shown with their properties, outside the examples."""
+    text = re.sub(r"^```python\n.*?^```$", "", text_of(SCRIPTING), flags=re.MULTILINE | re.DOTALL)
+    calls = re.findall(r"bpy\.ops\.octo_motion\.(\w+)(\([^()]*\))", text)
+    # A name without a value stands for one that is found when the operator runs.
+    found: dict[str, ast.Call] = {}
+    for name, arguments in calls:
+        given = re.sub(r"(?<=[(,\s])(\w+)(?=\s*[,)])", r"\1=...", arguments)
+        call = ast.parse(name + given, mode="eval").body
+        assert isinstance(call, ast.Call)
+        assert name not in found, f"{name} is shown twice"
+        found[name] = call
+    return found
+
+
+@pytest.mark.usefixtures("clean_blender")
+def test_every_operator_is_shown_with_its_properties_and_their_defaults() -> None:
+    import bpy
+
+    shown = shown_operators()
+    assert set(shown) == set(dir(bpy.ops.octo_motion))
+    for name, call in shown.items():
+        kind: Any = getattr(bpy.ops.octo_motion, name).get_rna_type()
+        definitions = {
+            each.identifier: each
+            for each in kind.properties
+            if each.identifier != "rna_type" and not each.is_hidden
+        }
+        assert set(definitions) == {keyword.arg for keyword in call.keywords}, name
+        for keyword in call.keywords:
+            value = ast.literal_eval(keyword.value)
+            if value is not ...:
+                default = definitions[str(keyword.arg)].default
+                close = isinstance(value, float) and math.isclose(value, default, rel_tol=1e-6)
+                assert close or value == default, f"{name}({keyword.arg}={value!r})"
+
+
+@pytest.mark.usefixtures("clean_blender")
+def test_ranges_of_the_octopus_are_the_operators_own() -> None:
+    import bpy
+
+    properties: Any = bpy.ops.octo_motion.add_octopus.get_rna_type().properties
+    table = rows(section("### Octopus"))
+    for name in ("arms", "joints", "arm_length", "first_diameter", "taper"):
+        definition = properties[name]
+        least, most = definition.hard_min, definition.hard_max
+        expected = f"{least:.6g} or more" if most > 2e9 else f"{least:g} to {most:g}"
+        assert table[name][0] == expected
+
+
+@pytest.mark.parametrize("word", ["generate", "bake"])
+def test_every_option_of_the_command_line_is_described(word: str) -> None:
+    from octo_motion.ui.batch.command_line import parser
+
+    commands: Any = parser("octo_motion", has_open_file=True)._subparsers
+    command = commands._group_actions[0].choices[word]
+    options = {option for action in command._actions for option in action.option_strings}
+    described_ones = set(re.findall(r"(?<![\w-])--?[a-z]+", tables(section(f"## `{word}`", BATCH))))
+    # An option may be named beside another one, but none that does not exist.
+    assert described_ones == options - {"-h", "--help"}
+
+
+def test_every_key_of_a_job_is_described() -> None:
+    from octo_motion.ui.batch.job import KEYS
+
+    assert set(rows(section("## Job files", BATCH))) == set(KEYS)
+
+
+def test_every_gait_that_comes_along_is_in_the_guide() -> None:
+    from octo_motion.core.locomotion import gait
+
+    guide = text_of(REPOSITORY / "docs" / "guide.md")
+    assert [name for name in gait.presets() if f"`{name}`" not in guide] == []
+
+
+# --- Links ---------------------------------------------------------------------------------------
+
+
+def anchors(page: Path) -> set[str]:
+    """What headings can be linked as, in the way of code forges."""
+    text = re.sub(r"^```.*?^```$", "", text_of(page), flags=re.MULTILINE | re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    plain = [re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings]
+    return {heading.strip().replace(" ", "-") for heading in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_link_and_picture_is_in_the_repository(page: Path) -> None:
+    wrong = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", without_code(page)):
+        if target.startswith(("https://", "http://")):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        is_here = file.is_relative_to(REPOSITORY) and file.exists()
+        if not is_here or (anchor and anchor not in anchors(file)):
+            wrong.append(target)
+    assert wrong == []
+
+
+def test_every_page_can_be_reached_from_the_readme() -> None:
+    reached, waiting = set[Path](), [REPOSITORY / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        reached.add(page)
+        for target in re.findall(r"\]\(([^)#\s]+\.md)", without_code(page)):
+            linked = (page.parent / target).resolve()
+            if linked not in reached:
+                waiting.append(linked)
+    assert set(PAGES) <= reached
+
+
+def test_every_picture_is_used() -> None:
+    used = {
+        (page.parent / target).resolve()
+        for page in PAGES
+        for target in re.findall(r"!\[[^\]]*\]\(([^)\s]+)\)", text_of(page))
+    }
+    assert set((REPOSITORY / "docs" / "images").iterdir()) <= used
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_picture_says_what_it_shows(page: Path) -> None:
+    assert re.findall(r"!\[\s*\]\([^)]*\)", text_of(page)) == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_no_page_names_a_path_of_some_machine(page: Path) -> None:
+    machine = r"(?<![\w.:/`])/(?:work|home|root|tmp|usr|opt|mnt|Users)\b|\b[A-Z]:\\|\bfile://"
+    assert re.findall(machine, text_of(page)) == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_make_target_that_is_named_exists(page: Path) -> None:
+    listed = subprocess.run(
+        ["make", "--no-print-directory", "help"],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    targets = {line.split()[1] for line in listed.stdout.splitlines()}
+    code = re.findall(r"^```.*?^```$|`[^`\n]+`", text_of(page), re.MULTILINE | re.DOTALL)
+    assert set(re.findall(r"\bmake ([a-z]+)", "\n".join(code))) <= targets
