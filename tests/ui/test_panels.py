@@ -41,13 +41,13 @@ class Layout:
         assert index < max(getattr(definition, "array_length", 0), 1)
         self.drawn.append(name)
 
-    def prop_search(self, data: Any, name: str, where: Any, what: str, **_: Any) -> None:
+    def prop_search(self, data: Any, name: str, where: Any, what: str) -> None:
         assert where.bl_rna.properties[what].type == "COLLECTION"
         self.prop(data, name)
 
     def operator(self, name: str, *, icon: str = "NONE", **_: Any) -> Any:
         assert icon in ICONS
-        module, _, operator = name.partition(".")
+        module, operator = name.split(".")
         rna = getattr(getattr(bpy.ops, module), operator).get_rna_type()
         self.drawn.append(name)
 
@@ -62,7 +62,7 @@ class Layout:
         self.drawn.append(name)
         getattr(bpy.types, name).draw(SimpleNamespace(layout=self), bpy.context)
 
-    def template_list(  # noqa: PLR0917 - Blender's order
+    def template_list(
         self, kind: str, _name: str, data: Any, items: str, other: Any, active: str, **_: Any
     ) -> None:
         assert active in other.bl_rna.properties
