@@ -9,7 +9,7 @@ Any other action is left exactly as it is.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -213,14 +213,14 @@ def write_action(
     assert isinstance(strip, bpy.types.ActionKeyframeStrip)
     channelbag = strip.channelbag(slot, ensure=True)
     assert channelbag is not None
-    _write_curves(channelbag, times, channels)
+    digests = _write_curves(channelbag, times, channels)
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(times[0]), float(times[-1])
     data.action = action
     data.action_slot = slot
     if assigned is not None and assigned.library is None and assigned.users == 0:
         assigned.use_fake_user = True
-    _mark(action, obj, settings_note)
+    _mark(action, obj, settings_note, _fingerprint(action, digests))
     return action
 
 
@@ -322,10 +322,15 @@ def _checked(frames: Floats, channels: Sequence[Channel]) -> np.ndarray:
 
 def _write_curves(
     channelbag: bpy.types.ActionChannelbag, times: np.ndarray, channels: Sequence[Channel]
-) -> None:
+) -> dict[tuple[str, int], bytes]:
     """Make the curves what the channels say. Curves that are there already are filled anew, so
     that their colours, selection and place in the editors stay.
+
+    Returns:
+        The hash of each curve's keys, by its data path and index: to read them back takes longer
+        than to write them.
     """
+    digests = {}
     curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
     groups = {group.name: group for group in channelbag.groups}
     # Everything goes through the same few buffers: memory stays modest, however many the bones.
@@ -351,9 +356,11 @@ def _write_curves(
             keys.foreach_set("interpolation", linear)
             keys.foreach_set("type", generated)
             curve.update()
+            digests[channel.data_path, component] = _keys_digest(points, linear, generated)
     for curve in curves.values():
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
+    return digests
 
 
 def _filled(count: int, name: str, item: str) -> np.ndarray:
@@ -363,21 +370,29 @@ def _filled(count: int, name: str, item: str) -> np.ndarray:
     return np.full(count, definition.enum_items[item].value, dtype=np.int32)
 
 
-def _mark(action: bpy.types.Action, obj: bpy.types.Object, settings_note: str) -> None:
+def _mark(
+    action: bpy.types.Action, obj: bpy.types.Object, settings_note: str, fingerprint: str
+) -> None:
     action[MARK] = {
         "owner": obj.name,
         "name": action.name,
         "version": _MARK_VERSION,
-        "fingerprint": _fingerprint(action),
+        "fingerprint": fingerprint,
         "note": settings_note,
     }
 
 
-def _fingerprint(action: bpy.types.Action) -> str:
+def _fingerprint(
+    action: bpy.types.Action, known: Mapping[tuple[str, int], bytes] | None = None
+) -> str:
     """A hash of all in an action that an artist can have set on purpose.
 
     Handles are left out: they have no effect on linear keys, and a key that is made Bézier
     changes its interpolation.
+
+    Args:
+        action: the action.
+        known: hashes of its curves' keys, where they have just been written.
     """
     digest = hashlib.blake2b(digest_size=16)
 
@@ -396,14 +411,24 @@ def _fingerprint(action: bpy.types.Action) -> str:
             add(curve.data_path, curve.array_index, curve.extrapolation, curve.mute, curve.lock)
             keys = curve.keyframe_points
             add(len(keys), len(curve.modifiers))
-            points = np.empty(2 * len(keys), dtype=np.float32)
-            kinds = np.empty((2, len(keys)), dtype=np.int32)
-            keys.foreach_get("co", points)
-            keys.foreach_get("interpolation", kinds[0])
-            keys.foreach_get("type", kinds[1])
-            digest.update(points)
-            digest.update(kinds)
+            if known is not None:
+                digest.update(known[curve.data_path, curve.array_index])
+                continue
+            points = np.empty((len(keys), 2), dtype=np.float32)
+            interpolation, kinds = np.empty((2, len(keys)), dtype=np.int32)
+            keys.foreach_get("co", points.ravel())
+            keys.foreach_get("interpolation", interpolation)
+            keys.foreach_get("type", kinds)
+            digest.update(_keys_digest(points, interpolation, kinds))
     return digest.hexdigest()
+
+
+def _keys_digest(points: np.ndarray, interpolation: np.ndarray, kinds: np.ndarray) -> bytes:
+    """Hash of a curve's keys: (keys, 2) frames and values, single precision, and their kinds."""
+    digest = hashlib.blake2b(points, digest_size=16)
+    digest.update(interpolation)
+    digest.update(kinds)
+    return digest.digest()
 
 
 def _channelbags(action: bpy.types.Action) -> Iterator[bpy.types.ActionChannelbag]:

@@ -19,6 +19,27 @@ seeds = st.integers(0, 2**31)
 counts = st.integers(2, 12)
 
 
+def columns(rows: Floats) -> Floats:
+    """From (…, batch, 3), which reads well, to the solver's (…, 3, batch); and back."""
+    return np.swapaxes(rows, -2, -1)
+
+
+def chord(directions: Floats, lengths: Floats) -> Floats:
+    return columns(ccd.chord(columns(directions), lengths))
+
+
+def aimed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
+    return columns(ccd.aimed(columns(directions), lengths, columns(goal)))
+
+
+def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) -> Floats:
+    return columns(ccd.swept(columns(directions), lengths, weights, columns(goal)))
+
+
+def closed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
+    return columns(ccd.closed(columns(directions), lengths, columns(goal)))
+
+
 def a_group(seed: int, count: int, batch: int = 8) -> tuple[Floats, Floats, Floats]:
     """Directions of groups bent to one side, not quite evenly, lengths, and goals within reach."""
     random = np.random.default_rng(seed)
@@ -32,7 +53,7 @@ def a_group(seed: int, count: int, batch: int = 8) -> tuple[Floats, Floats, Floa
 
 
 def distance(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
-    return np.linalg.norm(ccd.chord(directions, lengths) - goal, axis=-1)
+    return np.linalg.norm(chord(directions, lengths) - goal, axis=-1)
 
 
 def turned_one_joint_after_the_other(
@@ -52,10 +73,10 @@ def turned_one_joint_after_the_other(
 @given(seeds, st.integers(1, 4), st.floats(0.05, 1.0))
 def test_a_sweep_is_the_papers_joint_by_joint(seed: int, count: int, weight: float) -> None:
     directions, lengths, goal = a_group(seed, count, 1)
-    goal = ccd.chord(directions, lengths) + 0.2 * goal  # nothing near a half turn
+    goal = chord(directions, lengths) + 0.2 * goal  # nothing near a half turn
     weights = np.full(count, weight)
 
-    swept = ccd.swept(directions, lengths, weights, goal)
+    found = swept(directions, lengths, weights, goal)
 
     # Short levers take less than their full share; the same sweep with the shares so lowered.
     shares = np.empty(count)
@@ -71,7 +92,7 @@ def test_a_sweep_is_the_papers_joint_by_joint(seed: int, count: int, weight: flo
         assume(angle < 0.7 * np.pi)
         after[joint:] = rotate(from_axis_angle(axis, shares[joint] * angle), after[joint:])
     expected = turned_one_joint_after_the_other(directions[:, 0], lengths, shares, goal[0])
-    assert np.allclose(swept[:, 0], expected, atol=1e-6)
+    assert np.allclose(found[:, 0], expected, atol=1e-6)
 
 
 @given(seeds, counts, st.floats(0.1, 1.0))
@@ -79,11 +100,11 @@ def test_sweeps_bring_the_end_nearer_to_a_goal_it_faces(
     seed: int, count: int, weight: float
 ) -> None:
     directions, lengths, goal = a_group(seed, count)
-    directions = ccd.aimed(directions, lengths, goal)
+    directions = aimed(directions, lengths, goal)
     before = distance(directions, lengths, goal)
 
     for _ in range(4):
-        directions = ccd.swept(directions, lengths, np.full(count, weight), goal)
+        directions = swept(directions, lengths, np.full(count, weight), goal)
 
     assert np.all(distance(directions, lengths, goal) <= before + 1e-9)
     assert np.allclose(np.linalg.norm(directions, axis=-1), 1.0, atol=1e-12)
@@ -93,20 +114,20 @@ def test_sweeps_bring_the_end_nearer_to_a_goal_it_faces(
 def test_closing_ends_at_every_goal_within_reach(seed: int, count: int) -> None:
     directions, lengths, goal = a_group(seed, count)
 
-    closed = ccd.closed(directions, lengths, goal)
+    found = closed(directions, lengths, goal)
 
     # What rounding off the full stretch costs: f² / 4 of the slack, slack 0.05 at least.
     allowed = 0.25 * ccd._ROUNDING**2 / 0.05 * lengths.sum()
-    assert np.max(distance(closed, lengths, goal)) <= allowed + 1e-7
-    assert np.allclose(np.linalg.norm(closed, axis=-1), 1.0, atol=1e-12)
+    assert np.max(distance(found, lengths, goal)) <= allowed + 1e-7
+    assert np.allclose(np.linalg.norm(found, axis=-1), 1.0, atol=1e-12)
 
 
 @given(seeds, counts)
 def test_closing_what_is_closed_changes_nothing_to_speak_of(seed: int, count: int) -> None:
     directions, lengths, goal = a_group(seed, count)
-    once = ccd.closed(directions, lengths, goal)
+    once = closed(directions, lengths, goal)
 
-    twice = ccd.closed(once, lengths, goal)
+    twice = closed(once, lengths, goal)
 
     assert np.max(np.abs(twice - once)) <= 1e-3
 
@@ -116,9 +137,9 @@ def test_a_goal_out_of_reach_is_pointed_at_with_a_stretched_group(seed: int, cou
     directions, lengths, goal = a_group(seed, count)
     goal = normalized(goal) * 1.5 * lengths.sum()
 
-    closed = ccd.closed(directions, lengths, goal)
+    found = closed(directions, lengths, goal)
 
-    reached = ccd.chord(closed, lengths)
+    reached = chord(found, lengths)
     assert np.allclose(normalized(reached), normalized(goal), atol=1e-9)
     assert np.all(np.linalg.norm(reached, axis=-1) >= (1.0 - ccd._ROUNDING) * lengths.sum())
 
@@ -141,7 +162,11 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
         with_bank = np.concatenate([angles, np.zeros((20, 3, 1))], axis=-1)
         links = link_rotations(with_bank)
         targets = pseudo_targets(links, (1.0 + contraction(with_bank)) / 3)
-        return ccd.solve(chain, ccd.asked_shape(chain, angles, sway), links, targets, softness)
+        shape = ccd.asked_shape(chain, np.moveaxis(angles, 0, -1), sway.T)
+        solution = ccd.solve(
+            chain, shape, np.moveaxis(links, 0, -1), np.moveaxis(targets, 0, -1), softness
+        )
+        return columns(solution)
 
     one, other = solved(angles, sway), solved(angles * mirrored, sway * mirrored)
 
@@ -153,7 +178,7 @@ def test_the_asked_shape_joins_smoothly_from_link_to_link() -> None:
     angles = np.radians(np.array([[[20.0, 0.0], [-50.0, 10.0], [30.0, -20.0]]]))
     from octo_motion.core.locomotion.targets import link_rotations
 
-    shape = ccd.asked_shape(chain, angles, np.zeros((1, 2)))
+    shape = columns(ccd.asked_shape(chain, np.moveaxis(angles, 0, -1), np.zeros((2, 1))))
     links = link_rotations(np.concatenate([angles, np.zeros((1, 3, 1))], axis=-1))
     directions = np.concatenate(
         [rotate(links[:, group], shape[segments]) for group, segments in enumerate(chain.groups)]
@@ -171,8 +196,8 @@ def test_a_goal_at_the_root_leaves_finite_numbers(count: int) -> None:
     directions = np.broadcast_to([1.0, 0.0, 0.0], (count, 3, 3)).copy()
     goal = np.array([[0.0, 0.0, 0.0], [1e-14, 0.0, 0.0], [-1.0, 0.0, 0.0]])
 
-    closed = ccd.closed(directions, np.ones(count), goal)
-    swept = ccd.swept(directions, np.ones(count), np.full(count, 0.4), goal)
+    bent = closed(directions, np.ones(count), goal)
+    turned = swept(directions, np.ones(count), np.full(count, 0.4), goal)
 
-    assert np.all(np.isfinite(closed))
-    assert np.all(np.isfinite(swept))
+    assert np.all(np.isfinite(bent))
+    assert np.all(np.isfinite(turned))

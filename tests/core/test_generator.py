@@ -2,7 +2,6 @@
 """Arms of any build follow their gait: on target, in one piece, without a pop or a twist."""
 
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
@@ -75,20 +74,18 @@ def test_bones_keep_their_lengths_and_stay_joined(name: str, joints: int) -> Non
 @every_preset
 @every_build
 def test_no_bone_pops(name: str, joints: int) -> None:
-    # A pop keeps its size however small the time step; all else shrinks with the step. Steps
-    # are fine enough to see the fastest moment, when a group passes through its full length.
+    # A pop keeps its size however small the time step; all else halves with the step, once steps
+    # are fine enough to see the fastest moment: when a group passes through its full length.
     skeleton, arms, body = body_with_arms(1, joints)
     generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
 
-    largest = [
+    coarse, fine = (
         angle_between(turns[:-1], turns[1:]).max(axis=0)
-        for turns in (posed(generator, frames).rotations for frames in (1536, 3072, 6144))
-    ]
+        for turns in (posed(generator, frames).rotations for frames in (12288, 24576))
+    )
 
-    for coarse, fine in itertools.pairwise(largest):
-        moving = coarse > 1e-6
-        assert np.all(fine[moving] <= 0.75 * coarse[moving])
-        assert fine.max() <= 0.55 * coarse.max()
+    moving = coarse > 1e-6
+    assert np.all(fine[moving] <= 0.6 * coarse[moving])
 
 
 @every_preset

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.poses import arm_rest, bone_rotations
+from octo_motion.core.locomotion.poses import ArmRest, arm_rest, bone_rotations
 from octo_motion.core.rotations import Floats, angle_between, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import bone_matrix, skeleton_of
@@ -51,6 +51,12 @@ def posed_segments(skeleton: Skeleton, chain: list[str], rotations: Floats) -> F
     return np.moveaxis(normalized(np.diff(heads[:, order], axis=1)), 1, 0)
 
 
+def rotations_of(rest: ArmRest, directions: Floats, bank: Floats) -> Floats:
+    """Rotations (bones, frames, 4) of a single arm, from directions (bones, frames, 3)."""
+    columns = np.moveaxis(directions, -1, 1)[..., None]
+    return np.moveaxis(bone_rotations([rest], columns, bank[..., None])[:, 0], 1, 0)
+
+
 def wanted_directions(random: np.random.Generator, count: int, frames: int = 5) -> Floats:
     steps = random.normal(0.0, 0.4, (count, frames, 3))
     return normalized(np.array([1.0, 0.0, 0.0]) + np.cumsum(steps, axis=0))
@@ -69,7 +75,7 @@ def test_segments_point_where_the_solver_wants_them(
     wanted = wanted_directions(random, len(chain))
     bank = random.normal(0.0, 1.0, wanted.shape[:2]) * banked
 
-    rotations = bone_rotations(arm_rest(skeleton, chain), wanted, bank)
+    rotations = rotations_of(arm_rest(skeleton, chain), wanted, bank)
 
     assert np.allclose(posed_segments(skeleton, chain, rotations), wanted[:-1], atol=1e-6)
 
@@ -80,7 +86,7 @@ def test_bones_that_do_not_inherit_rotation_are_posed_from_their_own_rest(seed: 
     skeleton, chain = a_chain(random, not_inheriting=("bone2", "bone4"))
     wanted = wanted_directions(random, len(chain))
 
-    rotations = bone_rotations(arm_rest(skeleton, chain), wanted, np.zeros(wanted.shape[:2]))
+    rotations = rotations_of(arm_rest(skeleton, chain), wanted, np.zeros(wanted.shape[:2]))
 
     assert np.allclose(posed_segments(skeleton, chain, rotations), wanted[:-1], atol=1e-6)
 
@@ -93,7 +99,7 @@ def test_a_bone_turns_no_further_than_its_segment_does(seed: int) -> None:
     rest = arm_rest(skeleton, chain)
     wanted = wanted_directions(random, len(chain))
 
-    rotations = bone_rotations(rest, wanted, np.zeros(wanted.shape[:2]))
+    rotations = rotations_of(rest, wanted, np.zeros(wanted.shape[:2]))
 
     turned = angle_between(rotations, np.array([1.0, 0.0, 0.0, 0.0]))
     after = rotate(rotations, rest.segments[:, None])
@@ -109,6 +115,6 @@ def test_at_rest_no_bone_turns(seed: int) -> None:
     order = [skeleton.index[name] for name in chain]
     directions = rotate(skeleton.rest_rotations[order], rest.segments)[:, None]
 
-    rotations = bone_rotations(rest, directions, np.zeros(directions.shape[:2]))
+    rotations = rotations_of(rest, directions, np.zeros(directions.shape[:2]))
 
     assert np.max(angle_between(rotations, np.array([1.0, 0.0, 0.0, 0.0]))) <= 1e-6

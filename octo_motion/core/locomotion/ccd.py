@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Weighted cyclic coordinate descent of an arm's three groups, in batch [Octopus, §3.1.4].
 
-An arm is handled as the directions of its segments, arrays of shape (segments, batch, 3) in the
-arm's own frame (x outward, z up); the batch is all frames of all arms that are built alike.
+An arm is handled as the directions of its segments in the arm's own frame (x outward, z up). The
+batch is all frames of all arms that are built alike. It is the last axis here, unlike elsewhere:
+vectors are (3, batch) and directions (segments, 3, batch), so that each component is one run of
+memory, which is what makes the solver fast.
 
 The result depends on nothing but the angles of its own frame. So each frame must start afresh,
 and must not pop where a target crosses the line of the group before it. The usual start, a
@@ -19,25 +21,28 @@ from typing import Final
 
 import numpy as np
 
-from ..rotations import Floats, cross, from_rotation_vector, normalized, rotate, shortest_arc
+from ..rotations import Floats
+from .columns import cross, dot, product, smallest_arc, turned
 
 SWEEPS: Final = 4
-SOFTENINGS: Final = 8
+SOFTENINGS: Final = 4
+_SPREADS: Final = 2
+"""How often bends are spread before the groups are closed again."""
 
 # Stretching a group to its full length is the singular point of any inverse kinematics: its bend
 # grows like the square root of what is left. Rounding the corner off costs half of this at most,
 # in group lengths.
-_ROUNDING: Final = 2.0e-3
+_ROUNDING: Final = 1.5e-4
 # A joint turns the less, the shorter its lever: of a lever of √0.05 of the group, half. So the
 # last joints do not curl, and an arm of many bones takes the shape of one of few.
 _SHORT_LEVER: Final = 0.05
 _JOINTS_OF_A_WEIGHT: Final = 4
 # Where a gait bends a group much more than this, the group does not need to sway.
 _SLIGHT: Final = np.radians(8.0)
-# No segment is bent further away from the chord when a group folds up.
-_FARTHEST_BEND: Final = 1.5 * np.pi
+# Square of the tangent of half the largest bend, 170°, of a group that folds up.
+_MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
 _NEWTON_STEPS: Final = 6
-_NEWTON_STEPS_BETWEEN: Final = 3
+_NEWTON_STEPS_BETWEEN: Final = 2
 _TINY: Final = 1e-12
 
 
@@ -66,44 +71,43 @@ def solve(
     shape: Floats,
     links: Floats,
     targets: Floats,
-    softness: float = 1.0,
+    softness: float = 0.8,
 ) -> Floats:
-    """Directions (segments, batch, 3) of arms whose groups end at their targets.
+    """Directions (segments, 3, batch) of arms whose groups end at their targets.
 
     Args:
         chain: the arms' build.
-        shape: (segments, batch, 3) the shape to start from, each group seen from its own link
+        shape: (segments, 3, batch) the shape to start from, each group seen from its own link
             (see ``asked_shape``).
-        links: (batch, 3, 4) orientations of the links.
-        targets: (batch, 4, 3) pseudo-targets Q₀ … Q₃; those out of reach are pointed at.
+        links: (links, 4, batch) orientations of the links.
+        targets: (links + 1, 3, batch) pseudo-targets Q₀ … Q₃; those out of reach are pointed at.
         softness: 0 leaves the bends as they are; towards 1 they are spread over neighbours.
     """
     directions = np.empty_like(shape)
+    root = np.zeros_like(targets[0])
     for group, segments in enumerate(chain.groups):
-        directions[segments] = rotate(links[:, group], shape[segments])
-    root = np.zeros_like(targets[:, 0])
-    for group, segments in enumerate(chain.groups):
-        lengths, goal = chain.lengths[segments], targets[:, group + 1] - root
-        own = aimed(directions[segments], lengths, goal)
+        lengths, goal = chain.lengths[segments], targets[group + 1] - root
+        own = aimed(turned(links[group], shape[segments]), lengths, goal)
         for _ in range(SWEEPS if len(own) > 1 else 0):
             own = swept(own, lengths, chain.weights[segments], goal)
         directions[segments] = closed(own, lengths, goal)
         root = root + chord(directions[segments], lengths)
     rounds = SOFTENINGS if softness > 0.0 else 0
     for number in range(1, rounds + 1):
-        directions = softened(directions, softness)
+        for _ in range(_SPREADS):
+            directions = softened(directions, softness)
         # Only the last closing has to be exact.
         steps = _NEWTON_STEPS if number == rounds else _NEWTON_STEPS_BETWEEN
         root = np.zeros_like(root)
         for group, segments in enumerate(chain.groups):
-            lengths, goal = chain.lengths[segments], targets[:, group + 1] - root
+            lengths, goal = chain.lengths[segments], targets[group + 1] - root
             directions[segments] = closed(directions[segments], lengths, goal, steps)
             root = root + chord(directions[segments], lengths)
     return directions
 
 
 def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
-    """The shape that the gait asks for, (segments, batch, 3), each group seen from its link.
+    """The shape that the gait asks for, (segments, 3, batch), each group seen from its link.
 
     Along each group the direction turns from halfway back to the link before to halfway on to
     the link after, about the link's own direction in the mean; a parabola is the simplest that
@@ -111,44 +115,44 @@ def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
 
     Args:
         chain: the arms' build.
-        angles: (batch, 3, 2) head and pitch of each link.
-        sway: (batch, 2) head and pitch of the bend that is added at the root of the first group
+        angles: (links, 2, batch) head and pitch of each link.
+        sway: (2, batch) head and pitch of the bend that is added at the root of the first group
             where it is nearly straight; it changes sides along each group.
     """
     # The first group leaves the body straight, and nothing pulls at the last one's end: there it
     # goes on as it came.
-    before = -0.5 * angles * np.array([2.0, 1.0, 1.0])[:, None]
-    after = 0.5 * np.concatenate([angles[:, 1:], angles[:, 2:]], axis=1)
-    shape = np.empty((len(chain.lengths), len(angles), 3))
-    asked = np.sum(before**2 + after**2, axis=-1)[..., None]
-    swaying = sway[:, None] * _SLIGHT**2 / (_SLIGHT**2 + asked)
+    before = -0.5 * angles * np.array([2.0, 1.0, 1.0])[:, None, None]
+    after = 0.5 * angles[[1, 2, 2]]
+    asked = np.sum(before**2 + after**2, axis=1, keepdims=True)
+    swaying = sway * (_SLIGHT**2 / (_SLIGHT**2 + asked))
+    shape = np.zeros((len(chain.lengths), 3, angles.shape[-1]))
+    shape[:, 0] = 1.0
     for group, segments in enumerate(chain.groups):
         lengths = chain.lengths[segments]
+        if len(lengths) == 1:
+            continue
         reach = np.cumsum(lengths)
         along = ((reach - 0.5 * lengths) / reach[-1])[:, None, None]
         turn = (
-            before[:, group] * (1.0 - 4.0 * along + 3.0 * along**2)
-            + after[:, group] * (3.0 * along**2 - 2.0 * along)
-            + (-1.0) ** group * swaying[:, group] * (1.0 - 2.0 * along)
+            before[group] * (1.0 - 4.0 * along + 3.0 * along**2)
+            + after[group] * (3.0 * along**2 - 2.0 * along)
+            + (-1.0) ** group * swaying[group] * (1.0 - 2.0 * along)
         )
-        if len(lengths) == 1:
-            turn = np.zeros_like(turn)
-        head, pitch = turn[..., 0], turn[..., 1]
-        shape[segments] = np.stack(
-            [np.cos(head) * np.cos(pitch), np.cos(head) * np.sin(pitch), np.sin(head)], axis=-1
-        )
+        level = np.cos(turn[:, 0])
+        shape[segments, 0] = level * np.cos(turn[:, 1])
+        shape[segments, 1] = level * np.sin(turn[:, 1])
+        shape[segments, 2] = np.sin(turn[:, 0])
     return shape
 
 
 def chord(directions: Floats, lengths: Floats) -> Floats:
-    """Vector (batch, 3) from a group's root to its end."""
-    return np.einsum("s,sbc->bc", lengths, directions)
+    """Vector (3, batch) from a group's root to its end."""
+    return np.tensordot(lengths, directions, axes=1)
 
 
 def aimed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
-    """A group turned as a whole about its root, its end towards the goal (batch, 3)."""
-    turn = shortest_arc(normalized(chord(directions, lengths)), normalized(goal))
-    return rotate(turn, directions)
+    """A group turned as a whole about its root, its end towards the goal (3, batch)."""
+    return turned(smallest_arc(chord(directions, lengths), goal), directions)
 
 
 def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) -> Floats:
@@ -158,38 +162,41 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
     The joints nearer to the root have not moved yet when a joint turns, and those beyond move as
     one piece; so it is enough to carry along the vector from the joint to the end, and to apply
     to each segment all turns from the root up to its own joint.
+
+    Weights count for groups of four joints, as in the source; where more joints share the bend,
+    each takes the less of it.
     """
     count = len(directions)
     steps = lengths[:, None, None] * directions
-    to_goal = goal - np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps[:-1], axis=0)])
-    turns = np.empty((*directions.shape[:-1], 4))
     whole = float(np.sum(lengths))
     scale = min(1.0, _JOINTS_OF_A_WEIGHT / count)
+    to_goal = goal - chord(directions, lengths)
+    turns: list[Floats] = []
     end = np.zeros_like(goal)
     for joint in range(count - 1, -1, -1):
         end = end + steps[joint]
-        turns[joint] = _partial_arc(end, to_goal[joint], weights[joint] * scale, whole)
-        end = rotate(turns[joint], end)
+        to_goal = to_goal + steps[joint]
+        turns.append(_partial_arc(end, to_goal, weights[joint] * scale, whole))
+        end = turned(turns[-1], end)
     result = np.empty_like(directions)
-    turn = turns[0]
-    result[0] = rotate(turn, directions[0])
+    turn = turns.pop()
+    result[0] = turned(turn, directions[0])
     for joint in range(1, count):
-        turn = _product(turn, turns[joint])
-        result[joint] = rotate(turn, directions[joint])
+        turn = product(turn, turns.pop())
+        result[joint] = turned(turn, directions[joint])
     return result
 
 
 def closed(directions: Floats, lengths: Floats, goal: Floats, steps: int = _NEWTON_STEPS) -> Floats:
     """A group bent as much as it takes for its end to be at the goal, in the shape it has.
 
-    The bends are the angles between the segments and the chord. All are scaled by one factor,
-    found by Newton's method, so that the chord is as long as the goal is far; then the group is
+    The bends are the angles between the segments and the chord. The tangents of half of them are
+    all scaled by one factor, so that the chord is as long as the goal is far; then the group is
     turned about its root.
     """
     whole = float(np.sum(lengths))
-    distance = np.sqrt(np.sum(goal * goal, axis=-1))
     if len(lengths) > 1:
-        slack = 1.0 - distance / whole
+        slack = 1.0 - np.sqrt(dot(goal, goal)) / whole
         slack = 0.5 * (slack + np.sqrt(slack * slack + _ROUNDING**2))
         directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0), steps)
     return aimed(directions, lengths, goal)
@@ -200,50 +207,53 @@ def softened(directions: Floats, amount: float) -> Floats:
 
     Before the first segment stands the way in which the arm leaves the body, x.
     """
-    outward = np.zeros_like(directions[:1])
-    outward[..., 0] = 1.0
-    before = np.concatenate([outward, directions[:-1]])
-    after = np.concatenate([directions[1:], directions[-1:]])
-    mean = (1.0 - 0.5 * amount) * directions + 0.25 * amount * (before + after)
-    size = np.sqrt(np.einsum("sbc,sbc->sb", mean, mean))
-    return mean / np.maximum(size, _TINY)[..., None]
+    mean = (1.0 - 0.5 * amount) * directions
+    share = 0.25 * amount
+    mean[1:] += share * directions[:-1]
+    mean[:-1] += share * directions[1:]
+    mean[0, 0] += share
+    mean[-1] += share * directions[-1]
+    mean *= (1.0 / np.maximum(np.sqrt(dot(mean, mean)), _TINY))[:, None]
+    return mean
 
 
 def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> Floats:
-    """A group whose bends are scaled so that its chord is as long as wanted (batch,)."""
-    axis = chord(directions, lengths)
-    found = np.sqrt(np.sum(axis * axis, axis=-1))
-    axis = axis / np.maximum(found, _TINY)[:, None]
-    along = np.einsum("sbc,bc->sb", directions, axis)
-    across = directions - along[..., None] * axis
-    sine = np.sqrt(np.einsum("sbc,sbc->sb", across, across))
-    bend = np.arctan2(sine, along)
-    across = across / np.maximum(sine, _TINY)[..., None]
-    # The squared chord is nearly linear in the square of the factor, so Newton's method takes
-    # that as its unknown; a bracket keeps it safe.
-    low = np.zeros_like(wanted)
-    high = (_FARTHEST_BEND / np.maximum(np.max(bend, axis=0), _TINY)) ** 2
+    """A group whose bends are scaled so that its chord is as long as wanted (batch,).
+
+    With k = tan²(θ/2) of a segment's bend θ, and q the square of the factor, the segment gets the
+    bend of cosine ``(1 − q k) / (1 + q k)``: the chord is a rational function of q, and its
+    square is nearly linear where bends are slight. Newton's method finds q.
+    """
     whole = float(np.sum(lengths))
+    axis = chord(directions, lengths)
+    found = np.sqrt(dot(axis, axis))
+    axis = axis / np.maximum(found, _TINY)
+    along = dot(directions, axis[None])
+    rest = np.maximum(1.0 + along, 1e-9)
+    tangent = np.maximum(1.0 - along, 0.0) / rest
+    across = (directions - along[:, None] * axis) * (2.0 / rest)[:, None]
+    limit = _MOST_FOLDED / np.maximum(np.max(tangent, axis=0), _TINY)
     square = _squared_arc(wanted / whole) / np.maximum(_squared_arc(found / whole), _TINY)
-    square = np.minimum(square, 0.9 * high)
+    square = np.minimum(square, limit)
+    weighted = lengths[:, None] * tangent
+    goal = wanted * wanted
     for _ in range(steps):
-        factor = np.sqrt(square)
-        angle = factor * bend
-        cosine, sinus = np.cos(angle), np.sin(angle)
-        inner = np.einsum("s,sb->b", lengths, cosine)
-        outer = np.einsum("s,sb,sbc->bc", lengths, sinus, across)
-        excess = inner * inner + np.sum(outer * outer, axis=-1) - wanted * wanted
-        low = np.where(excess > 0.0, square, low)
-        high = np.where(excess > 0.0, high, square)
-        inner_slope = -np.einsum("s,sb,sb->b", lengths, bend, sinus)
-        outer_slope = np.einsum("s,sb,sb,sbc->bc", lengths, bend, cosine, across)
-        slope = (inner * inner_slope + np.sum(outer * outer_slope, axis=-1)) / np.maximum(
-            factor, _TINY
-        )
-        step = square - excess / np.where(np.abs(slope) > _TINY, slope, -_TINY)
-        square = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
-    angle = np.sqrt(square) * bend
-    return np.cos(angle)[..., None] * axis + np.sin(angle)[..., None] * across
+        share = 1.0 / (1.0 + square * tangent)
+        fading = weighted * share
+        # Along the axis Σ l (2 share − 1); across it the square root of q times Σ l share across.
+        inner = 2.0 * np.tensordot(lengths, share, axes=1) - whole
+        outer = np.einsum("s,sb,scb->cb", lengths, share, across)
+        slope_inner = -2.0 * np.add.reduce(fading * share, axis=0)
+        slope_outer = -np.einsum("sb,sb,scb->cb", fading, share, across)
+        spread = dot(outer, outer)
+        excess = inner * inner + square * spread - goal
+        slope = 2.0 * (inner * slope_inner + square * dot(outer, slope_outer)) + spread
+        step = square - excess / np.minimum(slope, -_TINY)
+        square = np.minimum(np.clip(step, 0.25 * square, 4.0 * square), limit)
+    share = 1.0 / (1.0 + square * tangent)
+    across *= (np.sqrt(square) * share)[:, None]
+    across += (2.0 * share - 1.0)[:, None] * axis
+    return across
 
 
 def _squared_arc(ratio: Floats) -> Floats:
@@ -253,26 +263,19 @@ def _squared_arc(ratio: Floats) -> Floats:
 
 
 def _partial_arc(start: Floats, goal: Floats, share: float, whole: float) -> Floats:
-    """Quaternions (batch, 4) of a share of the smallest turn from one vector to another.
+    """Quaternions (4, batch) of a share of the smallest turn from one vector to another.
 
     Where the turn has no definite axis it fades out: near half a turn, and where the vectors are
     short against the ``whole`` group.
     """
     normal = cross(start, goal)
-    sine = np.sqrt(np.sum(normal * normal, axis=-1))
-    cosine = np.sum(start * goal, axis=-1)
+    sine = np.sqrt(dot(normal, normal))
+    cosine = dot(start, goal)
     angle = np.arctan2(sine, cosine)
-    angle = angle * share * np.clip(4.0 * (1.0 - angle / np.pi), 0.0, 1.0)
+    angle *= share * np.clip(4.0 * (1.0 - angle / np.pi), 0.0, 1.0)
     size = np.sqrt(sine * sine + cosine * cosine)
-    angle = angle * size / (size + _SHORT_LEVER * whole * whole)
-    return from_rotation_vector(normal * (angle / np.maximum(sine, _TINY))[:, None])
-
-
-def _product(first: Floats, second: Floats) -> Floats:
-    w = first[:, :1] * second[:, :1] - np.sum(first[:, 1:] * second[:, 1:], -1, keepdims=True)
-    xyz = (
-        first[:, :1] * second[:, 1:]
-        + second[:, :1] * first[:, 1:]
-        + cross(first[:, 1:], second[:, 1:])
-    )
-    return np.concatenate([w, xyz], axis=-1)
+    angle *= 0.5 * size / (size + _SHORT_LEVER * whole * whole)
+    turn = np.empty((4, len(angle)))
+    turn[0] = np.cos(angle)
+    turn[1:] = normal * (np.sin(angle) / np.maximum(sine, _TINY))
+    return turn

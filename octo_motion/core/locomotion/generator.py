@@ -16,11 +16,12 @@ from typing import Final
 import numpy as np
 
 from ..errors import RigError, SettingsError
-from ..rotations import Floats, from_axis_angle, from_matrix, rotate
+from ..rotations import Floats, from_axis_angle, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
 from .arm import GROUPS, group_lengths, split_groups
 from .ccd import Chain, asked_shape, solve
 from .chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
+from .columns import turned
 from .gait import GaitCurve, GaitTable, evaluate, variation
 from .poses import arm_rest, bone_rotations
 from .targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
@@ -105,8 +106,6 @@ class ArmPoses:
     """(frames, bones, 4) unit quaternions in each bone's rest frame (Blender's matrix_basis)."""
     misses: Floats
     """(frames, arms, groups) distance of each group's end from its target, in arm lengths."""
-    lowest: Floats
-    """(frames,) height of the lowest joint over the body's centre, in armature units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +143,8 @@ class Generator:
         # From an arm's own frame to the body's: azimuth counts from the front, −Y.
         azimuths = arm_azimuths(skeleton, [arm.bones for arm in self._arms], body)
         self._outward = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
-        self._to_armature = from_matrix(body.rotation)
+        # From an arm's own frame to armature space.
+        self._to_armature = multiply(from_matrix(body.rotation), self._outward)
         self._hands = np.array([arm.handedness for arm in self._arms])
         self._pairs = tuple(arm.pair for arm in self._arms)
         gait = settings.gait
@@ -172,9 +172,16 @@ class Generator:
         It is the gait's own, whatever variation and turning add: the same for every shot.
         """
         phase = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
-        angles = evaluate(self._settings.gait, phase[:, None] + self._offsets, self._pairs)
-        _, _, lowest = self._pose(angles, np.zeros((len(phase), len(self._arms))))
-        return max(0.0, -float(lowest.min()))
+        angles = self._mirrored(evaluate(self._settings.gait, self.arm_phases(phase), self._pairs))
+        lowest = 0.0
+        for build in self._builds:
+            columns = list(build.arms)
+            directions, _ = self._solve(build, angles[:, columns], np.zeros((1, len(columns))))
+            # Up is the same for the arm's frame and the body's.
+            climbs = np.cumsum(build.chain.lengths[:, None, None] * directions[:, 2], axis=0)
+            heights = self._roots[columns, 2] + self._lengths[columns] * climbs
+            lowest = min(lowest, float(heights.min()), float(self._roots[columns, 2].min()))
+        return -lowest
 
     def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
@@ -204,37 +211,40 @@ class Generator:
             parts = [self._pose(angles, steering)]
         return ArmPoses(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
-    def _pose(self, angles: Floats, steering: Floats) -> tuple[Floats, Floats, Floats]:
-        """Rotations, misses and lowest heights from angles and steering (frames, arms)."""
+    def _mirrored(self, angles: Floats) -> Floats:
+        """The same angles (frames, arms, links, 3), but with turns anticlockwise for every arm."""
+        hands = np.ones((len(self._arms), 1, 3))
+        hands[..., [PITCH, BANK]] = self._hands[:, None, None]
+        return angles * hands
+
+    def _pose(self, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        """Rotations and misses from angles (frames, arms, links, 3) and steering (frames, arms)."""
         frames = len(angles)
-        angles = angles.copy()
-        angles[..., PITCH] *= self._hands[:, None]
-        angles[..., BANK] *= self._hands[:, None]
+        angles = self._mirrored(angles)
         ends = np.cumsum([0] + [len(arm.bones) for arm in self._arms])
         rotations = np.empty((frames, ends[-1], 4))
         misses = np.empty((frames, len(self._arms), GROUPS))
-        lowest = np.zeros(frames)
         for build in self._builds:
             columns = list(build.arms)
-            directions, missed = self._solve(build, angles[:, columns], steering[:, columns])
-            misses[:, columns] = missed
+            own = angles[:, columns]
+            directions, misses[:, columns] = self._solve(build, own, steering[:, columns])
+            count, size = len(directions), frames * len(columns)
+            to_armature = np.tile(self._to_armature[columns].T, (1, frames))
+            in_armature = turned(to_armature, directions.reshape(count, 3, size))
+            bank = np.repeat(
+                np.moveaxis(own[..., BANK], -1, 0) / np.array(build.chain.sizes)[:, None, None],
+                build.chain.sizes,
+                axis=0,
+            )
+            posed = bone_rotations(
+                [self._rests[arm] for arm in columns], in_armature.reshape(directions.shape), bank
+            )
             for place, arm in enumerate(columns):
-                own = rotate(self._outward[arm], directions[:, :, place])
-                height = np.cumsum(build.chain.lengths[:, None] * own[..., 2], axis=0).min(axis=0)
-                height = self._roots[arm, 2] + self._lengths[arm] * np.minimum(height, 0.0)
-                lowest = np.minimum(lowest, height)
-                bank = np.concatenate(
-                    [
-                        np.repeat(angles[None, :, arm, link, BANK] / size, size, axis=0)
-                        for link, size in enumerate(build.chain.sizes)
-                    ]
-                )
-                turned = bone_rotations(self._rests[arm], rotate(self._to_armature, own), bank)
-                rotations[:, ends[arm] : ends[arm + 1]] = np.moveaxis(turned, 0, 1)
-        return rotations, misses, lowest
+                rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
+        return rotations, misses
 
     def _solve(self, build: _Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
-        """Directions (segments, frames, arms, 3) in the arms' frames; misses (frames, arms, 3)."""
+        """Directions (segments, 3, frames, arms) in the arms' frames; misses (frames, arms, 3)."""
         frames, arms = angles.shape[:2]
         batch = frames * arms
         width = build.widths * (1.0 + contraction(angles, self._settings.contraction)) ** (
@@ -243,18 +253,18 @@ class Generator:
         )
         steered = angles.copy()
         steered[..., 0, PITCH] += steering
-        links = link_rotations(steered).reshape(batch, GROUPS, 4)
-        targets = pseudo_targets(links, width.reshape(batch, GROUPS))
+        links = link_rotations(steered)
+        targets = _batch_last(pseudo_targets(links, width), batch)
         sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
-        shape = asked_shape(
-            build.chain, steered[..., [HEAD, PITCH]].reshape(batch, GROUPS, 2), sway
+        shape = asked_shape(build.chain, _batch_last(steered[..., [HEAD, PITCH]], batch), sway.T)
+        directions = solve(
+            build.chain, shape, _batch_last(links, batch), targets, self._settings.softness
         )
-        directions = solve(build.chain, shape, links, targets, self._settings.softness)
         joints = np.cumsum(build.chain.lengths[:, None, None] * directions, axis=0)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
-        missed = np.linalg.norm(ends - np.moveaxis(targets[:, 1:], 1, 0), axis=-1)
+        missed = np.linalg.norm(ends - targets[1:], axis=1)
         return (
-            directions.reshape(len(build.chain.lengths), frames, arms, 3),
+            directions.reshape(len(directions), 3, frames, arms),
             np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1),
         )
 
@@ -275,6 +285,12 @@ class Generator:
             chain = Chain(shares, sizes, sampled)
             builds.append(_Build(tuple(arms), chain, group_lengths(shares, sizes)))
         return tuple(builds)
+
+
+def _batch_last(values: Floats, batch: int) -> Floats:
+    """From (frames, arms, rows, components) to what the solver takes: (rows, components, batch)."""
+    rows = values.reshape(batch, *values.shape[2:])
+    return np.ascontiguousarray(np.moveaxis(rows, 0, -1))
 
 
 def _check_disjoint(arms: Sequence[Arm]) -> None:

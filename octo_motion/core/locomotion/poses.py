@@ -2,8 +2,8 @@
 """From solved joints to bone rotations: swing by the smallest rotation, twist by bank alone.
 
 A bone that follows its segment by the smallest rotation from where its parent carries it gains no
-twist of its own. So twist is a channel by itself: bank, and nothing else [SPEC of the source's
-first open problem: arms that wring themselves, suckers that face the sky].
+twist of its own. So twist is a channel by itself: bank, and nothing else: the
+source's first open problem was arms that wring themselves, and suckers that face the sky.
 """
 
 from __future__ import annotations
@@ -13,17 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rotations import (
-    Floats,
-    conjugate,
-    from_axis_angle,
-    multiply,
-    normalized,
-    rotate,
-    shortest_arc,
-)
+from ..rotations import Floats, conjugate, multiply, normalized, rotate
 from ..skeleton import Skeleton
 from .chains import joint_positions
+from .columns import product, smallest_arc, turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,23 +55,40 @@ def arm_rest(skeleton: Skeleton, bones: Sequence[str]) -> ArmRest:
     return ArmRest(segments, carried, tuple(follows))
 
 
-def bone_rotations(rest: ArmRest, directions: Floats, bank: Floats) -> Floats:
-    """Rotations (bones, frames, 4) in each bone's rest frame (Blender's ``matrix_basis``).
+def bone_rotations(rests: Sequence[ArmRest], directions: Floats, bank: Floats) -> Floats:
+    """Rotations (frames, arms, bones, 4) in each bone's rest frame (Blender's ``matrix_basis``).
 
     Args:
-        rest: the arm.
-        directions: (bones, frames, 3) unit vectors along the segments, armature space.
-        bank: (bones, frames) radians by which each bone is twisted about its own segment,
+        rests: the arms, all of as many bones.
+        directions: (bones, 3, frames, arms) unit vectors along the segments, armature space.
+        bank: (bones, frames, arms) radians by which each bone is twisted about its own segment,
             against the bone before.
     """
-    result = np.empty((*directions.shape[:-1], 4))
-    orientation = np.empty(0)
-    for bone, segment in enumerate(rest.segments):
-        carried = rest.carried[bone]
-        if rest.follows[bone]:
-            carried = multiply(orientation, carried)
-        wanted = rotate(conjugate(carried), directions[bone])
-        swing = shortest_arc(segment, wanted)
-        result[bone] = multiply(swing, from_axis_angle(segment, bank[bone]))
-        orientation = multiply(carried, result[bone])
+    bones, _, frames, arms = directions.shape
+    batch = frames * arms
+    wanted = directions.reshape(bones, 3, batch)
+    half = 0.5 * bank.reshape(bones, batch)
+    result = np.empty((frames, arms, bones, 4))
+    orientation = np.zeros((4, batch))
+    orientation[0] = 1.0
+    for bone in range(bones):
+        segment = _tiled([rest.segments[bone] for rest in rests], frames)
+        carried = _tiled([rest.carried[bone] for rest in rests], frames)
+        follows = np.array([rest.follows[bone] for rest in rests])
+        if np.all(follows):
+            carried = product(orientation, carried)
+        elif np.any(follows):
+            carried = np.where(np.tile(follows, frames), product(orientation, carried), carried)
+        backwards = carried * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
+        turn = smallest_arc(segment, turned(backwards, wanted[bone]))
+        if np.any(half[bone]):
+            twist = np.concatenate([np.cos(half[bone])[None], np.sin(half[bone]) * segment])
+            turn = product(turn, twist)
+        orientation = product(carried, turn)
+        result[:, :, bone] = turn.T.reshape(frames, arms, 4)
     return result
+
+
+def _tiled(each: Sequence[Floats], frames: int) -> Floats:
+    """What differs by arm, (components,) each, as (components, frames × arms)."""
+    return np.tile(np.stack(each, axis=-1), (1, frames))
