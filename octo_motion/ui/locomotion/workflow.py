@@ -343,7 +343,10 @@ def _uniform_scale(armature: bpy.types.Object, world: Floats) -> float:
         raise RigError(
             f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
         )
-    return scale
+    # A world matrix has the scale but for the rounding of its rotation, and rotation is what an
+    # earlier result changes: the same settings must give the same keys.
+    own = np.abs(np.array(armature.scale) * np.array(armature.delta_scale)).mean()
+    return float(own) if np.isclose(own, scale, rtol=1e-5) else float(f"{scale:.6g}")
 
 
 def _arms(
