@@ -256,22 +256,23 @@ def look(camera: bpy.types.Object, forward: Points, up: Points) -> None:
     camera.location = place
 
 
-def frame_points(camera: bpy.types.Object, points: Points, margin: float = 0.06) -> None:
+def frame_points(camera: bpy.types.Object, points: Points, margin: float = 0.08) -> None:
     """Move a camera, which keeps looking the way it does, so that it sees all points (…, 3).
 
     Args:
         camera: with a lens, not orthographic.
         points: world space.
-        margin: free room around them, as a share of their extent.
+        margin: how much farther away it goes than they need, as a share of the distance.
     """
     flat = points.reshape(-1, 3)
-    centre = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
-    roomy = centre + (1.0 + 2.0 * margin) * (flat - centre)
     bpy.context.view_layer.update()
     place, _ = camera.camera_fit_coords(
-        bpy.context.evaluated_depsgraph_get(), roomy.ravel().tolist()
+        bpy.context.evaluated_depsgraph_get(), flat.ravel().tolist()
     )
-    camera.location = place
+    # A step back from where they fit exactly.
+    distance = float(np.linalg.norm(flat.mean(axis=0) - np.array(place)))
+    back = camera.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0))
+    camera.location = Vector(place) + margin * distance * back
     bpy.context.view_layer.update()
 
 
