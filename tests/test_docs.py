@@ -303,11 +303,94 @@ def test_every_key_of_a_job_is_described() -> None:
     assert set(rows(section("## Job files", BATCH))) == set(KEYS)
 
 
+def test_every_parameter_of_a_new_octopus_is_named_for_jobs() -> None:
+    from octo_motion.ui.batch import job
+
+    text = rows(section("## Job files", BATCH))["octopus"][0]
+    assert [name for name in job._OCTOPUS_KEYS if f"`{name}`" not in text] == []
+
+
 def test_every_gait_that_comes_along_is_in_the_guide() -> None:
     from octo_motion.core.locomotion import gait
 
     guide = text_of(REPOSITORY / "docs" / "guide.md")
     assert [name for name in gait.presets() if f"`{name}`" not in guide] == []
+
+
+# --- Messages ------------------------------------------------------------------------------------
+
+NOT_IN_THE_PANELS = (
+    # Limits of the properties keep these from happening.
+    *("A setting of the gait is not a number.", "A setting of the travel is not a number."),
+    *("A joint's weight is not between 0 and 1.", "The contraction is ….", "The softness is …."),
+    *("The stride is … m.", "The burst is ….", "The body looks … strides ahead."),
+    *("A corner is turned within … strides.", "The speed is … m/s.", "… is …."),
+    # An empty list is filled before.
+    "The list of arms is empty.",
+)
+"""Errors that scripts alone could meet."""
+
+
+def sources() -> list[ast.Module]:
+    """The modules of the extension, without the command line."""
+    modules = (REPOSITORY / "octo_motion").rglob("*.py")
+    return [ast.parse(text_of(each)) for each in modules if each.parent.name != "batch"]
+
+
+def message(node: ast.AST) -> str | None:
+    """A text of the source with … for what is filled in."""
+    match node:
+        case ast.Constant(value=str(text)):
+            return text
+        case ast.JoinedStr(values=parts):
+            return "".join(
+                str(getattr(part, "value", "")) if isinstance(part, ast.Constant) else "…"
+                for part in parts
+            ).replace("'…'", "…")
+        case _:
+            return None
+
+
+def explained() -> dict[str, re.Pattern[str]]:
+    """Messages of the guide, … standing for anything."""
+    guide = section("## When something goes wrong", REPOSITORY / "docs" / "guide.md")
+    cells = [line.strip("|").split("|")[0].strip() for line in tables(guide).splitlines()]
+    shown = [each for cell in cells if cell.strip("-") for each in cell.split(" / ")]
+    return {
+        each: re.compile(re.escape(each.rstrip(".")).replace("…", ".*"))
+        for each in shown
+        if each != "Message"
+    }
+
+
+def test_every_message_that_the_guide_explains_is_one_that_artists_can_read() -> None:
+    said = {text for tree in sources() for node in ast.walk(tree) if (text := message(node))}
+    unknown = [
+        shown
+        for shown, pattern in explained().items()
+        if not any(pattern.match(text) for text in said)
+    ]
+    assert unknown == []
+
+
+def test_every_error_that_artists_can_meet_is_explained_in_the_guide() -> None:
+    errors = [
+        text
+        for tree in sources()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in {"RigError", "GaitError", "RouteError", "SettingsError", "WriteError"}
+        if node.args and (text := message(node.args[0]))
+    ]
+    assert len(errors) > len(NOT_IN_THE_PANELS)
+    patterns = explained().values()
+    missing = [
+        text
+        for text in errors
+        if text not in NOT_IN_THE_PANELS and not any(each.match(text) for each in patterns)
+    ]
+    assert missing == []
 
 
 # --- Links ---------------------------------------------------------------------------------------
