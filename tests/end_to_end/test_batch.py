@@ -15,7 +15,8 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.ui.batch import commands, registration
+from octo_motion.core.errors import WriteError
+from octo_motion.ui.batch import bake, commands, registration
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 PROGRAM = "python -m octo_motion"
@@ -302,6 +303,16 @@ def test_blender_that_is_killed_while_it_writes_leaves_nothing_behind(tmp_path: 
     assert names(tmp_path / "out") == {"a.blend"}
 
 
+def test_fault_of_ours_is_one_shots_and_leaves_its_traceback_in_the_report(tmp_path: Path) -> None:
+    environment = grieving(tmp_path, "raise TypeError('odd')")
+    shot = f'[[shots]]\nname = "a"\noutput = "out/a.blend"\n{SMALL}{ROUTE}{RANGE}'
+    job = write(tmp_path / "job.toml", shot)
+    assert run("bake", job, **environment).returncode == 1
+    assert report(job)["a"]["error"] == "TypeError: odd"
+    assert "Traceback (most recent call last)" in report(job)["a"]["log"]
+    assert names(tmp_path / "out") == set()
+
+
 @posix
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_run_that_is_stopped_leaves_no_process_and_no_unfinished_file(
@@ -338,6 +349,23 @@ def test_run_that_is_stopped_leaves_no_process_and_no_unfinished_file(
     else:
         assert status == 130
         assert {shot["error"] for shot in report(job).values()} == {"Stopped before it was done."}
+
+
+def test_report_that_cannot_be_written_any_more_stops_no_shot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_arguments: object) -> None:
+        monkeypatch.setattr(bake, "write_report", fail)
+
+    def fail(*_arguments: object) -> None:
+        raise WriteError("The disk is full.", "Make room.")
+
+    monkeypatch.setattr(bake, "write_report", full)  # the first report is written, no other
+    shot = f'[[shots]]\nname = "a"\noutput = "out/a.blend"\n{SMALL}{ROUTE}{RANGE}'
+    assert run_here("bake", write(tmp_path / "job.toml", shot)) == 1
+    told = capsys.readouterr().out
+    assert "1 done, 0 skipped, 0 failed. Report: The disk is full. Make room." in told
+    assert names(tmp_path / "out") == {"a.blend"}
 
 
 # --- One file ------------------------------------------------------------------------------------
@@ -503,6 +531,15 @@ def test_export_has_the_creature_and_its_motion_alone(
         seen = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
         places.append(seen.matrix_world @ seen.data.vertices[0].co)
     assert (places[1] - places[0]).length > 0.1
+
+
+def test_file_saved_in_edit_mode_is_as_good(scene: Path, tmp_path: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    bpy.context.view_layer.objects.active = bpy.data.objects["Octopus Skin"]
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.wm.save_as_mainfile(filepath=str(scene))
+    arguments = ("--route", "Wall", "--set", "timing=RANGE", "--set", "frame_end=3")
+    assert run_here("generate", scene, "--export", tmp_path / "a.glb", *arguments) == 0
 
 
 def test_alembic_without_a_mesh_is_refused(tmp_path: Path) -> None:

@@ -138,6 +138,7 @@ class _Run:
     total: int
     finished: int = 0
     digests: dict[str, str] = field(default_factory=dict)
+    report_problem: str = ""
 
     def all(self, plans: Sequence[_Plan], jobs: int) -> int:
         """Bake what is to be baked."""
@@ -147,7 +148,7 @@ class _Run:
             elif plan.skip:
                 self._skip(plan)
         # Now, so that a report that cannot be written is known before hours of work.
-        self._report()
+        self._write_report()
         waiting = {plan.entry.name: plan for plan in plans if not (plan.problem or plan.skip)}
         order = list(waiting.values())
         try:
@@ -246,10 +247,19 @@ class _Run:
     def _conclude(self, plans: Sequence[_Plan]) -> int:
         records = [self.records[plan.entry.name] for plan in plans]
         told = (f"{count(records, each)} {each}" for each in ("done", "skipped", "failed"))
-        self.say(f"{', '.join(told)}. Report: {self.report}")
-        return 1 if count(records, "failed") else 0
+        self.say(f"{', '.join(told)}. Report: {self.report_problem or self.report}")
+        return 1 if count(records, "failed") or self.report_problem else 0
 
     def _report(self) -> None:
+        """Write the report if that is possible; if not, the shots are baked all the same."""
+        try:
+            self._write_report()
+        except OctoMotionError as error:
+            self.report_problem = str(error)
+        else:
+            self.report_problem = ""
+
+    def _write_report(self) -> None:
         """Write the report: shots in the job's order; those that are no longer in it leave."""
         names = (shot.entry.name for shot in self.job.shots)
         records = [self.records[name] for name in names if name in self.records]

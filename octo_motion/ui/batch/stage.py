@@ -61,6 +61,9 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
         scene = _scene_of(armature, scene)
     libraries = tuple(bpy.path.abspath(each.filepath) for each in bpy.data.libraries)
     with _context(scene, armature):
+        if bpy.context.mode.startswith("EDIT"):
+            # So was the file saved; what is being edited is not to be keyed, nor exported.
+            bpy.ops.object.mode_set(mode="OBJECT")
         if entry.fps is not None:
             scene.render.fps, scene.render.fps_base = frame_rate(entry.fps)
         _apply(entry, armature, scene)
