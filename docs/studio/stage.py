@@ -270,9 +270,10 @@ def frame_points(camera: bpy.types.Object, points: Points, margin: float = 0.08)
         bpy.context.evaluated_depsgraph_get(), flat.ravel().tolist()
     )
     # A step back from where they fit exactly.
-    distance = float(np.linalg.norm(flat.mean(axis=0) - np.array(place)))
+    distance = float(np.linalg.norm(flat.mean(axis=0) - np.asarray(place, dtype=np.float64)))
     back = camera.matrix_world.to_3x3() @ Vector((0.0, 0.0, 1.0))
-    camera.location = Vector(place) + margin * distance * back
+    camera.location = place
+    camera.location += margin * distance * back
     bpy.context.view_layer.update()
 
 

@@ -29,7 +29,7 @@ PARTS: dict[str, list[Place]] = {
     "joints to bone rotations": [(generator, "bone_rotations")],
     "values of the channels": [(workflow.Shot, "_channels")],
     "write keys": [(actions, "_write_curves")],
-    "fingerprint of the keys": [(actions, "_mark")],
+    "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
 }
 
 

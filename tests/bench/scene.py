@@ -9,13 +9,13 @@ import bpy
 import numpy as np
 
 from octo_motion.blender.curves import add_route_curve
+from octo_motion.core.locomotion.arm import group_lengths, split_groups
+from octo_motion.core.locomotion.chains import arm_azimuths, joint_positions
 from octo_motion.core.locomotion.gait import evaluate
-from octo_motion.core.locomotion.generator import _Build
-from octo_motion.core.locomotion.targets import BANK, PITCH, contraction, link_rotations
-from octo_motion.core.locomotion.targets import pseudo_targets as chain_of_targets
+from octo_motion.core.locomotion.targets import contraction, link_rotations, pseudo_targets
 from octo_motion.core.locomotion.travel import plan_travel
-from octo_motion.core.rotations import Floats, rotate
-from octo_motion.ui.locomotion.workflow import Shot, prepare
+from octo_motion.core.rotations import Floats, from_axis_angle, rotate
+from octo_motion.ui.locomotion.workflow import prepare
 
 _CYCLE_FRAMES = 48
 """Two seconds at 24 frames a second: the default of the settings."""
@@ -54,30 +54,24 @@ def build(arms: int, joints: int, frames: int, gait: str, *, skin: bool) -> bpy.
 def groups(armature: bpy.types.Object) -> list[Group]:
     """All groups of all arms with their pseudo-targets, by the formulas of the gait alone."""
     shot = prepare(armature, bpy.context)
-    generator = shot.generator
-    phases = generator.arm_phases(plan_travel(shot.route, shot.travel, shot.times).phase)
+    body, skeleton = shot.body, shot.skeleton
+    phases = shot.generator.arm_phases(plan_travel(shot.route, shot.travel, shot.times).phase)
     angles = evaluate(shot.gait, phases, tuple(arm.pair for arm in shot.arms))
-    hands = np.array([arm.handedness for arm in shot.arms])
-    angles[..., PITCH] *= hands[:, None]
-    angles[..., BANK] *= hands[:, None]
-    return [group for build in generator._builds for group in _groups_of(shot, build, angles)]
-
-
-def _groups_of(shot: Shot, build: _Build, angles: Floats) -> list[Group]:
-    generator = shot.generator
+    azimuths = arm_azimuths(skeleton, [arm.bones for arm in shot.arms], body)
     result: list[Group] = []
-    for arm in build.arms:
-        sizes = build.chain.sizes
-        widths = build.widths * (1.0 + contraction(angles[:, arm])) ** (np.array(sizes) > 1)
-        own = chain_of_targets(link_rotations(angles[:, arm]), widths)
-        length = float(generator._lengths[arm])
-        outward = rotate(generator._outward[arm], own[:, 1:])
-        places = shot.body.center + rotate(
-            generator._to_armature, generator._roots[arm] + length * outward
-        )
+    for number, arm in enumerate(shot.arms):
+        joints = body.to_body(joint_positions(skeleton, arm.bones))
+        segments = np.linalg.norm(np.diff(joints, axis=0), axis=1)
+        sizes = split_groups(segments)
+        own = angles[:, number] * np.array([1.0, arm.handedness, arm.handedness])
+        widths = group_lengths(segments, sizes) * (1.0 + contraction(own))
+        chain = pseudo_targets(link_rotations(own), widths)[:, 1:]
+        # From the arm's frame, x outward, to the body's, whose front is −Y, and the armature's.
+        outward = from_axis_angle(np.array([0.0, 0.0, 1.0]), azimuths[number] - 0.5 * np.pi)
+        places = body.center + (joints[0] + rotate(outward, chain)) @ body.rotation.T
         ends = np.cumsum((0, *sizes))
         result += [
-            Group(shot.arms[arm].bones[ends[each] : ends[each + 1]], length, places[:, each])
+            Group(arm.bones[ends[each] : ends[each + 1]], float(segments.sum()), places[:, each])
             for each in range(len(sizes))
         ]
     return result
