@@ -13,6 +13,26 @@ from ...core.errors import RigError, WriteError
 from .blender_said import blender_said
 
 
+def check_export(path: Path, armature: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Make sure, before any work, that an armature can be exported to a file.
+
+    Raises:
+        RigError: there is nothing that the format could keep.
+        WriteError: Blender's exporter is switched off or not there.
+    """
+    group, name, _exporter = _EXPORTERS[path.suffix.lower()]
+    if name not in dir(getattr(bpy.ops, group)):
+        raise WriteError(
+            f"This Blender has no exporter for {path.suffix}.",
+            "Enable its add-on in the preferences, or take an official build of Blender.",
+        )
+    meshes = (each for each in _creature(armature, scene) if each.type == "MESH")
+    if path.suffix.lower() == ".abc" and next(meshes, None) is None:
+        raise RigError(
+            f"'{armature.name}' has no mesh, and Alembic keeps no bones.", "Export to .glb or .fbx."
+        )
+
+
 def export(
     path: Path, armature: bpy.types.Object, scene: bpy.types.Scene, first: int, last: int
 ) -> None:
@@ -27,23 +47,12 @@ def export(
         last: last frame of the motion.
 
     Raises:
-        RigError: there is nothing that the format could keep.
-        WriteError: the file cannot be written, or Blender's exporter is switched off.
+        WriteError: the file cannot be written, or the armature is hidden.
     """
-    creature = list(_creature(armature, scene))
     scene.frame_start, scene.frame_end = first, last
     scene.frame_set(first)
-    if path.suffix.lower() == ".abc" and not any(each.type == "MESH" for each in creature):
-        raise RigError(
-            f"'{armature.name}' has no mesh, and Alembic keeps no bones.", "Export to .glb or .fbx."
-        )
-    group, name, exporter = _EXPORTERS[path.suffix.lower()]
-    if name not in dir(getattr(bpy.ops, group)):
-        raise WriteError(
-            f"This Blender has no exporter for {path.suffix}.",
-            "Enable its add-on in the preferences, or take an official build of Blender.",
-        )
-    _select(creature, armature)
+    _select(list(_creature(armature, scene)), armature)
+    _group, _name, exporter = _EXPORTERS[path.suffix.lower()]
     try:
         exporter(path, first, last)
     except RuntimeError as error:

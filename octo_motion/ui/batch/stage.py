@@ -22,7 +22,7 @@ from ..locomotion.properties import locomotion_settings, set_gait
 from ..locomotion.workflow import Summary, generate
 from .blender_said import blender_said
 from .entry import NewRoute, ShotEntry, frame_rate
-from .exports import export
+from .exports import check_export, export
 
 _ROUTE_NAME: Final = "Octopus Route"
 _COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
@@ -66,6 +66,8 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
             bpy.ops.object.mode_set(mode="OBJECT")
         if entry.fps is not None:
             scene.render.fps, scene.render.fps_base = frame_rate(entry.fps)
+        for path in entry.exports:
+            check_export(path, armature, scene)
         _apply(entry, armature, scene)
         summary = generate(armature, bpy.context)
         if entry.octopus is not None:
