@@ -4,8 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Final
 
 import bpy
+import numpy as np
+
+_STILL: Final = 0.01
+"""Bone lengths, radians and factors by which a bone may be off its rest pose unnoticed."""
 
 
 def animated_bones(action: bpy.types.Action) -> set[str]:
@@ -39,3 +44,30 @@ def rest_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
             bone.rotation_axis_angle = (0.0, 0.0, 1.0, 0.0)
         else:
             bone.rotation_euler = (0.0, 0.0, 0.0)
+
+
+def displaced_bones(
+    armature: bpy.types.Object, turned: Iterable[str], carrying: Iterable[str]
+) -> list[str]:
+    """Those of the bones that are posed by more than what is going to be keyed.
+
+    Args:
+        armature: the armature object.
+        turned: bones whose rotation is going to be keyed: location and scale count.
+        carrying: bones that get no keys: rotation counts as well.
+    """
+    if armature.pose is None:
+        return []
+    bones = armature.pose.bones
+    found: list[str] = []
+    for name in turned:
+        bone = bones[name]
+        moved = np.abs(np.array(bone.location)).max() / bone.length
+        if max(moved, np.abs(np.array(bone.scale) - 1.0).max()) > _STILL:
+            found.append(name)
+    for name in carrying:
+        basis = np.array(bones[name].matrix_basis)
+        basis[:3, 3] /= bones[name].length
+        if np.abs(basis - np.eye(4)).max() > _STILL:
+            found.append(name)
+    return found

@@ -652,12 +652,34 @@ def test_constraints_that_hide_the_keys_are_told(octopus: Any) -> None:
     octopus.pose.bones["Arm1_2.L"].constraints.new("COPY_ROTATION").target = octopus
     octopus.constraints.new("LIMIT_LOCATION")
     warnings = workflow.generate(octopus, bpy.context).warnings
-    assert any("move 1 of the 4 arms ('Arm 1 L')" in told for told in warnings)
+    assert any("move one bone of the arms ('Arm1_2.L')" in told for told in warnings)
     assert any("away from its route" in told for told in warnings)
     settings_of(octopus).travel_on = "BONE"
     octopus.pose.bones["Root"].constraints.new("LIMIT_LOCATION")
     warnings = workflow.generate(octopus, bpy.context).warnings
     assert any("root bone 'Root'" in told for told in warnings)
+
+
+def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
+    assert workflow.generate(octopus, bpy.context).warnings == ()
+    octopus.pose.bones["Root"].rotation_quaternion = (0.8, 0.6, 0.0, 0.0)
+    (told,) = workflow.generate(octopus, bpy.context).warnings
+    assert told.startswith("The pose of one bone moves the arms ('Root')")
+    assert octopus.pose.bones["Root"].rotation_quaternion[1] == pytest.approx(0.6)
+    octopus.pose.bones["Arm1_1.L"].location.x = 0.1
+    octopus.pose.bones["Arm1_2.L"].scale.y = 2.0
+    (told,) = workflow.generate(octopus, bpy.context).warnings
+    assert told.startswith("The pose of 3 bones moves the arms ('Arm1_1.L')")
+    settings_of(octopus).travel_on = "BONE"
+    (told,) = workflow.generate(octopus, bpy.context).warnings
+    assert told.startswith("The pose of 2 bones")
+    for name in ("Arm1_1.L", "Arm1_2.L"):
+        octopus.pose.bones[name].matrix_basis.identity()
+        octopus.pose.bones[name].location.x = 0.0
+        octopus.pose.bones[name].scale.y = 1.0
+    # What was keyed on the root bone goes back to rest by itself.
+    settings_of(octopus).travel_on = "OBJECT"
+    assert workflow.generate(octopus, bpy.context).warnings == ()
 
 
 def test_targets_that_are_missed_are_told(octopus: Any) -> None:

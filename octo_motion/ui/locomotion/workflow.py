@@ -22,7 +22,7 @@ from ...blender import actions
 from ...blender.armature import armature_data, read_skeleton, world_matrix
 from ...blender.arms import world_directions
 from ...blender.curves import read_route
-from ...blender.poses import animated_bones, rest_bones
+from ...blender.poses import animated_bones, displaced_bones, rest_bones
 from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
@@ -301,6 +301,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         warnings=[
             *(detection.notes if detection else _held(skeleton, arms)),
             *_warnings(settings, armature, skeleton),
+            *_displaced(settings, armature, skeleton, arms),
         ],
     )
 
@@ -406,12 +407,13 @@ def _root_bone(
 
 
 def _held(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
-    held = [arm.name for arm in arms if is_driven(skeleton, arm.bones)]
-    if not held:
+    bones = [bone for arm in arms for bone in arm.bones if is_driven(skeleton, [bone])]
+    if not bones:
         return []
+    count = "one bone" if len(bones) == 1 else f"{len(bones)} bones"
     told = (
-        f"Constraints or drivers move {len(held)} of the {len(arms)} arms ('{held[0]}'): "
-        "keys on their bones have no effect while those are on."
+        f"Constraints or drivers move {count} of the arms ('{bones[0]}'{' …' * (len(bones) > 1)}): "
+        "keys there have little or no effect while those are on."
     )
     return [told]
 
@@ -431,6 +433,37 @@ def _warnings(
     ):
         told.append(f"Constraints move '{armature.name}' away from its route.")
     return told
+
+
+def _displaced(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    arms: tuple[Arm, ...],
+) -> list[str]:
+    """Poses that stay and move the arms: an artist's, or what an imported file has left."""
+    turned = [bone for arm in arms for bone in arm.bones]
+    carrying: set[int] = set()
+    for bone in turned:
+        parent = skeleton.parents[skeleton.index[bone]]
+        while parent >= 0 and parent not in carrying:
+            carrying.add(parent)
+            parent = skeleton.parents[parent]
+    own = {skeleton.names[number] for number in carrying} - set(turned)
+    if settings.travel_on == "BONE":
+        own.discard(settings.root_bone)
+    if (previous := _previous_action(armature, settings)) is not None:
+        # These go back to rest if they are not keyed again.
+        own -= animated_bones(previous)
+    found = displaced_bones(armature, turned, sorted(own))
+    if not found:
+        return []
+    count = "one bone" if len(found) == 1 else f"{len(found)} bones"
+    told = (
+        f"The pose of {count} moves the arms ('{found[0]}'): the body stands off its route by "
+        "that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not."
+    )
+    return [told]
 
 
 # --- Settings to core's --------------------------------------------------------------------------

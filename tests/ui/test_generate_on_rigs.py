@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rigs as artists bring them walk and swim with a click on Add Route and a click on Generate."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.blender.curves import read_route
+from octo_motion.ui.locomotion import workflow
+from octo_motion.ui.locomotion.arm_items import bones_of
+from tests.ui.rig import click, joints_in_world
+
+RIGS = (
+    # file, armature, arms
+    ("InfiniteSkinnedTentacle.glb", "Armature", 64),
+    ("assimp_animation_with_skeleton.fbx", "Armature", None),
+    ("nssm_octopus.blend", "Armature", 8),
+    ("octopus_cheli_sanjuan.glb", "Object_6", 6),
+    ("rigify_simple_tentacle_8arm.blend", "octo_meta", 8),
+    ("rigify_simple_tentacle_8arm.blend", "RIG-octo_meta", 8),
+)
+
+
+@pytest.mark.parametrize("gait", ["walk", "swim"])
+@pytest.mark.parametrize(("file", "name", "count"), RIGS)
+def test_a_real_rig_follows_its_route(
+    shared_data: Callable[[str], Path], file: str, name: str, count: int | None, gait: str
+) -> None:
+    path = shared_data(f"octo/{file}")
+    importers: dict[str, Any] = {
+        ".blend": bpy.ops.wm.open_mainfile,
+        ".glb": bpy.ops.import_scene.gltf,
+        ".fbx": bpy.ops.import_scene.fbx,
+    }
+    importers[path.suffix](filepath=str(path))
+    armature: Any = bpy.data.objects[name]
+    bpy.context.view_layer.objects.active = armature
+    if bpy.context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    own = set(bpy.data.actions)
+    click("add_route")
+    settings = armature.octo_motion.locomotion
+    settings.gait, settings.timing, settings.frame_end = gait, "RANGE", 48
+    settings.ease_in = settings.ease_out = 0.0
+
+    summary = workflow.generate(armature, bpy.context)
+
+    assert count in (None, len(settings.arms))
+    # The solver's own promise, in arm lengths.
+    assert summary.miss < 1e-3
+    # Whatever actions came with the file are still there, and still in use by no one less.
+    assert own < set(bpy.data.actions)
+    route = read_route(settings.route)
+    bones = [bone.name for bone in armature.pose.bones]
+    roots = [bones.index(bones_of(arm)[0]) for arm in settings.arms]
+    posed = any("stands off its route" in told for told in summary.warnings)
+    if file == "InfiniteSkinnedTentacle.glb":
+        # It stacks its arms at rest and spreads them in pose mode.
+        assert posed
+        return
+    for frame, share in ((1, 0.0), (48, 1.0)):
+        middle = joints_in_world(armature, frame)[roots, 0].mean(axis=0)
+        aside = middle - route.position(share)
+        if gait == "walk":
+            aside[2] = 0.0
+        # Half a percent for scales that are not quite equal.
+        assert np.linalg.norm(aside) < (0.05 if posed else 5e-3) * route.length
