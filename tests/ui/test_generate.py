@@ -206,6 +206,19 @@ def test_travel_on_the_object_or_on_the_root_bone_gives_the_same_places(
     np.testing.assert_allclose(back, on_object, atol=2e-5)
 
 
+def test_a_route_may_hang_on_an_object_that_stays(octopus: Any) -> None:
+    settings = settings_of(octopus)
+    settings.travel_on = "BONE"
+    settings.route.parent = octopus
+    action = generate(octopus)
+    before = {key: values.tobytes() for key, values in keys(action).items()}
+    bpy.context.scene.frame_set(40)
+    assert {key: values.tobytes() for key, values in keys(generate(octopus)).items()} == before
+    settings.route.parent_type, settings.route.parent_bone = "BONE", "Root"
+    with pytest.raises(OctoMotionError, match="would move with it"):
+        workflow.generate(octopus, bpy.context)
+
+
 @pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
 def test_scale_of_the_object_changes_nothing_but_the_size(scale: float) -> None:
     armature = make_octopus()
@@ -526,6 +539,13 @@ def sheared(armature: Any) -> None:
     armature.scale = (1.0, 1.0, np.sqrt(5.0))
 
 
+def carried_route(armature: Any) -> None:
+    between = bpy.data.objects.new("Between", None)
+    bpy.context.scene.collection.objects.link(between)
+    settings_of(armature).route.parent = between
+    between.parent = armature
+
+
 def without_root(armature: Any) -> None:
     settings_of(armature).travel_on, settings_of(armature).root_bone = "BONE", "No such bone"
 
@@ -600,6 +620,7 @@ def tweaked(armature: Any) -> None:
         (mirrored, "mirrored"),
         (without_size, "has no size"),
         (sheared, "sheared by its parent"),
+        (carried_route, "'Route' hangs on 'Octopus' and would move"),
         (without_root, "no bone 'No such bone' to travel on"),
         (connected_root, "connected to its parent"),
         (backwards, "ends at frame -5 and starts at 1"),

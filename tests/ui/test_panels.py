@@ -20,22 +20,40 @@ PANELS = [each for each in panels.CLASSES if issubclass(each, bpy.types.Panel)]
 ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
 
 
+FUNCTIONS = bpy.types.UILayout.bl_rna.functions
+
+
+def check(function: str, arguments: Any) -> None:
+    """This Blender knows the function and its arguments."""
+    assert set(arguments) <= set(FUNCTIONS[function].parameters.keys()), (function, arguments)
+
+
 class Layout:
     """Writes down what is drawn."""
 
     def __init__(self, drawn: list[str] | None = None) -> None:
         self.drawn: list[str] = [] if drawn is None else drawn
 
-    def _part(self, **_: Any) -> "Layout":
+    def row(self, **arguments: Any) -> "Layout":
+        check("row", arguments)
         return Layout(self.drawn)
 
-    row = column = split = box = _part
+    def column(self, **arguments: Any) -> "Layout":
+        check("column", arguments)
+        return Layout(self.drawn)
+
+    def split(self, **arguments: Any) -> "Layout":
+        check("split", arguments)
+        return Layout(self.drawn)
 
     def label(self, *, text: str, icon: str = "NONE") -> None:
         assert icon in ICONS
         self.drawn.append(text)
 
-    def prop(self, data: Any, name: str, *, icon: str = "NONE", index: int = -1, **_: Any) -> None:
+    def prop(
+        self, data: Any, name: str, *, icon: str = "NONE", index: int = -1, **more: Any
+    ) -> None:
+        check("prop", more)
         assert icon in ICONS
         definition = data.bl_rna.properties[name]
         assert index < max(getattr(definition, "array_length", 0), 1)
@@ -45,7 +63,8 @@ class Layout:
         assert where.bl_rna.properties[what].type == "COLLECTION"
         self.prop(data, name)
 
-    def operator(self, name: str, *, icon: str = "NONE", **_: Any) -> Any:
+    def operator(self, name: str, *, icon: str = "NONE", **more: Any) -> Any:
+        check("operator", more)
         assert icon in ICONS
         module, operator = name.split(".")
         rna = getattr(getattr(bpy.ops, module), operator).get_rna_type()
@@ -57,25 +76,28 @@ class Layout:
 
         return Properties()
 
-    def menu(self, name: str, *, icon: str = "NONE", **_: Any) -> None:
+    def menu(self, name: str, *, icon: str = "NONE", **more: Any) -> None:
+        check("menu", more)
         assert icon in ICONS
         self.drawn.append(name)
         getattr(bpy.types, name).draw(SimpleNamespace(layout=self), bpy.context)
 
     def template_list(
-        self, kind: str, _name: str, data: Any, items: str, other: Any, active: str, **_: Any
+        self, kind: str, _name: str, data: Any, items: str, other: Any, active: str, **more: Any
     ) -> None:
+        check("template_list", more)
         assert active in other.bl_rna.properties
         for number, item in enumerate(getattr(data, items)):
             row = getattr(bpy.types, kind).draw_item
             row(SimpleNamespace(), bpy.context, self, data, item, 0, other, active, number)
 
     def template_curve_mapping(self, data: Any, name: str) -> None:
+        assert "template_curve_mapping" in FUNCTIONS
         assert data.bl_rna.properties[name].fixed_type.identifier == "CurveMapping"
         self.drawn.append(name)
 
-    def separator(self, **_: Any) -> None:
-        pass
+    def separator(self, **more: Any) -> None:
+        check("separator", more)
 
 
 class Tab(dict[str, list[str]]):

@@ -136,11 +136,7 @@ class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
         return context.window_manager.invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
-        name = self.name or settings.gait
-        if name == settings.gait:
-            # What is loaded must not be lost with its preset.
-            _editable(settings)
+        name = self.name or _settings(context).gait
         presets.remove_gait(name)
         self.report({"INFO"}, f"Removed the gait '{name}'.")
 

@@ -265,6 +265,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         raise RouteError(
             f"'{armature.name}' has no route.", "Choose a curve as its route, or add one."
         )
+    _check_route_stays(settings, armature)
     scene = context.scene
     assert scene is not None
     depsgraph = context.evaluated_depsgraph_get()
@@ -321,6 +322,20 @@ def _previous_action(
     if data is not None and data.action is not None and actions.is_generated(data.action):
         return data.action
     return settings.result
+
+
+def _check_route_stays(settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object) -> None:
+    """A route that its own traveller carries would be somewhere else each time."""
+    child = settings.route
+    while child is not None and child.parent is not None:
+        carried = settings.travel_on == "OBJECT" or child.parent_type == "BONE"
+        if child.parent == armature and carried:
+            raise RouteError(
+                f"The route '{settings.route.name}' hangs on '{armature.name}' and would move "
+                "with it.",
+                "Clear its parent (Alt P).",
+            )
+        child = child.parent
 
 
 # --- The rig ---------------------------------------------------------------------------------
