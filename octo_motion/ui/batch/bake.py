@@ -303,7 +303,7 @@ class _Stage(ExitStack):
         request = self._path(entry.name, "request.json")
         write_request(request, entry, self.places[entry.name])
         command = child_command(request, self.answer(entry.name))
-        return Task(entry.name, command, child_environment(), self.log(entry.name))
+        return Task(entry.name, command, child_environment(self._folder), self.log(entry.name))
 
     def leave(self, name: str) -> None:
         """Delete what is left of a shot's unfinished outputs."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import traceback
 from collections.abc import Mapping
@@ -58,11 +59,17 @@ def child_command(request: Path, answer: Path) -> list[str]:
     ]
 
 
-def child_environment() -> dict[str, str]:
-    """Environment in which another Python finds this package."""
+def child_environment(scratch: Path) -> dict[str, str]:
+    """Environment in which another Python finds this package.
+
+    Args:
+        scratch: folder for temporary files; a Blender that is killed leaves its own there.
+    """
     root = Path(__file__).resolve().parents[2 + len(_PACKAGE.split("."))]
     paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH", "")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1"}
+    temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(scratch))
+    python = {"PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1"}
+    return {**os.environ, **temporary, **python}
 
 
 def write_request(path: Path, entry: ShotEntry, places: Mapping[Path, Path]) -> None:
@@ -89,6 +96,8 @@ def run_shot(request: Path, answer: Path) -> int:
     def clean_up() -> None:
         for place in places.values():
             remove_staged(place)
+        # Requests, answers and logs of a run that is no more.
+        shutil.rmtree(request.parent, ignore_errors=True)
 
     try:
         with dying_with_parent(clean_up):
