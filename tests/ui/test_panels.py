@@ -96,6 +96,11 @@ class Layout:
         assert data.bl_rna.properties[name].fixed_type.identifier == "CurveMapping"
         self.drawn.append(name)
 
+    def template_ID(self, data: Any, name: str) -> None:  # noqa: N802 - Blender's name
+        assert "template_ID" in FUNCTIONS
+        assert isinstance(getattr(data, name), bpy.types.ID)
+        self.drawn.append("users")
+
     def separator(self, **more: Any) -> None:
         check("separator", more)
 
@@ -165,6 +170,10 @@ def test_a_gait_shows_what_it_needs(gait: str) -> None:
     assert "octo_motion.gait_knot_remove" in tab["table"]
     assert "octo_motion.gait_offset_remove" in tab["table"]
     assert "mapping" in tab["weights"]
+    assert "users" not in tab["weights"]
+    armature: Any = settings.id_data
+    armature.copy()
+    assert "users" in Tab()["weights"]
     assert "height" in tab["heading"]
     bpy.data.node_groups.remove(settings.weight_curve)
     assert "The curve is gone: switch it off and on." in Tab()["weights"]

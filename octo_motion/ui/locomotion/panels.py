@@ -317,6 +317,9 @@ class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
             column.prop(settings, "weight_root", text="Root")
             column.prop(settings, "weight_tip", text="Tip")
         elif group is not None and curve_node(group) is not None:
+            if group.users > 1:
+                # A copy of the armature shares the curve; a click on the number parts them.
+                layout.template_ID(settings, "weight_curve")
             layout.template_curve_mapping(group.nodes[NODE], "mapping")
         else:
             layout.label(text="The curve is gone: switch it off and on.", icon="ERROR")
