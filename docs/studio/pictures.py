@@ -7,6 +7,7 @@ import argparse
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -21,8 +22,12 @@ from stage import Pixels
 import octo_motion
 from octo_motion.core.locomotion import gait
 
-_WIDE: Final = (848, 478)
+_WIDE: Final = (768, 432)
 _CELL: Final = (264, 198)
+_FAR_WALK: Final = replace(
+    shots.WALK, route=((-1.2, 0.6, 0.0), (-0.5, -0.7, 0.0), (0.4, 0.8, 0.0), (1.3, 0.0, 0.0))
+)
+"""Far enough for several octopuses to stand side by side."""
 _UP: Final = np.array([0.0, 0.0, 1.0])
 
 
@@ -122,7 +127,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "walk_above": cycle_of(shots.WALK, contact_sheet.ABOVE),
     "swim_side": cycle_of(shots.SWIM, contact_sheet.SIDE),
     "swim_above": cycle_of(shots.SWIM, contact_sheet.ABOVE),
-    "walk_route": along_route(shots.WALK, 3),
+    "walk_route": along_route(_FAR_WALK, 4),
     "swim_route": along_route(shots.SWIM, 5),
     "rig": rig,
     "gaits": gaits,
