@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
-import tempfile
+import secrets
 from pathlib import Path
 from typing import Final
 
@@ -133,16 +134,15 @@ def write_gait(table: GaitTable, path: Path) -> None:
     Raises:
         WriteError: it cannot be written.
     """
+    # Not tempfile's: those are for their owner's eyes alone, and this one becomes the result.
+    scratch = path.with_name(f".{secrets.token_hex(4)}.part")
     try:
-        handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=".gait-", suffix=".part")
-    except OSError as error:
-        raise _unwritable(f"'{path}'", error) from error
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+        with scratch.open("x", encoding="utf-8", newline="\n") as file:
             file.write(gait.to_json(table))
-        Path(scratch).replace(path)
+        scratch.replace(path)
     except OSError as error:
-        Path(scratch).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            scratch.unlink(missing_ok=True)
         raise _unwritable(f"'{path}'", error) from error
 
 

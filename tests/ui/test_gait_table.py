@@ -179,6 +179,17 @@ def test_a_gait_goes_through_a_file(settings: Any, tmp_path: Path) -> None:
     assert same(read_gait(settings), exported)
 
 
+@pytest.mark.usefixtures("settings")
+def test_a_gait_goes_to_a_file_beside_the_scene_that_colleagues_can_read(tmp_path: Path) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+
+    bpy.ops.octo_motion.gait_export(filepath="//mine.json")
+
+    (tmp_path / "plain").touch()  # as any new file is
+    assert (tmp_path / "mine.json").stat().st_mode == (tmp_path / "plain").stat().st_mode
+    assert bpy.ops.octo_motion.gait_import(filepath="//mine.json") == {"FINISHED"}
+
+
 def test_files_that_are_no_gait_are_told_and_change_nothing(settings: Any, tmp_path: Path) -> None:
     settings.gait = "swim"
     path = tmp_path / "gait.json"

@@ -72,7 +72,7 @@ class ArmItem(bpy.types.PropertyGroup):
     )
     enabled: BoolProperty(
         name="Enabled",
-        description="Move this arm. Switched off, its bones keep the keys they have",
+        description="Move this arm. Switched off, it gets no keys and keeps its pose",
         default=True,
         override=OVERRIDE,
     )
