@@ -48,6 +48,7 @@ def build(arms: int, joints: int, frames: int, gait: str, *, skin: bool) -> bpy.
     settings.frame_start, settings.frame_end = 1, frames
     # Steering would move the targets by a rule of our own; the comparison is about reaching them.
     settings.turning = 0.0
+    settings.stand = False
     return armature
 
 

@@ -164,7 +164,7 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
         targets = pseudo_targets(links, (1.0 + contraction(with_bank)) / 3)
         shape = ccd.asked_shape(chain, np.moveaxis(angles, 0, -1), sway.T)
         solution = ccd.solve(
-            chain, shape, np.moveaxis(links, 0, -1), np.moveaxis(targets, 0, -1), softness
+            chain, shape, np.moveaxis(links, 0, -1), np.moveaxis(targets, 0, -1), softness=softness
         )
         return columns(solution)
 

@@ -424,6 +424,57 @@ def test_clearance_is_how_deep_a_whole_cycle_reaches() -> None:
     assert plain.clearance == pytest.approx(-lowest, abs=1e-9)
 
 
+# --- Standing ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["walk", "walk_search"])
+@pytest.mark.parametrize("joints", [7, 12, 30])
+def test_standing_several_arms_are_on_the_ground_at_any_time_and_none_is_below(
+    name: str, joints: int
+) -> None:
+    skeleton, arms, body = body_with_arms(8, joints)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name], stand=True))
+
+    poses = posed(generator, 96)
+
+    heights = np.array(
+        [
+            posed_joints(skeleton, arm, poses.rotations, generator.bones)[..., 2].min(axis=1)
+            for arm in arms
+        ]
+    )
+    heights += generator.clearance
+    # The clearance looks at as many phases as there are frames here.
+    assert heights.min() >= -1e-9
+    standing = np.count_nonzero(heights < 0.05, axis=0)
+    assert standing.min() >= 2
+    assert poses.misses.max() <= 1e-3
+
+
+@pytest.mark.parametrize("joints", [7, 12, 30])
+def test_standing_pops_nothing(joints: int) -> None:
+    skeleton, arms, body = body_with_arms(1, joints)
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], stand=True))
+
+    coarse, fine = (
+        angle_between(turns[:-1], turns[1:]).max(axis=0)
+        for turns in (posed(generator, frames).rotations for frames in (12288, 24576))
+    )
+
+    assert np.all(fine <= 0.6 * coarse)
+
+
+@pytest.mark.parametrize(("name", "joints"), [("walk_literal", 12), ("swim", 12), ("walk", 3)])
+def test_level_gaits_swimmers_and_stiff_arms_stand_on_nothing(name: str, joints: int) -> None:
+    rig = body_with_arms(2, joints)
+
+    plain, standing = (
+        posed(generated(rig, gait=PRESETS[name], stand=stand)).rotations for stand in (False, True)
+    )
+
+    assert np.array_equal(plain, standing)
+
+
 # --- Faults --------------------------------------------------------------------------------------
 
 

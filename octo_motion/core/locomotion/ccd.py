@@ -43,6 +43,8 @@ _SLIGHT: Final = np.radians(8.0)
 _MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
 _NEWTON_STEPS: Final = 6
 _NEWTON_STEPS_BETWEEN: Final = 2
+# Arm lengths within which a joint comes to rest on a floor.
+_FLOOR_ROUNDING: Final = 0.03
 _TINY: Final = 1e-12
 
 
@@ -71,7 +73,9 @@ def solve(
     shape: Floats,
     links: Floats,
     targets: Floats,
+    *,
     softness: float = 0.8,
+    floor: Floats | None = None,
 ) -> Floats:
     """Directions (segments, 3, batch) of arms whose groups end at their targets.
 
@@ -82,6 +86,8 @@ def solve(
         links: (links, 4, batch) orientations of the links.
         targets: (links + 1, 3, batch) pseudo-targets Q₀ … Q₃; those out of reach are pointed at.
         softness: 0 leaves the bends as they are; towards 1 they are spread over neighbours.
+        floor: (batch,) height that joints between the groups' ends keep above, as far as the
+            targets let them.
     """
     directions = np.empty_like(shape)
     root = np.zeros_like(targets[0])
@@ -92,10 +98,12 @@ def solve(
             own = swept(own, lengths, chain.weights[segments], goal)
         directions[segments] = closed(own, lengths, goal)
         root = root + chord(directions[segments], lengths)
-    rounds = SOFTENINGS if softness > 0.0 else 0
+    rounds = SOFTENINGS if softness > 0.0 or floor is not None else 0
     for number in range(1, rounds + 1):
         for _ in range(_SPREADS):
             directions = softened(directions, softness)
+        if floor is not None:
+            directions = lifted(directions, chain.lengths, floor)
         # Only the last closing has to be exact.
         steps = _NEWTON_STEPS if number == rounds else _NEWTON_STEPS_BETWEEN
         root = np.zeros_like(root)
@@ -215,6 +223,25 @@ def softened(directions: Floats, amount: float) -> Floats:
     mean[-1] += share * directions[-1]
     mean *= (1.0 / np.maximum(np.sqrt(dot(mean, mean)), _TINY))[:, None]
     return mean
+
+
+def raised(heights: Floats, floor: Floats) -> Floats:
+    """Heights (…, batch) that are never below the floor (batch,), with a smooth passage.
+
+    Differences never grow: what is within reach of each other stays so.
+    """
+    above = heights - floor
+    return floor + 0.5 * (above + np.sqrt(above * above + _FLOOR_ROUNDING**2))
+
+
+def lifted(directions: Floats, lengths: Floats, floor: Floats) -> Floats:
+    """An arm whose joints below a floor are raised to it; lengths are kept, ends may move."""
+    heights = np.cumsum(lengths[:, None] * directions[:, 2], axis=0)
+    lift = raised(heights, floor) - heights
+    result = directions.copy()
+    result[:, 2] += np.diff(lift, axis=0, prepend=0.0 * lift[:1]) / lengths[:, None]
+    result *= (1.0 / np.maximum(np.sqrt(dot(result, result)), _TINY))[:, None]
+    return result
 
 
 def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> Floats:

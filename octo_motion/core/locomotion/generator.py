@@ -19,7 +19,7 @@ from ..errors import RigError, SettingsError
 from ..rotations import Floats, from_axis_angle, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
 from .arm import GROUPS, group_lengths, split_groups
-from .ccd import Chain, asked_shape, solve
+from .ccd import Chain, asked_shape, raised, solve
 from .chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
 from .columns import turned
 from .gait import GaitCurve, GaitTable, evaluate, variation
@@ -31,6 +31,10 @@ _CHUNK: Final = 4096
 """Arms solved at a time, counted over frames: what stays within a processor's cache."""
 _CYCLE_SAMPLES: Final = 96
 """Phases at which a cycle is looked at as a whole."""
+_STANDING: Final = 0.4
+"""Share of a cycle in which an arm would reach deeper than the floor."""
+_LEAST_DEPTH: Final = 0.1
+"""Arm lengths: a gait that reaches less deep moves its arms level, and stands on nothing."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,10 @@ class GaitSettings:
     seed: int = 0
     turning: float = 0.5
     """Share of the turn that lies ahead which the arms take on as pitch [Octopus, §3.5]."""
+    stand: bool = False
+    """WALK: whether targets that lie deeper than most are raised to a floor where most are, so
+    that many arms stand on the ground together, and not the tip of one. The source's walk, whose
+    targets are the table's alone, knows no ground."""
 
     def __post_init__(self) -> None:
         numbers = (
@@ -154,6 +162,11 @@ class Generator:
         sway[:, PITCH] *= self._hands
         self._sway = settings.sway * sway
         self._builds = self._group(segments)
+        self._floor = -np.inf
+        if settings.stand and gait.manner == "WALK":
+            floor = float(np.quantile(self._cycle_depths(), _STANDING))
+            if floor < -_LEAST_DEPTH * self.arm_length:
+                self._floor = floor
 
     @property
     def bones(self) -> tuple[str, ...]:
@@ -171,17 +184,21 @@ class Generator:
 
         It is the gait's own, whatever variation and turning add: the same for every shot.
         """
+        return -float(self._cycle_depths().min())
+
+    def _cycle_depths(self) -> Floats:
+        """Heights (phases, arms) over the body's centre of each arm's lowest joint."""
         phase = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
         angles = self._mirrored(evaluate(self._settings.gait, self.arm_phases(phase), self._pairs))
-        lowest = 0.0
+        depths = np.empty((_CYCLE_SAMPLES, len(self._arms)))
         for build in self._builds:
             columns = list(build.arms)
             directions, _ = self._solve(build, angles[:, columns], np.zeros((1, len(columns))))
             # Up is the same for the arm's frame and the body's.
             climbs = np.cumsum(build.chain.lengths[:, None, None] * directions[:, 2], axis=0)
-            heights = self._roots[columns, 2] + self._lengths[columns] * climbs
-            lowest = min(lowest, float(heights.min()), float(self._roots[columns, 2].min()))
-        return -lowest
+            lowest = np.minimum(climbs.min(axis=0), 0.0)
+            depths[:, columns] = self._roots[columns, 2] + self._lengths[columns] * lowest
+        return depths
 
     def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
@@ -255,10 +272,22 @@ class Generator:
         steered[..., 0, PITCH] += steering
         links = link_rotations(steered)
         targets = _batch_last(pseudo_targets(links, width), batch)
+        floor = None
+        # Two targets raised to one height come nearer to each other, which a single bone cannot.
+        if np.isfinite(self._floor) and min(build.chain.sizes) > 1:
+            columns = list(build.arms)
+            own = (self._floor - self._roots[columns, 2]) / self._lengths[columns]
+            floor = np.tile(own, frames)
+            targets[1:, 2] = raised(targets[1:, 2], floor)
         sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
         shape = asked_shape(build.chain, _batch_last(steered[..., [HEAD, PITCH]], batch), sway.T)
         directions = solve(
-            build.chain, shape, _batch_last(links, batch), targets, self._settings.softness
+            build.chain,
+            shape,
+            _batch_last(links, batch),
+            targets,
+            softness=self._settings.softness,
+            floor=floor,
         )
         joints = np.cumsum(build.chain.lengths[:, None, None] * directions, axis=0)
         ends = joints[np.cumsum(build.chain.sizes) - 1]

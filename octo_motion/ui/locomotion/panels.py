@@ -145,6 +145,7 @@ class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
             layout.row().prop(settings, "heading", expand=True)
             layout.prop(settings, "heading_angle")
             layout.prop(settings, "keep_upright")
+            layout.prop(settings, "stand")
         else:
             layout.prop(settings, "bank_in_turns")
         column = layout.column(align=True)

@@ -223,6 +223,15 @@ class OCTO_MOTION_PG_locomotion(bpy.types.PropertyGroup):
         override=OVERRIDE,
     )
 
+    stand: BoolProperty(
+        name="Stand",
+        description="Walking, arms that would reach deeper than most lie down at their depth, so "
+        "that several stand on the ground together. Off, the gait's angles alone count, and the "
+        "creature hangs on the tip of its deepest arm",
+        default=True,  # other than in core, where the source's walk is the default
+        override=OVERRIDE,
+    )
+
     # --- The gait ------------------------------------------------------------------------------
 
     gait: StringProperty(

@@ -500,6 +500,7 @@ def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> Gait
         variation=(settings.variation_min, settings.variation_max),
         seed=settings.seed,
         turning=settings.turning,
+        stand=settings.stand,
     )
 
 
