@@ -149,7 +149,7 @@ def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Float
     Raises:
         RigError: the parent's scale is zero in some direction.
     """
-    frame = _parent_frame(obj)
+    frame = parent_frame(obj)
     # The rotation within a frame that may scale, shear and mirror: its polar decomposition.
     left, sizes, right = np.linalg.svd(frame[:3, :3])
     if sizes[-1] < 1e-6 * sizes[0]:
@@ -159,7 +159,7 @@ def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Float
     turn = from_matrix(turn if np.linalg.det(turn) > 0.0 else -turn)
     mode = obj.rotation_mode
     own_rotations = multiply(
-        multiply(conjugate(_delta_rotation(obj)), conjugate(turn)), normalized(quaternions)
+        multiply(conjugate(delta_rotation(obj)), conjugate(turn)), normalized(quaternions)
     )
     own_locations = np.linalg.solve(frame[:3, :3], (locations - frame[:3, 3]).T).T
     return [
@@ -474,7 +474,7 @@ def _in_rotation_mode(quaternions: Floats, mode: str) -> Floats:
     return continuous_euler(to_euler(quaternions, mode), mode)
 
 
-def _parent_frame(obj: bpy.types.Object) -> Floats:
+def parent_frame(obj: bpy.types.Object) -> Floats:
     """The frame (4, 4) in which the object's own channels stand, at the current frame."""
     if obj.parent is None:
         return np.eye(4)
@@ -486,7 +486,8 @@ def _parent_frame(obj: bpy.types.Object) -> Floats:
     return np.array(parent @ obj.matrix_parent_inverse, dtype=np.float64)
 
 
-def _delta_rotation(obj: bpy.types.Object) -> Floats:
+def delta_rotation(obj: bpy.types.Object) -> Floats:
+    """An object's delta rotation, (4,), in its rotation mode."""
     if obj.rotation_mode == "QUATERNION":
         return normalized(obj.delta_rotation_quaternion)
     if obj.rotation_mode == "AXIS_ANGLE":

@@ -33,3 +33,7 @@ class SettingsError(OctoMotionError):
 
 class WriteError(OctoMotionError):
     """The result has nowhere to go: read-only data, a missing folder, a full disk."""
+
+
+class ClipError(OctoMotionError):
+    """A motion clip cannot be read, or has not what splicing needs of it."""

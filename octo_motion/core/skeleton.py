@@ -94,10 +94,12 @@ class Skeleton:
                     _inverse(self.rest_rotations[parent]),
                 )
                 position = heads[..., parent, :] + rotate(turn, head - self.heads[parent])
-                carried = multiply(turn, rest) if self.inherits_rotation[bone] else rest
-                carried = np.broadcast_to(carried, basis[..., bone, :].shape)
+                carried = multiply(turn, rest)
             if locations is not None:
+                # Along the axes that the parent carries, whether its rotation is inherited or not.
                 position = position + rotate(carried, locations[..., bone, :])
+            if not self.inherits_rotation[bone]:
+                carried = np.broadcast_to(rest, basis[..., bone, :].shape)
             heads[..., bone, :] = position
             rotations[..., bone, :] = multiply(carried, basis[..., bone, :])
         return rotations, heads

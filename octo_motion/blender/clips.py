@@ -1,0 +1,465 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Actions to clips and clips to actions: motion as arrays, exactly as Blender shows it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Final
+
+import bpy
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..core.errors import ClipError
+from ..core.rotations import (
+    IDENTITY,
+    Floats,
+    from_axis_angle,
+    from_euler,
+    from_matrix,
+    multiply,
+    normalized,
+    to_matrix,
+)
+from ..core.skeleton import Skeleton
+from ..core.splicing.clip import Clip
+from ..core.splicing.scaled_pose import without_scale
+from ..core.splicing.unpose import orientations_of, unposed
+from .actions import (
+    Channel,
+    delta_rotation,
+    location_channel,
+    object_channels,
+    parent_frame,
+    rotation_channels,
+    writable_armature,
+    write_action,
+)
+from .armature import armature_data, read_skeleton, world_matrix
+from .fcurves import evaluate, is_shown, key_range
+from .scene_poses import assigned, shown_poses
+from .unkeyed import AT_REST, UnkeyedPose, keep_unkeyed_pose, rotation_channel, unkeyed_pose
+
+_LEAST_SCALING: Final = 1e-6
+"""Factors by which a bone's scale may be off one, and be taken for one."""
+
+_ROUNDING: Final = 1e-4
+"""Factors by which importers' scale keys are off one, or unequal, without meaning it."""
+
+_STILL: Final = 1e-7
+"""Of the skeleton's size: a location that is smaller is none."""
+
+_Curves = dict[tuple[str, str], dict[int, bpy.types.FCurve]]
+"""F-curves by bone ("" is the object itself) and property, then by component."""
+
+
+def read_clip(
+    armature: bpy.types.Object,
+    action: bpy.types.Action | None = None,
+    slot: bpy.types.ActionSlot | None = None,
+    *,
+    visual: bool = False,
+    frames: ArrayLike | None = None,
+    rate: float | None = None,
+) -> Clip:
+    """The motion that an action gives an armature. Nothing in the file is changed.
+
+    What the action has no curve for keeps its value: where the object stands, and a bone's pose,
+    as far as nothing else moves it (glTF files pose bones that no action of theirs moves). But
+    what another action on the armature has left there is no part of this clip: such a bone is
+    at rest. Parents of the object are taken as they stand at the current frame. Scaled bones
+    move and turn those they carry; the clip keeps where they are, not how large.
+
+    Args:
+        armature: the armature object.
+        action: the action; the armature's own if none is given. With ``visual`` and none given
+            there need not be any: NLA tracks will do.
+        slot: the slot of the action; if none is given the one that the armature uses, or would.
+        visual: as the scene shows it, with NLA, constraints, drivers and moving parents. Plays
+            the scene, so takes longer.
+        frames: (frames,) ascending, subframes allowed; the whole frames between the slot's first
+            and last key, or of the action's manual frame range, if none is given.
+        rate: frames per second, the scene's if none is given.
+
+    Raises:
+        RigError: the object is no armature, or has no bones.
+        ClipError: there is no action, no slot for the armature, no curve for it, only one frame,
+            or the armature is scaled unequally.
+    """
+    armature_data(armature)
+    skeleton = read_skeleton(armature)
+    data = armature.animation_data
+    if action is None and data is not None:
+        action = data.action
+        slot = slot or (data.action_slot if action is not None else None)
+    scene = bpy.context.scene
+    assert scene is not None
+    per_second = float(rate or scene.render.fps / scene.render.fps_base)
+    if action is None:
+        tracks = data is not None and any(track.strips for track in data.nla_tracks)
+        if not (visual and tracks):
+            raise ClipError(f"'{armature.name}' has no action.", "Give it one, or import a clip.")
+        times = _checked_frames(_track_range(armature) if frames is None else frames, frames)
+        return _shown_clip(armature, skeleton, armature.name, times, per_second)
+    slot = slot or _slot_for(armature, action)
+    curves = _curves_of(action, slot, skeleton)
+    if not curves:
+        raise ClipError(
+            f"Action '{action.name}' has no keys for the bones of '{armature.name}'.",
+            "Choose an action made for this armature.",
+        )
+    times = _checked_frames(_action_range(action, curves) if frames is None else frames, frames)
+    if visual:
+        with assigned(armature, action, slot):
+            return _shown_clip(armature, skeleton, action.name, times, per_second)
+    unkeyed = unkeyed_pose(armature)
+    rotations, locations = _bone_motion(armature, skeleton, curves, unkeyed, times)
+    world = _object_motion(armature, curves, times)
+    _check_scale(armature, world)
+    return Clip(action.name, skeleton, times, per_second, rotations, locations, world)
+
+
+def write_clip(
+    armature: bpy.types.Object,
+    clip: Clip,
+    *,
+    name: str = "",
+    note: str = "",
+    previous: bpy.types.Action | None = None,
+) -> bpy.types.Action:
+    """Give an armature a clip as a new action, with keys on all bones.
+
+    Each bone keeps its rotation mode, and turns the short way from frame to frame. The action
+    that the armature had is not changed. The object gets keys where the clip moves it.
+
+    Args:
+        armature: an armature with the clip's bones.
+        clip: the motion.
+        name: name of the new action, the clip's if empty.
+        note: what the clip was made from, kept with the action.
+        previous: an action written here before, to be written anew if nobody has edited it.
+
+    Returns:
+        The action, assigned to the armature.
+
+    Raises:
+        RigError: the object is no armature, or lacks a bone.
+        WriteError: it is read-only, or in NLA tweak mode.
+    """
+    writable_armature(armature)
+    skeleton = clip.skeleton
+    channels = rotation_channels(armature, skeleton.names, clip.rotations)
+    channels += _location_channels(armature, clip)
+    assert armature.pose is not None
+    channels += [
+        Channel(bone.path_from_id("scale"), np.ones((len(clip), 3)), bone.name)
+        for bone in armature.pose.bones
+        if bone.name in skeleton.index and bone.scale[:] != (1.0, 1.0, 1.0)
+    ]
+    own = world_matrix(armature)
+    if np.abs(clip.world - own).max() > _STILL * max(1.0, np.abs(own).max()):
+        turns = from_matrix(clip.world[:, :3, :3] / clip.scale)
+        channels += object_channels(armature, clip.world[:, :3, 3], turns)
+    keep_unkeyed_pose(armature)
+    return write_action(
+        armature,
+        name or clip.name,
+        clip.frames,
+        channels,
+        previous=previous,
+        settings_note=note,
+    )
+
+
+def _location_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
+    """Locations of roots, and of all bones that are not, or would not stay, where rest has them."""
+    skeleton = clip.skeleton
+    size = np.ptp(skeleton.heads, axis=0).max() + skeleton.lengths.max()
+    assert armature.pose is not None
+    channels: list[Channel] = []
+    for number, name in enumerate(skeleton.names):
+        if skeleton.connected[number]:
+            continue
+        bone = armature.pose.bones[name]
+        values = clip.locations[:, number]
+        at_rest = bone.location[:] == (0.0, 0.0, 0.0) and np.abs(values).max() < _STILL * size
+        if at_rest and skeleton.parents[number] >= 0:
+            continue
+        if not bone.bone.use_local_location:
+            values = values @ _location_axes(skeleton, number).T
+        channels.append(location_channel(armature, name, values))
+    return channels
+
+
+def _shown_clip(
+    armature: bpy.types.Object, skeleton: Skeleton, name: str, times: Floats, rate: float
+) -> Clip:
+    matrices, world = shown_poses(armature, times)
+    _check_scale(armature, world)
+    orientations = from_matrix(orientations_of(matrices[..., :3, :3]))
+    rotations, locations = unposed(skeleton, orientations, matrices[..., :3, 3])
+    return Clip(name, skeleton, times, rate, rotations, locations, world)
+
+
+def _slot_for(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types.ActionSlot:
+    """The slot that Blender would give the armature, or the only one with its bones."""
+    data = armature.animation_data
+    slots = [slot for slot in action.slots if slot.target_id_type in ("OBJECT", "UNSPECIFIED")]
+    if data is not None and data.action == action and data.action_slot is not None:
+        return data.action_slot
+    for slot in slots:
+        if armature in slot.users():
+            return slot
+    wanted = [f"OB{armature.name}"]
+    if data is not None:
+        wanted.insert(0, data.last_slot_identifier)
+    fitting = [slot for slot in slots if _curves_of(action, slot, read_skeleton(armature))]
+    for identifier in wanted:
+        for slot in fitting:
+            if slot.identifier == identifier:
+                return slot
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        names = ", ".join(f"'{slot.name_display}'" for slot in fitting)
+        raise ClipError(
+            f"Action '{action.name}' has several slots that fit '{armature.name}': {names}.",
+            "Assign the action to the armature and choose its slot in the Action editor.",
+        )
+    if any(_channelbag_curves(action, slot) for slot in action.slots):
+        raise ClipError(
+            f"Action '{action.name}' has no slot for '{armature.name}'.",
+            "Choose an action made for this armature.",
+        )
+    raise ClipError(f"Action '{action.name}' is empty.", "Choose an action that has keys.")
+
+
+def _channelbag_curves(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot
+) -> list[bpy.types.FCurve]:
+    found: list[bpy.types.FCurve] = []
+    for layer in action.layers:
+        for strip in layer.strips:
+            if isinstance(strip, bpy.types.ActionKeyframeStrip):
+                channelbag = strip.channelbag(slot)
+                if channelbag is not None:
+                    found.extend(channelbag.fcurves)
+    return found
+
+
+def _curves_of(action: bpy.types.Action, slot: bpy.types.ActionSlot, skeleton: Skeleton) -> _Curves:
+    """The curves that move the armature or its bones; none at all if no bone is among them."""
+    curves: _Curves = defaultdict(dict)
+    bones = False
+    for curve in _channelbag_curves(action, slot):
+        if not is_shown(curve):
+            continue
+        start, _, rest = curve.data_path.partition('pose.bones["')
+        name, _, channel = rest.rpartition('"].')
+        if start:
+            name, channel = "", curve.data_path
+        else:
+            name = bpy.utils.unescape_identifier(name)
+            if name not in skeleton.index:
+                continue
+        if channel.removeprefix("delta_") in AT_REST:
+            curves[name, channel][curve.array_index] = curve
+            bones = bones or bool(name)
+    return curves if bones else {}
+
+
+def _action_range(action: bpy.types.Action, curves: _Curves) -> Floats:
+    """The whole frames within the keys (or the artist's own range), at least the two ends."""
+    if action.use_frame_range:
+        start, end = action.frame_start, action.frame_end
+    else:
+        ranges = [
+            key_range(curve)
+            for components in curves.values()
+            for curve in components.values()
+            if len(curve.keyframe_points) or len(curve.sampled_points)
+        ]
+        if not ranges:
+            raise ClipError(
+                f"Action '{action.name}' has no keys, so no beginning and no end.",
+                "Give it a manual frame range.",
+            )
+        start, end = min(each[0] for each in ranges), max(each[1] for each in ranges)
+    if end - start < 0.5:
+        raise ClipError(
+            f"Action '{action.name}' has only one frame: it is a pose, not a motion.",
+            "Choose an action with keys at two frames or more.",
+        )
+    return _whole_frames(start, end)
+
+
+def _whole_frames(start: float, end: float) -> Floats:
+    # Frames are single precision in Blender, and importers miss whole ones by a little.
+    first, last = np.ceil(start - 1e-3), np.floor(end + 1e-3)
+    return np.arange(first, last + 1.0) if last > first else np.array([start, end])
+
+
+def _track_range(armature: bpy.types.Object) -> Floats:
+    data = armature.animation_data
+    assert data is not None
+    strips = [strip for track in data.nla_tracks for strip in track.strips if not strip.mute]
+    if not strips:
+        raise ClipError(f"All NLA strips of '{armature.name}' are muted.", "Unmute one.")
+    return _whole_frames(
+        min(strip.frame_start for strip in strips), max(strip.frame_end for strip in strips)
+    )
+
+
+def _checked_frames(times: ArrayLike, given: ArrayLike | None) -> Floats:
+    """A ValueError is a fault of the caller's, not a user's."""
+    checked = np.asarray(times, dtype=np.float64)
+    if checked.ndim != 1 or len(checked) == 0 or not (np.diff(checked) > 0.0).all():
+        raise ValueError(f"frames must be one ascending row, not {given}")
+    return checked
+
+
+def _values(
+    curves: _Curves, owner: str, channel: str, otherwise: Sequence[float], times: Floats
+) -> Floats:
+    """(frames, components) of one property."""
+    result = np.tile(np.array(otherwise, dtype=np.float64), (len(times), 1))
+    for component, curve in curves.get((owner, channel), {}).items():
+        if component < result.shape[1]:
+            result[:, component] = evaluate(curve, times)
+    return result
+
+
+def _bone_motion(
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    curves: _Curves,
+    unkeyed: UnkeyedPose,
+    times: Floats,
+) -> tuple[Floats, Floats]:
+    """Rotations (frames, bones, 4) and locations (frames, bones, 3)."""
+    shape = (len(times), len(skeleton))
+    rotations = np.broadcast_to(IDENTITY, (*shape, 4)).copy()
+    locations = np.zeros((*shape, 3))
+    scales = np.ones((*shape, 3))
+    bones = armature_data(armature).bones
+    modes = _rotation_modes(armature, skeleton)
+    present = {*curves, *unkeyed}
+
+    def values(name: str, channel: str) -> Floats:
+        otherwise = unkeyed.get((name, channel), AT_REST[channel])
+        return _values(curves, name, channel, otherwise, times)
+
+    for number, name in enumerate(skeleton.names):
+        if (name, "location") in present and not skeleton.connected[number]:
+            moved = values(name, "location")
+            if not bones[name].use_local_location:
+                moved = moved @ _location_axes(skeleton, number)
+            locations[:, number] = moved
+        if (name, "scale") in present:
+            scales[:, number] = values(name, "scale")
+    for mode in set(modes.values()):
+        channel = rotation_channel(mode)
+        chosen = [
+            name for name in skeleton.names if modes[name] == mode and (name, channel) in present
+        ]
+        if chosen:
+            numbers = [skeleton.index[name] for name in chosen]
+            turned = np.stack([values(name, channel) for name in chosen], axis=1)
+            rotations[:, numbers] = _as_quaternions(turned, mode)
+    off = np.abs(scales - 1.0).max(axis=(0, 2))
+    _check_inheritance(armature, skeleton, off > _ROUNDING)
+    if (off > _LEAST_SCALING).any():
+        return without_scale(skeleton, rotations, locations, scales)
+    return rotations, locations
+
+
+def _location_axes(skeleton: Skeleton, bone: int) -> Floats:
+    """A bone's own axes (3, 3), as columns, seen along those in which its location is given when
+    it is not local: its parent's, or the armature's.
+    """
+    axes = skeleton.rest_matrices[bone, :3, :3]
+    parent = skeleton.parents[bone]
+    return axes if parent < 0 else skeleton.rest_matrices[parent, :3, :3].T @ axes
+
+
+def _check_inheritance(armature: bpy.types.Object, skeleton: Skeleton, scaled: np.ndarray) -> None:
+    bones = armature_data(armature).bones
+    beneath = scaled.copy()
+    for number, parent in enumerate(skeleton.parents):
+        if parent < 0 or not beneath[parent]:
+            continue
+        bone = bones[number]
+        if bone.inherit_scale != "FULL" or not bone.use_inherit_rotation:
+            raise ClipError(
+                f"'{armature.name}' scales bones above '{bone.name}', which does not inherit it.",
+                "Turn on Visual to read the motion as it is shown.",
+            )
+        beneath[number] = True
+
+
+def _rotation_modes(armature: bpy.types.Object, skeleton: Skeleton) -> dict[str, str]:
+    if armature.pose is None:
+        bpy.context.view_layer.update()
+    if armature.pose is None:
+        raise ClipError(
+            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+        )
+    pose = {bone.name: bone.rotation_mode for bone in armature.pose.bones}
+    return {name: pose.get(name, "QUATERNION") for name in skeleton.names}
+
+
+def _as_quaternions(values: Floats, mode: str) -> Floats:
+    """Values (…, components) of a rotation mode as unit quaternions (…, 4)."""
+    if mode == "QUATERNION":
+        return _unit(values)
+    if mode == "AXIS_ANGLE":
+        return _unit(from_axis_angle(normalized(values[..., 1:]), values[..., 0]))
+    return from_euler(values, mode)
+
+
+def _unit(quaternions: Floats) -> Floats:
+    """Of length one; one of no length is no rotation, as in Blender."""
+    unit = normalized(quaternions)
+    return np.where(np.any(unit, axis=-1, keepdims=True), unit, IDENTITY)
+
+
+def _object_motion(armature: bpy.types.Object, curves: _Curves, times: Floats) -> Floats:
+    """World matrices (frames, 4, 4) of the armature object."""
+    if not any(not name for name, _ in curves):
+        return np.broadcast_to(world_matrix(armature), (len(times), 4, 4)).copy()
+
+    def values(channel: str) -> Floats:
+        return _values(curves, "", channel, tuple(getattr(armature, channel)), times)
+
+    mode = armature.rotation_mode
+    channel = rotation_channel(mode)
+    rotations = _as_quaternions(values(channel), mode)
+    delta = f"delta_{channel}"
+    if ("", delta) in curves and mode != "AXIS_ANGLE":
+        rotations = multiply(_as_quaternions(values(delta), mode), rotations)
+    else:
+        rotations = multiply(delta_rotation(armature), rotations)
+    own = np.zeros((len(times), 4, 4))
+    scales = values("scale") * values("delta_scale")
+    own[:, :3, :3] = to_matrix(rotations) * scales[:, None, :]
+    own[:, :3, 3] = values("location") + values("delta_location")
+    own[:, 3, 3] = 1.0
+    return parent_frame(armature) @ own
+
+
+def _check_scale(armature: bpy.types.Object, world: Floats) -> None:
+    sizes = np.linalg.norm(world[:, :3, :3], axis=1)
+    mean = sizes.mean()
+    if mean == 0.0 or not np.isfinite(world).all():
+        raise ClipError(f"'{armature.name}' has no size.", "Repair the object's scale.")
+    if (np.linalg.det(world[:, :3, :3]) < 0.0).any():
+        raise ClipError(
+            f"'{armature.name}' is mirrored by a negative scale.",
+            "Apply its scale (Object > Apply > Scale).",
+        )
+    if np.abs(sizes / mean - 1.0).max() > _ROUNDING:
+        raise ClipError(
+            f"The scale of '{armature.name}' is not the same in all directions and at all frames.",
+            "Give it one scale: apply it (Object > Apply > Scale), and remove its scale keys.",
+        )

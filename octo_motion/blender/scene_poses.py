@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Poses as the scene shows them, frame by frame: NLA, constraints, drivers and all."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ..core.rotations import Floats
+
+_CHANNELS: Final = (
+    *("location", "scale"),
+    *("rotation_quaternion", "rotation_euler", "rotation_axis_angle"),
+)
+
+
+def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats]:
+    """What an armature looks like at these frames of the current scene.
+
+    The scene is played through and put back to its frame; a pose that has no keys yet survives.
+
+    Returns:
+        Bone matrices (frames, bones, 4, 4) in armature space, in the order of the armature's
+        bones, and the object's world matrices (frames, 4, 4).
+    """
+    scene = bpy.context.scene
+    assert scene is not None
+    assert armature.pose is not None
+    count = len(armature.pose.bones)
+    bones = np.empty((len(frames), count, 4, 4))
+    world = np.empty((len(frames), 4, 4))
+    buffer = np.empty(16 * count, dtype=np.float32)
+    with _kept(scene, armature):
+        for number, frame in enumerate(frames):
+            whole = math.floor(frame)
+            scene.frame_set(whole, subframe=float(frame - whole))
+            shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            assert shown.pose is not None
+            shown.pose.bones.foreach_get("matrix", buffer)
+            # Blender hands over matrices column by column.
+            bones[number] = buffer.reshape(count, 4, 4).transpose(0, 2, 1)
+            world[number] = shown.matrix_world
+    return bones, world
+
+
+@contextmanager
+def assigned(
+    armature: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.ActionSlot
+) -> Iterator[None]:
+    """An action on the armature for a while; then what it had before."""
+    data = armature.animation_data
+    had_none = data is None
+    data = data or armature.animation_data_create()
+    assert data is not None
+    before, slot_before = data.action, data.action_slot
+    if before == action and slot_before == slot:
+        yield
+        return
+    try:
+        data.action = action
+        data.action_slot = slot
+        yield
+    finally:
+        data.action = before
+        if before is not None:
+            data.action_slot = slot_before
+        if had_none:
+            armature.animation_data_clear()
+
+
+@contextmanager
+def _kept(scene: bpy.types.Scene, armature: bpy.types.Object) -> Iterator[None]:
+    frame, subframe = scene.frame_current, scene.frame_subframe
+    assert armature.pose is not None
+    owners = (armature, *armature.pose.bones)
+    values = [[tuple(getattr(owner, name)) for name in _CHANNELS] for owner in owners]
+    try:
+        yield
+    finally:
+        scene.frame_set(frame, subframe=subframe)
+        for owner, mine in zip(owners, values, strict=True):
+            for name, value in zip(_CHANNELS, mine, strict=True):
+                if tuple(getattr(owner, name)) != value:
+                    setattr(owner, name, value)

@@ -1,0 +1,412 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A clip is what Blender shows; reading changes nothing, and what is written is what was read."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import mathutils
+import numpy as np
+import pytest
+
+from octo_motion.blender.actions import MARK
+from octo_motion.blender.clips import read_clip, write_clip
+from octo_motion.blender.unkeyed import AT_REST
+from octo_motion.core.errors import ClipError, RigError
+from octo_motion.core.rotations import angle_between
+from octo_motion.core.splicing.clip import Clip
+
+# Blender's importer leaves the file open.
+pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+
+SharedData = Callable[[str], Path]
+
+MODES = ("QUATERNION", "AXIS_ANGLE", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+RNG_SEED = 7
+
+# Blender poses in single precision; a bone at the end of a chain gathers the rounding of all.
+ANGLE = 2e-5
+POSITION = 1e-5
+
+
+def import_clip(path: Path) -> Any:
+    if path.suffix == ".bvh":
+        bpy.ops.import_anim.bvh(filepath=str(path), update_scene_fps=True)
+    elif path.suffix == ".fbx":
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    else:
+        bpy.ops.import_scene.gltf(filepath=str(path))
+    return next(item for item in bpy.data.objects if item.type == "ARMATURE")
+
+
+def as_blender_shows(armature: Any, frames: Any) -> tuple[Any, Any]:
+    """World axes (frames, bones, 3, 3), free of scale, and heads, from the scene itself."""
+    scene = bpy.context.scene
+    axes, heads = [], []
+    for frame in frames:
+        scene.frame_set(int(np.floor(frame)), subframe=float(frame - np.floor(frame)))
+        shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        matrices = [np.array(shown.matrix_world @ bone.matrix) for bone in shown.pose.bones]
+        heads.append([matrix[:3, 3] for matrix in matrices])
+        axes.append([matrix[:3, :3] / np.linalg.norm(matrix[:3, 1]) for matrix in matrices])
+    return np.array(axes), np.array(heads)
+
+
+def assert_shown(armature: Any, clip: Clip, size: float, *, y_only: bool = False) -> None:
+    """The clip is what the scene shows. Sheared bones have no axes but Y to compare."""
+    axes, heads = as_blender_shows(armature, clip.frames)
+    orientations, positions = clip.posed()
+    assert np.abs(positions - heads).max() < POSITION * size
+    from octo_motion.core.rotations import to_matrix
+
+    ours = to_matrix(orientations)
+    chosen = slice(1, 2) if y_only else slice(None)
+    assert np.abs(ours[..., chosen] - axes[..., chosen]).max() < ANGLE
+
+
+def body_size(clip: Clip) -> float:
+    _, heads = clip.posed()
+    return float(np.ptp(heads[0], axis=0).max())
+
+
+def some_frames(clip: Clip, count: int = 12) -> Any:
+    """Whole frames and fractions, from before the first to after the last."""
+    return np.linspace(clip.frames[0] - 2.0, clip.frames[-1] + 2.0, count)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "secondlife/avatar_walk.bvh",
+        "secondlife/avatar_backflip.bvh",
+        "cmu/12_01_walk.bvh",
+        "cmu/pirouette_threejs.bvh",
+        "animated_drawings/fair1_dab.bvh",
+        "animated_drawings/rokoko_jesse_dance.bvh",
+        "makehuman/walk1.bvh",
+        "derived_fbx_gltf/sl_walk.fbx",
+        "derived_fbx_gltf/sl_punch_L.glb",
+        "rigs_with_actions/KayKit_Knight.glb",
+        "rigs_with_actions/RobotExpressive.glb",
+    ],
+)
+def test_real_clips_are_read_as_blender_shows_them(shared_data: SharedData, name: str):
+    armature = import_clip(shared_data(name))
+    whole = read_clip(armature)
+    clip = read_clip(armature, frames=some_frames(whole))
+    assert_shown(armature, clip, body_size(whole))
+    visual = read_clip(armature, frames=some_frames(whole), visual=True)
+    assert np.abs(visual.posed()[1] - clip.posed()[1]).max() < POSITION * body_size(whole)
+
+
+def make_rig(*, connected: bool = False) -> Any:
+    """A chain of rolled bones, one of each rotation mode."""
+    armature: Any = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    random = np.random.default_rng(RNG_SEED)
+    parent, head = None, np.zeros(3)
+    for mode in MODES:
+        bone = armature.data.edit_bones.new(f'{mode} "x"].y')
+        bone.head = head
+        head = head + random.normal(0.0, 0.5, 3)
+        bone.tail = head
+        bone.roll = random.uniform(-3.0, 3.0)
+        bone.parent, bone.use_connect = parent, connected and parent is not None
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for mode, bone in zip(MODES, armature.pose.bones, strict=True):
+        bone.rotation_mode = mode
+    return armature
+
+
+def rotation_of(bone: Any) -> str:
+    mode = bone.rotation_mode
+    return f"rotation_{mode.lower()}" if mode in ("QUATERNION", "AXIS_ANGLE") else "rotation_euler"
+
+
+def animate(armature: Any, *, scale: bool = False) -> list[Any]:
+    """Keys at uneven frames for all bones and the object. Returns the F-curves."""
+    random = np.random.default_rng(RNG_SEED)
+    for frame in (1, 4, 9, 10, 17):
+        for bone in armature.pose.bones:
+            channel = rotation_of(bone)
+            values = random.normal(0.0, 1.0, len(getattr(bone, channel)))
+            setattr(bone, channel, values)
+            bone.location = random.normal(0.0, 0.2, 3)
+            bone.keyframe_insert(channel, frame=frame)
+            bone.keyframe_insert("location", frame=frame)
+            if scale:
+                bone.scale = random.uniform(0.7, 1.4, 3)
+                bone.keyframe_insert("scale", frame=frame)
+        armature.location = random.normal(0.0, 3.0, 3)
+        armature.rotation_euler = random.normal(0.0, 1.0, 3)
+        armature.keyframe_insert("location", frame=frame)
+        armature.keyframe_insert("rotation_euler", frame=frame)
+    data = armature.animation_data
+    return list(data.action.layers[0].strips[0].channelbag(data.action_slot).fcurves)
+
+
+def interpolate(curves: list[Any], *kinds: str) -> None:
+    for number, curve in enumerate(curves):
+        for key, point in enumerate(curve.keyframe_points):
+            point.interpolation = kinds[(number + key) % len(kinds)]
+        curve.update()
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [("LINEAR",), ("CONSTANT",), ("LINEAR", "CONSTANT"), ("BEZIER",), ("BOUNCE", "SINE", "LINEAR")],
+)
+@pytest.mark.parametrize("extrapolation", ["CONSTANT", "LINEAR"])
+def test_every_rotation_mode_interpolation_and_extrapolation(
+    kinds: tuple[str, ...], extrapolation: str
+):
+    armature = make_rig()
+    curves = animate(armature)
+    interpolate(curves, *kinds)
+    for curve in curves:
+        curve.extrapolation = extrapolation
+    clip = read_clip(armature, frames=np.arange(-3.0, 22.0, 0.5))
+    assert_shown(armature, clip, 10.0)
+
+
+@pytest.mark.parametrize(
+    "kind", ["CYCLES", "NOISE", "GENERATOR", "FNGENERATOR", "LIMITS", "STEPPED"]
+)
+def test_every_modifier_of_f_curves(kind: str):
+    armature = make_rig()
+    curves = animate(armature)
+    interpolate(curves, "LINEAR")
+    for curve in curves:
+        modifier = curve.modifiers.new(kind)
+        if kind == "LIMITS":
+            modifier.use_max_y, modifier.max_y = True, 0.1
+    clip = read_clip(armature, frames=np.arange(-3.0, 40.0, 0.7))
+    assert_shown(armature, clip, 30.0)
+
+
+def test_muted_curves_do_nothing_and_muted_groups_only_what_blender_lets_them():
+    armature = make_rig()
+    curves = animate(armature)
+    curves[0].mute = True
+    curves[40].group.mute = True
+    for bone in armature.pose.bones:
+        bone.location = (0, 0, 0)
+        setattr(bone, rotation_of(bone), AT_REST[rotation_of(bone)])
+    clip = read_clip(armature)
+    assert_shown(armature, clip, 10.0)
+
+
+def test_connected_bones_stay_where_they_are():
+    armature = make_rig(connected=True)
+    animate(armature)
+    assert_shown(armature, read_clip(armature), 10.0)
+
+
+@pytest.mark.parametrize("switch", ["use_local_location", "use_inherit_rotation"])
+def test_bones_that_do_not_follow_their_parent_in_everything(switch: str):
+    armature = make_rig()
+    animate(armature)
+    for bone in list(armature.data.bones)[::2]:
+        setattr(bone, switch, False)
+    assert_shown(armature, read_clip(armature), 10.0)
+
+
+def test_scaled_bones_carry_their_children():
+    armature = make_rig()
+    animate(armature, scale=True)
+    assert_shown(armature, read_clip(armature), 20.0, y_only=True)
+
+
+def test_scale_that_is_not_inherited_is_refused_unless_read_as_shown():
+    armature = make_rig()
+    animate(armature, scale=True)
+    armature.data.bones[3].inherit_scale = "NONE"
+    with pytest.raises(ClipError, match=r"does not inherit it.*Visual"):
+        read_clip(armature)
+    assert_shown(armature, read_clip(armature, visual=True), 20.0, y_only=True)
+
+
+def test_the_object_may_have_parent_scale_delta_and_any_mode():
+    armature = make_rig()
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.location, parent.rotation_euler, parent.scale = (1, 2, 3), (0.3, 0.2, 0.1), (3, 3, 3)
+    armature.parent = parent
+    armature.matrix_parent_inverse = mathutils.Matrix.Translation((1, 2, 3))
+    armature.scale = (0.1, 0.1, 0.1)
+    armature.delta_location, armature.delta_rotation_euler = (3, 2, 1), (0.1, 0.2, 0.3)
+    armature.rotation_mode = "YZX"
+    animate(armature)
+    clip = read_clip(armature)
+    assert clip.scale == pytest.approx(0.3, rel=1e-5)
+    assert_shown(armature, clip, 10.0)
+
+
+def test_constraints_and_nla_are_read_as_shown():
+    armature = make_rig()
+    animate(armature)
+    data = armature.animation_data
+    action = data.action
+    strip = data.nla_tracks.new().strips.new("strip", 20, action)
+    strip.scale, strip.repeat = 0.5, 2.0
+    data.action = None
+    limit = armature.pose.bones[2].constraints.new("LIMIT_ROTATION")
+    limit.use_limit_x, limit.max_x, limit.owner_space = True, 0.2, "LOCAL"
+    clip = read_clip(armature, visual=True)
+    assert (clip.frames[0], clip.frames[-1]) == (20.0, 36.0)
+    assert_shown(armature, clip, 10.0)
+    # Another action than the one assigned may be looked at, too.
+    assert_shown_with = read_clip(armature, action, visual=True)
+    assert armature.animation_data.action is None
+    assert len(assert_shown_with) == 17
+
+
+def test_reading_changes_nothing():
+    armature = make_rig()
+    animate(armature)
+    other = bpy.data.actions.new("Other")
+    armature.animation_data.action = other
+    bone = armature.pose.bones[1]
+    bpy.context.scene.frame_set(3, subframe=0.25)
+    bone.location = (1, 2, 3)
+    before = [np.array(each.matrix_basis) for each in armature.pose.bones]
+    action = bpy.data.actions["RigAction"]
+    read_clip(armature, action)
+    read_clip(armature, action, visual=True)
+    scene = bpy.context.scene
+    assert (scene.frame_current, scene.frame_subframe) == (3, 0.25)
+    assert armature.animation_data.action == other
+    assert armature.animation_data.action_slot is None
+    after = [np.array(each.matrix_basis) for each in armature.pose.bones]
+    assert np.array_equal(before, after)
+    assert not list(armature.keys())
+
+
+def test_rate_and_frames_are_the_scenes_unless_given():
+    armature = make_rig()
+    animate(armature)
+    render = bpy.context.scene.render
+    render.fps, render.fps_base = 30, 1.001
+    clip = read_clip(armature)
+    assert clip.rate == pytest.approx(29.97, abs=1e-3)
+    assert list(clip.frames) == list(range(1, 18))
+    assert read_clip(armature, rate=120.0).rate == 120.0
+    action = armature.animation_data.action
+    action.use_frame_range, action.frame_start, action.frame_end = True, 5, 8
+    assert list(read_clip(armature).frames) == [5, 6, 7, 8]
+
+
+def test_what_another_action_left_behind_is_no_part_of_a_clip_but_a_pose_without_keys_is():
+    armature = make_rig()
+    bones = armature.pose.bones
+    bones[0].keyframe_insert("rotation_quaternion", frame=1)
+    bones[0].rotation_quaternion = (0.6, 0.8, 0.0, 0.0)
+    bones[0].keyframe_insert("rotation_quaternion", frame=9)
+    action = armature.animation_data.action
+    bones[2].rotation_euler = (0.1, 0.2, 0.3)
+    armature.animation_data.action = None
+    other = bpy.data.actions.new("Other")
+    armature.animation_data.action = other
+    bones[4].rotation_euler = (0.5, 0.5, 0.5)
+    bones[4].keyframe_insert("rotation_euler", frame=1)
+    clip = read_clip(armature, action)
+    turned = angle_between(clip.rotations[0], (1.0, 0.0, 0.0, 0.0))
+    assert turned[2] > 0.1
+    assert turned[4] == 0.0
+    # Neither is lost when a result that keys all bones comes and goes.
+    written = write_clip(armature, clip)
+    bones[2].rotation_euler = (0.0, 0.0, 0.0)
+    again = read_clip(armature, action)
+    assert armature.animation_data.action == written
+    assert np.array_equal(again.rotations, clip.rotations)
+
+
+def test_slots_are_told_apart():
+    armature, other = make_rig(), make_rig()
+    animate(armature)
+    action = armature.animation_data.action
+    slot = action.slots.new("OBJECT", "Second")
+    other.animation_data_create().action = action
+    other.animation_data.action_slot = slot
+    animate(other)
+    data = armature.animation_data
+    assert data is not None
+    data.action = None
+    with pytest.raises(ClipError, match="several slots that fit"):
+        # A third armature, of neither slot.
+        read_clip(make_rig(), action)
+    assert len(read_clip(other, action)) == 17
+    assert len(read_clip(armature, action, action.slots[0])) == 17
+
+
+def test_each_thing_that_cannot_be_read_is_told():
+    empty: Any = bpy.data.objects.new("Empty", None)
+    bpy.context.scene.collection.objects.link(empty)
+    with pytest.raises(RigError, match="'Empty' is not an armature"):
+        read_clip(empty)
+    armature = make_rig()
+    with pytest.raises(ClipError, match="'Rig' has no action"):
+        read_clip(armature)
+    action = bpy.data.actions.new("Nothing")
+    with pytest.raises(ClipError, match="Action 'Nothing' is empty"):
+        read_clip(armature, action)
+    empty.keyframe_insert("location", frame=1)
+    with pytest.raises(ClipError, match="has no slot for 'Rig'"):
+        read_clip(armature, empty.animation_data.action)
+    armature.keyframe_insert("location", frame=1)
+    with pytest.raises(ClipError, match="has no keys for the bones of 'Rig'"):
+        read_clip(armature)
+    armature.pose.bones[0].keyframe_insert("location", frame=1)
+    with pytest.raises(ClipError, match="only one frame"):
+        read_clip(armature)
+    armature.pose.bones[0].keyframe_insert("location", frame=5)
+    armature.scale = (1, 1, 2)
+    bpy.context.view_layer.update()
+    with pytest.raises(ClipError, match="not the same in all directions"):
+        read_clip(armature)
+    armature.scale = (-1, 1, 1)
+    bpy.context.view_layer.update()
+    with pytest.raises(ClipError, match="mirrored"):
+        read_clip(armature)
+
+
+@pytest.mark.parametrize("switch", ["", "use_local_location", "use_inherit_rotation", "scale"])
+def test_what_is_written_is_what_was_read(switch: str):
+    armature = make_rig()
+    curves = animate(armature, scale=switch == "scale")
+    interpolate(curves, "LINEAR")
+    if switch.startswith("use_"):
+        for bone in list(armature.data.bones)[::2]:
+            setattr(bone, switch, False)
+    source = armature.animation_data.action
+    keys = [tuple(point.co) for curve in curves for point in curve.keyframe_points]
+    clip = read_clip(armature)
+    modes = [bone.rotation_mode for bone in armature.pose.bones]
+    action = write_clip(armature, clip, name="Result", note="Rig, and nothing else")
+    assert armature.animation_data.action == action != source
+    assert [tuple(point.co) for curve in curves for point in curve.keyframe_points] == keys
+    assert source.use_fake_user
+    assert [bone.rotation_mode for bone in armature.pose.bones] == modes
+    assert action[MARK]["note"] == "Rig, and nothing else"
+    assert_shown(armature, clip, 20.0)
+    again = read_clip(armature)
+    assert angle_between(again.rotations, clip.rotations).max() < ANGLE
+    assert np.abs(again.locations - clip.locations).max() < 1e-4
+
+
+def test_written_quaternions_keep_their_sign():
+    armature = make_rig()
+    interpolate(animate(armature), "LINEAR")
+    clip = read_clip(armature)
+    write_clip(armature, clip)
+    data = armature.animation_data
+    bag = data.action.layers[0].strips[0].channelbag(data.action_slot)
+    path = armature.pose.bones[0].path_from_id("rotation_quaternion")
+    values = np.array(
+        [[bag.fcurves.find(path, index=i).evaluate(f) for i in range(4)] for f in clip.frames]
+    )
+    assert (np.sum(values[1:] * values[:-1], axis=1) > 0.0).all()
