@@ -112,6 +112,33 @@ def test_a_swimming_body_is_on_its_route_with_the_mantle_ahead(octopus: Any) -> 
     np.testing.assert_allclose(mantle, (0.0, -1.0, 0.0), atol=0.05)
 
 
+def test_swimming_stretches_head_and_mantle_and_walking_lets_them_back() -> None:
+    click("add_octopus", with_mesh=False)
+    octopus: Any = bpy.context.object
+    give_route(octopus)
+    settings = settings_of(octopus)
+    settings.timing, settings.frame_end = "RANGE", 5
+
+    def lean() -> float:
+        generate(octopus)
+        bpy.context.view_layer.update()
+        pose = octopus.pose.bones
+        along = pose["mantle"].tail - pose["head"].head
+        return float(along.angle((0.0, 0.0, 1.0)))
+
+    at_rest = lean()
+    assert at_rest > 0.5
+    settings.gait = "swim"
+    assert lean() == pytest.approx(0.0, abs=1e-3)
+    settings.streamline = 0.0
+    assert lean() == pytest.approx(at_rest, abs=1e-6)
+    settings.streamline = 1.0
+    assert lean() == pytest.approx(0.0, abs=1e-3)
+    settings.gait = "walk"
+    assert lean() == pytest.approx(at_rest, abs=1e-6)
+    assert not any("mantle" in path for path, _ in keys(octopus.animation_data.action))
+
+
 @pytest.mark.parametrize("gait", ["walk", "walk_literal", "swim"])
 def test_every_preset_moves_every_bone_of_the_arms(octopus: Any, gait: str) -> None:
     settings_of(octopus).gait = gait

@@ -24,7 +24,7 @@ NAMES = {
     *("heading", "heading_angle", "keep_upright", "look_ahead", "corner"),
     *("height_mode", "height", "stand"),
     *("gait", "table", "contraction", "softness", "sway", "phase_spread", "turning"),
-    *("burst", "bank_in_turns"),
+    *("burst", "streamline", "bank_in_turns"),
     *("variation_min", "variation_max", "seed"),
     *("weight_root", "weight_tip", "use_weight_curve", "weight_curve"),
     *("timing", "cycle_time", "speed", "frame_start", "frame_end"),

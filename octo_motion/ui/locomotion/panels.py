@@ -147,6 +147,7 @@ class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
             layout.prop(settings, "keep_upright")
             layout.prop(settings, "stand")
         else:
+            layout.prop(settings, "streamline")
             layout.prop(settings, "bank_in_turns")
         column = layout.column(align=True)
         column.prop(settings, "look_ahead")

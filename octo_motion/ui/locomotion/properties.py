@@ -308,6 +308,16 @@ class OCTO_MOTION_PG_locomotion(bpy.types.PropertyGroup):
         max=1.0,
         override=OVERRIDE,
     )
+    streamline: FloatProperty(
+        name="Streamline",
+        description="Swimming: how far head and mantle stretch out along the way. At 0 they lean "
+        "back as they do at rest",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        override=OVERRIDE,
+    )
     bank_in_turns: FloatProperty(
         name="Bank in Turns",
         description="Swimming: how far the body rolls into a turn. At 1, a turn of 45° in a "

@@ -29,6 +29,7 @@ from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.detection import Detection, detect_arms
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
+from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import TravelSettings, duration, plan_travel, strides
@@ -113,6 +114,10 @@ class Shot:
     seconds: float
     root_bone: str
     """Bone that takes the travel, "" for the object."""
+    mantle: tuple[str, ...]
+    """Bones that are stretched out, none in a walk."""
+    mantle_rotations: Floats
+    """(bones, 4) how, the same at every frame."""
     extend_scene_range: bool
     note: str
     """The settings as JSON, kept with the action."""
@@ -201,7 +206,11 @@ class Shot:
         assert self.locations is not None
         assert self.orientations is not None
         bones = self.generator.bones
-        turned = actions.rotation_channels(armature, bones, self.rotations)
+        held = np.tile(self.mantle_rotations, (len(self.frames), 1, 1))
+        turned = [
+            *actions.rotation_channels(armature, bones, self.rotations),
+            *actions.rotation_channels(armature, self.mantle, held),
+        ]
         if not self.root_bone:
             moved = actions.object_channels(armature, self.locations, self.orientations)
             return [*moved, *turned]
@@ -276,6 +285,11 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     gait = read_gait(settings)
     generator = Generator(skeleton, arms, body, _gait_settings(settings, gait))
     route = read_route(settings.route, depsgraph, settings.spline)
+    mantle: tuple[str, ...] = ()
+    if gait.manner == "SWIM" and settings.streamline > 0.0:
+        # Arms that are switched off are no mantle either.
+        listed = [tuple(bone.name for bone in item.bones) for item in settings.arms if item.bones]
+        mantle = find_mantle(skeleton, listed or [arm.bones for arm in arms], body)
     travel = _travel_settings(settings, gait, gait.stride * generator.arm_length * scale)
     seconds, frames, times = _timing(settings, route, travel, scene.render)
     return Shot(
@@ -296,6 +310,8 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         times=times,
         seconds=seconds,
         root_bone=_root_bone(settings, armature, detection),
+        mantle=mantle,
+        mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
         extend_scene_range=settings.extend_scene_range,
         note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
         # Detection has looked for constraints itself.

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A swimming body stretches head and mantle out in line with its arms."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from octo_motion.core.locomotion.chains import BodyFrame, body_frame
+from octo_motion.core.locomotion.mantle import find_mantle, stretched
+from octo_motion.core.rotations import Floats, angle_between, rotate
+from octo_motion.core.skeleton import Skeleton
+from tests.core.rigs import body_with_arms, bone_matrix, skeleton_of
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def octopus(lean: float = 40.0) -> tuple[Skeleton, list[tuple[str, ...]], BodyFrame]:
+    """Arms, and above them a head and a mantle that leans back, with an eye and a siphon."""
+    arms_alone, arms, _ = body_with_arms(4, 3)
+    names = [*arms_alone.names, "head", "mantle", "eye", "siphon"]
+    last = len(arms_alone)
+    parents = [*arms_alone.parents, 0, last, last, last]
+    angle = np.radians(lean)
+    along = np.array([0.0, np.sin(angle), np.cos(angle)])
+    neck = np.array([0.0, 0.05, 0.2])
+    matrices = [
+        *arms_alone.rest_matrices,
+        bone_matrix(np.zeros(3), neck, 0.3),
+        bone_matrix(neck, along, -0.7),
+        bone_matrix(neck, np.array([1.0, 0.0, 0.2]), 0.0),
+        bone_matrix(neck, np.array([0.0, 1.0, -1.0]), 0.0),
+    ]
+    lengths = [*arms_alone.lengths, float(np.linalg.norm(neck)), 0.4, 0.1, 0.1]
+    skeleton = skeleton_of(names, parents, matrices, lengths)
+    bones = [arm.bones for arm in arms]
+    return skeleton, bones, body_frame(skeleton, bones, "Z", "-Y")
+
+
+def posed_along(skeleton: Skeleton, mantle: tuple[str, ...], turns: Floats) -> Floats:
+    """Directions (bones, 3) of the mantle's bones once turned."""
+    basis = np.tile(IDENTITY, (len(skeleton), 1))
+    basis[[skeleton.index[name] for name in mantle]] = turns
+    orientations, _ = skeleton.pose(basis)
+    return rotate(
+        orientations[[skeleton.index[name] for name in mantle]], np.array([0.0, 1.0, 0.0])
+    )
+
+
+def test_head_and_mantle_are_found_and_eyes_and_siphon_left_alone() -> None:
+    assert find_mantle(*octopus()) == ("head", "mantle")
+
+
+def test_fully_stretched_they_point_the_way_that_the_body_swims() -> None:
+    skeleton, arms, body = octopus()
+    mantle = find_mantle(skeleton, arms, body)
+
+    turns = stretched(skeleton, mantle, body, 1.0)
+
+    assert np.allclose(posed_along(skeleton, mantle, turns), [0.0, 0.0, 1.0], atol=1e-9)
+
+
+def test_not_stretched_they_stay_at_rest() -> None:
+    skeleton, arms, body = octopus()
+
+    turns = stretched(skeleton, find_mantle(skeleton, arms, body), body, 0.0)
+
+    assert np.max(angle_between(turns, IDENTITY)) <= 1e-7
+
+
+def test_the_more_is_asked_for_the_straighter_they_are() -> None:
+    skeleton, arms, body = octopus()
+    mantle = find_mantle(skeleton, arms, body)
+
+    upright = [
+        posed_along(skeleton, mantle, stretched(skeleton, mantle, body, amount))[-1, 2]
+        for amount in (0.0, 0.3, 0.6, 1.0)
+    ]
+
+    assert np.all(np.diff(upright) > 0.0)
+
+
+@pytest.mark.parametrize("lean", [80.0, 120.0])
+def test_a_part_that_lies_across_the_body_is_not_bent_up(lean: float) -> None:
+    assert find_mantle(*octopus(lean)) == ()
+
+
+def test_a_part_that_constraints_move_is_left_to_them() -> None:
+    skeleton, arms, body = octopus()
+    driven = tuple(name == "mantle" for name in skeleton.names)
+
+    assert find_mantle(dataclasses.replace(skeleton, constrained=driven), arms, body) == ()
+
+
+def test_a_body_of_arms_alone_has_no_mantle() -> None:
+    skeleton, arms, body = body_with_arms(4, 3)
+    bones = [arm.bones for arm in arms]
+
+    assert find_mantle(skeleton, bones, body) == ()
+    assert stretched(skeleton, (), body, 1.0).shape == (0, 4)
