@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import RigError, WriteError
+from ..core.keys import BezierKeys
 from ..core.rotations import (
     Floats,
     conjugate,
@@ -40,6 +41,10 @@ _MARK_VERSION: Final = 1
 _OBJECT_GROUP: Final = "Object Transforms"
 """The channel group in which Blender itself keeps an object's transform keys."""
 
+_HANDLE_SLACK: Final = 1e-3
+"""Share of a handle's length by which it may stray: each time that Blender aligns handles, it
+rounds them anew."""
+
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
 
@@ -52,6 +57,8 @@ class Channel:
     values: Floats
     """(frames, components)"""
     group: str
+    keys: BezierKeys | None = None
+    """What is written in place of one linear key per frame."""
 
 
 def writable_armature(obj: bpy.types.Object) -> None:
@@ -177,7 +184,7 @@ def write_action(
     previous: bpy.types.Action | None,
     settings_note: str = "",
 ) -> bpy.types.Action:
-    """Give an object an action with these channels, one linear key per frame.
+    """Give an object an action with these channels: their own keys, or one linear key per frame.
 
     ``previous`` is written anew in place, and keeps its name, slot and users, if it was made here
     for this object, nobody has edited it since, and no other object, NLA strip or constraint uses
@@ -213,14 +220,14 @@ def write_action(
     assert isinstance(strip, bpy.types.ActionKeyframeStrip)
     channelbag = strip.channelbag(slot, ensure=True)
     assert channelbag is not None
-    digests = _write_curves(channelbag, times, channels)
+    digests, handles = _write_curves(channelbag, times, channels)
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(times[0]), float(times[-1])
     data.action = action
     data.action_slot = slot
     if assigned is not None and assigned.library is None and assigned.users == 0:
         assigned.use_fake_user = True
-    _mark(action, obj, settings_note, _fingerprint(action, digests))
+    _mark(action, obj, settings_note, _fingerprint(action, digests), handles)
     return action
 
 
@@ -232,13 +239,22 @@ def is_generated(action: bpy.types.Action) -> bool:
 def is_edited(action: bpy.types.Action) -> bool:
     """Whether the action is not, or no longer, what was generated.
 
-    Keys, modifiers and further curves count, so do a muted or locked curve, markers and the frame
-    range. A name, a colour, a selection and a fake user do not.
+    Keys, handles, modifiers and further curves count, so do a muted or locked curve, markers and
+    the frame range. A name, a colour, a selection and a fake user do not.
     """
     mark = action.get(MARK)
     if mark is None or mark.get("version") != _MARK_VERSION:
         return True
-    return mark.get("fingerprint") != _fingerprint(action)
+    return mark.get("fingerprint") != _fingerprint(action) or _handles_moved(action)
+
+
+def key_count(action: bpy.types.Action) -> int:
+    """Number of keys on all curves of an action."""
+    return sum(
+        len(curve.keyframe_points)
+        for channelbag in _channelbags(action)
+        for curve in channelbag.fcurves
+    )
 
 
 def _may_replace(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
@@ -322,17 +338,17 @@ def _checked(frames: Floats, channels: Sequence[Channel]) -> np.ndarray:
 
 def _write_curves(
     channelbag: bpy.types.ActionChannelbag, times: np.ndarray, channels: Sequence[Channel]
-) -> dict[tuple[str, int], bytes]:
+) -> tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]:
     """Make the curves what the channels say. Curves that are there already are filled anew, so
     that their colours, selection and place in the editors stay.
 
     Returns:
         The hash of each curve's keys, by its data path and index: to read them back takes longer
-        than to write them.
+        than to write them. The handles of those that have Bézier keys.
     """
-    digests = {}
+    digests: dict[tuple[str, int], bytes] = {}
+    handles: dict[tuple[str, int], np.ndarray] = {}
     curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
-    groups = {group.name: group for group in channelbag.groups}
     # Everything goes through the same few buffers: memory stays modest, however many the bones.
     points = np.empty((len(times), 2), dtype=np.float32)
     points[:, 0] = times
@@ -340,14 +356,19 @@ def _write_curves(
     # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
     generated = _filled(len(times), "type", "GENERATED")
     for channel in channels:
-        if channel.group not in groups:
-            groups[channel.group] = channelbag.groups.new(channel.group)
         for component in range(channel.values.shape[1]):
             curve = curves.pop((channel.data_path, component), None)
             if curve is None:
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
-                curve.group = groups[channel.group]
             keys = curve.keyframe_points
+            # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
+            if curve.group is None or _is_bezier(curve) != (channel.keys is not None):
+                group = channelbag.groups.get(channel.group)
+                curve.group = group or channelbag.groups.new(channel.group)
+            place = (channel.data_path, component)
+            if channel.keys is not None:
+                digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
+                continue
             if len(keys) != len(times):
                 keys.clear()
                 keys.add(len(times))
@@ -356,11 +377,73 @@ def _write_curves(
             keys.foreach_set("interpolation", linear)
             keys.foreach_set("type", generated)
             curve.update()
-            digests[channel.data_path, component] = _keys_digest(points, linear, generated)
+            digests[place] = _keys_digest(points, linear, generated)
     for curve in curves.values():
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
-    return digests
+    return digests, handles
+
+
+def _write_bezier(
+    curve: bpy.types.FCurve, keys: BezierKeys, component: int
+) -> tuple[bytes, np.ndarray]:
+    """Fill a curve with Bézier keys; the hash of its keys, and its handles as Blender has them."""
+    points = curve.keyframe_points
+    if len(points) != len(keys):
+        points.clear()
+        points.add(len(keys))
+    coordinates = np.column_stack([keys.frames, keys.values[:, component]])
+    bezier = _filled(len(keys), "interpolation", "BEZIER")
+    generated = _filled(len(keys), "type", "GENERATED")
+    free = _filled(len(keys), "handle_left_type", "FREE")
+    kinds = np.where(keys.smooth, _filled(len(keys), "handle_left_type", "ALIGNED"), free)
+    points.foreach_set("co", coordinates.ravel())
+    points.foreach_set("interpolation", bezier)
+    points.foreach_set("type", generated)
+    points.foreach_set("handle_left_type", kinds)
+    points.foreach_set("handle_right_type", kinds)
+    points.foreach_set("handle_left", np.ascontiguousarray(keys.left[:, component]).ravel())
+    points.foreach_set("handle_right", np.ascontiguousarray(keys.right[:, component]).ravel())
+    curve.update()
+    return _keys_digest(coordinates, bezier, generated), _handles(curve)
+
+
+def _is_bezier(curve: bpy.types.FCurve) -> bool:
+    keys = curve.keyframe_points
+    return len(keys) > 0 and keys[0].interpolation == "BEZIER"
+
+
+def _handles(curve: bpy.types.FCurve) -> np.ndarray:
+    """Left and right handles (keys, 4) of a curve."""
+    points = curve.keyframe_points
+    left, right = np.empty((2, len(points), 2), dtype=np.float32)
+    points.foreach_get("handle_left", left.ravel())
+    points.foreach_get("handle_right", right.ravel())
+    return np.column_stack([left, right])
+
+
+def _handles_moved(action: bpy.types.Action) -> bool:
+    """Whether a handle of Bézier keys is not, or no longer, where it was written.
+
+    The keys themselves must be known to be as they were.
+    """
+    written = np.frombuffer(action[MARK].get("handles", b""), dtype=np.float32).reshape(-1, 4)
+    start = 0
+    for curve in _sorted_curves(action):
+        points = curve.keyframe_points
+        if not _is_bezier(curve):
+            continue
+        now, then = _handles(curve), written[start : start + len(points)]
+        start += len(points)
+        if len(then) != len(now):
+            return True
+        keys = np.empty((len(points), 2), dtype=np.float32)
+        points.foreach_get("co", keys.ravel())
+        keys = np.tile(keys, (1, 2))
+        slack = _HANDLE_SLACK * np.abs(then - keys) + 8.0 * np.spacing(np.abs(keys))
+        if (np.abs(now - then) > slack).any():
+            return True
+    return start != len(written)
 
 
 def _filled(count: int, name: str, item: str) -> np.ndarray:
@@ -371,7 +454,11 @@ def _filled(count: int, name: str, item: str) -> np.ndarray:
 
 
 def _mark(
-    action: bpy.types.Action, obj: bpy.types.Object, settings_note: str, fingerprint: str
+    action: bpy.types.Action,
+    obj: bpy.types.Object,
+    settings_note: str,
+    fingerprint: str,
+    handles: Mapping[tuple[str, int], np.ndarray],
 ) -> None:
     action[MARK] = {
         "owner": obj.name,
@@ -380,6 +467,9 @@ def _mark(
         "fingerprint": fingerprint,
         "note": settings_note,
     }
+    if handles:
+        ordered = [handles[place] for place in sorted(handles)]
+        action[MARK]["handles"] = np.concatenate(ordered).tobytes()
 
 
 def _fingerprint(
@@ -387,8 +477,9 @@ def _fingerprint(
 ) -> str:
     """A hash of all in an action that an artist can have set on purpose.
 
-    Handles are left out: they have no effect on linear keys, and a key that is made Bézier
-    changes its interpolation.
+    Handles of linear keys are left out: they have no effect, and a key that is made Bézier changes
+    its interpolation. Those of Bézier keys are compared, not hashed: Blender rounds aligned ones
+    anew each time that a curve is updated.
 
     Args:
         action: the action.
@@ -403,23 +494,19 @@ def _fingerprint(
     add([(marker.name, marker.frame) for marker in action.pose_markers])
     add([slot.handle for slot in action.slots])
     add([len(layer.strips) for layer in action.layers])
-    for channelbag in _channelbags(action):
-        # An artist may move channels up and down in the list.
-        for curve in sorted(
-            channelbag.fcurves, key=lambda each: (each.data_path, each.array_index)
-        ):
-            add(curve.data_path, curve.array_index, curve.extrapolation, curve.mute, curve.lock)
-            keys = curve.keyframe_points
-            add(len(keys), len(curve.modifiers))
-            if known is not None:
-                digest.update(known[curve.data_path, curve.array_index])
-                continue
-            points = np.empty((len(keys), 2), dtype=np.float32)
-            interpolation, kinds = np.empty((2, len(keys)), dtype=np.int32)
-            keys.foreach_get("co", points.ravel())
-            keys.foreach_get("interpolation", interpolation)
-            keys.foreach_get("type", kinds)
-            digest.update(_keys_digest(points, interpolation, kinds))
+    for curve in _sorted_curves(action):
+        add(curve.data_path, curve.array_index, curve.extrapolation, curve.mute, curve.lock)
+        keys = curve.keyframe_points
+        add(len(keys), len(curve.modifiers))
+        if known is not None:
+            digest.update(known[curve.data_path, curve.array_index])
+            continue
+        points = np.empty((len(keys), 2), dtype=np.float32)
+        interpolation, kinds = np.empty((2, len(keys)), dtype=np.int32)
+        keys.foreach_get("co", points.ravel())
+        keys.foreach_get("interpolation", interpolation)
+        keys.foreach_get("type", kinds)
+        digest.update(_keys_digest(points, interpolation, kinds))
     return digest.hexdigest()
 
 
@@ -429,6 +516,12 @@ def _keys_digest(points: np.ndarray, interpolation: np.ndarray, kinds: np.ndarra
     digest.update(interpolation)
     digest.update(kinds)
     return digest.digest()
+
+
+def _sorted_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+    """All curves by path and component: an artist may move channels up and down in the list."""
+    curves = [curve for channelbag in _channelbags(action) for curve in channelbag.fcurves]
+    return sorted(curves, key=lambda each: (each.data_path, each.array_index))
 
 
 def _channelbags(action: bpy.types.Action) -> Iterator[bpy.types.ActionChannelbag]:

@@ -44,8 +44,10 @@ _ROWS: Final = 8192
 """Frames times limbs measured at a time: what stays within a processor's cache."""
 _PULL: Final = 0.01
 """Weight, against that of a frame, of the wish that handles follow the motion's slope."""
-_SPARE: Final = 0.999
+_SPARE: Final = 0.998
 """Share of the bounds that is used up before values are rounded."""
+_KEPT: Final = 0.999
+"""Share of them that is used up afterwards: Blender still rounds handles that it aligns."""
 _KINK: Final = 0.5
 """Bounds by which the motion must turn aside within a frame to have a corner there."""
 
@@ -429,7 +431,7 @@ class _Work:
             limbs, starts, ends = spans.limbs, spans.starts, spans.ends
             broken = np.zeros(len(spans), dtype=bool)
             for part in _blocks(ends - starts):
-                broken[part] = self._errors(spans.part(part)) > 1.0
+                broken[part] = self._errors(spans.part(part)) > _KEPT
             split = broken & (ends - starts > 1)
             if not split.any():
                 return self._as_keys(spans, keyed)
