@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One piece of a body carried over from the splice clip onto the base, frame by frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ClipError
+from ..rotations import Floats, conjugate, multiply, rotate
+from ..skeleton import Skeleton
+from .clip import Clip
+from .correspondence import (
+    Correspondence,
+    chain_length,
+    correspondence,
+    is_identity,
+    matched_bones,
+    matched_chains,
+)
+from .frames import BodyFrame, chain_frame, chest_frame, laid_over, pelvis_frame
+from .joint_rotation import Limb, hinge_axis, joint_turn, reach
+from .landmarks import Landmarks
+from .parts import Part, beneath, bone_of, landmark_bone, piece_bones
+from .posture import Posture, posture_of, sampled, slerp
+
+_LIMBS = {"arm": ("upper_arm", "forearm", "hand"), "leg": ("thigh", "shin", "foot")}
+
+_HINGE_SAMPLES = 200
+"""Frames of a clip from which a limb's hinge is read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A clip, and which bones of it are which."""
+
+    clip: Clip
+    landmarks: Landmarks | None
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The clip's."""
+        return self.clip.skeleton
+
+    def humanoid(self) -> Landmarks:
+        """The landmarks, where a part needs them."""
+        if self.landmarks is None:
+            raise ClipError(
+                f"It is not known which bones of '{self.clip.name}' are arms and legs.",
+                "Map its skeleton first.",
+            )
+        return self.landmarks
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """All that does not change over time: one piece on two skeletons."""
+
+    base: Side
+    splice: Side
+    bones: tuple[int, ...]
+    """Of the base, parents first; the joint is the first one's."""
+    frames: tuple[BodyFrame, BodyFrame]
+    """From which the piece is seen, on base and splice."""
+    match: Correspondence
+    limb: tuple[tuple[int, int, int], tuple[int, int, int]] | None
+    """Joint, elbow and hand, on base and splice."""
+    spread: tuple[tuple[int, ...], tuple[int, ...]] | None
+    """Chains with unlike numbers of bones, on base and splice."""
+
+
+def carriers(
+    part: Part, base: Side, splice: Side, *, clavicle: bool, seen_from: str
+) -> list[Carrier]:
+    """The pieces of a part.
+
+    Raises:
+        ClipError: a bone is missing on either skeleton.
+    """
+    if part.root:
+        return [_chain_carrier(part, base, splice)]
+    return [
+        _piece_carrier(piece, base, splice, clavicle=clavicle, seen_from=seen_from)
+        for piece in part.pieces
+    ]
+
+
+def carry(
+    carrier: Carrier,
+    base: Posture,
+    splice: Posture,
+    rotations: Floats,
+    locations: Floats,
+    *,
+    exact: bool,
+) -> None:
+    """Write the piece's rotations, fully spliced, into the base's arrays.
+
+    Args:
+        carrier: the piece.
+        base: the base over these frames, as it was.
+        splice: the splice clip at the moments that belong to them.
+        rotations: (frames, bones, 4) of the base's skeleton, to be changed.
+        locations: (frames, bones, 3), likewise.
+        exact: whether hands and feet land on the point where they were seen, as far as the limb
+            reaches; otherwise they lie in its direction, as in the source.
+    """
+    ours, theirs = carrier.frames
+    our_frame = ours.orientation(base)
+    # From the splice clip's world into the base's: the bodies' frames laid over each other.
+    between = multiply(our_frame, conjugate(theirs.orientation(splice)))
+    result = posture_of(base.skeleton, rotations, locations)
+    if carrier.spread is not None:
+        _carry_spread(carrier, between, splice, result, rotations)
+        return
+    _carry_inner(carrier, between, (result, splice), rotations, locations)
+    if carrier.limb is None:
+        return
+    (joint, elbow, hand), (other_joint, other_elbow, other_hand) = carrier.limb
+    result = posture_of(base.skeleton, rotations, locations)
+    limb = Limb(result.head(joint), result.head(elbow), result.head(hand))
+    ratio = chain_length(base.skeleton, (joint, elbow, hand)) / max(
+        chain_length(splice.skeleton, (other_joint, other_elbow, other_hand)), 1e-12
+    )
+    our_place, their_place = ours.place(base), theirs.place(splice)
+
+    def seen(bone: int) -> Floats:
+        return our_place + ratio * rotate(between, splice.head(bone) - their_place)
+
+    wanted = Limb(limb.joint, seen(other_elbow), seen(other_hand))
+    turn = joint_turn(limb, wanted)
+    lower_turn = turn
+    if exact:
+        turned = Limb(
+            limb.joint,
+            limb.joint + rotate(turn, limb.elbow - limb.joint),
+            limb.joint + rotate(turn, limb.hand - limb.joint),
+        )
+        hinge = rotate(multiply(turn, result.orientation(joint)), _hinge(carrier))
+        upper_bend, lower_bend = reach(turned, wanted.hand, hinge)
+        turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
+    _turn_limb(result, rotations, (joint, turn), (elbow, lower_turn))
+
+
+def _turn_limb(
+    result: Posture, rotations: Floats, upper: tuple[int, Floats], lower: tuple[int, Floats]
+) -> None:
+    """Turn two bones in armature space; what hangs on them keeps its own rotations."""
+    (joint, turn), (elbow, lower_turn) = upper, lower
+    wanted = multiply(turn, result.orientation(joint))
+    rotations[:, joint] = multiply(conjugate(result.carried(joint)), wanted)
+    if lower_turn is not turn:
+        carried = result.carried(elbow)
+        if result.skeleton.inherits_rotation[elbow]:
+            carried = multiply(turn, carried)
+        wanted = multiply(lower_turn, result.orientation(elbow))
+        rotations[:, elbow] = multiply(conjugate(carried), wanted)
+
+
+def _carry_inner(
+    carrier: Carrier,
+    between: Floats,
+    postures: tuple[Posture, Posture],
+    rotations: Floats,
+    locations: Floats,
+) -> None:
+    """Orientations of all matched bones as they are seen from the body."""
+    result, splice = postures
+    base, other = result.skeleton, splice.skeleton
+    pairs, constants = carrier.match.pairs, carrier.match.constants
+    for bone in carrier.bones:
+        if bone not in pairs:
+            continue
+        answer, constant = pairs[bone], constants[bone]
+        parent = base.parents[bone]
+        joined = (
+            bone != carrier.bones[0]
+            and parent in pairs
+            and other.parents[answer] == pairs[parent]
+            and base.inherits_rotation[bone]
+            and other.inherits_rotation[answer]
+        )
+        if not joined:
+            wanted = multiply(multiply(between, splice.orientation(answer)), constant)
+            rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
+            continue
+        # Seen from its parent, a bone needs no other bone: constants before and after will do.
+        own = _offset(base, bone)
+        before = multiply(
+            multiply(conjugate(own), conjugate(constants[parent])), _offset(other, answer)
+        )
+        inner = splice.rotation(answer)
+        if not is_identity(before):
+            inner = multiply(before, inner)
+        rotations[:, bone] = inner if is_identity(constant) else multiply(inner, constant)
+        if carrier.match.same_rest:
+            locations[:, bone] = splice.location(answer)
+
+
+def _carry_spread(
+    carrier: Carrier, between: Floats, splice: Posture, result: Posture, rotations: Floats
+) -> None:
+    """A chain onto one with another number of bones: turns from rest, read off along its length."""
+    assert carrier.spread is not None
+    ours, theirs = carrier.spread
+    base, other = result.skeleton, splice.skeleton
+    rests = carrier.frames[0].at_rest(base), carrier.frames[1].at_rest(other)
+    lay = multiply(rests[1], conjugate(rests[0]))
+    places = np.interp(
+        _fractions(base, ours), _fractions(other, theirs), np.arange(len(theirs), dtype=np.float64)
+    )
+    for bone, place in zip(ours, places, strict=True):
+        first = int(place)
+        turn = splice.turn(theirs[first])
+        if place > first:
+            after = splice.turn(theirs[first + 1])
+            turn = slerp(turn, after, np.full(len(turn), place - first))
+        rest = multiply(lay, base.rest_rotations[bone])
+        wanted = multiply(between, multiply(turn, rest))
+        if bone == ours[-1] and bone in carrier.match.constants:
+            # The chest itself: its frame is met, not just its turn from rest.
+            own = splice.orientation(theirs[-1])
+            wanted = multiply(multiply(between, own), carrier.match.constants[bone])
+        rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
+
+
+def _fractions(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
+    steps = np.linalg.norm(np.diff(skeleton.heads[list(bones)], axis=0), axis=1)
+    passed = np.concatenate([[0.0], np.cumsum(steps)])
+    return passed / passed[-1] if passed[-1] > 0.0 else np.linspace(0.0, 1.0, len(passed))
+
+
+def _offset(skeleton: Skeleton, bone: int) -> Floats:
+    parent = skeleton.parents[bone]
+    return multiply(conjugate(skeleton.rest_rotations[parent]), skeleton.rest_rotations[bone])
+
+
+def _hinge(carrier: Carrier) -> Floats:
+    """Along the base's upper limb: the axis about which the splice clip bends it."""
+    assert carrier.limb is not None
+    (joint, _, _), others = carrier.limb
+    clip = carrier.splice.clip
+    chosen = np.linspace(clip.frames[0], clip.frames[-1], min(len(clip), _HINGE_SAMPLES))
+    posture = sampled(clip, chosen)
+    limb = Limb(*(posture.head(bone) for bone in others))
+    axis = hinge_axis(limb, posture.orientation(others[0]))
+    return rotate(conjugate(carrier.match.constants[joint]), axis)
+
+
+def _piece_carrier(
+    piece: str, base: Side, splice: Side, *, clavicle: bool, seen_from: str
+) -> Carrier:
+    ours, theirs = base.humanoid(), splice.humanoid()
+    kind, _, side = piece.partition(".")
+    if kind == "arm" and clavicle:
+        clavicle = all(each.get(f"clavicle.{side}") for each in (ours, theirs))
+    bones = piece_bones(piece, base.skeleton, ours, clavicle=clavicle)
+    others = piece_bones(piece, splice.skeleton, theirs, clavicle=clavicle)
+    chests = chest_frame(base.skeleton, ours), chest_frame(splice.skeleton, theirs)
+    chests = chests[0], laid_over(chests[1], chests[0])
+    frames = chests
+    if kind == "trunk" or (kind == "leg" and seen_from != "chest"):
+        pelvis = pelvis_frame(base.skeleton, ours)
+        frames = pelvis, laid_over(pelvis_frame(splice.skeleton, theirs), pelvis)
+    pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, (ours, theirs))
+    spread = None
+    if kind == "trunk":
+        if len(bones) == len(others):
+            pairs = dict(zip(bones, others, strict=True))
+        else:
+            pairs = {bones[-1]: others[-1]}
+            spread = tuple(bones), tuple(others)
+    rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
+    match = correspondence(base.skeleton, splice.skeleton, pairs, rests, ours)
+    if kind == "trunk":
+        constants = dict(match.constants)
+        constants[bones[-1]] = multiply(chests[1].turn, conjugate(chests[0].turn))
+        match = Correspondence(match.pairs, constants, match.same_rest)
+    limb = None
+    if kind in _LIMBS:
+        names = [f"{name}.{side}" for name in _LIMBS[kind]]
+        limb = _three(base.skeleton, ours, names), _three(splice.skeleton, theirs, names)
+    return Carrier(base, splice, tuple(bones), frames, match, limb, spread)
+
+
+def _three(skeleton: Skeleton, landmarks: Landmarks, names: Sequence[str]) -> tuple[int, int, int]:
+    first, second, third = (landmark_bone(skeleton, landmarks, name) for name in names)
+    for upper, lower in ((first, second), (second, third)):
+        if lower not in beneath(skeleton, [upper]):
+            raise ClipError(
+                f"'{skeleton.names[lower]}' does not hang on '{skeleton.names[upper]}'.",
+                "Such a limb follows controls: bake its motion onto its bones first.",
+            )
+    return first, second, third
+
+
+def _chain_carrier(part: Part, base: Side, splice: Side) -> Carrier:
+    bones = beneath(base.skeleton, [bone_of(base.skeleton, part.root)])
+    others = beneath(splice.skeleton, [bone_of(splice.skeleton, part.splice_root or part.root)])
+    names = matched_bones(base.skeleton, bones, splice.skeleton, others, (None, None))
+    pairs, spread = names, None
+    if len(names) < len(bones) or names.get(bones[0]) != others[0]:
+        pairs = matched_chains(base.skeleton, bones, splice.skeleton, others)
+        single = all(
+            _single(each, within)
+            for each, within in ((base.skeleton, bones), (splice.skeleton, others))
+        )
+        if single and len(bones) != len(others):
+            pairs, spread = {}, (tuple(bones), tuple(others))
+    frames = chain_frame(base.skeleton, bones), chain_frame(splice.skeleton, others)
+    rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
+    match = correspondence(base.skeleton, splice.skeleton, pairs, rests, None, aim_all=True)
+    return Carrier(base, splice, tuple(bones), frames, match, None, spread)
+
+
+def _single(skeleton: Skeleton, bones: Sequence[int]) -> bool:
+    inside = set(bones)
+    return all(sum(child in inside for child in skeleton.children[bone]) <= 1 for bone in bones)
