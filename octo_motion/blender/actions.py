@@ -175,6 +175,14 @@ def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Float
     ]
 
 
+def channel_unit(obj: bpy.types.Object) -> float:
+    """Metres in the world of one unit of an object's location channels.
+
+    The longest, where a parent scales unequally.
+    """
+    return float(np.linalg.norm(parent_frame(obj)[:3, :3], ord=2))
+
+
 def write_action(
     obj: bpy.types.Object,
     name: str,
@@ -228,6 +236,9 @@ def write_action(
     if assigned is not None and assigned.library is None and assigned.users == 0:
         assigned.use_fake_user = True
     _mark(action, obj, settings_note, _fingerprint(action, digests), handles)
+    action[MARK]["keys"] = key_count(action)
+    action[MARK]["frames"] = len(times)
+    action[MARK]["curves"] = sum(channel.values.shape[1] for channel in channels)
     return action
 
 
@@ -246,6 +257,17 @@ def is_edited(action: bpy.types.Action) -> bool:
     if mark is None or mark.get("version") != _MARK_VERSION:
         return True
     return mark.get("fingerprint") != _fingerprint(action) or _handles_moved(action)
+
+
+def key_counts(action: bpy.types.Action) -> tuple[int, int]:
+    """How many keys an action had when it was generated, and how many one per frame would be.
+
+    The same number twice where that is not known.
+    """
+    mark = action.get(MARK)
+    if mark is None or "curves" not in mark:
+        return key_count(action), key_count(action)
+    return int(mark["keys"]), int(mark["frames"]) * int(mark["curves"])
 
 
 def key_count(action: bpy.types.Action) -> int:

@@ -135,6 +135,19 @@ def chain_to_tip(skeleton: Skeleton, bones: Sequence[str]) -> Chain:
     )
 
 
+def check_bounds(angle: float, distance: float) -> None:
+    """Make sure that there is something to reduce within.
+
+    Raises:
+        SettingsError: a bound is not above zero.
+    """
+    if not (angle > 0.0 and distance > 0.0):
+        raise SettingsError(
+            "Without any tolerance, no key can be left out.",
+            "Choose an angle and a distance above zero, or keys on every frame.",
+        )
+
+
 def reduce_keys(frames: Floats, limbs: Sequence[Limb]) -> list[list[BezierKeys]]:
     """As few keys as keep each limb within its bounds at every frame.
 
@@ -149,11 +162,7 @@ def reduce_keys(frames: Floats, limbs: Sequence[Limb]) -> list[list[BezierKeys]]
         SettingsError: a bound is not above zero.
     """
     for limb in limbs:
-        if not (limb.angle > 0.0 and limb.distance > 0.0):
-            raise SettingsError(
-                "Without any tolerance, no key can be left out.",
-                "Choose an angle and a distance above zero, or keys on every frame.",
-            )
+        check_bounds(limb.angle, limb.distance)
     times = np.asarray(frames, dtype=np.float32).astype(np.float64)
     alike: dict[object, list[int]] = {}
     for number, limb in enumerate(limbs):

@@ -7,6 +7,7 @@ from typing import Any, Final, cast
 
 import bpy
 
+from ...blender.actions import key_counts
 from ...blender.armature import active_armature
 from ...blender.weight_curve import NODE, curve_node
 from ...core.errors import RigError
@@ -349,6 +350,11 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             column.prop(settings, "frame_end")
         layout.prop(settings, "extend_scene_range")
         layout.row().prop(settings, "travel_on", expand=True)
+        layout.row().prop(settings, "keys", expand=True)
+        if settings.keys == "REDUCED":
+            column = layout.column(align=True)
+            column.prop(settings, "key_angle", text="Tolerance Angle")
+            column.prop(settings, "key_distance")
         row = layout.row()
         row.scale_y = 1.5
         row.operator(OCTO_MOTION_OT_generate_locomotion.bl_idname, icon="PLAY", text="Generate")
@@ -367,6 +373,9 @@ def _draw_result(
     column.label(text=action.name, icon="ACTION")
     frames = action.frame_end - action.frame_start + 1.0
     column.label(text=f"{frames:.0f} frames, {length:.1f} s", icon="BLANK1")
+    keys, dense = key_counts(action)
+    if keys < dense:
+        column.label(text=f"{keys:,} keys instead of {dense:,}", icon="BLANK1")
 
 
 CLASSES: Final = (

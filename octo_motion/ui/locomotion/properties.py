@@ -458,6 +458,43 @@ class OCTO_MOTION_PG_locomotion(bpy.types.PropertyGroup):
         default=True,
         override=OVERRIDE,
     )
+    keys: EnumProperty(
+        name="Keys",
+        description="How many keys the motion gets",
+        items=(
+            ("DENSE", "Every Frame", "A key on every frame: the motion exactly as computed", 0),
+            (
+                "REDUCED",
+                "Few, Editable",
+                "As few keys as the tolerance allows, with handles; each arm in one group",
+                1,
+            ),
+        ),
+        override=OVERRIDE,
+    )
+    key_angle: FloatProperty(
+        name="Angle",
+        description="How far any bone may be turned away, at any frame, where there are few keys",
+        subtype="ANGLE",
+        default=np.radians(0.5),
+        min=0.0,
+        max=np.pi,
+        soft_max=np.radians(10.0),
+        step=10,
+        precision=2,
+        override=OVERRIDE,
+    )
+    key_distance: FloatProperty(
+        name="Distance",
+        description="How far any arm's tip may be away, at any frame, where there are few keys. "
+        "In arm lengths",
+        default=0.005,
+        min=0.0,
+        soft_max=0.1,
+        step=0.1,
+        precision=4,
+        override=OVERRIDE,
+    )
     result: PointerProperty(
         name="Result",
         description="The action that was generated last. It is made anew in place until you edit "

@@ -25,6 +25,7 @@ from ...blender.curves import read_route
 from ...blender.poses import animated_bones, displaced_bones, rest_bones
 from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
+from ...core.keys import check_bounds
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.detection import Detection, detect_arms
 from ...core.locomotion.gait import GaitTable
@@ -38,6 +39,7 @@ from ...core.skeleton import Skeleton
 from ..plain import plain
 from .arm_items import bones_of, write_arms, write_body
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
+from .reduced import Body, Motion, Tolerances, reduced
 
 MOST_FRAMES: Final = 100_000
 """A journey of more is a slip of the hand: over an hour at 24 frames a second."""
@@ -72,6 +74,9 @@ class Summary:
     """Length of the motion."""
     miss: float
     """Largest distance of a group of joints from its target, in arm lengths."""
+    keys: int
+    dense_keys: int
+    """How many keys there would be with one per frame."""
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     """Things that happened as they should, but that one may want to know."""
@@ -83,7 +88,8 @@ class Summary:
             f"{self.manner.capitalize()} of {self.frames} frames ({self.seconds:.1f} s): "
             f"'{self.action}'."
         )
-        return " ".join([told, *self.notes])
+        fewer = f"{self.keys:,} keys instead of {self.dense_keys:,}."
+        return " ".join([told, *([fewer] * (self.keys < self.dense_keys)), *self.notes])
 
 
 @dataclass(eq=False)
@@ -118,6 +124,8 @@ class Shot:
     """Bones that are stretched out, none in a walk."""
     mantle_rotations: Floats
     """(bones, 4) how, the same at every frame."""
+    tolerances: Tolerances | None
+    """How far few keys may be off, none for a key on every frame."""
     extend_scene_range: bool
     note: str
     """The settings as JSON, kept with the action."""
@@ -187,6 +195,7 @@ class Shot:
             write_body(settings, self.detection)
         rest_bones(armature, left_behind - animated_bones(action))
         notes = self._extend_range()
+        keys, dense_keys = actions.key_counts(action)
         assert self.misses is not None
         return Summary(
             gait=self.gait.name,
@@ -197,6 +206,8 @@ class Shot:
             frame_end=int(self.frames[-1]),
             seconds=self.seconds,
             miss=float(self.misses.max()),
+            keys=keys,
+            dense_keys=dense_keys,
             warnings=(*self.warnings, *self._missed()),
             notes=notes,
         )
@@ -205,23 +216,26 @@ class Shot:
         assert self.rotations is not None
         assert self.locations is not None
         assert self.orientations is not None
-        bones = self.generator.bones
         held = np.tile(self.mantle_rotations, (len(self.frames), 1, 1))
-        turned = [
-            *actions.rotation_channels(armature, bones, self.rotations),
-            *actions.rotation_channels(armature, self.mantle, held),
-        ]
-        if not self.root_bone:
-            moved = actions.object_channels(armature, self.locations, self.orientations)
-            return [*moved, *turned]
-        locations, rotations = root_bone_transforms(
-            self.skeleton, self.root_bone, self.world, self.locations, self.orientations
+        if self.root_bone:
+            locations, rotations = root_bone_transforms(
+                self.skeleton, self.root_bone, self.world, self.locations, self.orientations
+            )
+            travel = [
+                actions.location_channel(armature, self.root_bone, locations),
+                *actions.rotation_channels(armature, [self.root_bone], rotations[:, None]),
+            ]
+        else:
+            travel = actions.object_channels(armature, self.locations, self.orientations)
+        motion = Motion(
+            travel=travel,
+            arms=actions.rotation_channels(armature, self.generator.bones, self.rotations),
+            mantle=actions.rotation_channels(armature, self.mantle, held),
         )
-        return [
-            actions.location_channel(armature, self.root_bone, locations),
-            *actions.rotation_channels(armature, [self.root_bone], rotations[:, None]),
-            *turned,
-        ]
+        if self.tolerances is None:
+            return motion.all()
+        body = Body(*(armature, self.scale, self.skeleton, self.arms, self.mantle, self.root_bone))
+        return reduced(self.frames, body, motion, self.tolerances)
 
     def _missed(self) -> list[str]:
         assert self.misses is not None
@@ -312,6 +326,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         root_bone=_root_bone(settings, armature, detection),
         mantle=mantle,
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
+        tolerances=_tolerances(settings, generator.arm_length),
         extend_scene_range=settings.extend_scene_range,
         note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
         # Detection has looked for constraints itself.
@@ -538,6 +553,13 @@ def _travel_settings(
         keep_upright=settings.keep_upright,
         corner=settings.corner,
     )
+
+
+def _tolerances(settings: OCTO_MOTION_PG_locomotion, arm_length: float) -> Tolerances | None:
+    if settings.keys != "REDUCED":
+        return None
+    check_bounds(settings.key_angle, settings.key_distance)
+    return Tolerances(settings.key_angle, settings.key_distance * arm_length)
 
 
 def _height(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, clearance: float) -> float:
