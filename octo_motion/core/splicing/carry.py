@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from .correspondence import (
     matched_chains,
 )
 from .frames import BodyFrame, chain_frame, chest_frame, laid_over, pelvis_frame
-from .joint_rotation import Limb, hinge_axis, joint_turn, reach
+from .joint_rotation import SOFT, SOFT_EXACT, Limb, hinge_axis, joint_turn, reach
 from .landmarks import Landmarks
 from .parts import Part, beneath, bone_of, landmark_bone, piece_bones
 from .posture import Posture, posture_of, sampled, slerp
@@ -139,7 +139,8 @@ def carry(
             limb.joint + rotate(turn, limb.hand - limb.joint),
         )
         hinge = rotate(multiply(turn, result.orientation(joint)), _hinge(carrier))
-        upper_bend, lower_bend = reach(turned, wanted.hand, hinge)
+        soft = SOFT_EXACT if carrier.match.same_body else SOFT
+        upper_bend, lower_bend = reach(turned, wanted.hand, hinge, soft=soft)
         turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
     _turn_limb(result, rotations, (joint, turn), (elbow, lower_turn))
 
@@ -277,7 +278,7 @@ def _piece_carrier(
     if kind == "trunk":
         constants = dict(match.constants)
         constants[bones[-1]] = multiply(chests[1].turn, conjugate(chests[0].turn))
-        match = Correspondence(match.pairs, constants, match.same_rest)
+        match = replace(match, constants=constants)
     limb = None
     if kind in _LIMBS:
         names = [f"{name}.{side}" for name in _LIMBS[kind]]

@@ -55,6 +55,8 @@ class Correspondence:
     """Splice bone by base bone."""
     constants: Mapping[int, Floats]
     """(4,) by base bone: seen from the body, base bone = splice bone ∘ constant."""
+    same_body: bool
+    """Whether all bones are of the same lengths, up to one factor."""
     same_rest: bool
     """Whether rest poses, axes and sizes are the same: locations can be taken over."""
 
@@ -120,7 +122,8 @@ def correspondence(
         landmarks: the base's, or none for a chain.
         aim_all: whether directions matter for all bones, as in a chain.
     """
-    aim_all = aim_all or _same_body(base, splice, pairs)
+    same_body = _same_body(base, splice, pairs)
+    aim_all = aim_all or same_body
     kinds = {} if landmarks is None else {name: key for key, name in landmarks.bones.items()}
     our_back, their_back = (conjugate(each) for each in frames_at_rest)
     laid: dict[int, Floats] = {}
@@ -145,7 +148,7 @@ def correspondence(
         rest = multiply(our_back, base.rest_rotations[bone])
         other_rest = multiply(their_back, splice.rest_rotations[other])
         constants[bone] = multiply(conjugate(multiply(lay, other_rest)), rest)
-    return Correspondence(pairs, constants, _same_rest(base, splice, pairs))
+    return Correspondence(pairs, constants, same_body, _same_rest(base, splice, pairs))
 
 
 def chain_length(skeleton: Skeleton, bones: Sequence[int]) -> float:
@@ -205,6 +208,8 @@ def _same_body(base: Skeleton, splice: Skeleton, pairs: Mapping[int, int]) -> bo
 
 
 def _same_rest(base: Skeleton, splice: Skeleton, pairs: Mapping[int, int]) -> bool:
+    if not pairs:
+        return False
     ours = base.rest_matrices[list(pairs)]
     theirs = splice.rest_matrices[list(pairs.values())]
     return bool(np.allclose(ours, theirs, rtol=1e-5, atol=1e-6 * np.abs(ours).max()))

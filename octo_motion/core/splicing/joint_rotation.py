@@ -31,9 +31,19 @@ _STRAIGHT: Final = float(np.sin(np.radians(5.0)))
 _BENT: Final = float(np.sin(np.radians(20.0)))
 """Sine of the bend above which it says all."""
 
-_SOFT: Final = 5e-4
+_AGREES: Final = np.radians(45.0)
+_DISAGREES: Final = np.radians(120.0)
+"""Angles between the normals up to which they are made to agree, and from which the triangles are
+so unlike (bodies of other proportions) that their normals say nothing."""
+
+_MOVED: Final = np.radians(5.0)
+"""Change of a bend that is worth turning a straight limb to its hinge."""
+
+SOFT_EXACT: Final = 5e-4
+SOFT: Final = 1e-2
 """Of a limb's length: how far short of a point a limb may stay when it is almost stretched, so that
-the elbow does not shoot out and in as the point passes the end of its reach."""
+the elbow does not shoot out and in as the point passes the end of its reach. The first where hands
+are to be where they were; the second where bodies are of other proportions anyway."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,19 +73,25 @@ def joint_turn(limb: Limb, wanted: Limb) -> Floats:
     other = cross(wanted.elbow - limb.joint, wanted.hand - wanted.elbow)
     sine = np.sum(cross(normal, other) * goal, axis=-1)
     angle = np.arctan2(sine, np.sum(normal * other, axis=-1))
-    # Triangles that face away from each other agree at half a turn either way: there the choice
-    # would jump, so the turn fades out towards it.
-    share = _bend(limb) * _bend(wanted) * _smooth((np.pi - np.abs(angle)) / (0.5 * np.pi))
+    # It has faded out long before half a turn, where the way round would jump.
+    trust = _smooth((_DISAGREES - np.abs(angle)) / (_DISAGREES - _AGREES))
+    share = _bend(limb) * _bend(wanted) * trust
     return multiply(from_axis_angle(goal, angle * share), aimed)
 
 
-def reach(limb: Limb, target: Floats, hinge: Floats) -> tuple[Floats, Floats]:
+def reach(
+    limb: Limb, target: Floats, hinge: Floats, *, soft: float = SOFT_EXACT
+) -> tuple[Floats, Floats]:
     """Bend a limb so that its hand, which points at the target already, lands on it.
+
+    The elbow stays on the side on which it is. A straight limb has no side: it bends about its
+    hinge, and so does one that is bent the wrong way by a trifle.
 
     Args:
         limb: the limb.
         target: (frames, 3)
-        hinge: (frames, 3) unit vectors about which the elbow bends when the limb is straight.
+        hinge: (frames, 3) unit vectors about which the elbow bends.
+        soft: of the limb's length, how early it begins to fall short of what is out of reach.
 
     Returns:
         Rotations (frames, 4) of the upper and of the lower limb.
@@ -86,23 +102,34 @@ def reach(limb: Limb, target: Floats, hinge: Floats) -> tuple[Floats, Floats]:
     wanted = np.linalg.norm(target - limb.joint, axis=-1)
     whole = upper + lower
     # Measured as a change, so that a limb whose hand is there already does not move at all.
-    distance = now + _soft_reach(wanted, whole) - _soft_reach(now, whole)
+    distance = now + _soft_reach(wanted, whole, soft) - _soft_reach(now, whole, soft)
     distance = np.clip(distance, np.abs(upper - lower), whole)
     opened = _angle(upper, lower, now) - _angle(upper, lower, distance)
     swung = _angle(upper, now, lower) - _angle(upper, distance, lower)
     direction = normalized(limb.hand - limb.joint)
     normal = cross(limb.elbow - limb.joint, limb.hand - limb.elbow)
-    normal = normal / np.maximum(upper * lower, 1e-12)[:, None]
-    missing = np.maximum(_STRAIGHT - np.linalg.norm(normal, axis=-1), 0.0)[:, None]
     across = normalized(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
-    axis = normalized(normal + missing * across)
-    upper_turn = from_axis_angle(axis, swung)
-    lower_turn = from_axis_angle(axis, swung + opened)
-    # Where the hinge stood in for the normal, the hand has left its direction by a trifle.
-    elbow = rotate(upper_turn, limb.elbow - limb.joint)
-    hand = elbow + rotate(lower_turn, limb.hand - limb.elbow)
-    back = shortest_arc(normalized(hand), direction)
-    return multiply(back, upper_turn), multiply(back, lower_turn)
+    plane = normal / np.maximum(upper * lower, 1e-12)[:, None]
+    missing = np.maximum(_STRAIGHT - np.linalg.norm(plane, axis=-1), 0.0)
+    missing = missing * _smooth(np.abs(opened) / _MOVED)
+    axis = normalized(plane + missing[:, None] * across)
+    straight = ~np.any(axis, axis=-1)
+    axis[straight] = across[straight]
+    # About the limb's line: from its own plane to that in which it bends.
+    sine = np.sum(cross(normal, axis) * direction, axis=-1)
+    turn = from_axis_angle(direction, np.arctan2(sine, np.sum(normal * axis, axis=-1)))
+    upper_turn = multiply(from_axis_angle(axis, swung), turn)
+    lower_turn = multiply(from_axis_angle(axis, swung + opened), turn)
+    # The elbow goes round the limb's line to its new side, the bones do not twist with it.
+    return _untwisted(upper_turn, limb.elbow - limb.joint), _untwisted(
+        lower_turn, limb.hand - limb.elbow
+    )
+
+
+def _untwisted(turn: Floats, segment: Floats) -> Floats:
+    """The smallest rotation that points a segment where this one does."""
+    start = normalized(segment)
+    return shortest_arc(start, rotate(turn, start))
 
 
 def hinge_axis(limb: Limb, orientation: Floats) -> Floats:
@@ -135,10 +162,10 @@ def _smooth(share: Floats) -> Floats:
     return bounded * bounded * (3.0 - 2.0 * bounded)
 
 
-def _soft_reach(distance: Floats, whole: Floats) -> Floats:
+def _soft_reach(distance: Floats, whole: Floats, soft: float) -> Floats:
     """The distance itself well within reach; close to the whole length beyond, without a corner."""
     slack = whole - distance
-    return whole - 0.5 * (slack + np.sqrt(slack**2 + (2.0 * _SOFT * whole) ** 2))
+    return whole - 0.5 * (slack + np.sqrt(slack**2 + (2.0 * soft * whole) ** 2))
 
 
 def _angle(first: Floats, second: Floats, opposite: Floats) -> Floats:

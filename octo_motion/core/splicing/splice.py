@@ -48,8 +48,8 @@ class Splice:
     timing: Timing
     landmarks: Landmarks | None = None
     """Of the splice clip's skeleton; a chain needs none."""
-    reach: Reach = "exact"
-    """Hands and feet on the very point where they were seen, or (the source) in its direction."""
+    reach: Reach = "direction"
+    """Hands and feet in the direction where they were seen (the source), or on the very point."""
     travel: bool = False
     """Whether legs bring the splice clip's way through the world with them."""
     clavicle: bool = True

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The joint of a limb turns so that elbow and hand come to lie where they were seen."""
+
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from octo_motion.core.rotations import (
+    Floats,
+    angle_between,
+    from_axis_angle,
+    normalized,
+    rotate,
+    shortest_arc,
+)
+from octo_motion.core.splicing.joint_rotation import SOFT_EXACT, Limb, joint_turn, reach
+
+seeds = st.integers(0, 2**31)
+
+
+def bent_limb(random: np.random.Generator, bend: Floats) -> Limb:
+    """Limbs of lengths 0.3 and 0.25, bent by these angles, anywhere."""
+    count = len(bend)
+    along = normalized(random.normal(size=(count, 3)))
+    axis = normalized(np.cross(along, random.normal(size=(count, 3))))
+    joint = random.normal(size=(count, 3))
+    elbow = joint + 0.3 * along
+    return Limb(joint, elbow, elbow + 0.25 * rotate(from_axis_angle(axis, bend), along))
+
+
+def turned(limb: Limb, turn: Floats) -> Limb:
+    return Limb(
+        limb.joint,
+        limb.joint + rotate(turn, limb.elbow - limb.joint),
+        limb.joint + rotate(turn, limb.hand - limb.joint),
+    )
+
+
+@given(seed=seeds)
+def test_a_limb_of_the_same_shape_is_laid_exactly_onto_the_wanted_one(seed: int):
+    random = np.random.default_rng(seed)
+    limb = bent_limb(random, random.uniform(0.5, 2.5, 20))
+    # Further than 45° about the hand's direction the normals are not trusted.
+    wanted = turned(
+        limb, from_axis_angle(normalized(random.normal(size=(20, 3))), np.full(20, 0.6))
+    )
+    result = turned(limb, joint_turn(limb, wanted))
+    assert np.allclose(result.elbow, wanted.elbow, atol=1e-9)
+    assert np.allclose(result.hand, wanted.hand, atol=1e-9)
+
+
+@given(seed=seeds)
+def test_the_hand_always_points_where_it_should(seed: int):
+    random = np.random.default_rng(seed)
+    limb = bent_limb(random, random.uniform(0.0, 3.0, 20))
+    wanted = replace(bent_limb(random, random.uniform(0.0, 3.0, 20)), joint=limb.joint)
+    result = turned(limb, joint_turn(limb, wanted))
+    assert np.allclose(
+        normalized(result.hand - limb.joint), normalized(wanted.hand - limb.joint), atol=1e-9
+    )
+
+
+@given(seed=seeds)
+def test_a_straight_limb_keeps_its_turn_about_itself(seed: int):
+    random = np.random.default_rng(seed)
+    limb = bent_limb(random, np.zeros(20))
+    wanted = replace(bent_limb(random, random.uniform(0.5, 2.5, 20)), joint=limb.joint)
+    smallest = shortest_arc(
+        normalized(limb.hand - limb.joint), normalized(wanted.hand - limb.joint)
+    )
+    assert angle_between(joint_turn(limb, wanted), smallest).max() < 1e-9
+
+
+@given(seed=seeds)
+def test_nothing_pops_while_an_elbow_goes_through_straight(seed: int):
+    bends = [np.linspace(-0.6, 0.6, count) for count in (400, 800)]
+    steps = []
+    for bend in bends:
+        fixed = np.random.default_rng(seed)
+        along, across = np.eye(3)[0], np.eye(3)[2]
+        zeros = np.zeros((len(bend), 3))
+        elbow = zeros + 0.3 * along
+        limb = Limb(zeros, elbow, elbow + 0.25 * rotate(from_axis_angle(across, bend), elbow / 0.3))
+        wanted = turned(limb, from_axis_angle(normalized(fixed.normal(size=3)), 0.7))
+        shifted = replace(wanted, hand=wanted.hand + 0.03 * fixed.normal(size=3))
+        turns = joint_turn(limb, shifted)
+        steps.append(angle_between(turns[1:], turns[:-1]).max())
+    assert steps[1] < 0.6 * steps[0]
+
+
+@given(seed=seeds)
+def test_exact_reach_lands_on_every_point_within_reach(seed: int):
+    random = np.random.default_rng(seed)
+    limb = bent_limb(random, random.uniform(0.0, 2.8, 20))
+    direction = normalized(limb.hand - limb.joint)
+    distance = random.uniform(0.06, 0.549, (20, 1))
+    target = limb.joint + distance * direction
+    hinge = normalized(random.normal(size=(20, 3)))
+    upper, lower = reach(limb, target, hinge)
+    elbow = limb.joint + rotate(upper, limb.elbow - limb.joint)
+    hand = elbow + rotate(lower, limb.hand - limb.elbow)
+    # SOFT_EXACT of the length is what it may stay short.
+    assert np.linalg.norm(hand - target, axis=-1).max() < 1.01 * SOFT_EXACT * 0.55
+
+
+@given(seed=seeds)
+def test_a_hand_that_is_there_already_does_not_move(seed: int):
+    random = np.random.default_rng(seed)
+    limb = bent_limb(random, np.concatenate([random.uniform(0.0, 3.0, 18), [0.0, 1e-5]]))
+    hinge = normalized(random.normal(size=(20, 3)))
+    for turn in reach(limb, limb.hand, hinge):
+        assert angle_between(turn, (1.0, 0.0, 0.0, 0.0)).max() < 1e-6
+
+
+@given(seed=seeds)
+def test_a_limb_stretches_towards_what_is_out_of_reach(seed: int):
+    random = np.random.default_rng(seed)
+    limb = bent_limb(random, random.uniform(0.3, 2.8, 20))
+    direction = normalized(limb.hand - limb.joint)
+    upper, lower = reach(limb, limb.joint + 2.0 * direction, np.eye(3)[[0] * 20])
+    hand = rotate(upper, limb.elbow - limb.joint) + rotate(lower, limb.hand - limb.elbow)
+    assert np.allclose(hand, 0.55 * direction, atol=1e-3)

@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What must hold of splicing, on made-up bodies whose bones' axes lie anywhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from octo_motion.core.errors import ClipError
+from octo_motion.core.rotations import (
+    Floats,
+    angle_between,
+    from_rotation_vector,
+    multiply,
+    to_matrix,
+)
+from octo_motion.core.skeleton import Skeleton
+from octo_motion.core.splicing.clip import Clip
+from octo_motion.core.splicing.landmarks import Landmarks
+from octo_motion.core.splicing.parts import (
+    HEAD,
+    LEFT_ARM,
+    LEGS,
+    PARTS,
+    RIGHT_ARM,
+    TRUNK,
+    Part,
+    chain,
+    part_bones,
+)
+from octo_motion.core.splicing.splice import Reach, Splice, build, spliced
+from octo_motion.core.splicing.timing import Timing
+from tests.core.rigs import skeleton_of
+from tests.core.splice_bodies import (
+    LANDMARKS,
+    humanoid,
+    in_another_file,
+    motion,
+    moved,
+    relative,
+    turned_about,
+)
+
+seeds = st.integers(0, 2**31)
+parts = st.sampled_from(list(PARTS.values()))
+reaches = st.sampled_from(["direction", "exact"])
+few = settings(max_examples=40)
+
+FROM_START = Timing(1.0, 1.0)
+
+
+def positions(clip: Clip) -> Floats:
+    return clip.posed()[1]
+
+
+@few
+@given(seed=seeds, part=parts, reach=reaches, clavicle=st.booleans())
+def test_a_part_of_a_clip_on_itself_gives_the_clip_back(
+    seed: int, part: Part, reach: Reach, *, clavicle: bool
+):
+    random = np.random.default_rng(seed)
+    clip = motion(random, humanoid(random))
+    for travel in {False, "leg" in part.name}:
+        splice = Splice(part, clip, FROM_START, LANDMARKS, reach, travel, clavicle)
+        result = spliced(clip, LANDMARKS, splice)
+        assert angle_between(result.rotations, clip.rotations).max() < 1e-6
+        assert np.abs(positions(result) - positions(clip)).max() < 1e-6
+
+
+@few
+@given(seed=seeds, part=parts, reach=reaches)
+def test_moving_and_turning_the_splice_clip_changes_nothing(seed: int, part: Part, reach: Reach):
+    random = np.random.default_rng(seed)
+    base = motion(random, humanoid(random))
+    clip = motion(random, humanoid(random, same_proportions=False))
+    away = moved(clip, from_rotation_vector(random.normal(size=3)), random.normal(size=3))
+    results = [
+        spliced(base, LANDMARKS, Splice(part, each, FROM_START, LANDMARKS, reach))
+        for each in (clip, away)
+    ]
+    assert angle_between(results[0].rotations, results[1].rotations).max() < 1e-6
+
+
+@few
+@given(seed=seeds, angle=st.floats(-3.0, 3.0))
+def test_travel_begins_where_the_base_stands_and_faces(seed: int, angle: float):
+    random = np.random.default_rng(seed)
+    base = motion(random, humanoid(random))
+    clip = motion(random, humanoid(random), strength=0.2)
+    # Also about the vertical and to another height: the ground is the clip's own.
+    away = moved(clip, turned_about((0.0, 0.0, 1.0), angle), np.array([3.0, -2.0, 5.0]))
+    results = [
+        spliced(base, LANDMARKS, Splice(LEGS, each, FROM_START, LANDMARKS, travel=True))
+        for each in (clip, away)
+    ]
+    assert np.abs(positions(results[0]) - positions(results[1])).max() < 1e-6
+    hips = base.skeleton.index["hips"]
+    level = (positions(results[0]) - positions(base))[0, hips, :2]
+    # The pelvis, midway between the hip joints, stands where it was; it may be tilted otherwise.
+    assert np.linalg.norm(level) < 0.1
+
+
+@few
+@given(seed=seeds, part=parts, reach=reaches, posed_rest=st.booleans())
+def test_axes_units_and_rest_pose_of_the_splice_file_change_nothing(
+    seed: int, part: Part, reach: Reach, *, posed_rest: bool
+):
+    random = np.random.default_rng(seed)
+    base = motion(random, humanoid(random), strength=0.4)
+    clip = motion(random, base.skeleton, strength=0.4)
+    other = in_another_file(random, clip, posed_rest=posed_rest)
+    results = [
+        spliced(base, LANDMARKS, Splice(part, each, FROM_START, LANDMARKS, reach))
+        for each in (clip, other)
+    ]
+    # Where a rest pose is a pose, nothing tells how an end bone was turned about itself.
+    ends = [base.skeleton.index[f"finger.{side}"] for side in "LR"] if posed_rest else []
+    chosen = [bone for bone in range(len(base.skeleton)) if bone not in ends]
+    error = np.abs(positions(results[0]) - positions(results[1]))[:, chosen].max()
+    assert error < 1e-3
+
+
+@few
+@given(seed=seeds, part=parts, reach=reaches)
+def test_other_bones_keep_the_base_and_nothing_given_is_changed(
+    seed: int, part: Part, reach: Reach
+):
+    random = np.random.default_rng(seed)
+    base = motion(random, humanoid(random))
+    clip = motion(random, humanoid(random, same_proportions=False))
+    before = [
+        array.copy()
+        for each in (base, clip)
+        for array in (each.rotations, each.locations, each.world, each.frames)
+    ]
+    timing = Timing(3.0, 2.0, length=7.0, ease_in=2.0, ease_out=2.0)
+    result = spliced(base, LANDMARKS, Splice(part, clip, timing, LANDMARKS, reach))
+    changed = {base.skeleton.index[name] for name in part_bones(part, base.skeleton, LANDMARKS)}
+    others = [bone for bone in range(len(base.skeleton)) if bone not in changed]
+    assert np.array_equal(result.rotations[:, others], base.rotations[:, others])
+    assert np.array_equal(result.locations, base.locations)
+    assert np.array_equal(result.rotations[:3], base.rotations[:3])
+    assert np.array_equal(result.rotations[9:], base.rotations[9:])
+    after = [
+        array
+        for each in (base, clip)
+        for array in (each.rotations, each.locations, each.world, each.frames)
+    ]
+    assert all(np.array_equal(one, two) for one, two in zip(before, after, strict=True))
+
+
+@few
+@given(seed=seeds, reach=reaches)
+def test_the_hand_goes_through_the_chest_as_it_did_in_the_splice_clip(seed: int, reach: Reach):
+    random = np.random.default_rng(seed)
+    skeleton = humanoid(random)
+    base, clip = motion(random, skeleton), motion(random, skeleton)
+    result = spliced(base, LANDMARKS, Splice(RIGHT_ARM, clip, FROM_START, LANDMARKS, reach))
+    for bone in ("forearm.R", "hand.R", "finger.R"):
+        assert np.allclose(relative(result, bone, "chest"), relative(clip, bone, "chest"))
+
+
+@few
+@given(seed=seeds)
+def test_without_the_clavicle_the_hand_still_lands_exactly_where_it_reaches(seed: int):
+    random = np.random.default_rng(seed)
+    skeleton = humanoid(random)
+    base, clip = motion(random, skeleton, strength=0.3), motion(random, skeleton, strength=0.3)
+    splice = Splice(RIGHT_ARM, clip, FROM_START, LANDMARKS, "exact", clavicle=False)
+    result = spliced(base, LANDMARKS, splice)
+    wanted = relative(clip, "hand.R", "chest")
+    missed = np.linalg.norm(relative(result, "hand.R", "chest") - wanted, axis=-1)
+    needed = np.linalg.norm(wanted - relative(base, "upper_arm.R", "chest"), axis=-1)
+    heads = skeleton.heads[[skeleton.index[f"{n}.R"] for n in ("upper_arm", "forearm", "hand")]]
+    arm = np.linalg.norm(np.diff(heads, axis=0), axis=1).sum()
+    assert (missed[needed < arm] < 1e-3 * arm).all()
+    # Out of reach the arm is stretched towards it.
+    assert (missed <= np.maximum(needed - arm, 0.0) + 1e-3 * arm).all()
+
+
+def test_trunk_and_head_take_the_whole_orientation():
+    random = np.random.default_rng(5)
+    skeleton = humanoid(random)
+    base, clip = motion(random, skeleton), motion(random, skeleton)
+    result = build(
+        base,
+        LANDMARKS,
+        [Splice(part, clip, FROM_START, LANDMARKS) for part in (TRUNK, HEAD, LEFT_ARM)],
+    )
+    assert np.allclose(relative(result, "crown", "hips"), relative(clip, "crown", "hips"))
+    assert np.allclose(relative(result, "hand.L", "hips"), relative(clip, "hand.L", "hips"))
+
+
+def test_a_stack_is_rebuilt_retimed_reordered_and_muted_as_data():
+    random = np.random.default_rng(6)
+    skeleton = humanoid(random)
+    base, one, two = (motion(random, skeleton) for _ in range(3))
+    right = Splice(RIGHT_ARM, one, FROM_START, LANDMARKS)
+    left = Splice(LEFT_ARM, two, Timing(4.0, 1.0), LANDMARKS)
+    both = build(base, LANDMARKS, [right, left])
+    assert np.array_equal(both.rotations, build(base, LANDMARKS, [left, right]).rotations)
+    step = spliced(spliced(base, LANDMARKS, right), LANDMARKS, left)
+    assert np.array_equal(both.rotations, step.rotations)
+    muted = build(base, LANDMARKS, [replace(right, mute=True), left])
+    assert np.array_equal(muted.rotations, spliced(base, LANDMARKS, left).rotations)
+    later = build(base, LANDMARKS, [right, replace(left, timing=Timing(6.0, 1.0))])
+    assert not np.array_equal(later.rotations, both.rotations)
+
+
+def test_seams_are_smooth_when_eased():
+    random = np.random.default_rng(7)
+    skeleton = humanoid(random)
+    base, clip = motion(random, skeleton, 200), motion(random, skeleton, 200)
+    own = max(angle_between(c.rotations[1:], c.rotations[:-1]).max() for c in (base, clip))
+    timing = Timing(30.0, 30.0, length=100.0, ease_in=30.0, ease_out=30.0)
+    result = spliced(base, LANDMARKS, Splice(RIGHT_ARM, clip, timing, LANDMARKS))
+    steps = angle_between(result.rotations[1:], result.rotations[:-1])
+    # At most π apart, mixed within 30 frames at up to 1.5 times the mean speed, on top of both.
+    assert steps.max() < 2.0 * own + 1.5 * np.pi / 30.0
+
+
+def tentacles(counts: dict[str, int]) -> Skeleton:
+    """Straight arms round a body, each of so many bones and one unit long."""
+    names, parents, matrices = ["body"], [-1], [np.eye(4)]
+    for number, (name, count) in enumerate(counts.items()):
+        turn = turned_about((0.0, 0.0, 1.0), 2.0 * np.pi * number / len(counts))
+        for place in range(count):
+            matrix = np.eye(4)
+            # A bone points along Y: turned to X, then to the arm's own direction.
+            matrix[:3, :3] = to_matrix(multiply(turn, turned_about((0.0, 0.0, 1.0), -np.pi / 2)))
+            matrix[:3, 3] = matrix[:3, 1] * (0.2 + place / count)
+            parents.append(0 if place == 0 else len(names) - 1)
+            names.append(f"{name}{place}")
+            matrices.append(matrix)
+    lengths = [0.1, *(1.0 / count for count in counts.values() for _ in range(count))]
+    return skeleton_of(names, parents, matrices, lengths)
+
+
+def test_any_chain_can_be_spliced_also_onto_another_arm():
+    random = np.random.default_rng(8)
+    skeleton = tentacles({"a": 6, "b": 6, "c": 6})
+    base, clip = motion(random, skeleton), motion(random, skeleton)
+    result = spliced(base, None, Splice(chain("b0", "a0"), clip, FROM_START))
+    chosen = [skeleton.index[f"b{place}"] for place in range(6)]
+    source = [skeleton.index[f"a{place}"] for place in range(6)]
+    # Arms that stand alike on their body do the same turns.
+    error = angle_between(result.rotations[:, chosen], clip.rotations[:, source])
+    assert error.max() < 1e-6
+    same = spliced(base, None, Splice(chain("a0"), clip, FROM_START))
+    assert angle_between(same.rotations[:, source], clip.rotations[:, source]).max() < 1e-6
+
+
+@pytest.mark.parametrize("counts", [(6, 12), (12, 6), (5, 7)])
+def test_chains_of_unlike_numbers_of_bones_take_the_same_shape(counts: tuple[int, int]):
+    ours, theirs = tentacles({"a": counts[0]}), tentacles({"x": counts[1]})
+    base = motion(np.random.default_rng(9), ours)
+    clip = motion(np.random.default_rng(9), theirs)
+    bend = np.linspace(0.0, 1.5, len(clip))[:, None] / counts[1]
+    rotations = from_rotation_vector(bend[..., None] * np.array([0.0, 0.0, 1.0]))
+    clip = replace(clip, rotations=np.broadcast_to(rotations, clip.rotations.shape).copy())
+    clip.rotations[:, 0] = base.rotations[:, 0] = (1.0, 0.0, 0.0, 0.0)
+    result = spliced(base, None, Splice(chain("a0", "x0"), clip, FROM_START))
+    tips = relative(result, f"a{counts[0] - 1}", "body")
+    place = (counts[0] - 1) / counts[0] * counts[1]
+    lower = relative(clip, f"x{min(int(place), counts[1] - 1)}", "body")
+    assert np.linalg.norm(tips - lower, axis=-1).max() < 1.5 / min(counts)
+
+
+def test_what_is_missing_is_told():
+    random = np.random.default_rng(10)
+    clip = motion(random, humanoid(random))
+    without = Landmarks({key: value for key, value in LANDMARKS.bones.items() if key != "hand.R"})
+    with pytest.raises(ClipError, match="right hand"):
+        spliced(clip, without, Splice(RIGHT_ARM, clip, FROM_START, LANDMARKS))
+    with pytest.raises(ClipError, match="not known which bones"):
+        spliced(clip, LANDMARKS, Splice(RIGHT_ARM, clip, FROM_START))
+    with pytest.raises(ClipError, match="no legs"):
+        spliced(clip, LANDMARKS, Splice(HEAD, clip, FROM_START, LANDMARKS, travel=True))
+    with pytest.raises(ClipError, match="no bone 'tail'"):
+        spliced(clip, None, Splice(chain("tail"), clip, FROM_START))

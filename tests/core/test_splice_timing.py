@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A splice shows the right moment at the right time, and comes and goes softly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from octo_motion.core.errors import ClipError
+from octo_motion.core.splicing.alignment import suggest_timings
+from octo_motion.core.splicing.clip import Clip
+from octo_motion.core.splicing.timing import Timing, window
+from tests.core.splice_bodies import LANDMARKS, humanoid, motion
+
+
+def clip(frames: int, rate: float, first: float = 1.0) -> Clip:
+    random = np.random.default_rng(1)
+    made = motion(random, humanoid(random), frames)
+    return replace(made, rate=rate, frames=np.arange(frames) + first)
+
+
+def test_splice_time_follows_the_formula_in_real_time():
+    base, splice = clip(60, 24.0, first=10.0), clip(100, 48.0)
+    span = window(Timing(base_start=20.0, splice_start=5.0, rate=0.5), base, splice)
+    assert span.frames == slice(10, 60)
+    # Half speed, twice the frame rate: a frame per frame.
+    assert np.allclose(span.splice_frames, 5.0 + np.arange(50.0))
+    assert (span.weights == 1.0).all()
+
+
+def test_a_start_between_frames_is_kept():
+    span = window(Timing(20.25, 5.0), clip(60, 24.0), clip(100, 24.0))
+    assert span.splice_frames[0] == pytest.approx(5.75)
+
+
+def test_length_and_easing():
+    timing = Timing(11.0, 1.0, length=20.0, ease_in=4.0, ease_out=8.0)
+    span = window(timing, clip(60, 24.0), clip(100, 24.0))
+    assert span.frames == slice(10, 31)
+    assert span.weights[0] == span.weights[-1] == 0.0
+    assert span.weights[2] == pytest.approx(0.5)
+    assert span.weights[-5] == pytest.approx(0.5)
+    assert (span.weights[4:13] == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("after", "last", "end"), [("hold", 39.0, 60), ("loop", 2.0, 60), ("stop", 9.0, 10)]
+)
+def test_what_happens_when_the_splice_clip_runs_out(after: str, last: float, end: int):
+    splice = clip(10, 24.0, first=0.0)
+    timing = Timing(1.0, 0.0, after=after)  # pyright: ignore[reportArgumentType]
+    span = window(timing, clip(60, 24.0), splice)
+    assert span.frames == slice(0, end)
+    if after == "loop":
+        assert span.splice_frames.max() <= 9.0
+        assert list(span.splice_frames[:12]) == [*range(10), 1.0, 2.0]
+    elif after == "stop":
+        assert span.splice_frames[-1] == last
+
+
+def test_a_window_outside_the_base_is_empty():
+    span = window(Timing(100.0, 1.0), clip(60, 24.0), clip(10, 24.0))
+    assert span.frames == slice(0, 0)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"rate": 0.0},
+        {"rate": float("nan")},
+        {"length": 0.0},
+        {"ease_in": -1.0},
+        {"ease_out": -1.0},
+        {"after": "explode"},
+    ],
+)
+def test_a_timing_that_makes_no_sense_is_told(wrong: dict[str, float]):
+    timing = replace(Timing(1.0, 1.0), **wrong)
+    with pytest.raises(ClipError):
+        window(timing, clip(60, 24.0), clip(10, 24.0))
+
+
+@pytest.mark.parametrize("rate", [24.0, 120.0])
+def test_a_clip_is_found_within_the_clip_that_it_was_cut_from(rate: float):
+    random = np.random.default_rng(3)
+    base = replace(motion(random, humanoid(random), 300, strength=0.4), rate=rate)
+    cut = slice(120, 180)
+    splice = replace(
+        base,
+        frames=base.frames[cut],
+        rotations=base.rotations[cut],
+        locations=base.locations[cut],
+        world=base.world[cut],
+    )
+    best, *others = suggest_timings((base, LANDMARKS), (splice, LANDMARKS))
+    assert best.base_start == pytest.approx(121.0, abs=1.0)
+    assert best.splice_start == 121.0
+    assert len(others) == 2
+    assert all(best.cost < other.cost for other in others)
+    apart = np.diff(sorted(each.base_start for each in (best, *others)))
+    assert (apart >= 0.2 * rate).all()
