@@ -151,6 +151,8 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(after("An item of `arms`:", arms))
         case "bone":
             return rows(after("An item of its `bones`:", arms))
+        case "landmarks":
+            return rows(section("## Landmarks"))
         case "table":
             return rows(section(table).split("An item of", 1)[0])
         case "knot":
@@ -161,11 +163,13 @@ def described(group: str) -> dict[str, list[str]]:
 
 def group_class(group: str) -> Any:
     from octo_motion.ui.locomotion import arm_properties, gait_properties, properties
+    from octo_motion.ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
 
     own = {
         "locomotion": properties.OCTO_MOTION_PG_locomotion,
         "arm": arm_properties.ArmItem,
         "bone": arm_properties.ArmBoneItem,
+        "landmarks": OCTO_MOTION_PG_landmarks,
     }
     return own.get(group) or getattr(gait_properties, f"OCTO_MOTION_PG_gait_{group}")
 
@@ -222,7 +226,8 @@ def number(value: float, definition: Any) -> str:
 
 @pytest.mark.usefixtures("clean_blender")
 @pytest.mark.parametrize(
-    "group", ["locomotion", "arm", "bone", "table", "curve", "knot", "offset", "note"]
+    "group",
+    ["locomotion", "arm", "bone", "table", "curve", "knot", "offset", "note", "landmarks"],
 )
 def test_every_setting_is_described_with_its_type_and_its_default(group: str) -> None:
     owner = group_class(group)

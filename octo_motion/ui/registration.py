@@ -20,24 +20,30 @@ from .locomotion import (
     panels,
     properties,
 )
+from .splicing import import_clips, landmark_table
+from .splicing import properties as splicing_properties
 
 Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
 
 MENUS: tuple[tuple[Any, Draw], ...] = (
     (bpy.types.VIEW3D_MT_armature_add, add_octopus.draw_in_add_menu),
     (bpy.types.VIEW3D_MT_curve_add, add_route.draw_in_add_menu),
+    (bpy.types.TOPBAR_MT_file_import, import_clips.draw_in_import_menu),
 )
 
 CLASSES: tuple[type, ...] = (
     *gait_properties.CLASSES,
     *arm_list.CLASSES,
     *properties.CLASSES,
+    *landmark_table.CLASSES,
+    *splicing_properties.CLASSES,
     *settings.CLASSES,
     add_octopus.OCTO_MOTION_OT_add_octopus,
     add_route.OCTO_MOTION_OT_add_route,
     *gait_table.CLASSES,
     generate.OCTO_MOTION_OT_generate_locomotion,
     *panels.CLASSES,
+    *import_clips.CLASSES,
 )
 
 

@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
 from .locomotion.properties import OCTO_MOTION_PG_locomotion, make_overridable
+from .splicing.properties import OCTO_MOTION_PG_splicing
 
 
 class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
@@ -19,6 +20,12 @@ class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
         name="Locomotion",
         description="How the armature walks or swims",
         type=OCTO_MOTION_PG_locomotion,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    splicing: PointerProperty(
+        name="Splicing",
+        description="What splicing knows of the armature",
+        type=OCTO_MOTION_PG_splicing,
         override={"LIBRARY_OVERRIDABLE"},
     )
 

@@ -113,6 +113,22 @@ def read_names(names: Sequence[str]) -> tuple[BoneName, ...]:
     return tuple(_read(each, common) for each in words)
 
 
+def mirrored(names: Sequence[str], name: str) -> str | None:
+    """The bone called like another one but for its side, none if there is no such bone."""
+    said = dict(zip(names, read_names(names), strict=True))
+    own = said.get(name)
+    if own is None or not own.side:
+        return None
+    return next(
+        (
+            other
+            for other, each in said.items()
+            if each.side and each.side != own.side and each.stem == own.stem
+        ),
+        None,
+    )
+
+
 @cache
 def _known(word: str) -> bool:
     return word in _MEANINGS or word in _NO_PART
@@ -166,7 +182,7 @@ def _side_within(words: list[str]) -> tuple[str, list[str]]:
         for pattern in (_SIDE_PREFIX, _SIDE_SUFFIX):
             found = pattern.search(word)
             rest = pattern.sub("", word)
-            if found and _known(rest):
+            if found and (_known(rest) or len(found[1]) > 1):
                 return _SIDES[found[1]], [*words[:place], rest, *words[place + 1 :]]
     return "", words
 

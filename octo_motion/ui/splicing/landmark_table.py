@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The table of landmarks: found, then put right by hand, kept as a preset.
+
+Presets are Blender's own kind (a menu with + and −), for a table of names is what they are made
+for: artists know them, and they need no files of ours.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import bpy
+from bl_operators.presets import AddPresetBase
+from bpy.props import BoolProperty, EnumProperty
+
+from ...blender.actions import writable_armature
+from ...blender.armature import active_armature, armature_data, read_skeleton
+from ...core.errors import RigError
+from ...core.splicing.bone_names import mirrored
+from ...core.splicing.landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED
+from ...core.splicing.mapping import map_skeleton
+from ..locomotion.armature_operator import ArmatureOperator
+from . import landmark_properties
+from .landmark_properties import PROPERTIES, read_landmarks, title, write_landmarks
+from .properties import splicing_settings
+
+if TYPE_CHECKING:
+    from .properties import OCTO_MOTION_PG_splicing
+
+_CHOICES: Final = tuple(
+    (name, each, "Part of the body", number)
+    for number, (each, name) in enumerate(PROPERTIES.items())
+)
+
+
+class _TableOperator(ArmatureOperator):
+    """An operator on the table of the active armature."""
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        writable_armature(armature)
+        self.edit(context, armature, splicing_settings(armature).landmarks)
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:
+        """Do the work on an armature that can be edited."""
+        raise NotImplementedError
+
+
+class OCTO_MOTION_OT_map_skeleton(_TableOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.map_skeleton"
+    bl_label = "Find Landmarks"
+    bl_description = (
+        "Find out which bone is which part of the body, from the names of the bones and from the "
+        "rest pose, and fill the table. What cannot be told is left empty for you to choose"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    keep: BoolProperty(
+        name="Keep What Is Set",
+        description="Fill empty rows only",
+        options={"SKIP_SAVE"},
+    )
+
+    def edit(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        armature: bpy.types.Object,
+        table: Any,
+    ) -> None:
+        found = map_skeleton(read_skeleton(armature))
+        if found.problem:
+            raise RigError(
+                f"'{armature.name}' has no landmarks. {found.problem}",
+                "Choose an armature with two arms, two legs and a head, or fill the table by hand.",
+            )
+        bones = dict(found.landmarks.bones)
+        if self.keep:
+            bones |= read_landmarks(table).bones
+        write_landmarks(table, bones)
+        self.report({"INFO"}, f"{len(bones)} of {len(LANDMARKS)} landmarks are set.")
+        asked = [each for each in found.asked if each not in bones]
+        if asked:
+            names = ", ".join(title(each) for each in asked)
+            self.report({"WARNING"}, f"Choose the bones of: {names}. {found.missing[asked[0]]}")
+        for note in found.notes:
+            self.report({"WARNING"}, note)
+
+
+class OCTO_MOTION_OT_landmark_pick(_TableOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.landmark_pick"
+    bl_label = "Pick Landmark"
+    bl_description = "Take the active bone of pose mode for this part of the body"
+    bl_options = {"REGISTER", "UNDO"}
+
+    landmark: EnumProperty(
+        name="Landmark",
+        description="Which part of the body",
+        items=_CHOICES,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if context.mode != "POSE" or context.active_pose_bone is None:
+            cls.poll_message_set("Click the bone in pose mode first")
+            return False
+        return True
+
+    def edit(
+        self,
+        context: bpy.types.Context,
+        armature: bpy.types.Object,
+        table: Any,
+    ) -> None:
+        bone = context.active_pose_bone
+        if bone is None or bone.id_data != armature:
+            raise RigError(
+                f"The active bone is not of '{armature.name}'.", "Click a bone of that armature."
+            )
+        setattr(table, self.landmark, bone.name)
+
+
+class OCTO_MOTION_OT_landmarks_mirror(_TableOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.landmarks_mirror"
+    bl_label = "Mirror Landmarks"
+    bl_description = (
+        "Fill one side of the table with the bones that are called like those of the other side"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    direction: EnumProperty(
+        name="Direction",
+        items=(
+            ("LEFT_TO_RIGHT", "Left to Right", "The left side is right as it is"),
+            ("RIGHT_TO_LEFT", "Right to Left", "The right side is right as it is"),
+        ),
+        options={"SKIP_SAVE"},
+    )
+
+    def edit(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        armature: bpy.types.Object,
+        table: Any,
+    ) -> None:
+        bones = dict(read_landmarks(table).bones)
+        source, target = ("L", "R") if self.direction == "LEFT_TO_RIGHT" else ("R", "L")
+        given = {part: bones[f"{part}.{source}"] for part in SIDED if f"{part}.{source}" in bones}
+        word = {"L": "left", "R": "right"}
+        if not given:
+            raise RigError(f"The {word[source]} side of the table is empty.", "Fill it first.")
+        names = [bone.name for bone in armature_data(armature).bones]
+        for part, name in given.items():
+            other = mirrored(names, name)
+            if other is None:
+                raise RigError(
+                    f"There is no bone called like '{name}' on the {word[target]} side.",
+                    "Choose that side's bones by hand.",
+                )
+            bones[f"{part}.{target}"] = other
+        write_landmarks(table, bones)
+
+
+class OCTO_MOTION_OT_landmarks_clear(_TableOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.landmarks_clear"
+    bl_label = "Clear Landmarks"
+    bl_description = "Empty the table. Bones and their keys stay as they are"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def edit(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        armature: bpy.types.Object,  # noqa: ARG002
+        table: Any,
+    ) -> None:
+        write_landmarks(table, {})
+
+
+class OCTO_MOTION_MT_landmark_presets(bpy.types.Menu):
+    bl_label = "Landmark Presets"
+    bl_description = "Tables that were kept, for all rigs whose bones are called the same"
+    preset_subdir = "octo_motion/landmarks"
+    preset_operator = "script.execute_preset"
+
+    def draw(self, context: bpy.types.Context | None) -> None:
+        """All presets, as in Blender's own menus."""
+        self.draw_preset(cast("bpy.types.Context", context))
+
+
+class OCTO_MOTION_OT_landmark_preset_add(  # pyright: ignore[reportIncompatibleMethodOverride]
+    AddPresetBase, bpy.types.Operator
+):
+    bl_idname = "octo_motion.landmark_preset_add"
+    bl_label = "Keep Landmarks as Preset"
+    bl_description = "Keep the table, for all rigs whose bones are called the same"
+    # A file stays when something else is undone.
+    bl_options = {"REGISTER"}
+    preset_menu = "OCTO_MOTION_MT_landmark_presets"
+    preset_subdir = "octo_motion/landmarks"
+    preset_defines = [
+        "active = bpy.context.object",
+        "armature = active if active.type == 'ARMATURE' else active.find_armature()",
+        "landmarks = armature.octo_motion.splicing.landmarks",
+    ]
+    preset_values = [f"landmarks.{name}" for name in PROPERTIES.values()]
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        try:
+            active_armature(context)
+        except RigError as error:
+            cls.poll_message_set(str(error).rstrip("."))
+            return False
+        return True
+
+
+def draw_landmarks(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    settings: OCTO_MOTION_PG_splicing,
+) -> None:
+    """The table with its buttons; missing and unknown bones are red."""
+    row = layout.row(align=True)
+    row.operator(OCTO_MOTION_OT_map_skeleton.bl_idname, icon="ARMATURE_DATA")
+    row.operator(OCTO_MOTION_OT_landmarks_clear.bl_idname, text="", icon="X")
+    row = layout.row(align=True)
+    menu = OCTO_MOTION_MT_landmark_presets
+    preset = OCTO_MOTION_OT_landmark_preset_add.bl_idname
+    row.menu(menu.__name__, text=menu.bl_label)
+    row.operator(preset, text="", icon="ADD")
+    cast("Any", row.operator(preset, text="", icon="REMOVE")).remove_active = True
+    table = cast("Any", settings).landmarks
+    armature = cast("bpy.types.Object", settings.id_data)
+    # Picking is for pose mode: elsewhere the buttons would only take room.
+    can_pick = context.mode == "POSE"
+    column = layout.column(align=True)
+    for landmark in MIDDLE:
+        _draw_row(column, table, armature, (landmark,), can_pick=can_pick)
+    layout.separator()
+    row = layout.row(align=True)
+    row.label(text="Left")
+    mirror = OCTO_MOTION_OT_landmarks_mirror.bl_idname
+    to_right = row.operator(mirror, text="", icon="TRIA_RIGHT")
+    cast("Any", to_right).direction = "LEFT_TO_RIGHT"
+    to_left = row.operator(mirror, text="", icon="TRIA_LEFT")
+    cast("Any", to_left).direction = "RIGHT_TO_LEFT"
+    right = row.row()
+    right.alignment = "RIGHT"
+    right.label(text="Right")
+    column = layout.column(align=True)
+    for part in SIDED:
+        _draw_row(column, table, armature, (f"{part}.L", f"{part}.R"), can_pick=can_pick)
+
+
+def _draw_row(
+    column: bpy.types.UILayout,
+    table: Any,
+    armature: bpy.types.Object,
+    landmarks: tuple[str, ...],
+    *,
+    can_pick: bool,
+) -> None:
+    split = column.split(factor=0.25, align=True)
+    split.label(text=title(landmarks[0]).removeprefix("left ").capitalize())
+    row = split.row(align=True)
+    bones = armature_data(armature).bones
+    for landmark in landmarks:
+        name = PROPERTIES[landmark]
+        bone = getattr(table, name)
+        cell = row.row(align=True)
+        cell.alert = bone not in bones and (bool(bone) or landmark not in OPTIONAL)
+        cell.prop_search(table, name, armature.data, "bones", text="")
+        if can_pick:
+            pick = row.operator(OCTO_MOTION_OT_landmark_pick.bl_idname, text="", icon="EYEDROPPER")
+            cast("Any", pick).landmark = name
+
+
+CLASSES: Final[tuple[type, ...]] = (
+    *landmark_properties.CLASSES,
+    OCTO_MOTION_OT_map_skeleton,
+    OCTO_MOTION_OT_landmark_pick,
+    OCTO_MOTION_OT_landmarks_mirror,
+    OCTO_MOTION_OT_landmarks_clear,
+    OCTO_MOTION_MT_landmark_presets,
+    OCTO_MOTION_OT_landmark_preset_add,
+)

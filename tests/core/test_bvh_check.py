@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Damaged BVH files are refused with the line; what can be read in one way only is repaired."""
+
+import codecs
+from collections.abc import Callable
+
+import pytest
+
+from octo_motion.core.errors import ClipError
+from octo_motion.core.splicing.bvh_check import check_bvh
+
+SOUND = """HIERARCHY
+ROOT hip
+{
+\tOFFSET 0.0 0.0 0.0
+\tCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+\tJOINT chest
+\t{
+\t\tOFFSET 0.0 10.0 0.0
+\t\tCHANNELS 3 Zrotation Xrotation Yrotation
+\t\tEnd Site
+\t\t{
+\t\t\tOFFSET 0.0 5.0 0.0
+\t\t}
+\t}
+}
+MOTION
+Frames: 2
+Frame Time: 0.05
+1.0 2.0 3.0 10.5 -20.25 30.0 1e-3 .5 6.
+4.0 5.0 6.0 11.0 -21.0 31.0 7.0 8.0 9.0
+"""
+
+
+def changed(old: str, new: str) -> bytes:
+    assert old in SOUND
+    return SOUND.replace(old, new).encode()
+
+
+def test_a_sound_file_keeps_its_numbers_to_the_digit() -> None:
+    checked = check_bvh(SOUND.encode())
+
+    assert (checked.frames, checked.joints, checked.notes) == (2, 2, ())
+    assert checked.rate == pytest.approx(20.0, rel=1e-12)
+    assert "1.0 2.0 3.0 10.5 -20.25 30.0 1e-3 .5 6." in checked.text
+    # Its plainest form is a sound file again, and the same.
+    assert check_bvh(checked.text.encode()).text == checked.text
+
+
+SAME_MOTION: dict[str, Callable[[str], bytes]] = {
+    "mark of UTF-8": lambda text: codecs.BOM_UTF8 + text.encode(),
+    "UTF-16, little end first": lambda text: codecs.BOM_UTF16_LE + text.encode("utf-16-le"),
+    "UTF-16, big end first": lambda text: codecs.BOM_UTF16_BE + text.encode("utf-16-be"),
+    "line ends of Windows": lambda text: text.replace("\n", "\r\n").encode(),
+    "line ends of old Macs": lambda text: text.replace("\n", "\r").encode(),
+    "blank lines": lambda text: text.replace("\n", "\n\n \n").encode(),
+    "tabs": lambda text: text.replace(" ", "\t").encode(),
+    "small letters": lambda text: text.lower().encode(),
+    "capitals": lambda text: text.replace("End Site", "END SITE").encode(),
+    "brace beside the name": lambda text: (
+        text.replace("\n\t{", " {").replace("hip\n", "hip ").encode()
+    ),
+    "zero bytes at the end": lambda text: (text + "  \n\0\0").encode(),
+    "a remark at the end": lambda text: (text + "# made by hand\n").encode(),
+    "decimal commas": lambda text: text.replace(" .5 6.", " 0,5 6").replace(".", ",").encode(),
+}
+
+
+@pytest.mark.parametrize("how", SAME_MOTION)
+def test_the_same_motion_written_otherwise_is_the_same_motion(how: str) -> None:
+    expected, found = check_bvh(SOUND.encode()), check_bvh(SAME_MOTION[how](SOUND))
+
+    def values(text: str) -> list[float]:
+        rows = text.split("Frame Time:")[1].splitlines()[1:]
+        return [float(word) for row in rows for word in row.split()]
+
+    assert (found.frames, found.joints, found.rate) == (2, 2, expected.rate)
+    assert values(found.text) == values(expected.text)
+
+
+DAMAGED = {
+    "nothing in it": (b"", "is empty"),
+    "blanks alone": (b" \n\0 \n", "is empty"),
+    "something else": (b"Kaydara FBX Binary", "Line 1: this is not a BVH file"),
+    "no root": (b"HIERARCHY\nMOTION\nFrames: 1", "there is no ROOT"),
+    "no motion": (SOUND.split("MOTION", maxsplit=1)[0].encode(), "Line 15: .* there is no MOTION"),
+    "ends within": (SOUND.split("End Site", maxsplit=1)[0].encode(), "Line 9: the file ends"),
+    "a brace lacks": (changed("\t}\n}\nMOTION", "\t}\nMOTION"), "Line 15: MOTION comes before"),
+    "an offset lacks": (changed("\tOFFSET 0.0 0.0 0.0\n", ""), "Line 4: .* OFFSET should"),
+    "an offset of two": (changed("0.0 10.0 0.0", "0.0 10.0"), "Line 8: there are 2 numbers"),
+    "wrong count of channels": (changed("CHANNELS 3", "CHANNELS 4"), "Line 9: CHANNELS does not"),
+    "unknown channel": (changed("3 Zrotation", "3 Wrotation"), "Line 9: 'Wrotation' is no channel"),
+    "a channel twice": (changed("3 Zrotation", "3 Xrotation"), "Line 9: a channel is there twice"),
+    "no number of frames": (changed("Frames: 2", "Frames: many"), "Line 17: 'Frames: many'"),
+    "no frame time": (changed("Frame Time: 0.05\n", ""), "Line 18: .* 'Frame Time:'"),
+    "frame time of zero": (changed("Time: 0.05", "Time: 0"), "Line 18: the frame time is 0"),
+    "negative frame time": (changed("Time: 0.05", "Time: -0.05"), "Line 18: the frame time is -0"),
+    "tiny frame time": (changed("Time: 0.05", "Time: 0.0001"), "Line 18: .* 10000 frames a second"),
+    "infinite frame time": (changed("Time: 0.05", "Time: inf"), "Line 18: 'inf' is not a finite"),
+    "no frames": (SOUND.split("1.0 2.0", maxsplit=1)[0].encode(), "Line 18: there are no frames"),
+    "not a number": (changed("-20.25", "NaN"), "Line 19: 'NaN' is not a finite number"),
+    "infinite": (changed("31.0", "1.#INF"), "Line 20: '1.#INF' is not a finite number"),
+    "too large": (changed("31.0", "1e999"), "Line 20: '1e999' is not a finite number"),
+    "two numbers in one": (changed("3.0 10.5", "3.0-10.5"), "Line 19: '3.0-10.5' is no number"),
+    "one value less": (changed("4.0 5.0 ", "4.0 "), "Line 20: there are 8 numbers instead of 9"),
+    "a word in the motion": (changed("4.0", "four"), "Line 20: 'four' is no number"),
+    "zero bytes within": (changed("-20.25", "-20\0"), "Line 19: there are zero bytes"),
+    "half of UTF-16": (codecs.BOM_UTF16_LE + b"HIE", "begins like UTF-16"),
+}
+
+
+@pytest.mark.parametrize("how", DAMAGED)
+def test_a_damaged_file_is_refused_with_the_line(how: str) -> None:
+    content, message = DAMAGED[how]
+    with pytest.raises(ClipError, match=message):
+        check_bvh(content)
+
+
+def test_a_wrong_count_of_frames_is_told_and_all_frames_are_kept() -> None:
+    checked = check_bvh(changed("Frames: 2", "Frames: 7"))
+    assert checked.frames == 2
+    assert checked.notes == ("It says that it has 7 frames, but has 2.",)
+
+
+def test_names_in_an_old_encoding_are_told() -> None:
+    checked = check_bvh(SOUND.replace("chest", "poitrine_é").encode("latin-1"))
+    assert "poitrine_é" in checked.text
+    assert "not in UTF-8" in checked.notes[0]

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Importing clips: right speed, one collection, nothing left of files that are refused."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.blender.imports import NOTE, import_clip
+from octo_motion.core.errors import ClipError
+from tests.ui.rig import click, joints_in_world, keys
+
+Data = Callable[[str], Path]
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+REFUSED = {
+    "10_zero_frames": "Line 129: there are no frames",
+    "14_frame_time_zero": "Line 129: the frame time is 0 seconds",
+    "15_frame_time_missing": "Line 129: .* 'Frame Time:'",
+    "16_frame_time_negative": "Line 129: the frame time is -0.05 seconds",
+    "17_frame_time_tiny": "Line 129: .* 10000 frames a second",
+    "22_missing_space_slimevr": "Line 130: '-1.524539-7.5' is no number",
+    "35_empty_file": "The file is empty",
+    "37_hierarchy_only": "Line 126: .* there is no MOTION",
+}
+RATES = {
+    "AdityaHa": (2, 4.0),
+    "HoldTeddyByArm": (10, 3.0),
+    "SL_Avatar_Tpose": (1, 30.0),
+    "TeddyDangle": (6, 2.0),
+    "TeddyIdle": (7, 2.0),
+    "cossack dance 2": (49, 32.0),
+}
+
+
+def everything() -> dict[str, Any]:
+    """All data-blocks, and all of the scene that importers like to change."""
+    definitions = bpy.data.bl_rna.properties
+    kinds = [each.identifier for each in definitions if each.type == "COLLECTION"]
+    contents: dict[str, Any] = {kind: sorted(getattr(bpy.data, kind).keys()) for kind in kinds}
+    contents["scene"] = of_the_scene()
+    active = bpy.context.view_layer.objects.active
+    contents["active"] = active and active.name
+    contents["selected"] = [each.name for each in bpy.context.selected_objects]
+    return contents
+
+
+def of_the_scene() -> tuple[float, ...]:
+    scene: Any = bpy.context.scene
+    render = scene.render
+    return (
+        *(render.fps, render.fps_base, scene.frame_start, scene.frame_end),
+        *(scene.frame_current, scene.frame_subframe, scene.unit_settings.scale_length),
+    )
+
+
+def times(action: Any) -> np.ndarray:
+    """Frames of all keys of an action."""
+    return np.unique(np.concatenate([each[:, 0] for each in keys(action).values()]))
+
+
+def heads_at(armature: Any, frame: float) -> np.ndarray:
+    """Where the bones begin, in the order of the file."""
+    scene: Any = bpy.context.scene
+    current = scene.frame_current
+    heads = joints_in_world(armature, frame)[:, 0]
+    scene.frame_set(current)
+    return heads
+
+
+def import_files(*paths: Path) -> set[str]:
+    (folder,) = {each.parent for each in paths}
+    files = [{"name": each.name} for each in paths]
+    return click("import_clips", directory=str(folder), files=files)
+
+
+def names_in(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.bvh"))
+
+
+def test_every_damaged_file_is_imported_right_or_refused_with_the_line(shared_data: Data) -> None:
+    scene: Any = bpy.context.scene
+    scene.render.fps = 30
+    control = joints = None
+    for path in names_in(shared_data("malformed")):
+        before = everything()
+        if path.stem in REFUSED:
+            with pytest.raises(ClipError, match=REFUSED[path.stem]):
+                import_clip(path, bpy.context)
+            assert everything() == before, path.name
+            continue
+        clip = import_clip(path, bpy.context)
+        assert of_the_scene() == before["scene"], path.name
+        assert clip.armatures == clip.actions == (path.stem,)
+        action: Any = bpy.data.actions[path.stem]
+        frames = 1 if path.stem == "11_one_frame" else 25
+        # 25 frames of a twentieth of a second at 30 frames per second.
+        np.testing.assert_allclose(times(action), 1.0 + 1.5 * np.arange(frames), atol=1e-4)
+        assert (action.frame_start, action.frame_end) == pytest.approx((1.0, times(action)[-1]))
+        values = [each[0, 1] for each in keys(action).values()]
+        assert np.isfinite(values).all()
+        control = control or values
+        heads = heads_at(bpy.data.objects[path.stem], 8.5)
+        joints = heads if joints is None else joints
+        if re.match("0[1-9]|19|2[0-9]|34|42", path.stem):
+            # Of 80 units, single precision.
+            np.testing.assert_allclose(heads, joints, atol=1e-4, err_msg=path.name)
+        # A bone without an end points elsewhere, so its angles are others.
+        if re.match("0[1-79]|19|2[0-9]|34|42", path.stem):
+            # Angles of −0 come as a few 1e-21.
+            assert values == pytest.approx(control, abs=1e-12), path.name
+    assert [each.name for each in scene.collection.children] == ["Clips"]
+    assert len(scene.collection.objects) == 0
+
+
+@pytest.mark.parametrize("name", RATES)
+def test_real_files_of_odd_rates_play_at_their_own_speed(name: str, shared_data: Data) -> None:
+    frames, rate = RATES[name]
+    import_files(shared_data(f"odd_real/{name}.bvh"))
+
+    action: Any = bpy.data.actions[name]
+    expected = 1.0 + np.arange(frames) * 24.0 / rate
+    # The files give frame times of few digits.
+    np.testing.assert_allclose(times(action), expected, rtol=1e-4)
+    assert action[NOTE]["rate"] == pytest.approx(rate, rel=1e-4)
+    assert action[NOTE]["file"] == f"{name}.bvh"
+
+
+@pytest.mark.parametrize("clip", ["punch_L", "throw_R", "walk"])
+def test_bvh_fbx_and_gltf_of_one_motion_lie_on_the_same_frames(
+    clip: str, shared_data: Data
+) -> None:
+    before = of_the_scene()
+    import_files(shared_data(f"secondlife/avatar_{clip}.bvh"))
+    import_files(*(shared_data(f"derived_fbx_gltf/sl_{clip}.{kind}") for kind in ("fbx", "glb")))
+
+    bvh, fbx, gltf = (
+        bpy.data.actions[name] for name in (f"avatar_{clip}", f"sl_{clip}", f"sl_{clip}.001")
+    )
+    np.testing.assert_allclose(times(gltf), times(bvh), atol=1e-2)
+    # The exporter had left out keys that lie on a line, none of them first or last.
+    np.testing.assert_allclose(times(fbx)[[0, -1]], times(bvh)[[0, -1]], atol=1e-3)
+    assert all(np.abs(times(bvh) - each).min() < 1e-2 for each in times(fbx))
+    for each in (bvh, fbx, gltf):
+        assert each[NOTE]["rate"] == pytest.approx(bvh[NOTE]["rate"], rel=1e-3)
+    assert of_the_scene() == before
+    assert "Icosphere" not in "".join([*bpy.data.objects.keys(), *bpy.data.meshes.keys()])
+    assert list(bpy.data.collections.keys()) == ["Clips"]
+
+
+def test_a_clip_stands_as_blenders_own_importer_shows_it(shared_data: Data) -> None:
+    path = shared_data("secondlife/avatar_punch_L.bvh")
+    bpy.ops.import_anim.bvh(filepath=str(path))
+    own: Any = bpy.context.object
+    own_joints = [joints_in_world(own, frame) for frame in (1, 9, 25)]
+    import_files(path)
+    clip: Any = bpy.context.object
+
+    assert clip != own
+    for frame, joints in zip((1, 9, 25), own_joints, strict=True):
+        found = joints_in_world(clip, 1.0 + (frame - 1) * 24.0 / 20.0)
+        np.testing.assert_allclose(found, joints, atol=1e-3)  # of 80 units, single precision
+
+
+def test_a_rig_with_many_actions_shows_the_first_and_keeps_all(shared_data: Data) -> None:
+    import_files(shared_data("rigs_with_actions/KayKit_Knight.glb"))
+
+    armature: Any = bpy.context.object
+    assert armature.name == "KayKit_Knight"
+    assert len(bpy.data.actions) == 76
+    assert all(each.use_fake_user for each in bpy.data.actions)
+    assert len(armature.animation_data.nla_tracks) == 0
+    assert armature.animation_data.action is not None
+    assert armature.animation_data.action_slot is not None
+
+
+def test_one_damaged_file_stops_none_of_the_others(shared_data: Data, tmp_path: Path) -> None:
+    for name in ("secondlife/avatar_walk.bvh", "malformed/10_zero_frames.bvh"):
+        (tmp_path / Path(name).name).write_bytes(shared_data(name).read_bytes())
+    (tmp_path / "broken.glb").write_bytes(b"glTF but no more")
+    (tmp_path / "broken.fbx").write_bytes(b"no FBX at all")
+
+    done = import_files(*sorted(tmp_path.iterdir()), tmp_path / "absent.bvh")
+
+    assert done == {"FINISHED"}
+    assert list(bpy.data.objects.keys()) == ["avatar_walk"]
+    assert list(bpy.data.actions.keys()) == ["avatar_walk"]
+    assert list(bpy.data.collections.keys()) == ["Clips"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("clip.bvh", b"", "'clip.bvh' was not imported. The file is empty"),
+        ("clip.fbx", b"no FBX at all", "'clip.fbx' was not imported. Blender's importer"),
+        ("clip.glb", b"glTF but no more", "'clip.glb' was not imported. Blender's importer"),
+        ("clip.txt", b"walk", "'.txt' files are no motion"),
+        ("clip.bvh", None, "There is no such file"),
+    ],
+)
+def test_a_file_that_cannot_be_used_changes_nothing(
+    name: str, content: bytes | None, message: str, tmp_path: Path
+) -> None:
+    bpy.ops.object.armature_add()
+    before = everything()
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+
+    with pytest.raises(RuntimeError, match=re.escape(message)):
+        bpy.ops.octo_motion.import_clips(filepath=str(tmp_path / name))
+
+    assert everything() == before
+
+
+def test_a_rig_without_motion_is_refused_and_leaves_nothing(shared_data: Data) -> None:
+    before = everything()
+    with pytest.raises(ClipError, match="Its armature has no motion"):
+        import_clip(shared_data("rigs_with_actions/Quaternius_Superhero_Male.glb"), bpy.context)
+    assert everything() == before
+
+
+def test_without_a_file_nothing_is_imported() -> None:
+    with pytest.raises(RuntimeError, match="No file is given"):
+        bpy.ops.octo_motion.import_clips()
+
+
+def test_import_is_one_undo_step(shared_data: Data) -> None:
+    bpy.ops.ed.undo_push(message="before")
+    paths = [shared_data(f"secondlife/avatar_{name}.bvh") for name in ("walk", "run")]
+    import_files(*paths)
+    assert len(bpy.data.actions) == 2
+    bpy.ops.ed.undo()
+    assert len(bpy.data.actions) == len(bpy.data.objects) == len(bpy.data.collections) == 0
+
+
+def test_clips_are_imported_in_object_mode_alone() -> None:
+    bpy.ops.object.armature_add()
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not bpy.ops.octo_motion.import_clips.poll()
+
+
+def test_first_frame_and_collection_are_as_asked(shared_data: Data) -> None:
+    path = shared_data("secondlife/avatar_walk.bvh")
+    click("import_clips", filepath=str(path), frame_start=101)
+    click("import_clips", filepath=str(path))
+
+    first, second = (bpy.data.actions[name] for name in ("avatar_walk", "avatar_walk.001"))
+    assert times(first)[0] == pytest.approx(101.0)
+    np.testing.assert_allclose(times(second) + 100.0, times(first), atol=1e-4)
+    assert len(bpy.data.collections["Clips"].objects) == 2
+    assert {each.name for each in bpy.context.selected_objects} == {"avatar_walk.001"}
