@@ -5,8 +5,8 @@ What an animator edits is a pose key: one frame at which all channels of a limb 
 channels of a :class:`Limb` share their key frames, and each key holds the dense motion's own pose.
 Between two keys every channel is a cubic whose handles stand at thirds of the time: Blender's
 curve is then a cubic in time itself. Where the motion is smooth, handles follow its slope, so that
-the curve runs through the key without a corner; where it has a corner, they are found by linear
-least squares over the frames between the keys.
+the curve runs through the key without a corner; elsewhere they are found by linear least squares
+over the frames between the keys, and then brought into line wherever the bounds allow it.
 
 Key frames are found from left to right, each as far on as the bounds allow: no choice has fewer
 keys, as long as what can be spanned in one piece can be spanned in parts. Many limbs and many
@@ -48,8 +48,8 @@ _SPARE: Final = 0.998
 """Share of the bounds that is used up before values are rounded."""
 _KEPT: Final = 0.999
 """Share of them that is used up afterwards: Blender still rounds handles that it aligns."""
-_KINK: Final = 0.5
-"""Bounds by which the motion must turn aside within a frame to have a corner there."""
+_KINK: Final = 0.1
+"""Bounds by which the motion must turn aside within a frame to be let have a corner there."""
 
 Integers = NDArray[np.intp]
 Booleans = NDArray[np.bool_]
@@ -438,13 +438,44 @@ class _Work:
             self._fitted(spans)
             self._round(spans)
             limbs, starts, ends = spans.limbs, spans.starts, spans.ends
-            broken = np.zeros(len(spans), dtype=bool)
-            for part in _blocks(ends - starts):
-                broken[part] = self._errors(spans.part(part)) > _KEPT
-            split = broken & (ends - starts > 1)
+            split = self._broken(spans) & (ends - starts > 1)
             if not split.any():
-                return self._as_keys(spans, keyed)
+                return self._as_keys(spans, keyed, self._joined(spans))
             keyed[limbs[split], (starts + ends)[split] // 2] = True
+
+    def _joined(self, spans: _Spans) -> Booleans:
+        """Bring the two handles of a key into line wherever that keeps to the bounds.
+
+        Returns:
+            Whether they are, (limbs, frames, tracks).
+        """
+        thirds = (self._times[spans.ends] - self._times[spans.starts])[:, None] / 3.0
+        values = self._values[spans.limbs[1:], spans.starts[1:]]
+        before, after = thirds[:-1], thirds[1:]
+        into, out = spans.into[:-1].copy(), spans.out[1:].copy()
+        # A slope that is off moves the curve by as much as the span is long, at as many frames.
+        slope = before**2 * (values - into) + after**2 * (out - values)
+        slope /= before**3 + after**3
+        met = spans.limbs[1:] == spans.limbs[:-1]
+        while True:
+            spans.into[:-1] = np.where(met[:, None], values - before * slope, into)
+            spans.out[1:] = np.where(met[:, None], values + after * slope, out)
+            self._round(spans)
+            broken = self._broken(spans)
+            undone = met & (broken[:-1] | broken[1:])
+            if not undone.any():
+                break
+            met &= ~undone
+        joined = ~self._loose
+        joined[spans.limbs[1:][met], spans.starts[1:][met]] = True
+        return joined
+
+    def _broken(self, spans: _Spans) -> Booleans:
+        """Whether spans leave the bounds."""
+        broken = np.zeros(len(spans), dtype=bool)
+        for part in _blocks(spans.ends - spans.starts):
+            broken[part] = self._errors(spans.part(part)) > _KEPT
+        return broken
 
     def _round(self, spans: _Spans) -> None:
         starts, ends = self._times[spans.starts], self._times[spans.ends]
@@ -454,7 +485,7 @@ class _Work:
         spans.out = spans.out.astype(np.float32).astype(np.float64)
         spans.into = spans.into.astype(np.float32).astype(np.float64)
 
-    def _as_keys(self, spans: _Spans, keyed: Booleans) -> list[list[BezierKeys]]:
+    def _as_keys(self, spans: _Spans, keyed: Booleans, joined: Booleans) -> list[list[BezierKeys]]:
         result: list[list[BezierKeys]] = []
         for limb, marked in enumerate(keyed):
             (places,) = np.nonzero(marked)
@@ -478,7 +509,7 @@ class _Work:
                         values=values[:, columns].astype(np.float32),
                         left=left[:, columns].astype(np.float32),
                         right=right[:, columns].astype(np.float32),
-                        smooth=~self._loose[limb, places, track],
+                        smooth=joined[limb, places, track],
                     )
                     for track, columns in enumerate(self._columns)
                 ]
