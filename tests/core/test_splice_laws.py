@@ -30,7 +30,7 @@ from octo_motion.core.splicing.parts import (
     chain,
     part_bones,
 )
-from octo_motion.core.splicing.splice import Reach, Splice, build, spliced
+from octo_motion.core.splicing.splice import Reach, Splice, Splicer, build, spliced
 from octo_motion.core.splicing.timing import Timing
 from tests.core.rigs import skeleton_of
 from tests.core.splice_bodies import (
@@ -207,6 +207,21 @@ def test_a_stack_is_rebuilt_retimed_reordered_and_muted_as_data():
     assert np.array_equal(muted.rotations, spliced(base, LANDMARKS, left).rotations)
     later = build(base, LANDMARKS, [right, replace(left, timing=Timing(6.0, 1.0))])
     assert not np.array_equal(later.rotations, both.rotations)
+
+
+@pytest.mark.parametrize("travel", [False, True])
+def test_frames_in_sight_are_those_of_the_whole(travel: bool):  # noqa: FBT001
+    random = np.random.default_rng(11)
+    base = motion(random, humanoid(random), 60)
+    clip = motion(random, humanoid(random, same_proportions=False), 40)
+    splicer = Splicer(base, LANDMARKS, Splice(LEGS, clip, FROM_START, LANDMARKS, travel=travel))
+    timing = Timing(7.5, 3.0, 0.8, 30.0, ease_in=5.0, ease_out=5.0)
+    whole = splicer.at(timing)
+    for frames in (slice(0, 60, 7), slice(20, 21), slice(8, 16), slice(50, 60)):
+        part = splicer.at(timing, frames)
+        assert np.array_equal(part.frames, whole.frames[frames])
+        assert angle_between(part.rotations, whole.rotations[frames]).max() < 1e-6
+        assert np.allclose(part.locations, whole.locations[frames])
 
 
 def test_seams_are_smooth_when_eased():

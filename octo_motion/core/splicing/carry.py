@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -69,6 +70,18 @@ class Carrier:
     """Joint, elbow and hand, on base and splice."""
     spread: tuple[tuple[int, ...], tuple[int, ...]] | None
     """Chains with unlike numbers of bones, on base and splice."""
+
+    @cached_property
+    def hinge(self) -> Floats:
+        """Along the base's upper limb (3,): the axis about which the splice clip bends it."""
+        assert self.limb is not None
+        (joint, _, _), others = self.limb
+        clip = self.splice.clip
+        chosen = np.linspace(clip.frames[0], clip.frames[-1], min(len(clip), _HINGE_SAMPLES))
+        posture = sampled(clip, chosen)
+        limb = Limb(*(posture.head(bone) for bone in others))
+        axis = hinge_axis(limb, posture.orientation(others[0]))
+        return rotate(conjugate(self.match.constants[joint]), axis)
 
 
 def carriers(
@@ -138,7 +151,7 @@ def carry(
             limb.joint + rotate(turn, limb.elbow - limb.joint),
             limb.joint + rotate(turn, limb.hand - limb.joint),
         )
-        hinge = rotate(multiply(turn, result.orientation(joint)), _hinge(carrier))
+        hinge = rotate(multiply(turn, result.orientation(joint)), carrier.hinge)
         soft = SOFT_EXACT if carrier.match.same_body else SOFT
         upper_bend, lower_bend = reach(turned, wanted.hand, hinge, soft=soft)
         turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
@@ -236,18 +249,6 @@ def _fractions(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
 def _offset(skeleton: Skeleton, bone: int) -> Floats:
     parent = skeleton.parents[bone]
     return multiply(conjugate(skeleton.rest_rotations[parent]), skeleton.rest_rotations[bone])
-
-
-def _hinge(carrier: Carrier) -> Floats:
-    """Along the base's upper limb: the axis about which the splice clip bends it."""
-    assert carrier.limb is not None
-    (joint, _, _), others = carrier.limb
-    clip = carrier.splice.clip
-    chosen = np.linspace(clip.frames[0], clip.frames[-1], min(len(clip), _HINGE_SAMPLES))
-    posture = sampled(clip, chosen)
-    limb = Limb(*(posture.head(bone) for bone in others))
-    axis = hinge_axis(limb, posture.orientation(others[0]))
-    return rotate(conjugate(carrier.match.constants[joint]), axis)
 
 
 def _piece_carrier(

@@ -79,31 +79,68 @@ def spliced(base: Clip, landmarks: Landmarks | None, splice: Splice) -> Clip:
     Raises:
         ClipError: a bone or landmark is missing, or the timing makes no sense.
     """
-    legs = bool(_LEG_PIECES.intersection(splice.part.pieces))
-    if splice.travel and not legs:
-        raise ClipError(
-            f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
-        )
-    seen_from = "pelvis" if splice.travel else splice.seen_from
-    ours, theirs = Side(base, landmarks), Side(splice.clip, splice.landmarks)
-    pieces = carriers(splice.part, ours, theirs, clavicle=splice.clavicle, seen_from=seen_from)
-    span = window(splice.timing, base, splice.clip)
-    if span.frames.stop == span.frames.start:
-        return base
-    rotations, locations = base.rotations.copy(), base.locations.copy()
-    before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
-    moment = sampled(splice.clip, span.splice_frames)
-    # Views: what is written here is written into the whole.
-    turned, moved = rotations[span.frames], locations[span.frames]
-    for piece in pieces:
-        carry(piece, before, moment, turned, moved, exact=splice.reach == "exact")
-    if (span.weights < 1.0).any():
-        bones = sorted({bone for piece in pieces for bone in piece.bones})
-        _ease(base, span, bones, turned, moved)
-    if splice.travel:
-        whole = posture_of(base.skeleton, base.rotations, base.locations)
-        move_hips(pieces[0], span, whole, rotations, locations)
-    return replace(base, rotations=rotations, locations=locations)
+    return Splicer(base, landmarks, splice).at(splice.timing)
+
+
+class Splicer:
+    """A splice made ready: what does not hang on its timing is found once.
+
+    For a timing that is dragged, with few frames in sight: poses do not hang on each other.
+    """
+
+    def __init__(self, base: Clip, landmarks: Landmarks | None, splice: Splice) -> None:
+        """Match the two skeletons.
+
+        Raises:
+            ClipError: a bone or landmark is missing.
+        """
+        if splice.travel and not _LEG_PIECES.intersection(splice.part.pieces):
+            raise ClipError(
+                f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
+            )
+        seen_from = "pelvis" if splice.travel else splice.seen_from
+        sides = Side(base, landmarks), Side(splice.clip, splice.landmarks)
+        self._base, self._splice = base, splice
+        self._pieces = carriers(splice.part, *sides, clavicle=splice.clavicle, seen_from=seen_from)
+
+    def at(self, timing: Timing, frames: slice | None = None) -> Clip:
+        """The base with the part spliced on at this timing, all of it or these frames.
+
+        Raises:
+            ClipError: the timing makes no sense.
+        """
+        if frames is not None and self._splice.travel:
+            # Where the legs have led to by then is known only from the start on.
+            return _cut(self.at(timing), frames)
+        base = self._base if frames is None else _cut(self._base, frames)
+        span = window(timing, base, self._splice.clip)
+        if span.frames.stop == span.frames.start:
+            return base
+        rotations, locations = base.rotations.copy(), base.locations.copy()
+        before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
+        moment = sampled(self._splice.clip, span.splice_frames)
+        # Views: what is written here is written into the whole.
+        turned, moved = rotations[span.frames], locations[span.frames]
+        exact = self._splice.reach == "exact"
+        for piece in self._pieces:
+            carry(piece, before, moment, turned, moved, exact=exact)
+        if (span.weights < 1.0).any():
+            bones = sorted({bone for piece in self._pieces for bone in piece.bones})
+            _ease(base, span, bones, turned, moved)
+        if self._splice.travel:
+            whole = posture_of(base.skeleton, base.rotations, base.locations)
+            move_hips(self._pieces[0], span, whole, rotations, locations)
+        return replace(base, rotations=rotations, locations=locations)
+
+
+def _cut(clip: Clip, frames: slice) -> Clip:
+    return replace(
+        clip,
+        frames=clip.frames[frames],
+        rotations=clip.rotations[frames],
+        locations=clip.locations[frames],
+        world=clip.world[frames],
+    )
 
 
 def _ease(

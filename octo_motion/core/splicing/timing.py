@@ -49,8 +49,6 @@ class Window:
     """(window,) the same, without going out again."""
     splice_frames: Floats
     """(window,) moments of the splice clip, in its own frame numbers."""
-    to_end: bool
-    """Whether the splice lasts to the base's end."""
 
 
 def window(timing: Timing, base: Clip, splice: Clip) -> Window:
@@ -83,8 +81,7 @@ def window(timing: Timing, base: Clip, splice: Clip) -> Window:
         # The last frame itself is shown once, before the clip begins anew.
         over = moments > times[1] + 1e-6
         moments[over] = times[0] + np.mod(moments[over] - times[0], period)
-    to_end = bool(end >= base.frames[-1] - 1e-6)
-    return Window(frames, weights, entering, moments, to_end)
+    return Window(frames, weights, entering, moments)
 
 
 def _check(timing: Timing) -> None:
