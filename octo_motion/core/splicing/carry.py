@@ -17,7 +17,6 @@ from .correspondence import (
     Correspondence,
     chain_length,
     correspondence,
-    is_identity,
     matched_bones,
     matched_chains,
 )
@@ -56,6 +55,21 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
+class _Joined:
+    """Bones that hang on each other alike on both skeletons.
+
+    Seen from its parent, such a bone needs no other: ``before ∘ rotation ∘ after``.
+    """
+
+    base: tuple[int, ...]
+    splice: tuple[int, ...]
+    before: Floats
+    """(bones, 4)"""
+    after: Floats
+    """(bones, 4)"""
+
+
+@dataclass(frozen=True, eq=False)
 class Carrier:
     """All that does not change over time: one piece on two skeletons."""
 
@@ -70,6 +84,30 @@ class Carrier:
     """Joint, elbow and hand, on base and splice."""
     spread: tuple[tuple[int, ...], tuple[int, ...]] | None
     """Chains with unlike numbers of bones, on base and splice."""
+
+    @cached_property
+    def joined(self) -> _Joined | None:
+        """The bones that can be carried over one by one, if there are any."""
+        base, other = self.base.skeleton, self.splice.skeleton
+        pairs, constants = self.match.pairs, self.match.constants
+        bones = [
+            bone
+            for bone in self.bones[1:]
+            if bone in pairs
+            and (parent := base.parents[bone]) in pairs
+            and other.parents[pairs[bone]] == pairs[parent]
+            and base.inherits_rotation[bone]
+            and other.inherits_rotation[pairs[bone]]
+        ]
+        if not bones:
+            return None
+        answers = [pairs[bone] for bone in bones]
+        after = np.stack([constants[bone] for bone in bones])
+        above = np.stack([constants[base.parents[bone]] for bone in bones])
+        before = multiply(
+            multiply(conjugate(_offsets(base, bones)), conjugate(above)), _offsets(other, answers)
+        )
+        return _Joined(tuple(bones), tuple(answers), before, after)
 
     @cached_property
     def hinge(self) -> Floats:
@@ -182,35 +220,19 @@ def _carry_inner(
 ) -> None:
     """Orientations of all matched bones as they are seen from the body."""
     result, splice = postures
-    base, other = result.skeleton, splice.skeleton
-    pairs, constants = carrier.match.pairs, carrier.match.constants
+    joined = carrier.joined
+    if joined is not None:
+        inner = multiply(joined.before, splice.rotations(joined.splice))
+        rotations[:, joined.base] = multiply(inner, joined.after)
+        if carrier.match.same_rest:
+            for bone, answer in zip(joined.base, joined.splice, strict=True):
+                locations[:, bone] = splice.location(answer)
+    inside = () if joined is None else joined.base
     for bone in carrier.bones:
-        if bone not in pairs:
-            continue
-        answer, constant = pairs[bone], constants[bone]
-        parent = base.parents[bone]
-        joined = (
-            bone != carrier.bones[0]
-            and parent in pairs
-            and other.parents[answer] == pairs[parent]
-            and base.inherits_rotation[bone]
-            and other.inherits_rotation[answer]
-        )
-        if not joined:
+        if bone in carrier.match.pairs and bone not in inside:
+            answer, constant = carrier.match.pairs[bone], carrier.match.constants[bone]
             wanted = multiply(multiply(between, splice.orientation(answer)), constant)
             rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
-            continue
-        # Seen from its parent, a bone needs no other bone: constants before and after will do.
-        own = _offset(base, bone)
-        before = multiply(
-            multiply(conjugate(own), conjugate(constants[parent])), _offset(other, answer)
-        )
-        inner = splice.rotation(answer)
-        if not is_identity(before):
-            inner = multiply(before, inner)
-        rotations[:, bone] = inner if is_identity(constant) else multiply(inner, constant)
-        if carrier.match.same_rest:
-            locations[:, bone] = splice.location(answer)
 
 
 def _carry_spread(
@@ -246,9 +268,12 @@ def _fractions(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
     return passed / passed[-1] if passed[-1] > 0.0 else np.linspace(0.0, 1.0, len(passed))
 
 
-def _offset(skeleton: Skeleton, bone: int) -> Floats:
-    parent = skeleton.parents[bone]
-    return multiply(conjugate(skeleton.rest_rotations[parent]), skeleton.rest_rotations[bone])
+def _offsets(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
+    """Rest orientations (bones, 4) as the bones' parents see them."""
+    parents = [skeleton.parents[bone] for bone in bones]
+    return multiply(
+        conjugate(skeleton.rest_rotations[parents]), skeleton.rest_rotations[list(bones)]
+    )
 
 
 def _piece_carrier(

@@ -20,7 +20,6 @@ import numpy as np
 from ..rotations import (
     IDENTITY,
     Floats,
-    angle_between,
     conjugate,
     multiply,
     normalized,
@@ -154,11 +153,6 @@ def correspondence(
 def chain_length(skeleton: Skeleton, bones: Sequence[int]) -> float:
     """Length of the line through these bones' heads, armature units."""
     return float(np.linalg.norm(np.diff(skeleton.heads[list(bones)], axis=0), axis=1).sum())
-
-
-def is_identity(quaternion: Floats) -> bool:
-    """Whether a constant rotation changes nothing worth computing."""
-    return bool(angle_between(quaternion, IDENTITY) < 1e-9)
 
 
 def _plain(name: str) -> str:

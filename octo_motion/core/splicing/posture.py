@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -22,17 +22,21 @@ class Posture:
     def __init__(
         self,
         skeleton: Skeleton,
-        rotation: Callable[[int], Floats],
+        rotations: Callable[[Sequence[int]], Floats],
         location: Callable[[int], Floats],
     ) -> None:
         self.skeleton = skeleton
-        self.rotation = rotation
-        """(frames, 4) of a bone, in its rest frame."""
+        self.rotations = rotations
+        """(frames, bones, 4) of some bones, each in its rest frame."""
         self.location = location
         """(frames, 3) of a bone, in its rest frame."""
         self._orientations: dict[int, Floats] = {}
         self._heads: dict[int, Floats] = {}
         self._turns: dict[int, Floats] = {}
+
+    def rotation(self, bone: int) -> Floats:
+        """(frames, 4) of a bone, in its rest frame."""
+        return self.rotations([bone])[:, 0]
 
     def turn(self, bone: int) -> Floats:
         """How a bone has turned from its rest pose, (frames, 4)."""
@@ -80,21 +84,19 @@ class Posture:
 
 def posture_of(skeleton: Skeleton, rotations: Floats, locations: Floats) -> Posture:
     """The posture of arrays (frames, bones, 4) and (frames, bones, 3)."""
-    return Posture(skeleton, lambda bone: rotations[:, bone], lambda bone: locations[:, bone])
+    return Posture(skeleton, lambda bones: rotations[:, bones], lambda bone: locations[:, bone])
 
 
 def sampled(clip: Clip, frames: Floats) -> Posture:
     """A clip at any times, in its own frame numbers; beyond its ends it stands still."""
     before, after, share = _between(clip, frames)
-    rotations: dict[int, Floats] = {}
+    between = share.any()
 
-    def rotation(bone: int) -> Floats:
-        if bone not in rotations:
-            values = clip.rotations[:, bone]
-            rotations[bone] = (
-                slerp(values[before], values[after], share) if share.any() else values[before]
-            )
-        return rotations[bone]
+    def rotations(bones: Sequence[int]) -> Floats:
+        values = clip.rotations[:, bones]
+        if not between:
+            return values[before]
+        return slerp(values[before], values[after], share[:, None])
 
     def location(bone: int) -> Floats:
         values = clip.locations[:, bone]
@@ -102,7 +104,7 @@ def sampled(clip: Clip, frames: Floats) -> Posture:
             return np.zeros((len(before), 3))
         return values[before] + share[:, None] * (values[after] - values[before])
 
-    return Posture(clip.skeleton, rotation, location)
+    return Posture(clip.skeleton, rotations, location)
 
 
 def sampled_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
