@@ -18,7 +18,7 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ..core.errors import ClipError
+from ..core.errors import ClipError, WriteError
 from ..core.splicing.bvh_check import check_bvh
 
 SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
@@ -64,6 +64,7 @@ def import_clip(path: Path, context: bpy.types.Context, frame_start: int = 1) ->
 
     Raises:
         ClipError: the file cannot be read or has no motion; nothing has changed.
+        WriteError: the scene is linked.
     """
     importer = _IMPORTERS.get(path.suffix.lower())
     if importer is None:
@@ -73,6 +74,8 @@ def import_clip(path: Path, context: bpy.types.Context, frame_start: int = 1) ->
     before = _data_blocks()
     scene = context.scene
     assert scene is not None
+    if scene.library is not None:
+        raise WriteError("The scene is linked from another file.", "Work in a scene of this file.")
     rate = scene.render.fps / scene.render.fps_base
     try:
         with _unchanged(context, scene):

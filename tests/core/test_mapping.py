@@ -111,6 +111,11 @@ SCHEMES = {
         "{}_Collar | {}_Shoulder | {}_Elbow | {}_Wrist | {}_Hip | {}_Knee | {}_Ankle | {}_Foot",
         *("L", "R"),
     ),
+    "kinect": scheme(
+        "SpineBase | SpineMid | SpineShoulder | Neck | Head",
+        "Collar{} | Shoulder{} | Elbow{} | Wrist{} | Hip{} | Knee{} | Ankle{} | Foot{}",
+        *("Left", "Right"),
+    ),
     "vertebrae": scheme(
         "Pelvis | L5 | T8 | Neck | Head",
         "{}Shoulder | {}UpperArm | {}ForeArm | {}Hand | {}UpperLeg | {}LowerLeg | {}Foot | {}Toe",
@@ -145,19 +150,13 @@ SCHEMES = {
 }
 
 
-def not_the_last_of_feet(names: dict[str, str]) -> set[str]:
-    """Toes that are called feet beside ankles are found by nobody."""
-    return {f"toe.{side}" for side in "LR" if names[f"toe.{side}"].endswith("Foot")}
-
-
 @pytest.mark.parametrize("name", SCHEMES)
 def test_all_landmarks_are_found_under_the_names_of(name: str) -> None:
     names = SCHEMES[name]
 
     found = map_skeleton(humanoid(names))
 
-    expected = {each: names[each] for each in LANDMARKS if each not in not_the_last_of_feet(names)}
-    assert dict(found.landmarks.bones) == expected
+    assert dict(found.landmarks.bones) == names
     assert found.complete
     assert found.notes == ()
 
@@ -324,3 +323,44 @@ def test_fingers_beside_a_palm_do_not_hide_the_hand() -> None:
 
     assert found.landmarks["hand.L"] == "Palm2.L"
     assert found.notes == ("The left hand has 3 bones: 'Palm2.L' was taken.",)
+
+
+def test_an_arm_without_collar_bone_begins_at_the_shoulder() -> None:
+    names = SCHEMES["kinect"]
+    without = frozenset({"clavicle.L", "clavicle.R"})
+
+    found = map_skeleton(humanoid(names, without=without))
+
+    assert found.landmarks["upper_arm.L"] == "ShoulderLeft"
+    assert set(found.missing) == without
+
+
+HELPERS = {
+    # name of a bone by landmark, and what hangs beside or below it at the same place
+    "unreal": ("upperarm_twist_01_{}", "upper_arm", "ik_hand_{}", "hand", "weapon_{}", "hand"),
+    "japanese": ("{}腕捩", "upper_arm", "{}足ＩＫ", "foot", "{}足D", "thigh"),
+    "vroid": ("J_Sec_{}_Bust1", "chest", "J_Sec_{}_SkirtSide0", "hips", "J_Adj_{}_Eye", "head"),
+    "rigify": ("upper_arm_ik.{}", "upper_arm", "thigh_tweak.{}", "thigh", "heel.02.{}", "foot"),
+}
+WORDS = {"unreal": "lr", "japanese": "左右", "vroid": "LR", "rigify": "LR"}
+
+
+@pytest.mark.parametrize("name", HELPERS)
+def test_helpers_beside_the_bones_change_nothing(name: str) -> None:
+    names = SCHEMES[name]
+    skeleton = humanoid(names)
+    all_names, parents = [*skeleton.names], [*skeleton.parents]
+    matrices, lengths = [*skeleton.rest_matrices], [*skeleton.lengths]
+    patterns = HELPERS[name]
+    for pattern, landmark in zip(patterns[::2], patterns[1::2], strict=True):
+        for side, word in zip("LR", WORDS[name], strict=True):
+            bone = names.get(landmark) or names[f"{landmark}.{side}"]
+            parents.append(skeleton.index[bone])
+            all_names.append(pattern.replace("{}", word))
+            matrices.append(matrices[skeleton.index[bone]])
+            lengths.append(0.05)
+
+    found = map_skeleton(skeleton_of(all_names, parents, matrices, lengths))
+
+    assert dict(found.landmarks.bones) == names
+    assert found.notes == ()

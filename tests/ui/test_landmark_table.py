@@ -223,20 +223,19 @@ def test_every_landmark_has_a_property_with_a_tooltip() -> None:
 class Recorder:
     """Stands for a layout: takes every call, and keeps what was drawn."""
 
-    def __init__(self, log: list[tuple[str, Any]]) -> None:
+    def __init__(self, log: list[tuple[str, Any, Any]]) -> None:
         self.calls = log
-        self.alert = False
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        def call(*arguments: Any, **_: Any) -> Any:
-            self.calls.append((name, (*arguments, self.alert)))
+        def call(*arguments: Any, **options: Any) -> Any:
+            self.calls.append((name, arguments, options))
             return Recorder(self.calls)
 
         return call
 
 
 @pytest.mark.parametrize("mode", ["OBJECT", "POSE"])
-def test_missing_and_unknown_bones_are_drawn_red(mode: Any) -> None:
+def test_missing_and_unknown_bones_are_marked(mode: Any) -> None:
     armature = make_humanoid()
     settings: Any = splicing_settings(armature)
     click("map_skeleton")
@@ -244,13 +243,14 @@ def test_missing_and_unknown_bones_are_drawn_red(mode: Any) -> None:
     settings.landmarks.toe_l = ""
     settings.landmarks.head = "gone"
     bpy.ops.object.mode_set(mode=mode)
-    log: list[tuple[str, Any]] = []
+    log: list[tuple[str, Any, Any]] = []
     layout: Any = Recorder(log)
 
     landmark_table.draw_landmarks(layout, bpy.context, settings)
 
-    searches = {arguments[1]: arguments[-1] for call, arguments in log if call == "prop_search"}
-    assert set(searches) == set(PROPERTIES.values())
-    assert {name for name, red in searches.items() if red} == {"hand_l", "head"}
-    operators = [arguments[0] for call, arguments in log if call == "operator"]
+    searches = [arguments[1] for call, arguments, _ in log if call == "prop_search"]
+    assert searches == list(PROPERTIES.values())
+    labels = [options for call, _, options in log if call == "label"]
+    assert [each["text"] for each in labels if each.get("icon") == "ERROR"] == ["Head", "Hand"]
+    operators = [arguments[0] for call, arguments, _ in log if call == "operator"]
     assert operators.count("octo_motion.landmark_pick") == (21 if mode == "POSE" else 0)

@@ -32,7 +32,7 @@ _WORDS: Final[dict[str, str]] = {
     "thigh": "thigh upleg upperleg thighbend femur hip=.65 leg=.5 足=.9 脚=.9 もも 太もも 大腿",
     "shin": "shin calf lowerleg lowleg loleg knee=.95 leg=.75 tibia ひざ 膝 すね 下腿",
     "foot": "foot ankle 足首 足=.3",
-    "toe": "toe toes toebase ball forefoot つま先 つまさき 爪先",
+    "toe": "toe toes toebase ball forefoot foot=.3 つま先 つまさき 爪先",
 }
 """What each landmark is called, words of a name written together; with a weight where a word means
 it only in some rigs."""

@@ -171,22 +171,32 @@ def _fit(body: Body, bone: int, part: str) -> float:
 
 
 def _best_sequence(body: Body, candidates: Mapping[str, Mapping[int, float]]) -> dict[str, int]:
-    best: dict[int, tuple[float, dict[str, int]]] = {}
+    best: dict[tuple[str, int], tuple[float, dict[str, int]]] = {}
     for part, bones in candidates.items():
-        following: dict[int, tuple[float, dict[str, int]]] = {}
+        following: dict[tuple[str, int], tuple[float, dict[str, int]]] = {}
         for bone, weight in bones.items():
             options = [(weight, {part: bone})]
             options += [
-                (score + weight + _follows(body, before, bone, chain), {**chain, part: bone})
-                for before, (score, chain) in best.items()
-                if before != bone
+                (
+                    score + weight + _follows(body, before, bone, chain) - _left_out(last, part),
+                    {**chain, part: bone},
+                )
+                for (last, before), (score, chain) in best.items()
+                if bone not in chain.values()
             ]
-            following[bone] = max(options, key=lambda option: option[0])
+            following[part, bone] = max(options, key=lambda option: option[0])
         # A part may be left out: chains that end before stay in the race.
-        best = {**{bone: each for bone, each in best.items() if bone not in following}, **following}
+        best |= following
     if not best:
         return {}
     return max(best.values(), key=lambda option: option[0])[1]
+
+
+def _left_out(before: str, part: str) -> float:
+    """What it costs to leave out parts that every body has between two."""
+    parts = ARM if part in ARM else LEG
+    between = parts[parts.index(before) + 1 : parts.index(part)]
+    return 0.5 * sum(each not in OPTIONAL_PARTS for each in between)
 
 
 def _follows(body: Body, before: int, bone: int, chain: Mapping[str, int]) -> float:
@@ -247,4 +257,4 @@ def _skipped(body: Body, before: int, bone: int, part: str, gap: float) -> float
             # Another bone of the same part is no loss.
             cost += min(step, 1.0) * (1.0 - min(name.weights.get(part, 0.0), 1.0))
         child = between
-    return cost * (0.3 if part == "clavicle" else 2.0)
+    return cost * (0.3 if part in {"clavicle", "foot"} else 2.0)

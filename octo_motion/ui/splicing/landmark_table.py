@@ -7,6 +7,7 @@ for: artists know them, and they need no files of ours.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
@@ -133,11 +134,17 @@ class OCTO_MOTION_OT_landmarks_mirror(_TableOperator, bpy.types.Operator):
     direction: EnumProperty(
         name="Direction",
         items=(
-            ("LEFT_TO_RIGHT", "Left to Right", "The left side is right as it is"),
-            ("RIGHT_TO_LEFT", "Right to Left", "The right side is right as it is"),
+            ("LEFT_TO_RIGHT", "Left to Right", "The left side is as it should be"),
+            ("RIGHT_TO_LEFT", "Right to Left", "The right side is as it should be"),
         ),
         options={"SKIP_SAVE"},
     )
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: Any) -> str:  # noqa: ARG003
+        """The tooltip of either button."""
+        other = "right" if properties.direction == "LEFT_TO_RIGHT" else "left"
+        return f"Fill the {other} side with the bones that are called like those of this side"
 
     def edit(
         self,
@@ -221,7 +228,7 @@ def draw_landmarks(
     context: bpy.types.Context,
     settings: OCTO_MOTION_PG_splicing,
 ) -> None:
-    """The table with its buttons; missing and unknown bones are red."""
+    """The table with its buttons; missing and unknown bones are marked."""
     row = layout.row(align=True)
     row.operator(OCTO_MOTION_OT_map_skeleton.bl_idname, icon="ARMATURE_DATA")
     row.operator(OCTO_MOTION_OT_landmarks_clear.bl_idname, text="", icon="X")
@@ -235,43 +242,41 @@ def draw_landmarks(
     armature = cast("bpy.types.Object", settings.id_data)
     # Picking is for pose mode: elsewhere the buttons would only take room.
     can_pick = context.mode == "POSE"
-    column = layout.column(align=True)
-    for landmark in MIDDLE:
-        _draw_row(column, table, armature, (landmark,), can_pick=can_pick)
-    layout.separator()
-    row = layout.row(align=True)
-    row.label(text="Left")
-    mirror = OCTO_MOTION_OT_landmarks_mirror.bl_idname
-    to_right = row.operator(mirror, text="", icon="TRIA_RIGHT")
-    cast("Any", to_right).direction = "LEFT_TO_RIGHT"
-    to_left = row.operator(mirror, text="", icon="TRIA_LEFT")
-    cast("Any", to_left).direction = "RIGHT_TO_LEFT"
-    right = row.row()
-    right.alignment = "RIGHT"
-    right.label(text="Right")
-    column = layout.column(align=True)
-    for part in SIDED:
-        _draw_row(column, table, armature, (f"{part}.L", f"{part}.R"), can_pick=can_pick)
+    _draw_rows(layout, table, armature, MIDDLE, can_pick=can_pick)
+    for side, heading, direction in (
+        ("L", "Left", "LEFT_TO_RIGHT"),
+        ("R", "Right", "RIGHT_TO_LEFT"),
+    ):
+        row = layout.row(align=True)
+        row.label(text=heading)
+        mirror = row.operator(OCTO_MOTION_OT_landmarks_mirror.bl_idname, text="", icon="MOD_MIRROR")
+        cast("Any", mirror).direction = direction
+        parts = tuple(f"{part}.{side}" for part in SIDED)
+        _draw_rows(layout, table, armature, parts, can_pick=can_pick)
 
 
-def _draw_row(
-    column: bpy.types.UILayout,
+def _draw_rows(
+    layout: bpy.types.UILayout,
     table: Any,
     armature: bpy.types.Object,
-    landmarks: tuple[str, ...],
+    landmarks: Sequence[str],
     *,
     can_pick: bool,
 ) -> None:
-    split = column.split(factor=0.25, align=True)
-    split.label(text=title(landmarks[0]).removeprefix("left ").capitalize())
-    row = split.row(align=True)
+    # One column: side by side, names would be cut to two letters in a sidebar of usual width.
+    column = layout.column(align=True)
     bones = armature_data(armature).bones
     for landmark in landmarks:
         name = PROPERTIES[landmark]
         bone = getattr(table, name)
-        cell = row.row(align=True)
-        cell.alert = bone not in bones and (bool(bone) or landmark not in OPTIONAL)
-        cell.prop_search(table, name, armature.data, "bones", text="")
+        wrong = bone not in bones and (bool(bone) or landmark not in OPTIONAL)
+        split = column.split(factor=0.4, align=True)
+        words = title(landmark).removeprefix("left ").removeprefix("right ")
+        label = split.row(align=True)
+        label.alert = wrong
+        label.label(text=words.capitalize(), icon="ERROR" if wrong else "NONE")
+        row = split.row(align=True)
+        row.prop_search(table, name, armature.data, "bones", text="")
         if can_pick:
             pick = row.operator(OCTO_MOTION_OT_landmark_pick.bl_idname, text="", icon="EYEDROPPER")
             cast("Any", pick).landmark = name
