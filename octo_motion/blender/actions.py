@@ -384,7 +384,8 @@ def _write_curves(
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
             keys = curve.keyframe_points
             # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
-            if curve.group is None or _is_bezier(curve) != (channel.keys is not None):
+            regrouped = _is_bezier(curve) != (channel.keys is not None)
+            if curve.group is None or (regrouped and curve.group.name != channel.group):
                 group = channelbag.groups.get(channel.group)
                 curve.group = group or channelbag.groups.new(channel.group)
             place = (channel.data_path, component)
