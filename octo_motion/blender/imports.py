@@ -135,8 +135,10 @@ def _import_fbx(path: Path, scene: bpy.types.Scene) -> _Result:
 
 def _import_gltf(path: Path, scene: bpy.types.Scene) -> _Result:
     _content(path)
+    # The importer multiplies by the base of the rate where it should divide.
+    scene.render.fps_base = 1.0
     _call(bpy.ops.import_scene.gltf, filepath=str(path), disable_bone_shape=True)
-    return _Result(scene.render.fps / scene.render.fps_base, None)
+    return _Result(float(scene.render.fps), None)
 
 
 _IMPORTERS: Final[Mapping[str, Callable[[Path, bpy.types.Scene], _Result]]] = {

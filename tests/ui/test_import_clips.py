@@ -134,10 +134,15 @@ def test_real_files_of_odd_rates_play_at_their_own_speed(name: str, shared_data:
     assert action[NOTE]["file"] == f"{name}.bvh"
 
 
-@pytest.mark.parametrize("clip", ["punch_L", "throw_R", "walk"])
+@pytest.mark.parametrize(
+    ("clip", "rate"),
+    [("punch_L", (24, 1.0)), ("throw_R", (30, 1.001)), ("walk", (25, 1.0)), ("walk", (60, 1.5))],
+)
 def test_bvh_fbx_and_gltf_of_one_motion_lie_on_the_same_frames(
-    clip: str, shared_data: Data
+    clip: str, rate: tuple[int, float], shared_data: Data
 ) -> None:
+    scene: Any = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = rate
     before = of_the_scene()
     import_files(shared_data(f"secondlife/avatar_{clip}.bvh"))
     import_files(*(shared_data(f"derived_fbx_gltf/sl_{clip}.{kind}") for kind in ("fbx", "glb")))
@@ -145,6 +150,9 @@ def test_bvh_fbx_and_gltf_of_one_motion_lie_on_the_same_frames(
     bvh, fbx, gltf = (
         bpy.data.actions[name] for name in (f"avatar_{clip}", f"sl_{clip}", f"sl_{clip}.001")
     )
+    seconds = (times(bvh) - 1.0) * rate[1] / rate[0]
+    own = bvh[NOTE]["rate"]
+    np.testing.assert_allclose(seconds, np.arange(len(seconds)) / own, atol=1e-4)
     np.testing.assert_allclose(times(gltf), times(bvh), atol=1e-2)
     # The exporter had left out keys that lie on a line, none of them first or last.
     np.testing.assert_allclose(times(fbx)[[0, -1]], times(bvh)[[0, -1]], atol=1e-3)
