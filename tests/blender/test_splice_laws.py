@@ -11,9 +11,16 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.clips import read_clip, write_clip
-from octo_motion.core.rotations import Floats, angle_between, conjugate, multiply, rotate
+from octo_motion.core.rotations import (
+    Floats,
+    angle_between,
+    conjugate,
+    multiply,
+    normalized,
+    rotate,
+)
 from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.frames import chest_frame
+from octo_motion.core.splicing.frames import chest_frame, pelvis_frame
 from octo_motion.core.splicing.landmarks import Landmarks
 from octo_motion.core.splicing.mapping import map_skeleton
 from octo_motion.core.splicing.parts import LEFT_ARM, LEGS, PARTS, RIGHT_ARM, part_bones
@@ -187,6 +194,14 @@ def in_chest(clip: Clip, landmarks: Landmarks, landmark: str) -> Floats:
     return rotate(conjugate(frame.orientation(posture)), moved)
 
 
+def in_pelvis(clip: Clip, landmarks: Landmarks, landmark: str) -> Floats:
+    """The same as seen from the pelvis."""
+    frame = pelvis_frame(clip.skeleton, landmarks)
+    posture = posture_of(clip.skeleton, clip.rotations, clip.locations)
+    moved = posture.head(clip.skeleton.index[landmarks[landmark]]) - frame.place(posture)
+    return rotate(conjugate(frame.orientation(posture)), moved)
+
+
 def arm_length(clip: Clip, landmarks: Landmarks) -> float:
     heads, index = clip.skeleton.heads, clip.skeleton.index
     names = [landmarks[name] for name in ("upper_arm.R", "forearm.R", "hand.R")]
@@ -250,6 +265,36 @@ def test_nothing_pops_neither_at_straight_elbows_nor_at_seams(
                 steps.append(angle_between(result.rotations[1:], result.rotations[:-1]).max())
             # A jump would be as large at four times the frames; smooth motion has a quarter.
             assert steps[1] < 0.5 * steps[0]
+
+
+def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: SharedData):
+    # All bones of this file lie along one axis at rest, legs and arms alike.
+    odd, odd_marks = load(shared_data("animated_drawings/rokoko_jesse_dance.bvh"))
+    clip, marks = load(shared_data("secondlife/avatar_sword_strike_R.bvh"))
+    parts = [PARTS[name] for name in ("trunk", "head", "right_arm", "left_arm", "legs")]
+    for (base, landmarks), (other, others) in (
+        ((repeated(odd, len(clip)), odd_marks), (clip, marks)),
+        ((repeated(clip, 100), marks), (odd, odd_marks)),
+    ):
+        timing = Timing(1, other.frames[0], rate=base.rate / other.rate)
+        splices = [Splice(part, other, timing, others) for part in parts]
+        result = build(base, landmarks, splices)
+        frames = min(len(result), len(other))
+        for upper, lower in (
+            ("clavicle", "upper_arm"),
+            ("upper_arm", "forearm"),
+            ("forearm", "hand"),
+            ("thigh", "shin"),
+        ):
+            for side in "LR":
+                ours, theirs = (
+                    in_pelvis(each, mark, f"{lower}.{side}")
+                    - in_pelvis(each, mark, f"{upper}.{side}")
+                    for each, mark in ((result, landmarks), (other, others))
+                )
+                ours, theirs = normalized(ours[:frames]), normalized(theirs[:frames])
+                # Bodies are built differently; a limb that points elsewhere is off by far more.
+                assert np.degrees(np.arccos(np.sum(ours * theirs, axis=-1).min())) < 40.0
 
 
 def test_the_sources_own_experiment_becomes_new_actions(shared_data: SharedData):

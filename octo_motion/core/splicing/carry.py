@@ -10,7 +10,15 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import ClipError
-from ..rotations import Floats, conjugate, multiply, rotate
+from ..rotations import (
+    Floats,
+    angle_between,
+    conjugate,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+)
 from ..skeleton import Skeleton
 from .clip import Clip
 from .correspondence import (
@@ -27,6 +35,10 @@ from .parts import Part, beneath, bone_of, landmark_bone, piece_bones
 from .posture import Posture, posture_of, sampled, slerp
 
 _LIMBS = {"arm": ("upper_arm", "forearm", "hand"), "leg": ("thigh", "shin", "foot")}
+
+_UPRIGHT = np.radians(30.0)
+"""Between chest and pelvis: at more than this nobody stands. Some files' bones all lie along one
+axis at rest."""
 
 _HINGE_SAMPLES = 200
 """Frames of a clip from which a limb's hinge is read."""
@@ -84,6 +96,8 @@ class Carrier:
     """Joint, elbow and hand, on base and splice."""
     spread: tuple[tuple[int, ...], tuple[int, ...]] | None
     """Chains with unlike numbers of bones, on base and splice."""
+    bent_rest: bool = False
+    """Whether the rest pose of one of the two is none to compare the other's with."""
 
     @cached_property
     def joined(self) -> _Joined | None:
@@ -255,11 +269,24 @@ def _carry_spread(
             turn = slerp(turn, after, np.full(len(turn), place - first))
         rest = multiply(lay, base.rest_rotations[bone])
         wanted = multiply(between, multiply(turn, rest))
+        if carrier.bent_rest and bone != ours[-1]:
+            segment = base.heads[ours[ours.index(bone) + 1]] - base.heads[bone]
+            along = rotate(between, _direction(splice, theirs, first))
+            carried = result.carried(bone)
+            own = rotate(multiply(carried, conjugate(base.rest_rotations[bone])), segment)
+            own = np.broadcast_to(normalized(own), along.shape)
+            wanted = multiply(shortest_arc(own, along), carried)
         if bone == ours[-1] and bone in carrier.match.constants:
             # The chest itself: its frame is met, not just its turn from rest.
             own = splice.orientation(theirs[-1])
             wanted = multiply(multiply(between, own), carrier.match.constants[bone])
         rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
+
+
+def _direction(posture: Posture, bones: Sequence[int], place: int) -> Floats:
+    """Where a chain leads from one of its bones on (from its last: to it), (frames, 3)."""
+    first = min(place, len(bones) - 2)
+    return normalized(posture.head(bones[first + 1]) - posture.head(bones[first]))
 
 
 def _fractions(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
@@ -300,7 +327,14 @@ def _piece_carrier(
             pairs = {bones[-1]: others[-1]}
             spread = tuple(bones), tuple(others)
     rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
-    match = correspondence(base.skeleton, splice.skeleton, pairs, rests, ours)
+    bent = False
+    if kind == "trunk":
+        sides = zip(frames, chests, (base, splice), strict=True)
+        bent = any(
+            angle_between(low.at_rest(each.skeleton), high.at_rest(each.skeleton)) > _UPRIGHT
+            for low, high, each in sides
+        )
+    match = correspondence(base.skeleton, splice.skeleton, pairs, rests, ours, aim_all=bent)
     if kind == "trunk":
         constants = dict(match.constants)
         constants[bones[-1]] = multiply(chests[1].turn, conjugate(chests[0].turn))
@@ -309,7 +343,7 @@ def _piece_carrier(
     if kind in _LIMBS:
         names = [f"{name}.{side}" for name in _LIMBS[kind]]
         limb = _three(base.skeleton, ours, names), _three(splice.skeleton, theirs, names)
-    return Carrier(base, splice, tuple(bones), frames, match, limb, spread)
+    return Carrier(base, splice, tuple(bones), frames, match, limb, spread, bent)
 
 
 def _three(skeleton: Skeleton, landmarks: Landmarks, names: Sequence[str]) -> tuple[int, int, int]:

@@ -32,6 +32,10 @@ from .landmarks import LANDMARKS, Landmarks
 _SAME: Final = 0.005
 """Of a part's whole length: how much bones may differ in length and count as the same body's."""
 
+_UNLIKE: Final = float(np.cos(np.radians(45.0)))
+"""Cosine of the angle at which bones of two rest poses are no longer the same in the same pose.
+Some files' bones all lie along one axis at rest."""
+
 _AIMED: Final = frozenset({"upper_arm", "forearm", "thigh", "shin"})
 """Landmarks whose direction is what they show, whatever their bodies are."""
 
@@ -133,16 +137,15 @@ def correspondence(
         kind = landmark.partition(".")[0]
         lay = laid.get(base.parents[bone], _nearest(laid, base, bone))
         follower = _follower(base, bone, pairs, landmarks, landmark)
-        if aim_all or kind in _AIMED or not kind:
-            if follower is not None:
-                ours = rotate(our_back, base.heads[follower] - base.heads[bone])
-                theirs = rotate(their_back, splice.heads[pairs[follower]] - splice.heads[other])
-                ours, theirs = normalized(ours), normalized(rotate(lay, theirs))
-                if np.any(ours) and np.any(theirs):
-                    lay = multiply(shortest_arc(theirs, ours), lay)
-        elif kind != "hand":
-            # Clavicles, feet, spines and heads are built differently, but stand alike at rest.
-            lay = IDENTITY
+        if follower is not None:
+            ours = rotate(our_back, base.heads[follower] - base.heads[bone])
+            theirs = rotate(their_back, splice.heads[pairs[follower]] - splice.heads[other])
+            ours, theirs = normalized(ours), normalized(rotate(lay, theirs))
+            # Clavicles, feet, spines and heads are built differently, but hang on alike at rest:
+            # unless one rest pose is none to stand in.
+            aimed = aim_all or kind in _AIMED or not kind or np.dot(ours, theirs) < _UNLIKE
+            if aimed and np.any(ours) and np.any(theirs):
+                lay = multiply(shortest_arc(theirs, ours), lay)
         laid[bone] = lay
         rest = multiply(our_back, base.rest_rotations[bone])
         other_rest = multiply(their_back, splice.rest_rotations[other])
