@@ -78,7 +78,8 @@ def test_example_runs_in_a_new_file_and_leaves_a_motion(block: str) -> None:
     armatures: list[Any] = [each for each in bpy.data.objects if each.type == "ARMATURE"]
     assert armatures
     for armature in armatures:
-        action = armature.octo_motion.locomotion.result
+        own = armature.octo_motion
+        action = own.splicing.result or own.locomotion.result
         assert armature.animation_data.action == action
         assert action.frame_end > action.frame_start
 
@@ -153,6 +154,10 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(after("An item of its `bones`:", arms))
         case "landmarks":
             return rows(section("## Landmarks"))
+        case "splicing":
+            return rows(section("## Splicing").split("An item of", 1)[0])
+        case "splice":
+            return rows(after("An item of `splices`:", "## Splicing"))
         case "table":
             return rows(section(table).split("An item of", 1)[0])
         case "knot":
@@ -164,12 +169,16 @@ def described(group: str) -> dict[str, list[str]]:
 def group_class(group: str) -> Any:
     from octo_motion.ui.locomotion import arm_properties, gait_properties, properties
     from octo_motion.ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
+    from octo_motion.ui.splicing.properties import OCTO_MOTION_PG_splicing
+    from octo_motion.ui.splicing.splice_properties import SpliceItem
 
     own = {
         "locomotion": properties.OCTO_MOTION_PG_locomotion,
         "arm": arm_properties.ArmItem,
         "bone": arm_properties.ArmBoneItem,
         "landmarks": OCTO_MOTION_PG_landmarks,
+        "splicing": OCTO_MOTION_PG_splicing,
+        "splice": SpliceItem,
     }
     return own.get(group) or getattr(gait_properties, f"OCTO_MOTION_PG_gait_{group}")
 
@@ -227,11 +236,17 @@ def number(value: float, definition: Any) -> str:
 @pytest.mark.usefixtures("clean_blender")
 @pytest.mark.parametrize(
     "group",
-    ["locomotion", "arm", "bone", "table", "curve", "knot", "offset", "note", "landmarks"],
+    [
+        *("locomotion", "arm", "bone", "table", "curve", "knot", "offset", "note"),
+        *("splicing", "splice", "landmarks"),
+    ],
 )
 def test_every_setting_is_described_with_its_type_and_its_default(group: str) -> None:
     owner = group_class(group)
-    definitions = {name: owner.bl_rna.properties[name] for name in owner.__annotations__}
+    # A group's own, and those of the classes that it is put together from.
+    names = {name for each in owner.__mro__ for name in vars(each).get("__annotations__", ())}
+    names |= set(owner.__annotations__)
+    definitions = {name: owner.bl_rna.properties[name] for name in names}
     expected = {
         name: [type_of(each), default_of(each)] for name, each in sorted(definitions.items())
     }

@@ -20,7 +20,15 @@ from .locomotion import (
     panels,
     properties,
 )
-from .splicing import import_clips, landmark_table
+from .splicing import (
+    import_clips,
+    landmark_table,
+    splice_build,
+    splice_drag,
+    splice_list,
+    splice_panels,
+    splice_properties,
+)
 from .splicing import properties as splicing_properties
 
 Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
@@ -36,6 +44,7 @@ CLASSES: tuple[type, ...] = (
     *arm_list.CLASSES,
     *properties.CLASSES,
     *landmark_table.CLASSES,
+    *splice_properties.CLASSES,
     *splicing_properties.CLASSES,
     *settings.CLASSES,
     add_octopus.OCTO_MOTION_OT_add_octopus,
@@ -44,6 +53,10 @@ CLASSES: tuple[type, ...] = (
     generate.OCTO_MOTION_OT_generate_locomotion,
     *panels.CLASSES,
     *import_clips.CLASSES,
+    *splice_list.CLASSES,
+    *splice_build.CLASSES,
+    *splice_drag.CLASSES,
+    *splice_panels.CLASSES,
 )
 
 

@@ -59,7 +59,8 @@ class Layout:
         assert index < max(getattr(definition, "array_length", 0), 1)
         self.drawn.append(name)
 
-    def prop_search(self, data: Any, name: str, where: Any, what: str) -> None:
+    def prop_search(self, data: Any, name: str, where: Any, what: str, **more: Any) -> None:
+        check("prop_search", more)
         assert where.bl_rna.properties[what].type == "COLLECTION"
         self.prop(data, name)
 
@@ -80,7 +81,8 @@ class Layout:
         check("menu", more)
         assert icon in ICONS
         self.drawn.append(name)
-        getattr(bpy.types, name).draw(SimpleNamespace(layout=self), bpy.context)
+        stand_in = SimpleNamespace(layout=self, draw_preset=lambda _context: None)
+        getattr(bpy.types, name).draw(stand_in, bpy.context)
 
     def template_list(
         self, kind: str, _name: str, data: Any, items: str, other: Any, active: str, **more: Any

@@ -13,7 +13,7 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Final, cast
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
@@ -350,8 +350,10 @@ def _previous_action(
 ) -> bpy.types.Action | None:
     """The action to make anew: the one that plays if it was generated, else the last result."""
     data = armature.animation_data
-    if data is not None and data.action is not None and actions.is_generated(data.action):
-        return data.action
+    spliced = cast("Any", armature).octo_motion.splicing.result
+    playing = data.action if data is not None else None
+    if playing is not None and playing != spliced and actions.is_generated(playing):
+        return playing
     return settings.result
 
 

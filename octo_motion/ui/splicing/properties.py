@@ -11,9 +11,10 @@ from bpy.props import PointerProperty
 from ...blender.armature import armature_data
 from ..locomotion.properties import make_overridable
 from .landmark_properties import OCTO_MOTION_PG_landmarks
+from .splice_properties import SpliceStack
 
 
-class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
+class OCTO_MOTION_PG_splicing(SpliceStack, bpy.types.PropertyGroup):
     """Settings of splicing, saved with the armature object."""
 
     landmarks: PointerProperty(

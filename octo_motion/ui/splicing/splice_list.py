@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of splices: added, removed, moved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+
+from ...blender.actions import writable_armature
+from ...blender.armature import active_armature
+from ...blender.overrides import linked_names
+from ...core.errors import ClipError
+from ..locomotion.armature_operator import ArmatureOperator
+from .properties import splicing_settings
+from .splice_properties import PARTS
+from .stack import Reader
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+_SPARE_EASE: Final = 0.25
+"""Of a clip's length: longer easing would leave little of a short clip."""
+
+
+def active_splice(settings: Any) -> Any:
+    """The list's active splice, ``None`` in an empty list."""
+    number = settings.active_splice
+    return settings.splices[number] if 0 <= number < len(settings.splices) else None
+
+
+class OCTO_MOTION_UL_splices(bpy.types.UIList):
+    """A row for each splice: on or off, name, where it begins."""
+
+    def draw_item(  # noqa: PLR0917 - Blender's order
+        self,
+        context: bpy.types.Context | None,  # noqa: ARG002
+        layout: bpy.types.UILayout,
+        data: Any,  # noqa: ARG002
+        item: Any,
+        icon: int | None,  # noqa: ARG002
+        active_data: Any,  # noqa: ARG002
+        active_property: str | None,  # noqa: ARG002
+        index: int | None = 0,  # noqa: ARG002
+        flt_flag: int | None = 0,  # noqa: ARG002
+    ) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "mute", text="", icon="HIDE_ON" if item.mute else "HIDE_OFF", emboss=False)
+        name = row.row()
+        name.active = not item.mute
+        # Red: the source is gone.
+        name.alert = item.source is None or item.action is None
+        name.prop(item, "name", text="", emboss=False)
+        start = row.row()
+        start.alignment = "RIGHT"
+        start.active = not item.mute
+        start.label(text=f"{item.base_start:g}")
+
+
+class StackOperator(ArmatureOperator):
+    """An operator on the stack of the active armature."""
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        writable_armature(armature)
+        self.edit(context, armature, splicing_settings(armature))
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
+        """Do the work on an armature that can be edited."""
+        raise NotImplementedError
+
+
+class SpliceOperator(StackOperator):
+    """An operator on the active splice."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if active_splice(splicing_settings(active_armature(context))) is None:
+            cls.poll_message_set("Choose a splice in the list first")  # type: ignore[attr-defined]
+            return False
+        return True
+
+
+class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.splice_add"
+    bl_label = "Add Splice"
+    bl_description = (
+        "Add a part of another clip to the list. Select the armature with that clip, then Shift "
+        "click the one that gets it; its action becomes the base. Without another armature you "
+        "are asked for an action"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    part: EnumProperty(
+        name="Part", description="Which part of the body is taken", items=PARTS, default="RIGHT_ARM"
+    )
+    bone: StringProperty(
+        name="First Bone",
+        description="With the part Chain: its first bone; the active bone of pose mode if empty",
+        options={"SKIP_SAVE"},
+    )
+    source: StringProperty(
+        name="Source",
+        description="Armature with the clip; the other selected one if empty, and if there is "
+        "none, the active one itself",
+        options={"SKIP_SAVE"},
+    )
+    action: StringProperty(
+        name="Action",
+        description="The clip; the source's own action if empty",
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(
+        self,
+        context: bpy.types.Context,
+        event: bpy.types.Event,  # noqa: ARG002
+    ) -> set[OperatorReturnItems]:
+        """Ask for a source if the selection names none."""
+        if self.action or self.source or _other_armatures(context):
+            return self.execute(context)
+        assert context.window_manager is not None
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        assert layout is not None
+        layout.use_property_split = True
+        layout.prop(self, "part")
+        if self.part == "CHAIN":
+            layout.prop_search(self, "bone", active_armature(context).data, "bones")
+        layout.prop_search(self, "source", bpy.data, "objects")
+        layout.prop_search(self, "action", bpy.data, "actions")
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
+        base, base_slot = _base(armature, settings)
+        source = self._source(context, armature)
+        action, slot = self._action(source, armature)
+        bone = self._bone(context, armature)
+        reader = Reader()
+        visual = settings.visual and settings.base is not None
+        begins = reader.source(armature, base, base_slot, visual=visual).clip.frames[0]
+        clip = reader.source(source, action, slot, visual=False).clip
+        if settings.base is None:
+            settings.base, settings.base_slot = base, base_slot
+        item = settings.splices.add()
+        title = next(each[1] for each in PARTS if each[0] == self.part)
+        item.name = _unique(settings, f"{bone or title}: {action.name}")
+        item.part, item.bone = self.part, bone
+        item.source, item.action, item.slot = source, action, slot
+        item.base_start, item.splice_start = float(begins), float(clip.frames[0])
+        ease = min(item.ease_in, _SPARE_EASE * float(clip.frames[-1] - clip.frames[0]))
+        item.ease_in = item.ease_out = round(ease)
+        settings.active_splice = len(settings.splices) - 1
+
+    def _source(self, context: bpy.types.Context, armature: bpy.types.Object) -> bpy.types.Object:
+        if self.source:
+            found = bpy.data.objects.get(self.source)
+            if found is None or found.type != "ARMATURE":
+                raise ClipError(
+                    f"There is no armature '{self.source}'.", "Choose the armature of the clip."
+                )
+            return found
+        others = _other_armatures(context)
+        if len(others) > 1:
+            raise ClipError(
+                f"{len(others)} other armatures are selected.",
+                "Select the one with the clip, then Shift click the one that gets it.",
+            )
+        if others:
+            return others[0]
+        if not self.action:
+            raise ClipError(
+                "No source is selected.",
+                "Select the armature with the clip, then Shift click the one that gets it; or "
+                "choose an action.",
+            )
+        return armature
+
+    def _action(
+        self, source: bpy.types.Object, armature: bpy.types.Object
+    ) -> tuple[bpy.types.Action, str]:
+        if self.action:
+            action = bpy.data.actions.get(self.action)
+            if action is None:
+                raise ClipError(f"There is no action '{self.action}'.", "Choose the clip's action.")
+            return action, ""
+        data = source.animation_data
+        if data is None or data.action is None:
+            raise ClipError(
+                f"The source '{source.name}' has no action.", "Give it one, or choose an action."
+            )
+        if source == armature:
+            raise ClipError(
+                f"'{source.name}' is both base and source.", "Choose the action of the source."
+            )
+        return data.action, data.action_slot.identifier if data.action_slot else ""
+
+    def _bone(self, context: bpy.types.Context, armature: bpy.types.Object) -> str:
+        if self.part != "CHAIN":
+            return ""
+        if self.bone:
+            return self.bone
+        active = context.active_pose_bone
+        if active is None or active.id_data != armature:
+            raise ClipError(
+                "It is not said which chain.",
+                "Click its first bone in pose mode, or enter its name.",
+            )
+        return active.name
+
+
+class OCTO_MOTION_OT_splice_remove(SpliceOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.splice_remove"
+    bl_label = "Remove Splice"
+    bl_description = "Take the active splice off the list. Its clip stays as it is"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def edit(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        armature: bpy.types.Object,  # noqa: ARG002
+        settings: Any,
+    ) -> None:
+        name = settings.splices[settings.active_splice].name
+        if name in linked_names(settings, "splices"):
+            raise ClipError(
+                f"Splice '{name}' is in the linked file and cannot be removed here.",
+                "Mute it instead.",
+            )
+        settings.splices.remove(settings.active_splice)
+        settings.active_splice = max(0, min(settings.active_splice, len(settings.splices) - 1))
+
+
+class OCTO_MOTION_OT_splice_move(SpliceOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.splice_move"
+    bl_label = "Move Splice"
+    bl_description = (
+        "Move the active splice in the list. Each goes onto the result of those above it"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    direction: EnumProperty(
+        name="Direction",
+        items=(
+            ("UP", "Up", "Towards the first"),
+            ("DOWN", "Down", "Towards the last"),
+        ),
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[Any]:
+        settings = cast("Any", splicing_settings(active_armature(context)))
+        if not 0 <= self._target(settings) < len(settings.splices):
+            # It is the first or the last already: no undo step for that.
+            return {"CANCELLED"}
+        return super().execute(context)
+
+    def edit(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        armature: bpy.types.Object,  # noqa: ARG002
+        settings: Any,
+    ) -> None:
+        name = settings.splices[settings.active_splice].name
+        if name in linked_names(settings, "splices"):
+            raise ClipError(
+                f"Splice '{name}' is in the linked file, where the order is set.",
+                "Move splices that were added in this file, or change the order there.",
+            )
+        target = self._target(settings)
+        settings.splices.move(settings.active_splice, target)
+        settings.active_splice = target
+
+    def _target(self, settings: Any) -> int:
+        return settings.active_splice + (-1 if self.direction == "UP" else 1)
+
+
+def _other_armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
+    active = active_armature(context)
+    layer = context.view_layer
+    assert layer is not None
+    return [
+        each
+        for each in layer.objects
+        if each.type == "ARMATURE" and each != active and each.select_get(view_layer=layer)
+    ]
+
+
+def _base(armature: bpy.types.Object, settings: Any) -> tuple[bpy.types.Action, str]:
+    if settings.base is not None:
+        return settings.base, settings.base_slot
+    data = armature.animation_data
+    if data is None or data.action is None:
+        raise ClipError(
+            f"'{armature.name}' has no action to splice onto.", "Give it one, or choose the base."
+        )
+    return data.action, data.action_slot.identifier if data.action_slot else ""
+
+
+def _unique(settings: Any, name: str) -> str:
+    taken = {each.name for each in settings.splices}
+    unique, number = name, 1
+    while unique in taken:
+        unique = f"{name}.{number:03}"
+        number += 1
+    return unique
+
+
+CLASSES: Final[tuple[type, ...]] = (
+    OCTO_MOTION_UL_splices,
+    OCTO_MOTION_OT_splice_add,
+    OCTO_MOTION_OT_splice_remove,
+    OCTO_MOTION_OT_splice_move,
+)

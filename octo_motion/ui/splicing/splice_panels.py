@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Splicing: base and list, the active splice, its timing, landmarks."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import bpy
+
+from ...blender.armature import active_armature
+from ...core.errors import RigError
+from .landmark_table import draw_landmarks
+from .properties import splicing_settings
+from .splice_build import OCTO_MOTION_OT_splice_build, OCTO_MOTION_OT_splice_suggest_timing
+from .splice_drag import OCTO_MOTION_OT_splice_drag_timing
+from .splice_list import (
+    OCTO_MOTION_OT_splice_add,
+    OCTO_MOTION_OT_splice_move,
+    OCTO_MOTION_OT_splice_remove,
+    OCTO_MOTION_UL_splices,
+    active_splice,
+)
+from .stack import LEG_PARTS
+
+
+class _Panel:
+    """A panel of the tab that is there for armatures."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Octo Motion"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _armature(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        armature = _armature(context)
+        assert armature is not None
+        layout = cast("Any", self).layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        # Greyed out where nothing that is set would be saved.
+        layout.enabled = armature.is_editable
+        self.show(context, layout, cast("Any", splicing_settings(armature)))
+
+    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
+        raise NotImplementedError
+
+
+class _SplicePanel(_Panel):
+    """A panel of the active splice."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        armature = _armature(context)
+        return armature is not None and active_splice(splicing_settings(armature)) is not None
+
+
+def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
+    try:
+        return active_armature(context)
+    except RigError:
+        return None
+
+
+class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_splicing"
+    bl_label = "Splicing"
+    bl_order = 5
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: Any,
+    ) -> None:
+        _draw_action(layout, settings, "base", "base_slot")
+        layout.prop(settings, "visual")
+        row = layout.row()
+        row.template_list(
+            OCTO_MOTION_UL_splices.__name__,
+            "",
+            settings,
+            "splices",
+            settings,
+            "active_splice",
+            rows=4,
+            maxrows=8,
+        )
+        column = row.column(align=True)
+        column.operator(OCTO_MOTION_OT_splice_add.bl_idname, text="", icon="ADD")
+        column.operator(OCTO_MOTION_OT_splice_remove.bl_idname, text="", icon="REMOVE")
+        column.separator()
+        up = column.operator(OCTO_MOTION_OT_splice_move.bl_idname, text="", icon="TRIA_UP")
+        up.direction = "UP"
+        down = column.operator(OCTO_MOTION_OT_splice_move.bl_idname, text="", icon="TRIA_DOWN")
+        down.direction = "DOWN"
+        column = layout.column(align=True)
+        column.operator_context = "INVOKE_DEFAULT"
+        column.operator(OCTO_MOTION_OT_splice_drag_timing.bl_idname, icon="ARROW_LEFTRIGHT")
+        column.operator(OCTO_MOTION_OT_splice_suggest_timing.bl_idname, icon="LIGHT")
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator(OCTO_MOTION_OT_splice_build.bl_idname, icon="PLAY", text="Build")
+        if settings.result is not None:
+            layout.label(text=settings.result.name, icon="ACTION")
+
+
+class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_splice"
+    bl_label = "Splice"
+    bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: Any,
+    ) -> None:
+        item = active_splice(settings)
+        layout.prop(item, "part")
+        if item.part == "CHAIN":
+            layout.prop_search(item, "bone", settings.id_data.data, "bones")
+        source = layout.column()
+        source.alert = item.source is None
+        source.prop(item, "source")
+        if item.part == "CHAIN" and item.source is not None:
+            layout.prop_search(item, "source_bone", item.source.data, "bones")
+        _draw_action(layout, item, "action", "slot")
+        if item.source is None or item.action is None:
+            layout.label(text="Its source is gone: choose another", icon="ERROR")
+        elif not item.source.users_scene:
+            layout.label(text="Deleted, kept for this splice", icon="INFO")
+        layout.prop(item, "visual")
+        if item.part != "CHAIN":
+            layout.row().prop(item, "mode", expand=True)
+        if item.part in LEG_PARTS:
+            layout.prop(item, "with_travel")
+
+
+class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_splice_timing"
+    bl_label = "Timing of the Splice"
+    bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: Any,
+    ) -> None:
+        item = active_splice(settings)
+        column = layout.column(align=True)
+        column.prop(item, "base_start")
+        column.prop(item, "splice_start")
+        layout.prop(item, "rate")
+        layout.prop(item, "length")
+        column = layout.column(align=True)
+        column.prop(item, "ease_in")
+        column.prop(item, "ease_out", text="Out")
+        layout.row().prop(item, "after", expand=True)
+
+
+class OCTO_MOTION_PT_landmarks(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_landmarks"
+    bl_label = "Landmarks"
+    bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
+
+    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
+        layout.use_property_split = False
+        draw_landmarks(layout, context, settings)
+
+
+def _draw_action(layout: Any, group: Any, action: str, slot: str) -> None:
+    column = layout.column()
+    column.alert = getattr(group, action) is None
+    column.prop(group, action)
+    chosen = getattr(group, action)
+    # Most actions have one slot, which need not be chosen.
+    if chosen is not None and (len(chosen.slots) > 1 or getattr(group, slot) not in chosen.slots):
+        layout.prop_search(group, slot, chosen, "slots")
+
+
+CLASSES: Final = (
+    OCTO_MOTION_PT_splicing,
+    OCTO_MOTION_PT_splice,
+    OCTO_MOTION_PT_splice_timing,
+    OCTO_MOTION_PT_landmarks,
+)

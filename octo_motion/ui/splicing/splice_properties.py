@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The stack of splices, as it is saved with the armature object.
+
+The name of a splice is what Blender tells the items of a linked list apart by, so it alone cannot
+be overridden.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ..locomotion.gait_properties import OVERRIDE, OVERRIDE_LIST
+
+PARTS: Final = (
+    ("RIGHT_ARM", "Right Arm", "From the right collar bone or shoulder to the fingers", 0),
+    ("LEFT_ARM", "Left Arm", "From the left collar bone or shoulder to the fingers", 1),
+    ("LEGS", "Legs", "Both legs", 2),
+    ("TRUNK", "Trunk", "From above the pelvis to the chest", 3),
+    ("HEAD", "Head", "Neck and head", 4),
+    ("RIGHT_LEG", "Right Leg", "From the right hip to the toes", 5),
+    ("LEFT_LEG", "Left Leg", "From the left hip to the toes", 6),
+    ("CHAIN", "Chain", "A bone and all beneath it: a tail, an octopus arm", 7),
+)
+
+AFTER: Final = (
+    ("STOP", "Stop", "Back to the base", 0),
+    ("HOLD", "Hold", "Stay in the last pose", 1),
+    ("LOOP", "Loop", "Begin again with the clip's first frame", 2),
+)
+
+MODES: Final = (
+    ("DIRECTION", "Direction", "Hands and feet lie in the direction where the clip has them", 0),
+    ("EXACT", "Exact", "The limb bends so that hands and feet are where the clip has them", 1),
+)
+
+
+def _is_armature(_: Any, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "ARMATURE"
+
+
+def _slot(description: str) -> Any:
+    return StringProperty(name="Slot", description=description, override=OVERRIDE)
+
+
+class SpliceItem(bpy.types.PropertyGroup):
+    """One part of one clip, and when."""
+
+    name: StringProperty(name="Name", description="What this splice is called in the list")
+    part: EnumProperty(
+        name="Part",
+        description="Which part of the body is taken from the source",
+        items=PARTS,
+        override=OVERRIDE,
+    )
+    bone: StringProperty(
+        name="First Bone",
+        description="With the part Chain: its first bone on this armature",
+        override=OVERRIDE,
+    )
+    source_bone: StringProperty(
+        name="Source Bone",
+        description="With the part Chain: its first bone on the source, if it is called otherwise",
+        override=OVERRIDE,
+    )
+    source: PointerProperty(
+        name="Source",
+        description="The armature that the clip is for. It may have other proportions, bones and "
+        "axes, and may be this armature itself",
+        type=bpy.types.Object,
+        poll=_is_armature,
+        override=OVERRIDE,
+    )
+    action: PointerProperty(
+        name="Action",
+        description="The clip. It is never changed",
+        type=bpy.types.Action,
+        override=OVERRIDE,
+    )
+    slot: _slot("Slot of the clip's action; empty takes the one that fits the source")
+    visual: BoolProperty(
+        name="As Shown",
+        description="Take the clip as the scene shows it, with constraints, drivers and NLA. "
+        "That plays the scene, so it takes longer",
+        override=OVERRIDE,
+    )
+    splice_start: FloatProperty(
+        name="Clip Start",
+        description="Frame of the clip that is shown first",
+        default=1.0,
+        step=100,
+        precision=1,
+        override=OVERRIDE,
+    )
+    base_start: FloatProperty(
+        name="Base Start",
+        description="Frame of the base at which the splice begins",
+        default=1.0,
+        step=100,
+        precision=1,
+        override=OVERRIDE,
+    )
+    rate: FloatProperty(
+        name="Rate",
+        description="Speed of the clip, 1 as it is",
+        default=1.0,
+        min=0.01,
+        max=100.0,
+        soft_max=4.0,
+        step=5,
+        override=OVERRIDE,
+    )
+    length: FloatProperty(
+        name="Length",
+        description="Frames of the base that the splice lasts; 0 is as long as there is motion",
+        min=0.0,
+        step=100,
+        precision=1,
+        override=OVERRIDE,
+    )
+    ease_in: FloatProperty(
+        name="Ease In",
+        description="Frames over which the splice comes in",
+        default=6.0,
+        min=0.0,
+        step=100,
+        precision=1,
+        override=OVERRIDE,
+    )
+    ease_out: FloatProperty(
+        name="Ease Out",
+        description="Frames over which the splice goes, if it ends before the base",
+        default=6.0,
+        min=0.0,
+        step=100,
+        precision=1,
+        override=OVERRIDE,
+    )
+    after: EnumProperty(
+        name="After",
+        description="What happens when the clip runs out",
+        items=AFTER,
+        override=OVERRIDE,
+    )
+    mode: EnumProperty(
+        name="Reach",
+        description="Where hands and feet go on a body of other proportions",
+        items=MODES,
+        override=OVERRIDE,
+    )
+    with_travel: BoolProperty(
+        name="With Travel",
+        description="Legs bring the clip's way through the world with them, so that feet do not "
+        "skate",
+        override=OVERRIDE,
+    )
+    mute: BoolProperty(name="Mute", description="Leave this splice out", override=OVERRIDE)
+
+
+class SpliceStack:
+    """What ``Object.octo_motion.splicing`` has of the stack."""
+
+    base: PointerProperty(
+        name="Base",
+        description="The action onto which parts are spliced. It is never changed",
+        type=bpy.types.Action,
+        override=OVERRIDE,
+    )
+    base_slot: _slot("Slot of the base; empty takes the one that fits the armature")
+    visual: BoolProperty(
+        name="Base As Shown",
+        description="Take the base as the scene shows it, with constraints, drivers and NLA. "
+        "That plays the scene, so it takes longer",
+        override=OVERRIDE,
+    )
+    splices: CollectionProperty(
+        name="Splices",
+        description="What is spliced onto the base, each onto the result of those above it",
+        type=SpliceItem,
+        override=OVERRIDE_LIST,
+    )
+    active_splice: IntProperty(name="Active Splice", options={"HIDDEN"}, override=OVERRIDE)
+    result: PointerProperty(
+        name="Result",
+        description="The action that was built last. It is made anew in place until you edit it; "
+        "then it is yours, and the next one is a new action",
+        type=bpy.types.Action,
+        override=OVERRIDE,
+    )
+
+
+CLASSES: Final[tuple[type, ...]] = (SpliceItem,)

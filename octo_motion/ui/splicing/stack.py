@@ -1,0 +1,390 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A stack of splices from settings to keys: read → plain arrays → compute → write.
+
+:func:`prepare` reads everything and finds everything that is wrong; a :class:`Stack` computes on
+plain arrays alone; :func:`write` changes the file.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, cast
+
+import bpy
+import numpy as np
+
+from ...blender import actions
+from ...blender.armature import armature_data, read_skeleton
+from ...blender.clips import read_clip, write_clip
+from ...core.errors import ClipError, WriteError
+from ...core.splicing.alignment import Suggestion, suggest_timings
+from ...core.splicing.carry import Side, carriers
+from ...core.splicing.clip import Clip
+from ...core.splicing.landmarks import LANDMARKS, OPTIONAL, Landmarks
+from ...core.splicing.mapping import map_skeleton
+from ...core.splicing.parts import PARTS, Part, chain
+from ...core.splicing.splice import Reach, Splice, build
+from ...core.splicing.timing import After, Timing, window
+from ..plain import plain
+from .landmark_properties import read_landmarks, write_landmarks
+from .properties import OCTO_MOTION_PG_splicing, splicing_settings
+
+MOST_TRAVEL_FRAMES: Final = 120
+"""Frames from which a preview of legs that travel finds the ground."""
+
+
+LEG_PARTS: Final = frozenset({"LEGS", "RIGHT_LEG", "LEFT_LEG"})
+"""Parts that can bring their travel along."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A clip with what is known of its skeleton."""
+
+    armature: str
+    clip: Clip
+    landmarks: Landmarks | None
+    problem: str
+    """Why there are no landmarks."""
+    found: bool
+    """Whether the landmarks were found just now: the armature's table is not filled."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """A base and all that goes onto it, as plain data; see :func:`prepare`."""
+
+    armature: str
+    """Name of the object: references to Blender's data do not outlive a modal operator's tick."""
+    base: Source
+    splices: tuple[Splice | None, ...]
+    """In the order of the list; none for one that is muted."""
+
+    def compute(self) -> Clip:
+        """The whole result.
+
+        Raises:
+            ClipError: a bone or landmark is missing, or a timing makes no sense.
+        """
+        return build(self.base.clip, self.base.landmarks, self._acting())
+
+    def at(self, frame: float) -> Clip:
+        """The result at one frame, in a clip that has no other: quick enough for a mouse move.
+
+        Only the frames that matter for it are computed: where legs bring their travel along, also
+        those where it begins and ends and some from which to tell the ground.
+        """
+        base = self.base.clip
+        number = int(np.abs(base.frames - frame).argmin())
+        chosen = {number}
+        for splice in self._acting():
+            if splice.travel:
+                span = window(splice.timing, base, splice.clip).frames
+                if span.start < span.stop:
+                    chosen |= {span.start, span.stop - 1}
+                count = min(len(base), MOST_TRAVEL_FRAMES)
+                chosen |= set(np.linspace(0, len(base) - 1, count).astype(int).tolist())
+        rows = sorted(chosen)
+        few = build(_taken(base, rows), self.base.landmarks, self._acting())
+        return _taken(few, [rows.index(number)])
+
+    def retimed(self, number: int, base_start: float, splice_start: float) -> Stack:
+        """The same with another start of one splice."""
+        splices = list(self.splices)
+        splice = splices[number]
+        if splice is not None:
+            timing = replace(splice.timing, base_start=base_start, splice_start=splice_start)
+            splices[number] = replace(splice, timing=timing)
+        return replace(self, splices=tuple(splices))
+
+    def _acting(self) -> list[Splice]:
+        return [splice for splice in self.splices if splice is not None]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What was made, for people and for reports."""
+
+    action: str
+    frames: int
+    splices: int
+    """How many were not muted."""
+
+    @property
+    def message(self) -> str:
+        """One sentence."""
+        if self.splices == 0:
+            return f"'{self.action}': all splices are muted, so it is the base again."
+        word = "splice" if self.splices == 1 else "splices"
+        return f"{self.splices} {word} on {self.frames} frames: '{self.action}'."
+
+
+def _taken(clip: Clip, rows: Sequence[int]) -> Clip:
+    chosen = np.asarray(rows, dtype=np.intp)
+    return replace(
+        clip,
+        frames=clip.frames[chosen],
+        rotations=clip.rotations[chosen],
+        locations=clip.locations[chosen],
+        world=clip.world[chosen],
+    )
+
+
+# --- Reading -------------------------------------------------------------------------------------
+
+
+def prepare(armature: bpy.types.Object) -> Stack:
+    """Read all that the stack of an armature needs. Nothing is changed.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    settings = splicing_settings(armature)
+    stack = cast("Any", settings)
+    actions.writable_armature(armature)
+    if len(stack.splices) == 0:
+        raise ClipError(
+            f"'{armature.name}' has no splices.", "Add one in the panel Splicing (Add Splice)."
+        )
+    reader = Reader()
+    base = reader.base(armature)
+    splices = [None if item.mute else _splice(reader, item, base) for item in stack.splices]
+    return Stack(armature.name, base, tuple(splices))
+
+
+class Reader:
+    """Reads clips, each of them once."""
+
+    def __init__(self) -> None:
+        self._sources: dict[tuple[Any, ...], Source] = {}
+
+    def base(self, armature: bpy.types.Object) -> Source:
+        """The base of an armature's stack.
+
+        Raises:
+            OctoMotionError: there is none, or it cannot be read.
+        """
+        settings = cast("Any", splicing_settings(armature))
+        if settings.base is None:
+            raise ClipError(
+                f"'{armature.name}' has no base action, or it is gone.",
+                "Choose the base in the panel Splicing.",
+            )
+        return self.source(armature, settings.base, settings.base_slot, visual=settings.visual)
+
+    def item(self, item: Any) -> Source:
+        """The clip of a splice.
+
+        Raises:
+            OctoMotionError: it is gone, or cannot be read.
+        """
+        if item.source is None:
+            raise ClipError(
+                f"The source armature of splice '{item.name}' is gone, or was never chosen.",
+                "Choose it in the panel Splicing, mute the splice or remove it.",
+            )
+        if item.action is None:
+            raise ClipError(
+                f"The action of splice '{item.name}' is gone, or was never chosen.",
+                "Choose it in the panel Splicing, mute the splice or remove it.",
+            )
+        return self.source(item.source, item.action, item.slot, visual=item.visual)
+
+    def source(
+        self, armature: bpy.types.Object, action: bpy.types.Action, slot: str, *, visual: bool
+    ) -> Source:
+        """A clip by armature, action, and identifier of its slot ("" for the one that fits)."""
+        key = (armature.name_full, action.name_full, slot, visual)
+        if key not in self._sources:
+            chosen = None
+            if slot:
+                chosen = action.slots.get(slot)
+                if chosen is None:
+                    raise ClipError(
+                        f"Action '{action.name}' has no slot '{slot[2:]}'.",
+                        "Choose one of its slots in the panel Splicing, or leave the slot empty.",
+                    )
+            clip = read_clip(armature, action, chosen, visual=visual)
+            self._sources[key] = Source(armature.name, clip, *known_landmarks(armature))
+        return self._sources[key]
+
+
+def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, bool]:
+    """Landmarks of an armature: of its table, completed by what can be found.
+
+    Returns:
+        The landmarks, none where the table is empty and the skeleton is no humanoid; why that is
+        so; and whether the table was empty and could be filled with them.
+    """
+    bones = dict(read_landmarks(cast("Any", splicing_settings(armature)).landmarks).bones)
+    if all(each in bones for each in LANDMARKS if each not in OPTIONAL):
+        return Landmarks(bones), "", False
+    found = map_skeleton(read_skeleton(armature))
+    if found.problem and not bones:
+        return None, found.problem, False
+    return Landmarks(dict(found.landmarks.bones) | bones), "", not bones
+
+
+def _splice(reader: Reader, item: Any, base: Source) -> Splice:
+    source = reader.item(item)
+    part = _part(item, base, source)
+    if part.pieces:
+        for each in (base, source):
+            _check_landmarks(part, each)
+    splice = Splice(
+        part=part,
+        clip=source.clip,
+        timing=Timing(
+            base_start=item.base_start,
+            splice_start=item.splice_start,
+            rate=item.rate,
+            length=item.length or None,
+            ease_in=item.ease_in,
+            ease_out=item.ease_out,
+            after=cast("After", item.after.lower()),
+        ),
+        landmarks=source.landmarks,
+        reach=cast("Reach", item.mode.lower()),
+        # The panel offers it for legs alone.
+        travel=item.with_travel and item.part in LEG_PARTS,
+    )
+    # What only both together can tell.
+    carriers(part, *_sides(base, source), clavicle=True, seen_from="")
+    return splice
+
+
+def _sides(base: Source, source: Source) -> tuple[Side, Side]:
+    return Side(base.clip, base.landmarks), Side(source.clip, source.landmarks)
+
+
+def _part(item: Any, base: Source, source: Source) -> Part:
+    if item.part != "CHAIN":
+        return PARTS[item.part.lower()]
+    if not item.bone:
+        raise ClipError(
+            f"The chain of splice '{item.name}' has no first bone.",
+            "Choose it in the panel Splicing.",
+        )
+    part = chain(item.bone, item.source_bone)
+    for each, bone in ((base, part.root), (source, part.splice_root)):
+        if bone not in each.clip.skeleton.index:
+            raise ClipError(
+                f"'{each.armature}' has no bone '{bone}', the first of the chain of splice "
+                f"'{item.name}'.",
+                "Choose the first bones in the panel Splicing.",
+            )
+    return part
+
+
+def _check_landmarks(part: Part, source: Source) -> None:
+    """Ask for what cannot be told, with the name of whose it is."""
+    remedy = (
+        f"Make '{source.armature}' active, click Find Landmarks in the panel Splicing > Landmarks "
+        "and choose there what it cannot find."
+    )
+    if source.landmarks is None:
+        raise ClipError(f"'{source.armature}' has no landmarks. {source.problem}", remedy)
+    side = Side(source.clip, source.landmarks)
+    try:
+        carriers(part, side, side, clavicle=True, seen_from="")
+    except ClipError as error:
+        raise ClipError(f"'{source.armature}': {error.problem}", remedy) from None
+
+
+def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
+    """The best starts of a splice, best first.
+
+    Raises:
+        ClipError: it is muted, one of the bodies has no legs, or too little overlaps.
+    """
+    splice = stack.splices[number]
+    if splice is None:
+        raise ClipError("The splice is muted.", "Unmute it, then ask for its timing.")
+    ours = stack.base.landmarks
+    if ours is None or splice.landmarks is None:
+        raise ClipError(
+            "Timing is suggested from what the legs do, and one of the two has no landmarks.",
+            "Drag the timing instead, or fill the table in the panel Splicing > Landmarks.",
+        )
+    found = suggest_timings(
+        (stack.base.clip, ours),
+        (splice.clip, splice.landmarks),
+        splice_start=splice.timing.splice_start,
+        rate=splice.timing.rate,
+        count=count,
+    )
+    if not found:
+        raise ClipError(
+            "There is no moment at which enough of the two motions overlaps.",
+            "Begin the clip earlier (Clip Start), or drag the timing.",
+        )
+    return found
+
+
+# --- Writing -------------------------------------------------------------------------------------
+
+
+def write(stack: Stack, clip: Clip) -> Summary:
+    """Give the armature the result, in place of the one that was built before.
+
+    Raises:
+        WriteError: the object is gone, or has become read-only.
+    """
+    armature = local_object(stack.armature)
+    actions.writable_armature(armature)
+    settings = splicing_settings(armature)
+    group = cast("Any", settings)
+    previous = group.result
+    if previous is not None and is_source(previous):
+        # Someone splices from it: it stays as it is.
+        previous = None
+    kept, group.result = group.result, None
+    try:
+        action = write_clip(
+            armature,
+            clip,
+            name=f"{stack.base.clip.name} Spliced",
+            note=_note(settings),
+            previous=previous,
+        )
+    except WriteError:
+        group.result = kept
+        raise
+    group.result = action
+    if stack.base.found and stack.base.landmarks is not None:
+        # What was used is what the table shows from now on.
+        write_landmarks(group.landmarks, stack.base.landmarks.bones)
+    acting = sum(splice is not None for splice in stack.splices)
+    return Summary(action.name, len(clip), acting)
+
+
+def is_source(action: bpy.types.Action) -> bool:
+    """Whether any stack in the file is made from this action."""
+    for each in bpy.data.objects:
+        if each.type != "ARMATURE":
+            continue
+        group = cast("Any", each).octo_motion.splicing
+        if group.base == action or any(item.action == action for item in group.splices):
+            return True
+    return False
+
+
+def local_object(name: str) -> bpy.types.Object:
+    """An armature of this file by name.
+
+    Raises:
+        WriteError: it is gone.
+    """
+    try:
+        found = bpy.data.objects[name, None]  # type: ignore[index]
+        armature_data(found)
+    except KeyError:
+        raise WriteError(f"'{name}' is gone.", "Build again.") from None
+    return found
+
+
+def _note(settings: OCTO_MOTION_PG_splicing) -> str:
+    """The settings as JSON, kept with the action: what it was made from."""
+    return json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dragging a timing without a window: numbers and a pose come of it, and nothing else changes."""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+from ...blender.shown_pose import pose_values, restore_pose, show_pose
+from ...core.errors import WriteError
+from .stack import Stack, local_object
+
+PER_PIXEL: Final = 0.1
+"""Frames that a pixel of the mouse's way is worth."""
+
+FINE: Final = 0.1
+"""Of that, with Shift."""
+
+Handle = Literal["base", "splice"]
+
+
+class TimingDrag:
+    """The two starts of a splice, one of them moved by hand: on the base, or in the clip.
+
+    Args:
+        base_start: frame of the base at which the splice begins.
+        splice_start: frame of the clip that is shown then.
+    """
+
+    def __init__(self, base_start: float, splice_start: float) -> None:
+        self.handle: Handle = "base"
+        self.typed = ""
+        """What the keyboard has given so far."""
+        self._dragged: dict[Handle, float] = {"base": base_start, "splice": splice_start}
+        self._starts = dict(self._dragged)
+
+    @property
+    def starts(self) -> tuple[float, float]:
+        """Frames of the base and of the clip."""
+        return self._starts["base"], self._starts["splice"]
+
+    def tick(self, pixels: float, *, fine: bool = False) -> None:
+        """The mouse has moved: by whole frames, or ``fine`` by a tenth as much and by hundredths.
+
+        What was typed counts until it is taken back.
+        """
+        if self.typed or pixels == 0.0:
+            return
+        value = self._dragged[self.handle] + pixels * PER_PIXEL * (FINE if fine else 1.0)
+        self._dragged[self.handle] = value
+        self._starts[self.handle] = round(value, 2 if fine else 0)
+
+    def type(self, character: str) -> bool:
+        """A key for the number: digit, point, minus, or "" to take the last back.
+
+        Returns:
+            Whether it is one.
+        """
+        if character == "":
+            self.typed = self.typed[:-1]
+        elif character == "-":
+            # As everywhere in Blender, it turns the sign.
+            self.typed = self.typed[1:] if self.typed.startswith("-") else f"-{self.typed}"
+        elif character in ".," and "." not in self.typed:
+            self.typed += "."
+        elif character in tuple("0123456789"):
+            self.typed += character
+        else:
+            return False
+        try:
+            value = float(self.typed)
+        except ValueError:
+            value = round(self._dragged[self.handle])
+        self._starts[self.handle] = value
+        return True
+
+    def switch(self) -> None:
+        """Move the other start from now on."""
+        self._dragged = dict(self._starts)
+        self.typed = ""
+        self.handle = "splice" if self.handle == "base" else "base"
+
+    def told(self) -> str:
+        """The numbers, the one that moves marked."""
+        shown = {name: f"{value:g}" for name, value in self._starts.items()}
+        if self.typed:
+            shown[self.handle] = f"[{self.typed}|]"
+        marks = {name: "▸ " if name == self.handle else "" for name in shown}
+        return (
+            f"{marks['base']}Base Start: {shown['base']}    "
+            f"{marks['splice']}Clip Start: {shown['splice']}"
+        )
+
+
+class DragSession:
+    """A drag on an armature: its pose follows, until it is taken down.
+
+    Args:
+        stack: all that was read.
+        number: which of its splices, none that is muted.
+    """
+
+    def __init__(self, stack: Stack, number: int) -> None:
+        splice = stack.splices[number]
+        assert splice is not None
+        self.number = number
+        self.drag = TimingDrag(splice.timing.base_start, splice.timing.splice_start)
+        self._stack = stack
+        self._pose = pose_values(local_object(stack.armature))
+        self._shown: tuple[float, float, float] | None = None
+        self._down = False
+
+    def show(self, frame: float) -> None:
+        """Pose the armature as the result is at a frame; nothing to do if it is so already.
+
+        Raises:
+            OctoMotionError: the armature is gone, or the timing makes no sense.
+        """
+        wanted = (*self.drag.starts, frame)
+        if self._down or wanted == self._shown:
+            return
+        armature = local_object(self._stack.armature)
+        clip = self._stack.retimed(self.number, *self.drag.starts).at(frame)
+        show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0])
+        self._shown = wanted
+
+    @property
+    def stack(self) -> Stack:
+        """What was read, to be built from."""
+        return self._stack
+
+    def tear_down(self) -> None:
+        """Give the armature its pose back; safe to call twice."""
+        if self._down:
+            return
+        self._down = True
+        try:
+            armature = local_object(self._stack.armature)
+        except WriteError:
+            return
+        restore_pose(armature, self._pose)
