@@ -4,7 +4,9 @@
 import codecs
 from collections.abc import Callable
 
+import hypothesis.strategies as st
 import pytest
+from hypothesis import given
 
 from octo_motion.core.errors import ClipError
 from octo_motion.core.splicing.bvh_check import check_bvh
@@ -126,3 +128,29 @@ def test_names_in_an_old_encoding_are_told() -> None:
     checked = check_bvh(SOUND.replace("chest", "poitrine_é").encode("latin-1"))
     assert "poitrine_é" in checked.text
     assert "not in UTF-8" in checked.notes[0]
+
+
+PIECES = ["{", "}", "\n", "MOTION\n", "JOINT x\n", "End Site\n", "nan", " ", "\0", ",", "é", "#"]
+
+
+@given(
+    edits=st.lists(
+        st.tuples(
+            st.integers(0, len(SOUND)), st.integers(0, 40), st.sampled_from([*PIECES, "", ""])
+        ),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_whatever_is_cut_out_or_put_in_is_understood_or_refused(
+    edits: list[tuple[int, int, str]],
+) -> None:
+    text = SOUND
+    for place, length, piece in edits:
+        text = text[:place] + piece + text[place + length :]
+    try:
+        checked = check_bvh(text.encode())
+    except ClipError:
+        return
+    again = check_bvh(checked.text.encode())
+    assert (again.text, again.notes) == (checked.text, ())
