@@ -29,7 +29,7 @@ from .correspondence import (
     matched_chains,
 )
 from .frames import BodyFrame, chain_frame, chest_frame, laid_over, pelvis_frame
-from .joint_rotation import SOFT, SOFT_EXACT, Limb, hinge_axis, joint_turn, reach
+from .joint_rotation import Limb, hinge_axis, joint_turn, reach
 from .landmarks import Landmarks
 from .parts import Part, beneath, bone_of, landmark_bone, piece_bones
 from .posture import Posture, posture_of, sampled, slerp
@@ -204,8 +204,8 @@ def carry(
             limb.joint + rotate(turn, limb.hand - limb.joint),
         )
         hinge = rotate(multiply(turn, result.orientation(joint)), carrier.hinge)
-        soft = SOFT_EXACT if carrier.match.same_body else SOFT
-        upper_bend, lower_bend = reach(turned, wanted.hand, hinge, soft=soft)
+        alike = carrier.match.same_body
+        upper_bend, lower_bend = reach(turned, wanted.hand, hinge, alike=alike)
         turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
     _turn_limb(result, rotations, (joint, turn), (elbow, lower_turn))
 

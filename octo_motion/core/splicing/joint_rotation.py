@@ -39,8 +39,8 @@ so unlike (bodies of other proportions) that their normals say nothing."""
 _MOVED: Final = np.radians(5.0)
 """Change of a bend that is worth turning a straight limb to its hinge."""
 
-SOFT_EXACT: Final = 5e-4
-SOFT: Final = 1e-2
+SOFT_ALIKE: Final = 5e-4
+_SOFT: Final = 1e-2
 """Of a limb's length: how far short of a point a limb may stay when it is almost stretched, so that
 the elbow does not shoot out and in as the point passes the end of its reach. The first where hands
 are to be where they were; the second where bodies are of other proportions anyway."""
@@ -80,7 +80,7 @@ def joint_turn(limb: Limb, wanted: Limb) -> Floats:
 
 
 def reach(
-    limb: Limb, target: Floats, hinge: Floats, *, soft: float = SOFT_EXACT
+    limb: Limb, target: Floats, hinge: Floats, *, alike: bool = True
 ) -> tuple[Floats, Floats]:
     """Bend a limb so that its hand, which points at the target already, lands on it.
 
@@ -91,7 +91,8 @@ def reach(
         limb: the limb.
         target: (frames, 3)
         hinge: (frames, 3) unit vectors about which the elbow bends.
-        soft: of the limb's length, how early it begins to fall short of what is out of reach.
+        alike: whether the limb is of the proportions for which the target was seen. If not, the
+            point means less than the shape: what is straight stays straight.
 
     Returns:
         Rotations (frames, 4) of the upper and of the lower limb.
@@ -102,7 +103,9 @@ def reach(
     wanted = np.linalg.norm(target - limb.joint, axis=-1)
     whole = upper + lower
     # Measured as a change, so that a limb whose hand is there already does not move at all.
-    distance = now + _soft_reach(wanted, whole, soft) - _soft_reach(now, whole, soft)
+    soft = SOFT_ALIKE if alike else _SOFT
+    change = _soft_reach(wanted, whole, soft) - _soft_reach(now, whole, soft)
+    distance = now + (change if alike else _bend(limb) * change)
     distance = np.clip(distance, np.abs(upper - lower), whole)
     opened = _angle(upper, lower, now) - _angle(upper, lower, distance)
     swung = _angle(upper, now, lower) - _angle(upper, distance, lower)
