@@ -8,12 +8,10 @@ plain arrays alone; :func:`write` changes the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
 import bpy
-import numpy as np
 
 from ...blender import actions
 from ...blender.armature import armature_data, read_skeleton
@@ -26,14 +24,10 @@ from ...core.splicing.landmarks import LANDMARKS, OPTIONAL, Landmarks
 from ...core.splicing.mapping import map_skeleton
 from ...core.splicing.parts import PARTS, Part, chain
 from ...core.splicing.splice import Reach, Splice, build
-from ...core.splicing.timing import After, Timing, window
+from ...core.splicing.timing import After, Timing
 from ..plain import plain
 from .landmark_properties import read_landmarks, write_landmarks
 from .properties import OCTO_MOTION_PG_splicing, splicing_settings
-
-MOST_TRAVEL_FRAMES: Final = 120
-"""Frames from which a preview of legs that travel finds the ground."""
-
 
 LEG_PARTS: Final = frozenset({"LEGS", "RIGHT_LEG", "LEFT_LEG"})
 """Parts that can bring their travel along."""
@@ -68,27 +62,8 @@ class Stack:
         Raises:
             ClipError: a bone or landmark is missing, or a timing makes no sense.
         """
-        return build(self.base.clip, self.base.landmarks, self._acting())
-
-    def at(self, frame: float) -> Clip:
-        """The result at one frame, in a clip that has no other: quick enough for a mouse move.
-
-        Only the frames that matter for it are computed: where legs bring their travel along, also
-        those where it begins and ends and some from which to tell the ground.
-        """
-        base = self.base.clip
-        number = int(np.abs(base.frames - frame).argmin())
-        chosen = {number}
-        for splice in self._acting():
-            if splice.travel:
-                span = window(splice.timing, base, splice.clip).frames
-                if span.start < span.stop:
-                    chosen |= {span.start, span.stop - 1}
-                count = min(len(base), MOST_TRAVEL_FRAMES)
-                chosen |= set(np.linspace(0, len(base) - 1, count).astype(int).tolist())
-        rows = sorted(chosen)
-        few = build(_taken(base, rows), self.base.landmarks, self._acting())
-        return _taken(few, [rows.index(number)])
+        acting = [splice for splice in self.splices if splice is not None]
+        return build(self.base.clip, self.base.landmarks, acting)
 
     def retimed(self, number: int, base_start: float, splice_start: float) -> Stack:
         """The same with another start of one splice."""
@@ -98,9 +73,6 @@ class Stack:
             timing = replace(splice.timing, base_start=base_start, splice_start=splice_start)
             splices[number] = replace(splice, timing=timing)
         return replace(self, splices=tuple(splices))
-
-    def _acting(self) -> list[Splice]:
-        return [splice for splice in self.splices if splice is not None]
 
 
 @dataclass(frozen=True)
@@ -119,17 +91,6 @@ class Summary:
             return f"'{self.action}': all splices are muted, so it is the base again."
         word = "splice" if self.splices == 1 else "splices"
         return f"{self.splices} {word} on {self.frames} frames: '{self.action}'."
-
-
-def _taken(clip: Clip, rows: Sequence[int]) -> Clip:
-    chosen = np.asarray(rows, dtype=np.intp)
-    return replace(
-        clip,
-        frames=clip.frames[chosen],
-        rotations=clip.rotations[chosen],
-        locations=clip.locations[chosen],
-        world=clip.world[chosen],
-    )
 
 
 # --- Reading -------------------------------------------------------------------------------------

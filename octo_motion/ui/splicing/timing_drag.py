@@ -7,6 +7,7 @@ from typing import Final, Literal
 
 from ...blender.shown_pose import pose_values, restore_pose, show_pose
 from ...core.errors import WriteError
+from .preview import Preview
 from .stack import Stack, local_object
 
 PER_PIXEL: Final = 0.1
@@ -105,6 +106,7 @@ class DragSession:
         self.number = number
         self.drag = TimingDrag(splice.timing.base_start, splice.timing.splice_start)
         self._stack = stack
+        self._preview = Preview(stack, number)
         self._pose = pose_values(local_object(stack.armature))
         self._shown: tuple[float, float, float] | None = None
         self._down = False
@@ -119,7 +121,7 @@ class DragSession:
         if self._down or wanted == self._shown:
             return
         armature = local_object(self._stack.armature)
-        clip = self._stack.retimed(self.number, *self.drag.starts).at(frame)
+        clip = self._preview.at(frame, *self.drag.starts)
         show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0])
         self._shown = wanted
 
