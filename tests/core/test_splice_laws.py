@@ -287,7 +287,7 @@ def test_what_is_missing_is_told():
     random = np.random.default_rng(10)
     clip = motion(random, humanoid(random))
     without = Landmarks({key: value for key, value in LANDMARKS.bones.items() if key != "hand.R"})
-    with pytest.raises(ClipError, match="right hand"):
+    with pytest.raises(ClipError, match=r"right hand \(clip 'made up'\)\. Say it"):
         spliced(clip, without, Splice(RIGHT_ARM, clip, FROM_START, LANDMARKS))
     with pytest.raises(ClipError, match="not known which bones"):
         spliced(clip, LANDMARKS, Splice(RIGHT_ARM, clip, FROM_START))

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -64,6 +65,15 @@ class Side:
                 "Map its skeleton first.",
             )
         return self.landmarks
+
+    @contextmanager
+    def told(self) -> Iterator[None]:
+        """Errors within say which of the two clips they speak of."""
+        try:
+            yield
+        except ClipError as error:
+            problem = f"{error.problem.removesuffix('.')} (clip '{self.clip.name}')."
+            raise ClipError(problem, error.remedy) from error
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,14 +320,17 @@ def _piece_carrier(
     kind, _, side = piece.partition(".")
     if kind == "arm" and clavicle:
         clavicle = all(each.get(f"clavicle.{side}") for each in (ours, theirs))
-    bones = piece_bones(piece, base.skeleton, ours, clavicle=clavicle)
-    others = piece_bones(piece, splice.skeleton, theirs, clavicle=clavicle)
-    chests = chest_frame(base.skeleton, ours), chest_frame(splice.skeleton, theirs)
-    chests = chests[0], laid_over(chests[1], chests[0])
-    frames = chests
-    if kind == "trunk" or (kind == "leg" and seen_from != "chest"):
-        pelvis = pelvis_frame(base.skeleton, ours)
-        frames = pelvis, laid_over(pelvis_frame(splice.skeleton, theirs), pelvis)
+    from_pelvis = kind == "trunk" or (kind == "leg" and seen_from != "chest")
+    with base.told():
+        bones = piece_bones(piece, base.skeleton, ours, clavicle=clavicle)
+        chest = chest_frame(base.skeleton, ours)
+        pelvis = pelvis_frame(base.skeleton, ours) if from_pelvis else chest
+    with splice.told():
+        others = piece_bones(piece, splice.skeleton, theirs, clavicle=clavicle)
+        chests = chest, laid_over(chest_frame(splice.skeleton, theirs), chest)
+        frames = chests
+        if from_pelvis:
+            frames = pelvis, laid_over(pelvis_frame(splice.skeleton, theirs), pelvis)
     pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, (ours, theirs))
     spread = None
     if kind == "trunk":
@@ -342,7 +355,10 @@ def _piece_carrier(
     limb = None
     if kind in _LIMBS:
         names = [f"{name}.{side}" for name in _LIMBS[kind]]
-        limb = _three(base.skeleton, ours, names), _three(splice.skeleton, theirs, names)
+        with base.told():
+            our_limb = _three(base.skeleton, ours, names)
+        with splice.told():
+            limb = our_limb, _three(splice.skeleton, theirs, names)
     return Carrier(base, splice, tuple(bones), frames, match, limb, spread, bent)
 
 
@@ -358,8 +374,10 @@ def _three(skeleton: Skeleton, landmarks: Landmarks, names: Sequence[str]) -> tu
 
 
 def _chain_carrier(part: Part, base: Side, splice: Side) -> Carrier:
-    bones = beneath(base.skeleton, [bone_of(base.skeleton, part.root)])
-    others = beneath(splice.skeleton, [bone_of(splice.skeleton, part.splice_root or part.root)])
+    with base.told():
+        bones = beneath(base.skeleton, [bone_of(base.skeleton, part.root)])
+    with splice.told():
+        others = beneath(splice.skeleton, [bone_of(splice.skeleton, part.splice_root or part.root)])
     names = matched_bones(base.skeleton, bones, splice.skeleton, others, (None, None))
     pairs, spread = names, None
     if len(names) < len(bones) or names.get(bones[0]) != others[0]:
