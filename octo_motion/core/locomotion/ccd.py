@@ -44,7 +44,7 @@ _MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
 _NEWTON_STEPS: Final = 6
 _NEWTON_STEPS_BETWEEN: Final = 2
 # Arm lengths within which a joint comes to rest on a floor.
-_FLOOR_ROUNDING: Final = 0.03
+_FLOOR_ROUNDING: Final = 0.1
 _TINY: Final = 1e-12
 
 

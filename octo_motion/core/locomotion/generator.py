@@ -31,7 +31,7 @@ _CHUNK: Final = 4096
 """Arms solved at a time, counted over frames: what stays within a processor's cache."""
 _CYCLE_SAMPLES: Final = 96
 """Phases at which a cycle is looked at as a whole."""
-_STANDING: Final = 0.4
+_STANDING: Final = 0.3
 """Share of a cycle in which an arm would reach deeper than the floor."""
 _LEAST_DEPTH: Final = 0.1
 """Arm lengths: a gait that reaches less deep moves its arms level, and stands on nothing."""
