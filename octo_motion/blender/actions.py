@@ -35,6 +35,8 @@ from .armature import armature_data
 MARK: Final = "octo_motion_generated"
 """Custom property of an action made here: a group with the fields of ``_mark``."""
 
+_ENUMERATION: Final = np.uint8
+"""What Blender keeps a key's enumerations in: with another type it copies them one by one."""
 _MARK_VERSION: Final = 1
 """Counts up when the fingerprint is taken otherwise: older actions then count as edited."""
 
@@ -473,7 +475,7 @@ def _filled(count: int, name: str, item: str) -> np.ndarray:
     """A keyframe's enumeration value, as many times as there are keys."""
     definition = bpy.types.Keyframe.bl_rna.properties[name]
     assert isinstance(definition, bpy.types.EnumProperty)
-    return np.full(count, definition.enum_items[item].value, dtype=np.int32)
+    return np.full(count, definition.enum_items[item].value, dtype=_ENUMERATION)
 
 
 def _mark(
@@ -525,7 +527,7 @@ def _fingerprint(
             digest.update(known[curve.data_path, curve.array_index])
             continue
         points = np.empty((len(keys), 2), dtype=np.float32)
-        interpolation, kinds = np.empty((2, len(keys)), dtype=np.int32)
+        interpolation, kinds = np.empty((2, len(keys)), dtype=_ENUMERATION)
         keys.foreach_get("co", points.ravel())
         keys.foreach_get("interpolation", interpolation)
         keys.foreach_get("type", kinds)

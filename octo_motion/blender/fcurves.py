@@ -54,7 +54,7 @@ def _plain_keys(curve: bpy.types.FCurve) -> tuple[Floats, Floats, np.ndarray] | 
     count = len(curve.keyframe_points)
     if count == 0 or len(curve.modifiers):
         return None
-    kinds = np.empty(count, dtype=np.int32)
+    kinds = np.empty(count, dtype=np.uint8)
     curve.keyframe_points.foreach_get("interpolation", kinds)
     steps = kinds == _CONSTANT
     # The last key's own interpolation matters to extrapolation only.
