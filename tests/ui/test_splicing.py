@@ -524,9 +524,9 @@ def test_while_dragging_the_body_is_posed_as_it_will_be(part: str, travel: bool)
     stack_of(hero).splices[0].with_travel = travel
     OPERATORS.splice_add(part="HEAD")
     bpy.context.scene.frame_set(21)
-    session = DragSession(prepare(hero), 0)
+    session = DragSession(prepare(hero), 0, bpy.context.scene)
     session.drag.tick(52.0)
-    session.show(21.0)
+    session.show()
     shown = poses(hero)
     starts = session.drag.starts
     session.tear_down()
@@ -537,18 +537,41 @@ def test_while_dragging_the_body_is_posed_as_it_will_be(part: str, travel: bool)
     assert_same_pose(shown, poses(hero))
 
 
+def test_while_dragging_other_frames_can_be_looked_at() -> None:
+    hero, _ = hero_and_source()
+    OPERATORS.splice_add()
+    scene = bpy.context.scene
+    followers = len(bpy.app.handlers.frame_change_post)
+    scene.frame_set(30)
+    later = poses(hero)
+    scene.frame_set(4)
+    session = DragSession(prepare(hero), 0, scene)
+    session.drag.tick(60.0)
+    session.show()
+    scene.frame_set(30)
+    shown = poses(hero)
+    starts = session.drag.starts
+    session.tear_down()
+    assert len(bpy.app.handlers.frame_change_post) == followers
+    assert_same_pose(later, poses(hero))
+    OPERATORS.splice_drag_timing(base_start=starts[0], splice_start=starts[1])
+    scene.frame_set(30)
+    assert_same_pose(shown, poses(hero))
+    assert np.abs(shown["forearm.R"] - later["forearm.R"]).max() > 0.05
+
+
 def test_a_drag_that_is_given_up_leaves_everything_as_it_was() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()
     hero.pose.bones["head"].rotation_quaternion = (0.9, 0.1, 0.3, 0.0)
     before = snapshot()
-    session = DragSession(prepare(hero), 0)
+    session = DragSession(prepare(hero), 0, bpy.context.scene)
     session.drag.tick(100.0)
-    session.show(12.0)
+    session.show()
     assert snapshot() != before
     session.tear_down()
     assert snapshot() == before
-    session.show(12.0)
+    session.show()
     session.tear_down()
     assert snapshot() == before
 
@@ -556,10 +579,10 @@ def test_a_drag_that_is_given_up_leaves_everything_as_it_was() -> None:
 def test_a_drag_whose_armature_is_gone_says_so_and_ends() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()
-    session = DragSession(prepare(hero), 0)
+    session = DragSession(prepare(hero), 0, bpy.context.scene)
     bpy.data.objects.remove(hero)
     with pytest.raises(OctoMotionError, match="'Hero' is gone"):
-        session.show(3.0)
+        session.show()
     session.tear_down()
 
 

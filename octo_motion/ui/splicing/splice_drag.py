@@ -87,8 +87,8 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         try:
             writable_armature(armature)
             _check_shown(active_splice(settings))
-            self._session = DragSession(prepare(armature), settings.active_splice)
-            self._session.show(scene.frame_current_final)
+            self._session = DragSession(prepare(armature), settings.active_splice, scene)
+            self._session.show()
         except OctoMotionError as error:
             return self._fail(context, error)
         self._mouse = event.mouse_x
@@ -97,7 +97,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
-        """One event. The first after a change of frame shows the pose there."""
+        """One event."""
         session = self._session
         assert session is not None
         if event.value == "PRESS" and event.type in {"ESC", "RIGHTMOUSE"}:
@@ -109,9 +109,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
             free = event.type in _PASSED or event.type.startswith("TIMER")
             if not free:
                 self._take(session, event)
-            scene = context.scene
-            assert scene is not None
-            session.show(scene.frame_current_final)
+                session.show()
         except OctoMotionError as error:
             return self._fail(context, error)
         except BaseException:

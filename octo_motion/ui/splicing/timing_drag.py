@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Final, Literal
 
+import bpy
+
 from ...blender.shown_pose import pose_values, restore_pose, show_pose
-from ...core.errors import WriteError
+from ...core.errors import OctoMotionError, WriteError
 from .preview import Preview
 from .stack import Stack, local_object
 
@@ -93,50 +96,61 @@ class TimingDrag:
 
 
 class DragSession:
-    """A drag on an armature: its pose follows, until it is taken down.
+    """A drag on an armature: its pose follows, also when the frame changes, until it is taken down.
 
     Args:
         stack: all that was read.
         number: which of its splices, none that is muted.
+        scene: whose current frame is shown.
     """
 
-    def __init__(self, stack: Stack, number: int) -> None:
+    def __init__(self, stack: Stack, number: int, scene: bpy.types.Scene) -> None:
         splice = stack.splices[number]
         assert splice is not None
         self.number = number
+        self.stack = stack
         self.drag = TimingDrag(splice.timing.base_start, splice.timing.splice_start)
-        self._stack = stack
         self._preview = Preview(stack, number)
         self._pose = pose_values(local_object(stack.armature))
-        self._shown: tuple[float, float, float] | None = None
+        self._scene = scene.name
+        self._frame = scene.frame_current_final
         self._down = False
+        # A change of frame poses the armature as its action says.
+        bpy.app.handlers.frame_change_post.append(self._follow)
 
-    def show(self, frame: float) -> None:
-        """Pose the armature as the result is at a frame; nothing to do if it is so already.
+    def show(self) -> None:
+        """Pose the armature as the result is at the current frame.
 
         Raises:
             OctoMotionError: the armature is gone, or the timing makes no sense.
         """
-        wanted = (*self.drag.starts, frame)
-        if self._down or wanted == self._shown:
+        scene = bpy.data.scenes.get(self._scene)
+        if self._down or scene is None:
             return
-        armature = local_object(self._stack.armature)
-        clip = self._preview.at(frame, *self.drag.starts)
+        armature = local_object(self.stack.armature)
+        clip = self._preview.at(scene.frame_current_final, *self.drag.starts)
         show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0])
-        self._shown = wanted
-
-    @property
-    def stack(self) -> Stack:
-        """What was read, to be built from."""
-        return self._stack
 
     def tear_down(self) -> None:
         """Give the armature its pose back; safe to call twice."""
         if self._down:
             return
         self._down = True
+        followers = bpy.app.handlers.frame_change_post
+        if self._follow in followers:
+            followers.remove(self._follow)
         try:
-            armature = local_object(self._stack.armature)
+            armature = local_object(self.stack.armature)
         except WriteError:
             return
         restore_pose(armature, self._pose)
+        scene = bpy.data.scenes.get(self._scene)
+        if scene is not None and scene.frame_current_final != self._frame:
+            scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+
+    def _follow(self, scene: bpy.types.Scene, *_: object) -> None:
+        if scene.name != self._scene:
+            return
+        # The next event of the drag says what is wrong.
+        with suppress(OctoMotionError):
+            self.show()
