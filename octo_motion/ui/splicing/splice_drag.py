@@ -24,11 +24,13 @@ _HELP: Final = (
     "Drag: move    Shift: fine    Tab: base or clip    Numbers: type a frame    "
     "Arrow keys, Space: other frames    Enter, click: build    Esc, right click: as it was"
 )
-# The view and the time stay free.
 _PASSED: Final = frozenset(
-    {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM"}
-    | {"LEFT_ARROW", "RIGHT_ARROW", "UP_ARROW", "DOWN_ARROW", "SPACE"}
+    {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "SPACE"}
 )
+"""The view stays free, and playing."""
+
+# Blender's own operator for this would keep the pose that is only shown in an undo step.
+_FRAME_STEPS: Final = {"LEFT_ARROW": -1, "RIGHT_ARROW": 1}
 
 
 class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
@@ -127,7 +129,9 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
             session.drag.tick(event.mouse_x - self._mouse, fine=event.shift)
             self._mouse = event.mouse_x
         elif event.value == "PRESS":
-            if event.type == "TAB":
+            if event.type in _FRAME_STEPS:
+                session.step(_FRAME_STEPS[event.type])
+            elif event.type == "TAB":
                 session.drag.switch()
             elif event.type == "BACK_SPACE":
                 session.drag.type("")

@@ -131,6 +131,12 @@ class DragSession:
         clip = self._preview.at(scene.frame_current_final, *self.drag.starts)
         show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0])
 
+    def step(self, frames: int) -> None:
+        """Go so many frames on, or back."""
+        scene = bpy.data.scenes.get(self._scene)
+        if scene is not None:
+            scene.frame_set(scene.frame_current + frames)
+
     def tear_down(self) -> None:
         """Give the armature its pose back; safe to call twice."""
         if self._down:
