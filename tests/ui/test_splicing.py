@@ -682,6 +682,16 @@ def test_a_missing_landmark_is_named_with_whose_it_is() -> None:
     assert_refused("'Source': There is no bone 'no such bone'", "splice_build")
 
 
+def test_a_limb_that_is_no_chain_is_told_with_what_helps() -> None:
+    hero, source = hero_and_source()
+    OPERATORS.splice_add()
+    select(source)
+    OPERATORS.map_skeleton()
+    stack_of(source).landmarks.hand_r = "hand.L"
+    select(hero)
+    assert_refused("'Source': 'hand.L' does not hang on .*bake its motion", "splice_build")
+
+
 def test_a_clip_of_no_use_for_timing_is_told() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()

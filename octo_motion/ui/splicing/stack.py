@@ -251,7 +251,12 @@ def _check_landmarks(part: Part, source: Source) -> None:
     try:
         carriers(part, side, side, clavicle=True, seen_from="")
     except ClipError as error:
-        raise ClipError(f"'{source.armature}': {error.problem}", remedy) from None
+        known = source.landmarks.bones
+        bones = source.clip.skeleton.index
+        asked = any(known.get(each) not in bones for each in LANDMARKS if each not in OPTIONAL)
+        # With all landmarks there, it is the rig that does not serve.
+        told = remedy if asked else error.remedy
+        raise ClipError(f"'{source.armature}': {error.problem}", told) from None
 
 
 def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
