@@ -4,7 +4,8 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from octo_motion.core.rotations import angle_between, from_rotation_vector
 from octo_motion.core.splicing.clip import Clip
 from octo_motion.core.splicing.landmarks import LANDMARKS
 from octo_motion.ui.splicing import splice_panels
+from octo_motion.ui.splicing.splice_drag import OCTO_MOTION_OT_splice_drag_timing
 from octo_motion.ui.splicing.stack import prepare
 from octo_motion.ui.splicing.timing_drag import DragSession, TimingDrag
 from tests.core.humanoids import MIDDLE, PARENTS, humanoid
@@ -507,6 +509,36 @@ def test_a_typed_frame_counts_until_it_is_taken_back() -> None:
     assert drag.starts == (10.0, 3.0)
 
 
+def test_mouse_and_keys_do_what_the_status_bar_says() -> None:
+    hero, _ = hero_and_source()
+    OPERATORS.splice_add()
+    bpy.context.scene.frame_set(8)
+    session = DragSession(prepare(hero), 0, bpy.context.scene)
+    take = OCTO_MOTION_OT_splice_drag_timing._take
+    operator: Any = SimpleNamespace(_mouse=500.0)
+
+    def event(kind: str, value: str = "PRESS", **more: Any) -> None:
+        given = {"mouse_x": 0, "shift": False, "unicode": ""} | more
+        take(operator, session, cast("Any", SimpleNamespace(type=kind, value=value, **given)))
+
+    event("MOUSEMOVE", "NOTHING", mouse_x=540)
+    assert session.drag.starts == (5.0, 1.0)
+    event("MOUSEMOVE", "NOTHING", mouse_x=545, shift=True)
+    assert session.drag.starts == pytest.approx((5.05, 1.0))
+    event("TAB")
+    event("TAB", "RELEASE")
+    for key in "12":
+        event("ONE", unicode=key)
+        event("ONE", "RELEASE", unicode=key)
+    assert session.drag.starts == pytest.approx((5.05, 12.0))
+    event("BACK_SPACE")
+    assert session.drag.starts == pytest.approx((5.05, 1.0))
+    event("RIGHT_ARROW")
+    event("RIGHT_ARROW", "RELEASE")
+    assert bpy.context.scene.frame_current == 9
+    session.tear_down()
+
+
 def poses(armature: Any) -> dict[str, np.ndarray]:
     return {bone.name: np.array(bone.matrix_basis) for bone in armature.pose.bones}
 
@@ -750,8 +782,6 @@ def test_a_library_override_adds_splices_of_its_own_and_keeps_them(tmp_path: Pat
 
 
 def drawn() -> dict[str, list[str]]:
-    from types import SimpleNamespace
-
     found = {}
     for panel in splice_panels.CLASSES:
         kept: Any = panel
