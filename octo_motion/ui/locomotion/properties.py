@@ -462,10 +462,10 @@ class OCTO_MOTION_PG_locomotion(bpy.types.PropertyGroup):
         name="Keys",
         description="How many keys the motion gets",
         items=(
-            ("DENSE", "Every Frame", "A key on every frame: the motion exactly as computed", 0),
+            ("DENSE", "All", "A key on every frame: the motion exactly as computed", 0),
             (
                 "REDUCED",
-                "Few, Editable",
+                "Few",
                 "As few keys as the tolerance allows, with handles; each arm in one group",
                 1,
             ),
