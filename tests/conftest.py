@@ -4,7 +4,9 @@
 Tests of core and device never see bpy: it is imported only when a test of another folder runs.
 """
 
+import atexit
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,6 +20,28 @@ WITHOUT_BLENDER = {"core", "device"}
 # No deadline: a test must not depend on the clock. Derandomized: the same examples on each run.
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("repeatable")
+
+
+def pytest_sessionfinish(exitstatus: int) -> None:
+    """End the process once everything is done and told, without Blender 4.5's own end.
+
+    As a Python module it may wait for ever, after a long run, for a thread of its own that closes
+    files. What an add-on could leave behind is tested in processes that do come to their end:
+    tests/end_to_end/extension_life.py.
+    """
+    if sys.version_info < (3, 12):  # the Python of Blender 4.5
+        _endings.append(int(exitstatus))
+
+
+_endings: list[int] = []
+
+
+@atexit.register  # at the start: so it comes last
+def _end_at_once() -> None:
+    if _endings:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_endings[-1])
 
 
 def pytest_configure(config: pytest.Config) -> None:
