@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-
 from ..rotations import Floats
 
 
@@ -50,7 +49,7 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """How far each joint turns from rest: a cone for the bone's direction, a range for its twist."""
+    """How far each joint turns from rest: a cone for the bone, a range for its twist."""
 
     swing: Floats
     """(bodies,) half angle of the cone, π where there is none."""
