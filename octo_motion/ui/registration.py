@@ -19,6 +19,7 @@ from .locomotion import (
     generate,
     panels,
     properties,
+    setups,
 )
 from .splicing import (
     import_clips,
@@ -51,6 +52,7 @@ CLASSES: tuple[type, ...] = (
     add_route.OCTO_MOTION_OT_add_route,
     *gait_table.CLASSES,
     generate.OCTO_MOTION_OT_generate_locomotion,
+    *setups.CLASSES,
     *panels.CLASSES,
     *import_clips.CLASSES,
     *splice_list.CLASSES,
@@ -65,6 +67,7 @@ def register() -> None:
     for each in CLASSES:
         bpy.utils.register_class(each)
     settings.register()
+    setups.register()
     for menu, draw in MENUS:
         menu.append(draw)
     command_line.register()
@@ -75,6 +78,7 @@ def unregister() -> None:
     command_line.unregister()
     for menu, draw in reversed(MENUS):
         menu.remove(draw)
+    setups.unregister()
     settings.unregister()
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

@@ -66,6 +66,24 @@ def _unused() -> Any:
     )
 
 
+def _text(group: OCTO_MOTION_PG_gait_table) -> str:
+    try:
+        return gait.to_json(read_table(group, gait.presets().get(group.name)))
+    except GaitError:
+        return ""
+
+
+def _set_text(group: OCTO_MOTION_PG_gait_table, text: str) -> None:
+    try:
+        table = gait.from_json(text, "text")
+    except GaitError:
+        # Blender only prints what a property's setter raises. A name that is not the chosen
+        # gait's makes everyone say so.
+        assign(group, "name", "")
+        return
+    fill_table(group, table)
+
+
 def _link_angles(name: str, description: str) -> Any:
     return FloatVectorProperty(
         name=name,
@@ -232,6 +250,13 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
     )
     notes: CollectionProperty(
         name="Notes", type=OCTO_MOTION_PG_gait_note, options={"HIDDEN"}, override=OVERRIDE_LIST
+    )
+    as_text: StringProperty(
+        name="Text",
+        description="The whole table as in a gait's file (JSON), to read and to set",
+        get=_text,
+        set=_set_text,
+        options={"HIDDEN", "SKIP_SAVE"},
     )
 
 

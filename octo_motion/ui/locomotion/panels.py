@@ -27,6 +27,7 @@ from .gait_table import (
 )
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .setups import OCTO_MOTION_PT_setups
 
 _SIDES: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
 
@@ -163,6 +164,9 @@ class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_gait"
     bl_label = "Gait"
     bl_order = 3
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+        OCTO_MOTION_PT_setups.draw_panel_header(cast("Any", self).layout)
 
     def show(
         self,

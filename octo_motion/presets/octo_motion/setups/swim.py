@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# All arms beat together, the mantle ahead.
+import bpy
+
+active = bpy.context.object
+armature = active if active.type == "ARMATURE" else active.find_armature()
+settings = armature.octo_motion.locomotion
+
+settings.gait = "swim"

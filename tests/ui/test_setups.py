@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Set-ups: one click makes a creature move in another way, and one's own are kept."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from octo_motion.core.locomotion import gait
+from octo_motion.ui.locomotion import setups
+from octo_motion.ui.locomotion.properties import locomotion_settings, read_gait
+from tests.ui.rig import click, make_octopus
+
+SHIPPED = sorted(path.stem for path in (setups.PACKAGE / "presets" / setups.FOLDER).glob("*.py"))
+
+
+@pytest.fixture(autouse=True)
+def no_setups_of_the_user() -> Iterator[None]:
+    yield
+    folder = bpy.utils.user_resource("SCRIPTS", path=f"presets/{setups.FOLDER}")
+    for path in Path(folder).glob("*.py"):
+        path.unlink()
+
+
+@pytest.fixture
+def settings() -> Any:
+    return locomotion_settings(make_octopus())
+
+
+def state(settings: Any) -> dict[str, Any]:
+    values = {name: getattr(settings, name) for name in setups.governed()}
+    return {**values, "gait": gait.to_json(read_gait(settings))}
+
+
+def test_there_is_a_way_to_walk_and_one_to_swim() -> None:
+    assert {"walk", "swim"} <= set(SHIPPED)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_setup_of_the_add_on_generates_without_a_warning(name: str, settings: Any) -> None:
+    bpy.ops.octo_motion.setup_load(name=name)
+    bpy.ops.octo_motion.add_route()
+    assert click("generate_locomotion") == {"FINISHED"}
+    assert settings.result is not None
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_setup_says_everything_that_it_is_about(name: str, settings: Any) -> None:
+    bpy.ops.octo_motion.setup_load(name=name)
+    fresh = state(settings)
+    settings.contraction, settings.sway, settings.cycle_time = 0.3, 1.0, 9.0
+    settings.table.stride = 2.5
+    bpy.ops.octo_motion.setup_load(name=name)
+    assert state(settings) == fresh
+
+
+def test_setup_leaves_shot_rig_and_keys_alone(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route()
+    settings.frame_start, settings.keys, settings.seed = 17, "REDUCED", 5
+    route, arms = settings.route, len(settings.arms)
+    bpy.ops.octo_motion.setup_load(name="swim")
+    assert settings.table.manner == "SWIM"
+    assert (settings.frame_start, settings.keys, settings.seed) == (17, "REDUCED", 5)
+    assert (settings.route, len(settings.arms)) == (route, arms)
+
+
+def test_own_setup_comes_back_with_every_angle_of_its_table(settings: Any) -> None:
+    bpy.ops.octo_motion.setup_load(name="swim")
+    settings.contraction = 0.25
+    settings.table.curves[0].knots[1].head[0] = 0.5
+    kept = state(settings)
+    bpy.ops.octo_motion.setup_add(name="My Drift")
+    bpy.ops.octo_motion.setup_load(name="walk")
+    assert state(settings) != kept
+    bpy.ops.octo_motion.setup_load(name="My_Drift")
+    assert state(settings) == kept
+    assert list(setups.setup_paths())[-1] == "My_Drift"
+
+
+def test_own_setup_is_removed_and_those_of_the_add_on_are_not(settings: Any) -> None:
+    assert settings
+    bpy.ops.octo_motion.setup_add(name="Mine")
+    bpy.ops.octo_motion.setup_add(name="Mine", remove_name=True)
+    assert "Mine" not in setups.setup_paths()
+
+
+def test_loading_a_setup_is_one_undo_step(settings: Any) -> None:
+    armature = settings.id_data.name
+    bpy.ops.ed.undo_push(message="before")
+    bpy.ops.octo_motion.setup_load("EXEC_DEFAULT", True, name="swim")  # noqa: FBT003 - undo
+    bpy.ops.ed.undo()
+    assert locomotion_settings(bpy.data.objects[armature]).table.manner == "WALK"
+
+
+def test_unknown_setup_is_refused_with_the_names_that_there_are(settings: Any) -> None:
+    before = state(settings)
+    with pytest.raises(RuntimeError, match=r"There is no set-up 'jog'\. Choose one of walk, "):
+        bpy.ops.octo_motion.setup_load(name="jog")
+    assert state(settings) == before
+
+
+@pytest.mark.parametrize(
+    "line", ["settings.no_such.value = 1", "1 +", "settings.table.as_text = 'x'"]
+)
+def test_damaged_setup_is_refused_and_leaves_the_default(line: str, settings: Any) -> None:
+    default = state(settings)
+    bpy.ops.octo_motion.setup_add(name="Broken")
+    path = setups.setup_paths()["Broken"]
+    path.write_text(path.read_text(encoding="utf-8") + line + "\n", encoding="utf-8")
+    bpy.ops.octo_motion.setup_load(name="swim")
+    with pytest.raises(RuntimeError, match="The set-up 'Broken' is damaged: "):
+        bpy.ops.octo_motion.setup_load(name="Broken")
+    assert state(settings) == default
