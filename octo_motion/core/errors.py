@@ -37,3 +37,7 @@ class WriteError(OctoMotionError):
 
 class ClipError(OctoMotionError):
     """A motion clip cannot be read, or has not what splicing needs of it."""
+
+
+class DeviceError(OctoMotionError):
+    """A six-degree-of-freedom device, or the program that drives it, cannot be used."""
