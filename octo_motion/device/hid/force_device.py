@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Driver of force devices that speak the open HID profile."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+
+from ...core.errors import DeviceError
+from ..driver import Description, DeviceLostError, Kind, Sample
+from ..spatial import ZERO, Vector
+from . import force_profile as profile
+from .system import Found, Handle, drain, open_device
+
+
+def is_force_device(found: Found) -> bool:
+    """Whether an interface says that it follows the profile."""
+    return (found.page, found.usage) == (profile.USAGE_PAGE, profile.USAGE)
+
+
+class ForceDevice:
+    """One force device."""
+
+    def __init__(self, found: Found, handle: Handle, features: profile.Features) -> None:
+        self._handle: Handle | None = handle
+        self._sequence = 0
+        self._description = Description(
+            name=found.name or "Force device",
+            identity=found.identity,
+            kind=Kind.POSE,
+            buttons=tuple(f"Button {index + 1}" for index in range(features.buttons)),
+            dynamics=features.dynamics,
+        )
+
+    @classmethod
+    def open(cls, found: Found) -> ForceDevice:
+        """Open a device that was found, and ask what it can do.
+
+        Raises:
+            DeviceError: the system does not let us, or the device follows another version.
+        """
+        handle = open_device(found)
+        try:
+            size = profile.SIZES[profile.FEATURES]
+            report = bytes(handle.get_feature_report(profile.FEATURES, size))
+            features = profile.parse_features(report)
+        except (OSError, ValueError) as error:
+            handle.close()
+            raise DeviceError(
+                f"{found.name or 'The force device'} does not follow the profile: {error}.",
+                f"Its firmware must follow version {profile.VERSION} of the profile.",
+            ) from error
+        return cls(found, handle, features)
+
+    @property
+    def description(self) -> Description:
+        """Who it is."""
+        return self._description
+
+    def read(self) -> Sample | None:
+        """The newest pose; None where none came, or only damaged ones.
+
+        Raises:
+            DeviceLostError: it was unplugged.
+        """
+        if self._handle is None:
+            raise DeviceLostError(self._description.name)
+        try:
+            reports = drain(self._handle)
+        except (OSError, ValueError) as error:
+            raise DeviceLostError(self._description.name) from error
+        for report in reversed(reports):
+            with suppress(profile.ReportError):
+                state = profile.parse_state(report)
+                return Sample(
+                    *(time.perf_counter(), state.position, state.orientation),
+                    *(state.velocity, state.angular_velocity, state.buttons, state.held),
+                )
+        return None
+
+    def send(self, force: Vector, torque: Vector) -> None:
+        """Ask for a force; the device's own watchdog ends it where no other follows.
+
+        Raises:
+            DeviceLostError: it was unplugged.
+        """
+        if self._handle is None:
+            raise DeviceLostError(self._description.name)
+        self._sequence += 1
+        command = profile.Command(
+            self._sequence, profile.WATCHDOG_MILLISECONDS, force != ZERO or torque != ZERO,
+            force, torque,
+        )  # fmt: skip
+        try:
+            written = self._handle.write(profile.pack_command(command))
+        except (OSError, ValueError) as error:
+            raise DeviceLostError(self._description.name) from error
+        if written < 0:
+            raise DeviceLostError(self._description.name)
+
+    def close(self) -> None:
+        """Take force away and let the device go."""
+        if self._handle is not None:
+            with suppress(DeviceLostError, profile.ReportError):
+                self.send(ZERO, ZERO)
+            self._handle.close()
+            self._handle = None

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Driver of space mice: push the cap, and the pointer moves."""
+
+from __future__ import annotations
+
+import time
+from typing import Final
+
+from ..driver import Description, DeviceLostError, Kind, Sample
+from ..spatial import Vector
+from .descriptor import DescriptorError, Layout, parse
+from .models import USAGE, USAGE_PAGE, model_of
+from .multi_axis import MultiAxis, classic_layout
+from .response import Response
+from .system import Found, Handle, descriptor_of, drain, open_device
+
+_SILENCE: Final = 0.5
+"""s: a pushed cap reports every 8 to 16 ms; after so long it is out of reach, not held still."""
+
+
+def is_space_mouse(found: Found) -> bool:
+    """Whether an interface says that it is a multi-axis controller.
+
+    Where the system tells no usage (usage page 0), the table of products decides.
+    """
+    if found.page == 0:
+        return model_of(found.vendor, found.product) is not None
+    return (found.page, found.usage) == (USAGE_PAGE, USAGE)
+
+
+class SpaceMouse:
+    """One space mouse."""
+
+    def __init__(self, found: Found, handle: Handle, layout: Layout, response: Response) -> None:
+        model = model_of(found.vendor, found.product)
+        names = model.buttons if model else {}
+        self._handle: Handle | None = handle
+        self._axes = MultiAxis(layout)
+        self._heard = 0.0
+        self.response = response
+        self._description = Description(
+            name=model.name if model else found.name or "Space mouse",
+            identity=found.identity,
+            kind=Kind.RATE,
+            buttons=tuple(
+                names.get(bit, f"Button {bit + 1}") for bit in range(max(names, default=1) + 1)
+            ),
+        )
+
+    @classmethod
+    def open(cls, found: Found, response: Response | None = None) -> SpaceMouse:
+        """Open a device that was found.
+
+        Raises:
+            DeviceError: the system does not let us.
+        """
+        handle = open_device(found)
+        layout = None
+        descriptor = descriptor_of(handle)
+        if descriptor:
+            try:
+                layout = parse(descriptor)
+            except DescriptorError:
+                layout = None  # as if the system had not told it
+        if layout is None or not MultiAxis(layout).useful:
+            model = model_of(found.vendor, found.product)
+            layout = classic_layout(combined=bool(model and model.combined))
+        return cls(found, handle, layout, response or Response())
+
+    @property
+    def description(self) -> Description:
+        """Who it is."""
+        return self._description
+
+    def read(self) -> Sample | None:
+        """The newest state, all waiting reports taken in.
+
+        Raises:
+            DeviceLostError: it was unplugged.
+        """
+        if self._handle is None:
+            raise DeviceLostError(self._description.name)
+        try:
+            reports = drain(self._handle)
+        except (OSError, ValueError) as error:
+            raise DeviceLostError(self._description.name) from error
+        now = time.perf_counter()
+        known = [self._axes.feed(report) for report in reports]
+        if any(known):
+            self._heard = now
+        x, y, z, a, b, c = self.response.speeds(self._axes.push)
+        if now - self._heard > _SILENCE:
+            # At rest a device is silent; a push that nobody repeats is one that got lost.
+            x = y = z = a = b = c = 0.0
+        return Sample(
+            now, velocity=(x, y, z), angular_velocity=(a, b, c), buttons=self._axes.buttons
+        )
+
+    def send(self, force: Vector, torque: Vector) -> None:
+        """Nothing: a space mouse has no motors."""
+
+    def close(self) -> None:
+        """Let the device go."""
+        if self._handle is not None:
+            self._handle.close()
+            self._handle = None
