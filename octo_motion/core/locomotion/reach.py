@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How an octopus reaches: a bend that travels along the arm from its base to its tip.
+
+Gutfreund, Flash, Yarom, Fiorito, Segev and Hochner, "Organization of octopus arm movements: a
+model system for studying the control of flexible arms" (Journal of Neuroscience 16, 1996), found
+that an octopus reaches by pushing a bend along its arm: what lies before the bend is straight and
+points at the target, what lies behind follows it curled; the bend's speed has one peak between
+start and end, and the movement stays near a plane. Here the bend's place along the arm runs as a
+hand's does in a reach of least jerk (Flash and Hogan 1985), ``10 t³ − 15 t⁴ + 6 t⁵``, whose speed
+is such a bell. What lies behind the bend is a logarithmic spiral: its radius is in proportion to
+what is left of the arm, so it does not run into itself. Suckers face outwards there, and lead at
+the bend, as they do in nature.
+
+After the touch the same front runs on to the tip, and the arm winds about the object as it passes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..errors import SettingsError
+from ..rotations import Floats
+from .arm_frames import bends
+
+FOLD: Final = np.radians(110.0)
+"""Angle of the travelling bend."""
+_SPIRAL: Final = 1.5
+"""Radians of the spiral for each time that what is left of the arm gets e times shorter."""
+_BLUNT: Final = 0.2
+"""Arm lengths that the spiral thinks are left at the tip, so that it is not wound up endlessly."""
+_MOST_BENT: Final = np.radians(75.0)
+"""Of one joint."""
+_FRONT: Final = 0.22
+"""Width of the front in arm lengths."""
+_FRONT_SEGMENTS: Final = 2.0
+"""Least width of the front in segments."""
+_FIRST_BEND: Final = 0.1
+"""Where the bend forms, in arm lengths from the root."""
+_GATHERED: Final = 0.5
+"""Share of the reach by which the arm has left what it did otherwise."""
+_SET_OUT: Final = 0.12
+"""Share of the reach after which the bend sets out."""
+_STAGGER: Final = 0.8
+"""How much later the root joins in than the tip, in times that each of them takes."""
+_UNWOUND: Final = 0.5
+"""Share of the return by which the arm has let go."""
+_BACK_FROM, _BACK_TO = 0.3, 0.8
+"""Shares of the return between which the bend runs back to the root."""
+_LEAVES: Final = 0.45
+"""Share of the return after which the arm begins to go back to what it does otherwise."""
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """When an arm does what, in frames."""
+
+    start: float
+    """It sets out."""
+    contact: float
+    """It touches."""
+    closed: float
+    """It is wound all the way."""
+    release: float
+    """It begins to let go."""
+    end: float
+    """It does what it would do otherwise."""
+
+    def __post_init__(self) -> None:
+        times = (self.start, self.contact, self.closed, self.release, self.end)
+        if not np.all(np.isfinite(times)):
+            raise SettingsError("A time of the reach is not a number.", "Set it anew.")
+        if not self.start < self.contact <= self.closed <= self.release < self.end:
+            raise SettingsError(
+                f"A reach that starts at frame {self.start:g}, touches at {self.contact:g}, holds "
+                f"from {self.closed:g} to {self.release:g} and ends at {self.end:g} is out of "
+                "order.",
+                "Let each come after the one before.",
+            )
+
+    def weight(self, times: Floats, along: Floats) -> Floats:
+        """How far (frames, joints) the arm has left what it does otherwise, 0…1.
+
+        The tip curls up before the root aims, and stretches out after the root has gone back: so
+        the arm does not sweep over what it reaches for.
+
+        Args:
+            times: (frames,)
+            along: (joints,) where joints are on the arm, 0 at its root to 1.
+        """
+        whole, back = self.contact - self.start, self.end - self.release
+        out = (times[:, None] - self.start) / (_GATHERED * whole)
+        gone = (times[:, None] - self.release - _LEAVES * back) / ((1.0 - _LEAVES) * back)
+        out = eased((1.0 + _STAGGER) * out - _STAGGER * (1.0 - along))
+        gone = eased((1.0 + _STAGGER) * gone - _STAGGER * along)
+        return out * (1.0 - gone)
+
+    def front(self, times: Floats, begins: float, touches: float, ends: float) -> Floats:
+        """Where (frames,) the front is along the arm, from its three places."""
+        whole, back = self.contact - self.start, self.end - self.release
+        out = eased((times - self.start - _SET_OUT * whole) / ((1.0 - _SET_OUT) * whole))
+        if self.closed > self.contact:
+            wound = eased((times - self.contact) / (self.closed - self.contact))
+        else:
+            wound = (times >= self.contact).astype(np.float64)
+        unwound = eased((times - self.release) / (_UNWOUND * back))
+        back_again = eased(((times - self.release) / back - _BACK_FROM) / (_BACK_TO - _BACK_FROM))
+        place = begins + (touches - begins) * out * (1.0 - back_again)
+        return place + (ends - touches) * wound * (1.0 - unwound)
+
+
+def eased(share: Floats) -> Floats:
+    """The way of least jerk from 0 to 1 (Flash and Hogan 1985); held beyond both ends."""
+    t = np.clip(share, 0.0, 1.0)
+    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
+
+
+def front_width(lengths: Floats) -> float:
+    """Over how long a stretch of the arm the front passes."""
+    return max(_FRONT * float(lengths.sum()), _FRONT_SEGMENTS * float(lengths.mean()))
+
+
+def first_place(lengths: Floats) -> float:
+    """Where the front is when the bend forms."""
+    return _FIRST_BEND * float(lengths.sum())
+
+
+def passed(lengths: Floats, front: Floats) -> Floats:
+    """How far (…, segments) the front (…) has passed the joint at each segment's root, 0…1.
+
+    The first joint aims the arm; it is always passed.
+    """
+    joints = np.cumsum(lengths) - lengths
+    result = eased((front[..., None] - joints) / front_width(lengths))
+    result[..., 0] = 1.0
+    return result
+
+
+def folded(lengths: Floats, front: Floats, amount: float = 1.0) -> Floats:
+    """Turns (…, segments, 4) of what the front (…) has not passed: bend, and spiral beyond it.
+
+    Args:
+        lengths: (segments,).
+        front: (…) its place along the arm.
+        amount: how much of the bend.
+    """
+    whole, width = float(lengths.sum()), front_width(lengths)
+    ends = np.concatenate([[0.0], np.cumsum(lengths)])
+    left = whole - ends + _BLUNT * whole
+    curl = _SPIRAL * np.log(left[:-1] / left[1:])
+    # The bend lies within the front: its angle up to each place along the arm runs as the front.
+    behind = front[..., None] - 0.5 * width
+    so_far = eased((ends - 0.5 * np.append(lengths, lengths[-1]) - behind) / width)
+    bend = amount * FOLD * np.diff(so_far, axis=-1)
+    angles = np.minimum(curl + bend, _MOST_BENT)
+    angles[..., 0] = 0.0
+    return bends(angles)
