@@ -141,7 +141,7 @@ def test_all_faults_are_told_at_once_with_their_shots(tmp_path: Path) -> None:
         ('[defaults]\nname = "x"\n' + WALK, "defaults: A name belongs to one shot."),
         ("[[shots]]\n", "shot number 1: It has no name"),
         (WALK + WALK.replace("out", "other"), "shot 'walk': 2 shots have this name."),
-        (WALK + "colour = 3\n", "There is no key 'colour'. Valid: name, file, octopus"),
+        (WALK + "colour = 3\n", "There is no key 'colour'. Valid: name, kind, file, octopus"),
         ('[[shots]]\nname = "walk"\noutput = "w.blend"\n', "It has no creature: give file"),
         (WALK + "octopus = {}\n" + ROUTE, "It has a file and a new octopus"),
         ('[[shots]]\nname = "walk"\nfile = "x.blend"\n', "It writes nothing"),

@@ -92,12 +92,10 @@ def _chosen(job: Job, only: Sequence[str]) -> list[JobShot]:
     return [shot for shot in job.shots if not only or shot.entry.name in only]
 
 
-def _problems(
-    shots: Sequence[JobShot], check_file: Callable[[Path], None]
-) -> dict[Path | None, str]:
+def _problems(shots: Sequence[JobShot], check_file: Callable[[Path], None]) -> dict[Path, str]:
     """What is wrong with the files of shots; many shots may be of one file."""
-    problems: dict[Path | None, str] = {}
-    for file in {shot.entry.file for shot in shots if shot.entry.file is not None}:
+    problems: dict[Path, str] = {}
+    for file in {path for shot in shots for path in shot.entry.inputs}:
         try:
             check_file(file)
         except OctoMotionError as error:
@@ -105,13 +103,12 @@ def _problems(
     return problems
 
 
-def _plan(shot: JobShot, run: _Run, problems: Mapping[Path | None, str], *, force: bool) -> _Plan:
+def _plan(shot: JobShot, run: _Run, problems: Mapping[Path, str], *, force: bool) -> _Plan:
     """Look at a shot, without changing anything."""
-    named = (shot.entry.file, shot.gait_file)
-    inputs = tuple(path for path in named if path is not None)
+    inputs = shot.inputs
     try:
         entry = load_gait_file(shot)
-        problem = problems.get(entry.file, "")
+        problem = next((problems[path] for path in entry.inputs if path in problems), "")
     except OctoMotionError as error:
         entry, problem = shot.entry, str(error)
     plan = _Plan(entry, fingerprint(shot.asked, entry.gait), inputs, problem)

@@ -19,6 +19,22 @@ What is not given is as it is set in the file. The file that is read stays as it
 --overwrite is given; an output is written whole or not at all.
 """
 
+_SPLICE: Final = """\
+Put parts of other motions onto one motion, and save the result as a new file.
+
+FILE is the motion to splice onto: a motion file (.bvh, .fbx, .glb, .gltf), or a .blend file with
+an armature and its action. Each --splice goes onto the result of those before it; without any, the
+list that the .blend file has is built. What is read stays as it is.
+
+  splice walk.bvh --splice right_arm throw.bvh base_start=20 after=stop \\
+         --splice left_arm punch.bvh base_start=60 mode=exact -o walk_throw_punch.blend
+
+What is not given has the value that the panel gives to a new splice. Settings have the names that
+scripts use: Object.octo_motion.splicing.splices[N].NAME. clip=FILE, action=NAME and source=NAME (an
+armature of the .blend file) say where the part is from; landmarks.NAME=BONE says which bone is
+which, where it cannot be told.
+"""
+
 _BAKE: Final = """\
 Make many shots from a job file, each in a process of its own.
 
@@ -52,6 +68,15 @@ A job file is TOML; its paths are relative to its folder. [defaults] is for all 
 
 Settings have the names that scripts use: Object.octo_motion.locomotion.NAME. Numbers of angles are
 radians, texts may be in degrees.
+
+  [[shots]]
+  name = "walk_and_throw"
+  kind = "splice"                   # parts of other motions onto this one
+  file = "clips/walk.bvh"           # or a .blend file, with armature and base (an action) by name
+  splices = [
+      { part = "right_arm", clip = "clips/throw.bvh", base_start = 20, after = "stop" },
+      { part = "left_arm", clip = "clips/punch.bvh", base_start = 60, mode = "exact" },
+  ]
 """
 
 
@@ -64,11 +89,13 @@ def parser(program: str, *, has_open_file: bool) -> argparse.ArgumentParser:
     """
     main = argparse.ArgumentParser(
         prog=program,
-        description="Octo Motion: creatures with arms walk and swim along a route.",
+        description="Octo Motion: creatures with arms walk and swim along a route, parts of one "
+        "motion are put onto another.",
         epilog=f"{_STATUS} '{program} bake --help' shows what a job file looks like.",
     )
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_generate(commands, has_open_file=has_open_file)
+    _add_splice(commands, has_open_file=has_open_file)
     _add_bake(commands)
     return main
 
@@ -83,13 +110,64 @@ def _add_generate(
         epilog=_STATUS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    _add_files(command, "the .blend file to read", "the creature", has_open_file=has_open_file)
+    command.add_argument(
+        "--armature", metavar="NAME", default="", help="default: the one that has arms"
+    )
+    command.add_argument(
+        "--route", metavar="NAME", default="", help="the curve; default: the armature's own"
+    )
+    command.add_argument(
+        "--gait", metavar="NAME", default="", help="a gait by name, or a gait file (.json)"
+    )
+    _add_settings(command, "a setting, such as speed=0.4, sway=12° or table.stride=1.2")
+
+
+def _add_splice(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser], *, has_open_file: bool
+) -> None:
+    command = commands.add_parser(
+        "splice",
+        help="put parts of other motions onto one motion",
+        description=_SPLICE,
+        epilog=_STATUS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    _add_files(
+        command,
+        "the motion or .blend file to splice onto, before any --splice",
+        "the armature and what hangs on it",
+        has_open_file=has_open_file,
+    )
+    command.add_argument(
+        "--splice",
+        metavar=("PART", "FILE NAME=VALUE"),
+        nargs="+",
+        action="append",
+        default=[],
+        dest="splices",
+        help="a part, the motion file that it is from, and settings; may be repeated",
+    )
+    command.add_argument(
+        "--armature", metavar="NAME", default="", help="default: the one that has splices"
+    )
+    command.add_argument(
+        "--base", metavar="ACTION", default="", help="default: the list's, or the armature's own"
+    )
+    _add_settings(command, "a setting of the base, such as visual=true or landmarks.chest=Spine2")
+
+
+def _add_files(
+    command: argparse.ArgumentParser, file: str, exported: str, *, has_open_file: bool
+) -> None:
+    """What is read and what is written."""
     default = " (default: the one that is open)" if has_open_file else ""
     command.add_argument(
         "file",
         metavar="FILE",
         type=Path,
         nargs="?" if has_open_file else None,
-        help=f"the .blend file to read{default}",
+        help=f"{file}{default}",
     )
     command.add_argument(
         "-o", "--output", metavar="FILE", type=Path, help="the .blend file to write"
@@ -105,24 +183,18 @@ def _add_generate(
         type=Path,
         action="append",
         default=[],
-        help=f"export the creature as well ({', '.join(EXPORT_SUFFIXES)}); may be repeated",
+        help=f"export {exported} as well ({', '.join(EXPORT_SUFFIXES)}); may be repeated",
     )
-    command.add_argument(
-        "--armature", metavar="NAME", default="", help="default: the one that has arms"
-    )
-    command.add_argument(
-        "--route", metavar="NAME", default="", help="the curve; default: the armature's own"
-    )
-    command.add_argument(
-        "--gait", metavar="NAME", default="", help="a gait by name, or a gait file (.json)"
-    )
+
+
+def _add_settings(command: argparse.ArgumentParser, what: str) -> None:
     command.add_argument(
         "--set",
         metavar="NAME=VALUE",
         action="append",
         default=[],
         dest="settings",
-        help="a setting, such as speed=0.4, sway=12° or table.stride=1.2; may be repeated",
+        help=f"{what}; may be repeated",
     )
     command.add_argument("--fps", type=_frame_rate, help="frames per second of the scene")
 

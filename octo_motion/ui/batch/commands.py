@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -16,12 +16,14 @@ from ...core.locomotion import gait
 from .bake import STOPPED, BakeOptions, bake
 from .child import RUN_SHOT, run_shot
 from .command_line import parse
-from .entry import ShotEntry
+from .entry import ShotEntry, SpliceWork
 from .job import Known, export_fault, is_gait_file, read_gait_file
 from .known import check_file, known
+from .motion_files import is_motion
 from .outputs import commit, staged
 from .processes import stoppable
-from .setting_values import check_settings, parse_assignments
+from .setting_values import Setting, Value, check_settings, parse_assignments
+from .splice_job import parse_splice, read_splices
 from .stage import perform
 
 _WRONG: Final = 2
@@ -38,7 +40,7 @@ def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
         with stoppable():
             if options.command == "bake":
                 return _bake(options)
-            return _generate(options)
+            return _make(options)
     except KeyboardInterrupt:
         print("Stopped.", file=sys.stderr)
         return STOPPED
@@ -59,9 +61,11 @@ def _bake(options: argparse.Namespace) -> int:
         return _complain(error, _WRONG)
 
 
-def _generate(options: argparse.Namespace) -> int:
+def _make(options: argparse.Namespace) -> int:
+    """One file, to walk or swim or with splices."""
+    make_entry = _splice_entry if options.command == "splice" else _entry
     try:
-        entry = _entry(options, known())
+        entry = make_entry(options, known())
     except OctoMotionError as error:
         return _complain(error, _WRONG)
     try:
@@ -79,18 +83,74 @@ def _generate(options: argparse.Namespace) -> int:
 
 
 def _entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
-    """What the arguments ask for.
+    """What the arguments of ``generate`` ask for.
 
     Raises:
         OctoMotionError: they make no sense.
     """
+    source, read = _files(options)
+    output, exports = _outputs(options, read)
+    return ShotEntry(
+        name=read.stem,
+        file=source,
+        armature=options.armature,
+        route=options.route,
+        gait=_gait(options.gait, may_name),
+        settings=_settings(options, may_name.settings),
+        fps=options.fps,
+        output=output,
+        exports=exports,
+    )
+
+
+def _splice_entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
+    """What the arguments of ``splice`` ask for.
+
+    Raises:
+        OctoMotionError: they make no sense.
+    """
+    source, read = _files(options)
+    tables = [parse_splice(words) for words in options.splices]
+    splices, faults = None, []
+    if tables:
+        splices, faults = read_splices(tables, may_name.splice_settings, _resolved)
+    elif is_motion(read):
+        faults = ["There is nothing to splice: give --splice PART FILE."]
+    if faults:
+        raise SettingsError("\n".join(faults))
+    output, exports = _outputs(options, read, *(each.clip for each in splices or () if each.clip))
+    return ShotEntry(
+        name=read.stem,
+        file=source,
+        armature=options.armature,
+        settings=_settings(options, may_name.splicing_settings),
+        fps=options.fps,
+        output=output,
+        exports=exports,
+        splicing=SpliceWork(options.base, splices),
+    )
+
+
+def _files(options: argparse.Namespace) -> tuple[Path | None, Path]:
+    """The file that is named, if any, and the one that is read."""
     source = options.file.resolve() if options.file else None
     read = source or (Path(bpy.data.filepath).resolve() if bpy.data.filepath else None)
     if read is None:
         raise OctoMotionError("No file is open.", "Give the .blend file to read.")
+    return source, read
+
+
+def _outputs(options: argparse.Namespace, *read: Path) -> tuple[Path | None, tuple[Path, ...]]:
+    """The .blend file to write, and what to export to.
+
+    Args:
+        options: the arguments.
+        read: all files that are read, the scene first.
+    """
     output = options.output.resolve() if options.output else None
-    if output is None and options.overwrite:
-        output = read
+    # What is read may be a motion file: that is never the one to overwrite.
+    if output is None and options.overwrite and not (options.export and is_motion(read[0])):
+        output = read[0]
     exports = tuple(path.resolve() for path in options.export)
     if output is None and not exports:
         raise WriteError(
@@ -106,23 +166,23 @@ def _entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
     if len(set(outputs)) < len(outputs):
         raise WriteError("Two outputs have the same path.", "Give each its own.")
     for path in outputs:
+        if path in read[1:]:
+            raise WriteError(f"'{path}' is a clip that is read.", "Give another path.")
         if path.exists() and not options.overwrite:
-            what = "is the file that is read" if path == read else "is there already"
+            what = "is the file that is read" if path == read[0] else "is there already"
             raise WriteError(f"'{path}' {what}.", "Give another path, or --overwrite.")
-    values, faults = check_settings(may_name.settings, parse_assignments(options.settings))
+    return output, exports
+
+
+def _settings(options: argparse.Namespace, valid: Mapping[str, Setting]) -> dict[str, Value]:
+    values, faults = check_settings(valid, parse_assignments(options.settings))
     if faults:
         raise SettingsError("\n".join(faults))
-    return ShotEntry(
-        name=read.stem,
-        file=source,
-        armature=options.armature,
-        route=options.route,
-        gait=_gait(options.gait, may_name),
-        settings=values,
-        fps=options.fps,
-        output=output,
-        exports=exports,
-    )
+    return values
+
+
+def _resolved(text: str) -> Path:
+    return Path(text).expanduser().resolve()
 
 
 def _gait(name: str, may_name: Known) -> str:

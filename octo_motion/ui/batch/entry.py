@@ -37,12 +37,37 @@ class NewRoute:
 
 
 @dataclass(frozen=True)
+class NewSplice:
+    """One splice for the list of an armature."""
+
+    clip: Path | None = None
+    """The motion file that the part is from; without it, ``source`` and ``action`` say it."""
+    source: str = ""
+    """Armature in the .blend file that the clip is for, the one that is spliced onto if empty."""
+    action: str = ""
+    """Name of the action, the only one of the motion file or the source's own if empty."""
+    settings: dict[str, Value] = field(default_factory=dict)
+    """Values of the item by name, the part among them, and ``landmarks.NAME`` of the source."""
+
+
+@dataclass(frozen=True)
+class SpliceWork:
+    """What to splice."""
+
+    base: str = ""
+    """Name of the action to splice onto; the armature's own, or the list's, if empty."""
+    splices: tuple[NewSplice, ...] | None = None
+    """In order, or none for the list that the file has."""
+
+
+@dataclass(frozen=True)
 class ShotEntry:
     """What one shot is made from, and what is made of it."""
 
     name: str
     file: Path | None = None
-    """The file to open; without it and without an octopus, the file that is open."""
+    """The file to open; without it and without an octopus, the file that is open. To splice, it
+    may be a motion file."""
     octopus: NewOctopus | None = None
     armature: str = ""
     route: str | NewRoute = ""
@@ -53,6 +78,15 @@ class ShotEntry:
     fps: float | None = None
     output: Path | None = None
     exports: tuple[Path, ...] = ()
+    splicing: SpliceWork | None = None
+    """What to splice; none: the armature is to walk or swim."""
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """All files that are named to be read: scene and clips."""
+        splices = (self.splicing and self.splicing.splices) or ()
+        named = (self.file, *(splice.clip for splice in splices))
+        return tuple(dict.fromkeys(path for path in named if path is not None))
 
     @property
     def outputs(self) -> tuple[Path, ...]:
@@ -65,6 +99,8 @@ class ShotEntry:
         plain["file"] = str(self.file) if self.file else None
         plain["output"] = str(self.output) if self.output else None
         plain["exports"] = [str(path) for path in self.exports]
+        for splice in (plain["splicing"] or {}).get("splices") or ():
+            splice["clip"] = str(splice["clip"]) if splice["clip"] else None
         return plain
 
     @classmethod
@@ -87,7 +123,18 @@ class ShotEntry:
             fps=plain["fps"],
             output=Path(plain["output"]) if plain["output"] else None,
             exports=tuple(Path(path) for path in plain["exports"]),
+            splicing=_splice_work(plain["splicing"]) if plain["splicing"] else None,
         )
+
+
+def _splice_work(plain: dict[str, Any]) -> SpliceWork:
+    given = plain["splices"]
+    return SpliceWork(plain["base"], None if given is None else tuple(map(_new_splice, given)))
+
+
+def _new_splice(plain: dict[str, Any]) -> NewSplice:
+    clip = Path(plain["clip"]) if plain["clip"] else None
+    return NewSplice(clip, plain["source"], plain["action"], plain["settings"])
 
 
 def frame_rate(fps: float) -> tuple[int, float]:

@@ -12,7 +12,7 @@ import math
 import os
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,13 +20,31 @@ from ...core.errors import OctoMotionError
 from ...core.locomotion import gait
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.octopus_shape import OctopusShape
-from .entry import EXPORT_SUFFIXES, HIGHEST_FPS, NewOctopus, NewRoute, Points, ShotEntry
-from .setting_values import Setting, check_settings, unknown
-
-KEYS: Final = (
-    *("name", "file", "octopus", "armature", "route", "gait", "settings", "fps"),
-    *("output", "export"),
+from .entry import (
+    EXPORT_SUFFIXES,
+    HIGHEST_FPS,
+    NewOctopus,
+    NewRoute,
+    Points,
+    ShotEntry,
+    SpliceWork,
 )
+from .motion_files import is_motion
+from .setting_values import Setting, check_settings, unknown
+from .splice_job import read_splices
+
+KINDS: Final = {
+    "generate": (
+        *("name", "kind", "file", "octopus", "armature", "route", "gait", "settings", "fps"),
+        *("output", "export"),
+    ),
+    "splice": (
+        *("name", "kind", "file", "armature", "base", "splices", "settings", "fps"),
+        *("output", "export"),
+    ),
+}
+"""What a shot of either kind may say."""
+KEYS: Final = tuple(dict.fromkeys(key for keys in KINDS.values() for key in keys))
 _OCTOPUS_KEYS: Final = (*(each.name for each in dataclasses.fields(OctopusShape)), "with_mesh")
 _ROUTE_KEYS: Final = ("control_points", "points", "cyclic")
 _POINTS: Final = "each of three numbers, [x, y, z]"
@@ -49,6 +67,10 @@ class Known:
     settings: Mapping[str, Setting]
     gait: Callable[[str], GaitTable]
     """A gait by name; raises GaitError."""
+    splicing_settings: Mapping[str, Setting] = field(default_factory=dict)
+    """Of a shot that splices."""
+    splice_settings: Mapping[str, Setting] = field(default_factory=dict)
+    """Of each splice in its list."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +81,11 @@ class JobShot:
     asked: dict[str, Any]
     """The shot's table with the defaults filled in, as it stands in the file."""
     gait_file: Path | None = None
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """All files that the shot names to be read."""
+        return (*self.entry.inputs, *((self.gait_file,) if self.gait_file else ()))
 
 
 @dataclass(frozen=True)
@@ -148,7 +175,11 @@ def is_gait_file(name: str) -> bool:
 
 
 def _merged(defaults: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
-    merged = {key: value for key, value in defaults.items() if key != "name"}
+    kind = table.get("kind", defaults.get("kind", "generate"))
+    of_others = {key for keys in KINDS.values() for key in keys}
+    of_others -= set(KINDS.get(kind, KEYS) if isinstance(kind, str) else KEYS)
+    # What only shots of another kind have is not meant for this one.
+    merged = {key: value for key, value in defaults.items() if key not in {"name", *of_others}}
     # A shot that says where its creature comes from does not mean the defaults' other one.
     for key, other in (("file", "octopus"), ("octopus", "file")):
         if key in table and other not in table:
@@ -190,21 +221,31 @@ class _Reader:
             self._fault('It has no name: write name = "…".')
 
     def shot(self) -> JobShot:
+        kind = self._table.get("kind", "generate")
+        if not isinstance(kind, str) or kind not in KINDS:
+            self._fault(unknown("kind", str(kind), KINDS))
+            kind = "generate"
         for key in self._table:
-            if key not in KEYS:
-                self._fault(unknown("key", key, KEYS))
+            if key not in KINDS[kind]:
+                self._fault(self._strange(key, kind))
+        return self._splicing() if kind == "splice" else self._generating()
+
+    def _strange(self, key: str, kind: str) -> str:
+        others = [each for each in KINDS if key in KINDS[each]]
+        if others:
+            return f'{key} is for shots with kind = "{others[0]}".'
+        return unknown("key", key, KINDS[kind])
+
+    def _generating(self) -> JobShot:
         file, octopus = self._path("file"), self._octopus()
+        if file is not None and is_motion(file):
+            self._fault(f"'{file.name}' is a motion file, which is for kind = \"splice\".")
         if file is not None and octopus is not None:
             self._fault("It has a file and a new octopus: give one of the two.")
         elif "file" not in self._table and "octopus" not in self._table:
             self._fault('It has no creature: give file = "….blend", or octopus = {} for a new one.')
         gait_text, gait_file = self._gait()
-        exports = self._exports()
-        output = self._path("output")
-        if output is not None and output.suffix.lower() != ".blend":
-            self._fault(f"The output '{output.name}' must end in .blend.")
-        if "output" not in self._table and not exports:
-            self._fault('It writes nothing: give output = "….blend", or export.')
+        output, exports = self._outputs()
         entry = ShotEntry(
             name=self._name,
             file=file,
@@ -212,12 +253,47 @@ class _Reader:
             armature="" if octopus else self._text("armature"),
             route=self._route(),
             gait=gait_text,
-            settings=self._settings(),
+            settings=self._settings(self._known.settings),
             fps=self._fps(),
             output=output,
             exports=exports,
         )
         return JobShot(entry, self._table, gait_file)
+
+    def _splicing(self) -> JobShot:
+        file = self._path("file")
+        if "file" not in self._table:
+            self._fault('It has no base: give file, a motion file or "….blend".')
+        splices = None
+        if "splices" in self._table:
+            splices, faults = read_splices(
+                self._table["splices"], self._known.splice_settings, self._resolved
+            )
+            for fault in faults:
+                self._fault(fault)
+        elif file is not None and is_motion(file):
+            self._fault("It splices nothing: give splices, a list of tables.")
+        output, exports = self._outputs()
+        entry = ShotEntry(
+            name=self._name,
+            file=file,
+            armature=self._text("armature"),
+            settings=self._settings(self._known.splicing_settings),
+            fps=self._fps(),
+            output=output,
+            exports=exports,
+            splicing=SpliceWork(self._text("base"), splices),
+        )
+        return JobShot(entry, self._table)
+
+    def _outputs(self) -> tuple[Path | None, tuple[Path, ...]]:
+        exports = self._exports()
+        output = self._path("output")
+        if output is not None and output.suffix.lower() != ".blend":
+            self._fault(f"The output '{output.name}' must end in .blend.")
+        if "output" not in self._table and not exports:
+            self._fault('It writes nothing: give output = "….blend", or export.')
+        return output, exports
 
     def _fault(self, sentences: str) -> None:
         self._faults.append(f"{self._label}: {sentences}")
@@ -339,12 +415,12 @@ class _Reader:
             self._fault(str(error))
             return "", None
 
-    def _settings(self) -> dict[str, Any]:
+    def _settings(self, known: Mapping[str, Setting]) -> dict[str, Any]:
         given = self._table.get("settings", {})
         if not isinstance(given, dict):
             self._fault(f"settings must be a table, not {given!r}.")
             return {}
-        values, faults = check_settings(self._known.settings, given)
+        values, faults = check_settings(known, given)
         for fault in faults:
             self._fault(fault)
         return values
@@ -405,9 +481,8 @@ def _path_faults(shots: Sequence[JobShot], job: Path, report: Path) -> list[str]
     """Outputs that would overwrite what is read, or one another."""
     owners = {_key(job): "the job file itself", _key(report.resolve()): "the report"}
     for shot in shots:
-        for path in (shot.entry.file, shot.gait_file):
-            if path is not None:
-                owners.setdefault(_key(path), f"an input of shot '{shot.entry.name}'")
+        for path in shot.inputs:
+            owners.setdefault(_key(path), f"an input of shot '{shot.entry.name}'")
     faults = []
     for shot in shots:
         for path in shot.entry.outputs:

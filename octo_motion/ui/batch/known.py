@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,11 @@ import bpy
 from ...blender import presets
 from ...core.errors import OctoMotionError
 from ..locomotion.properties import OCTO_MOTION_PG_locomotion
+from ..splicing.landmark_properties import OCTO_MOTION_PG_landmarks
+from ..splicing.properties import OCTO_MOTION_PG_splicing
+from ..splicing.splice_properties import SpliceItem
 from .job import Known
+from .motion_files import check_motion, is_motion
 from .setting_values import Setting
 
 _OWN_KEYS = {"name", "gait"}
@@ -22,9 +26,21 @@ _OWN_KEYS = {"name", "gait"}
 def known() -> Known:
     """What shots may name in this Blender."""
     return Known(
-        settings={setting.name: setting for setting in _settings(OCTO_MOTION_PG_locomotion)},
+        settings=_by_name(_settings(OCTO_MOTION_PG_locomotion)),
         gait=presets.load_gait,
+        splicing_settings=_by_name(_settings(OCTO_MOTION_PG_splicing)),
+        splice_settings=_by_name(
+            (
+                Setting("name", "STRING"),
+                *_settings(SpliceItem),
+                *_settings(OCTO_MOTION_PG_landmarks, "landmarks."),
+            )
+        ),
     )
+
+
+def _by_name(settings: Iterable[Setting]) -> dict[str, Setting]:
+    return {setting.name: setting for setting in settings}
 
 
 def _settings(group: Any, before: str = "") -> Iterator[Setting]:
@@ -59,8 +75,11 @@ def check_file(file: Path) -> None:
     """Make sure that Blender can read a file, without opening it.
 
     Raises:
-        OctoMotionError: there is no such file, or it is not Blender's.
+        OctoMotionError: there is no such file, or it is neither Blender's nor one of motion.
     """
+    if is_motion(file):
+        check_motion(file)
+        return
     if not file.is_file():
         raise OctoMotionError(f"There is no file '{file}'.", "Give the path of a .blend file.")
     if bpy.data.filepath and file.samefile(bpy.data.filepath):

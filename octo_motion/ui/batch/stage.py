@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One shot in this Blender: open or make the scene, generate, write."""
+"""One shot in this Blender: open or make the scene, generate or splice, write."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ from ...core.locomotion import gait
 from ...core.locomotion.detection import detect_arms
 from ..locomotion.properties import locomotion_settings, set_gait
 from ..locomotion.workflow import Summary, generate
+from . import splice_stage
 from .blender_said import blender_said
 from .entry import NewRoute, ShotEntry, frame_rate
 from .exports import check_export, export
+from .motion_files import is_motion
 
 _ROUTE_NAME: Final = "Octopus Route"
 _COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
@@ -33,10 +35,10 @@ _COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 class Performed:
     """What came of a shot."""
 
-    summary: Summary
+    summary: Summary | splice_stage.SpliceSummary
     armature: str
     libraries: tuple[str, ...]
-    """Paths of the files that the scene is linked from."""
+    """Paths of the files that the scene is linked from, and of those that clips consist of."""
 
 
 def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
@@ -49,17 +51,14 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    compress = _open(entry)
-    scene = bpy.context.scene
-    assert scene is not None
-    if entry.octopus is not None:
-        armature = add_octopus(
-            bpy.context, entry.octopus.shape, Matrix(), with_skin=entry.octopus.with_mesh
-        )
+    clips = splice_stage.Clips()
+    motion = entry.file if entry.splicing and entry.file and is_motion(entry.file) else None
+    if motion is not None:
+        armature, clips = splice_stage.import_base(motion, entry.fps)
+        compress, scene = False, armature.users_scene[0]
     else:
-        armature = find_armature(entry.armature, scene)
-        scene = _scene_of(armature, scene)
-    libraries = tuple(bpy.path.abspath(each.filepath) for each in bpy.data.libraries)
+        compress, (armature, scene) = _open(entry), _find(entry)
+    libraries = [bpy.path.abspath(each.filepath) for each in bpy.data.libraries]
     with _context(scene, armature):
         if bpy.context.mode.startswith("EDIT"):
             # So was the file saved; what is being edited is not to be keyed, nor exported.
@@ -68,16 +67,35 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
             scene.render.fps, scene.render.fps_base = frame_rate(entry.fps)
         for path in entry.exports:
             check_export(path, armature, scene)
-        _apply(entry, armature, scene)
-        summary = generate(armature, bpy.context)
-        if entry.octopus is not None:
+        if entry.splicing is not None:
+            work = (entry.splicing, entry.settings)
+            summary = splice_stage.splice(armature, *work, clips, motion)
+        else:
+            _apply(entry, armature, scene)
+            summary = generate(armature, bpy.context)
+        if entry.octopus is not None or motion is not None:
             scene.frame_start, scene.frame_end = summary.frame_start, summary.frame_end
         if entry.output is not None:
             _save(places[entry.output], compress=compress)
         # Whatever the exports need of the scene, the file has been saved before.
         for path in entry.exports:
             export(places[path], armature, scene, summary.frame_start, summary.frame_end)
-    return Performed(summary, armature.name, libraries)
+    libraries += [str(path) for path in clips.read]
+    return Performed(summary, armature.name, tuple(libraries))
+
+
+def _find(entry: ShotEntry) -> tuple[bpy.types.Object, bpy.types.Scene]:
+    """The armature to move, and a scene that it is in."""
+    scene = bpy.context.scene
+    assert scene is not None
+    if entry.octopus is not None:
+        armature = add_octopus(
+            bpy.context, entry.octopus.shape, Matrix(), with_skin=entry.octopus.with_mesh
+        )
+        return armature, scene
+    fits = splice_stage.has_splices if entry.splicing else _has_arms
+    armature = find_armature(entry.armature, scene, fits)
+    return armature, _scene_of(armature, scene)
 
 
 def _open(entry: ShotEntry) -> bool:
@@ -108,11 +126,13 @@ def _is_compressed(path: Path) -> bool:
         return False
 
 
-def find_armature(name: str, scene: bpy.types.Scene) -> bpy.types.Object:
-    """The armature of that name, or the one that has arms.
+def find_armature(
+    name: str, scene: bpy.types.Scene, fits: Callable[[bpy.types.Object], bool]
+) -> bpy.types.Object:
+    """The armature of that name, or the one that fits.
 
-    Where several have arms, the scene's active object decides. Linked armatures count only where
-    there is no other: nothing could be written on them.
+    Where several fit, the scene's active object decides. Linked armatures count only where there
+    is no other: nothing could be written on them.
 
     Raises:
         RigError: there is none, or it is not clear which.
@@ -127,11 +147,11 @@ def find_armature(name: str, scene: bpy.types.Scene) -> bpy.types.Object:
     armatures = [each for each in every if each.library is None] or every
     if not armatures:
         raise RigError(f"The scene '{scene.name}' has no armature.", "Give a file that has one.")
-    with_arms = [each for each in armatures if _has_arms(each)]
-    if len(with_arms) == 1:
-        return with_arms[0]
+    fitting = [each for each in armatures if fits(each)]
+    if len(fitting) == 1:
+        return fitting[0]
     active = scene.view_layers[0].objects.active
-    candidates = with_arms or armatures
+    candidates = fitting or armatures
     if active in candidates:
         return active
     if len(candidates) == 1:
