@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The held body as the hand feels it between two steps of the simulation.
+
+The loop asks a thousand times a second where the body is; the simulation answers as often as it
+can. In between the loop goes on with a linear model of the body at the point where it is held: it
+keeps its velocity, and a pull other than the one the simulation last used changes that by the
+body's mobility, Δv = M⁻¹ ∫ Δf dt. After the local dynamics of Hasegawa's Springhead.
+
+When the simulation answers, model and simulation differ a little. The difference fades within a
+few milliseconds: a jump would be felt as a click.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import exp
+from typing import Final, NamedTuple
+
+from ..spatial import (
+    IDENTITY,
+    ZERO,
+    Quaternion,
+    Vector,
+    add,
+    add_scaled,
+    conjugate,
+    from_rotation_vector,
+    multiply,
+    scale,
+    subtract,
+    to_rotation_vector,
+    turned,
+)
+
+_FADE: Final = 0.004
+"""s in which a difference falls to a third."""
+
+
+class Pull(NamedTuple):
+    """How the simulation ties the held body to the pointer, and how the body gives way."""
+
+    stiffness: float = 0.0
+    """N/m of the simulation's own coupling."""
+    damping: float = 0.0
+    """N·s/m"""
+    angular_stiffness: float = 0.0
+    """N·m/rad"""
+    angular_damping: float = 0.0
+    """N·m·s/rad"""
+    mobility: float = 0.0
+    """1/kg of the body at the point held; 0: it keeps its velocity whatever pulls."""
+    angular_mobility: float = 0.0
+    """1/(kg·m²)"""
+
+
+class Held(NamedTuple):
+    """What the simulation knows of a held body, at the point where it is held."""
+
+    position: Vector
+    orientation: Quaternion
+    velocity: Vector
+    angular_velocity: Vector
+    pull: Pull = Pull()
+    force: Vector = ZERO
+    """N, that its own coupling used in its last step."""
+    torque: Vector = ZERO
+    """N·m, likewise."""
+
+
+@dataclass
+class LocalModel:
+    """A held body, a moment after the simulation last spoke."""
+
+    position: Vector = ZERO
+    orientation: Quaternion = IDENTITY
+    velocity: Vector = ZERO
+    angular_velocity: Vector = ZERO
+    _pull: Pull = field(default_factory=Pull)
+    _force: Vector = ZERO
+    _torque: Vector = ZERO
+    _off: Vector = ZERO
+    _twisted: Vector = ZERO
+    """Where the model still is beside the simulation, fading."""
+
+    def begin(self, held: Held) -> None:
+        """Start with what the simulation says, at a grab."""
+        self._take(held)
+        self._off = self._twisted = ZERO
+
+    def correct(self, held: Held, age: float) -> None:
+        """Take over what the simulation says; ``age`` s ago that was true."""
+        before, turn_before = self.felt()
+        self._take(held)
+        self.position = add_scaled(self.position, self.velocity, age)
+        self.orientation = turned(self.orientation, self.angular_velocity, age)
+        self._off = subtract(before, self.position)
+        self._twisted = to_rotation_vector(multiply(turn_before, conjugate(self.orientation)))
+
+    def _take(self, held: Held) -> None:
+        self.position, self.orientation = held.position, held.orientation
+        self.velocity, self.angular_velocity = held.velocity, held.angular_velocity
+        self._pull, self._force, self._torque = held.pull, held.force, held.torque
+
+    def advance(
+        self,
+        period: float,
+        position: Vector,
+        orientation: Quaternion,
+        velocity: Vector,
+        angular_velocity: Vector,
+    ) -> None:
+        """Go on for one period.
+
+        Args:
+            period: s
+            position: Of the pointer, world.
+            orientation: Of the pointer, world.
+            velocity: Of the pointer.
+            angular_velocity: Of the pointer.
+        """
+        pull = self._pull
+        if pull.mobility > 0.0:
+            now = add_scaled(
+                scale(subtract(position, self.position), pull.stiffness),
+                *(subtract(velocity, self.velocity), pull.damping),
+            )
+            # Backward Euler in one degree of freedom: stable whatever the simulation's stiffness.
+            gives = pull.mobility * period
+            softened = gives / (1.0 + gives * (pull.damping + period * pull.stiffness))
+            self.velocity = add_scaled(self.velocity, subtract(now, self._force), softened)
+        if pull.angular_mobility > 0.0:
+            apart = to_rotation_vector(multiply(orientation, conjugate(self.orientation)))
+            now = add_scaled(
+                scale(apart, pull.angular_stiffness),
+                *(subtract(angular_velocity, self.angular_velocity), pull.angular_damping),
+            )
+            gives = pull.angular_mobility * period
+            softened = gives / (
+                1.0 + gives * (pull.angular_damping + period * pull.angular_stiffness)
+            )
+            self.angular_velocity = add_scaled(
+                self.angular_velocity, subtract(now, self._torque), softened
+            )
+        self.position = add_scaled(self.position, self.velocity, period)
+        self.orientation = turned(self.orientation, self.angular_velocity, period)
+        left = exp(-period / _FADE)
+        self._off = scale(self._off, left)
+        self._twisted = scale(self._twisted, left)
+
+    def felt(self) -> tuple[Vector, Quaternion]:
+        """Where the hand feels the body."""
+        return (
+            add(self.position, self._off),
+            multiply(from_rotation_vector(self._twisted), self.orientation),
+        )

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ticks at absolute deadlines: a late one does not move those after it.
+
+What Python adds to a loop, and what is done about it:
+
+- *Garbage collection* stops everything for milliseconds when it looks through all objects. What is
+  there at the start is frozen (it is never looked through again) and the collector is switched
+  off; a tick makes no cycles, so counting references frees all that it makes.
+- *The GIL* makes threads wait for each other, up to 5 ms each time. The loop's process has one
+  thread, and the simulation another process.
+- *Sleep* wakes late: by about 0.1 ms on an idle Linux, up to 1 ms on Windows. So the last stretch
+  is waited for awake. Where the system allows, the process gets real-time priority.
+
+What remains is the system's own: when it gives the processor to another for long, ticks are left
+out, and counted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import sys
+import time
+from collections.abc import Callable
+from typing import Final
+
+from .timing import Histogram, LoopTimes
+
+_AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015
+"""s before a deadline from which on the loop does not sleep."""
+
+
+class Schedule:
+    """A loop of fixed period."""
+
+    def __init__(
+        self,
+        period: float,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.period = period
+        self._clock = clock
+        self._sleep = sleep
+        self.late = Histogram()
+        self.computing = Histogram()
+        self.missed = 0
+        self._begun = self._started = clock()
+        self._deadline = self._begun
+
+    def forget(self) -> None:
+        """Start counting anew."""
+        self.late, self.computing, self.missed = Histogram(), Histogram(), 0
+        self._started = self._clock()
+
+    def begin(self) -> float:
+        """Wait for the next deadline; the time at which the tick begins."""
+        self._deadline += self.period
+        now = self._clock()
+        if now > self._deadline:
+            left_out = int((now - self._deadline) / self.period)
+            self.missed += left_out
+            self._deadline += left_out * self.period
+        else:
+            if self._deadline - now > _AWAKE:
+                self._sleep(self._deadline - now - _AWAKE)
+            while now < self._deadline:
+                now = self._clock()
+        self.late.add(abs(now - self._begun - self.period))
+        self._begun = now
+        return now
+
+    def end(self) -> None:
+        """Say that the tick's work is done."""
+        self.computing.add(self._clock() - self._begun)
+
+    def times(self) -> LoopTimes:
+        """How well the loop has kept time since the start, or since ``forget``."""
+        spent = self._clock() - self._started
+        return LoopTimes(
+            rate=self.late.count / spent if spent > 0.0 else 0.0,
+            late=self.late.percentiles(),
+            computing=self.computing.percentiles(),
+            missed=self.missed,
+        )
+
+
+def make_real_time() -> str:
+    """Make this process keep time as well as it may; which priority it got, for the log."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    if sys.platform == "linux" and (os.cpu_count() or 1) > 1:
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
+            return "real-time"
+    with contextlib.suppress(OSError, AttributeError):
+        os.setpriority(os.PRIO_PROCESS, 0, -10)
+        return "raised"
+    return "normal"
