@@ -19,6 +19,8 @@ from .locomotion import (
     generate,
     panels,
     properties,
+    reach_list,
+    reach_properties,
     setups,
 )
 from .splicing import (
@@ -43,6 +45,7 @@ MENUS: tuple[tuple[Any, Draw], ...] = (
 CLASSES: tuple[type, ...] = (
     *gait_properties.CLASSES,
     *arm_list.CLASSES,
+    *reach_properties.CLASSES,
     *properties.CLASSES,
     *landmark_table.CLASSES,
     *splice_properties.CLASSES,
@@ -53,6 +56,7 @@ CLASSES: tuple[type, ...] = (
     *gait_table.CLASSES,
     generate.OCTO_MOTION_OT_generate_locomotion,
     *setups.CLASSES,
+    *reach_list.CLASSES,
     *panels.CLASSES,
     *import_clips.CLASSES,
     *splice_list.CLASSES,

@@ -65,6 +65,11 @@ class Profile:
         beyond = np.maximum(self.heights[0] - flat[:, 2], flat[:, 2] - self.heights[-1])
         return np.maximum(across, beyond).reshape(local.shape[:-1])
 
+    def scaled(self, factor: float) -> Profile:
+        """The same in another unit."""
+        sizes = (factor * self.heights, factor * self.support)
+        return Profile(factor * self.center, self.axes, *sizes)
+
     def grown(self, skin: float) -> Floats:
         """Support (slices, directions) of the object with a skin of this thickness all over it."""
         apart = self.heights[:, None] - self.heights

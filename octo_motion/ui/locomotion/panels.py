@@ -27,6 +27,7 @@ from .gait_table import (
 )
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .reach_list import draw_reaches
 from .setups import OCTO_MOTION_PT_setups
 
 _SIDES: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
@@ -334,6 +335,21 @@ class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
         layout.prop(settings, "sway")
 
 
+class OCTO_MOTION_PT_reaches(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_reaches"
+    bl_label = "Reaches"
+    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 3
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        draw_reaches(layout, settings)
+
+
 class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_generate"
     bl_label = "Generate"
@@ -392,5 +408,6 @@ CLASSES: Final = (
     OCTO_MOTION_PT_table,
     OCTO_MOTION_PT_variation,
     OCTO_MOTION_PT_weights,
+    OCTO_MOTION_PT_reaches,
     OCTO_MOTION_PT_generate,
 )

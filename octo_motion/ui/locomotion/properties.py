@@ -37,6 +37,7 @@ from .gait_properties import (
     read_table,
     used,
 )
+from .reach_properties import Reaches
 
 AXES: Final = (
     ("X", "X", "The armature's own +X", 0),
@@ -73,7 +74,7 @@ def _make_weight_curve(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.
         )
 
 
-class OCTO_MOTION_PG_locomotion(bpy.types.PropertyGroup):
+class OCTO_MOTION_PG_locomotion(Reaches, bpy.types.PropertyGroup):
     """How an armature walks or swims along a route."""
 
     # --- The rig -------------------------------------------------------------------------------

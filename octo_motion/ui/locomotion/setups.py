@@ -41,6 +41,7 @@ APART: Final = frozenset(
             "name",
             "seed",
             "active_arm",
+            "active_reach",
             "body_front",
             "body_up",
             "root_bone",

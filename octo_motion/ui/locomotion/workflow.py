@@ -39,6 +39,7 @@ from ...core.skeleton import Skeleton
 from ..plain import plain
 from .arm_items import bones_of, write_arms, write_body
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
+from .reach_motion import Reaching, Travelling, read_reaches
 from .reduced import Body, Motion, Tolerances, reduced
 
 MOST_FRAMES: Final = 100_000
@@ -127,6 +128,8 @@ class Shot:
     tolerances: Tolerances | None
     """How far few keys may be off, none for a key on every frame."""
     extend_scene_range: bool
+    reaching: Reaching | None
+    """What arms reach for."""
     note: str
     """The settings as JSON, kept with the action."""
     warnings: list[str] = field(default_factory=list)
@@ -135,6 +138,8 @@ class Shot:
     orientations: Floats | None = None
     misses: Floats | None = None
     """(arms,) largest of each arm."""
+    reached: tuple[str, ...] = ()
+    """What arms that reach do."""
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
@@ -154,6 +159,9 @@ class Shot:
             misses = np.maximum(misses, poses.misses.max(axis=(0, 2)))
             if part.stop < count:
                 yield part.stop / count
+        if self.reaching is not None:
+            travelling = Travelling(locations, orientations, self.scale)
+            self.reached = self.reaching.apply(self.frames, rotations, travelling)
         self.rotations, self.misses = rotations, misses
         self.locations, self.orientations = locations, orientations
         yield 1.0
@@ -209,7 +217,7 @@ class Shot:
             keys=keys,
             dense_keys=dense_keys,
             warnings=(*self.warnings, *self._missed()),
-            notes=notes,
+            notes=(*notes, *self.reached),
         )
 
     def _channels(self, armature: bpy.types.Object) -> list[actions.Channel]:
@@ -328,6 +336,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
         tolerances=_tolerances(settings, generator.arm_length),
         extend_scene_range=settings.extend_scene_range,
+        reaching=read_reaches(settings, armature, skeleton, arms, body, frames),
         note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
         # Detection has looked for constraints itself.
         warnings=[

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects to grasp: their form as the scene shows it, and where they are over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ..core.errors import RigError
+from ..core.rotations import Floats, continuous, from_matrix
+
+WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+"""Types of objects that can have faces."""
+
+
+def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
+    """The object's surface with its modifiers: vertices (v, 3) and triangles (t, 3).
+
+    In metres along the object's own axes, as :func:`read_places` places them; its scale is in
+    them.
+
+    Raises:
+        RigError: it has no surface.
+    """
+    evaluated = target.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh() if target.type in WITH_SURFACE else None
+    if mesh is None or len(mesh.polygons) == 0:
+        if mesh is not None:
+            evaluated.to_mesh_clear()
+        raise RigError(
+            f"'{target.name}' has no faces to grasp.", "Choose an object with a surface."
+        )
+    try:
+        vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        mesh.vertices.foreach_get("co", vertices.ravel())
+        mesh.calc_loop_triangles()
+        triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    finally:
+        evaluated.to_mesh_clear()
+    matrix = np.array(evaluated.matrix_world, dtype=np.float64)[:3, :3]
+    own = matrix_rotation(matrix)
+    return vertices @ (own.T @ matrix).T, triangles
+
+
+def read_places(target: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats]:
+    """World positions (frames, 3) and rotations (frames, 4) of an object.
+
+    A still object is read once; otherwise the scene is played through and put back to its frame.
+    """
+    scene = bpy.context.scene
+    assert scene is not None
+    matrices = np.empty((len(frames), 4, 4))
+    if not may_move(target):
+        shown = target.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        matrices[:] = np.array(shown.matrix_world, dtype=np.float64)
+    else:
+        with _frame_kept(scene):
+            for number, frame in enumerate(frames):
+                whole = math.floor(frame)
+                scene.frame_set(whole, subframe=float(frame - whole))
+                shown = target.evaluated_get(bpy.context.evaluated_depsgraph_get())
+                matrices[number] = shown.matrix_world
+    rotations = from_matrix(np.stack([matrix_rotation(each) for each in matrices[:, :3, :3]]))
+    return matrices[:, :3, 3], continuous(rotations)
+
+
+def may_move(target: bpy.types.Object) -> bool:
+    """Whether keys, drivers, constraints, physics or a parent's can move an object."""
+    each: bpy.types.Object | None = target
+    while each is not None:
+        if each.animation_data is not None or len(each.constraints) > 0:
+            return True
+        if each.rigid_body is not None or each.parent_type not in {"OBJECT", "BONE"}:
+            return True
+        if each.parent is not None and each.parent_type == "BONE":
+            return True
+        each = each.parent
+    return False
+
+
+def hangs_on(target: bpy.types.Object, owner: bpy.types.Object) -> bool:
+    """Whether an object is the other, or moves with it as its parent or by a constraint."""
+    each: bpy.types.Object | None = target
+    while each is not None:
+        if each == owner or any(
+            getattr(constraint, "target", None) == owner and not constraint.mute
+            for constraint in each.constraints
+        ):
+            return True
+        each = each.parent
+    return False
+
+
+def matrix_rotation(matrix: Floats) -> Floats:
+    """The rotation (3, 3) within a matrix (3, 3) that may scale, shear and mirror."""
+    left, _, right = np.linalg.svd(matrix)
+    turn = left @ right
+    return turn if np.linalg.det(turn) > 0.0 else -turn
+
+
+@contextmanager
+def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
+    frame, subframe = scene.frame_current, scene.frame_subframe
+    try:
+        yield
+    finally:
+        scene.frame_set(frame, subframe=subframe)

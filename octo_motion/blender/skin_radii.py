@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How thick the skin is about bones, measured on the meshes that an armature deforms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ..core.rotations import Floats
+
+_MOST_VERTICES: Final = 20_000
+"""Of more, only every second, third … is looked at."""
+_FEW: Final = 4
+"""Vertices of a bone that do not yet tell its thickness."""
+_BONE_ROOT, _BONE_TIP = 0.06, 0.012
+"""Radius in arm lengths at root and tip of an arm without skin."""
+
+
+def skin_radii(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> list[Floats]:
+    """Radii (bones + 1,) of the skin at the joints of each chain, armature units.
+
+    A bone's is the median distance of the vertices that follow it more than any other bone, at
+    rest. Bones without such vertices take over their neighbours'; a chain without any is given
+    the slender form that arms usually have.
+
+    Args:
+        armature: the armature object.
+        chains: names of bones, root to tip.
+    """
+    assert isinstance(armature.data, bpy.types.Armature)
+    bones = armature.data.bones
+    distances: dict[str, list[Floats]] = {}
+    for name, points in _followers(armature):
+        bone = bones.get(name)
+        if bone is None:
+            continue
+        head, tail = (np.array(end) for end in (bone.head_local, bone.tail_local))
+        along = tail - head
+        share = np.clip((points - head) @ along / max(along @ along, 1e-18), 0.0, 1.0)
+        off = points - head - share[:, None] * along
+        distances.setdefault(name, []).append(np.linalg.norm(off, axis=1))
+    measured = {name: np.concatenate(each) for name, each in distances.items()}
+    return [_of_chain(bones, chain, measured) for chain in chains]
+
+
+def _of_chain(
+    bones: bpy.types.ArmatureBones, chain: Sequence[str], measured: dict[str, Floats]
+) -> Floats:
+    lengths = np.array([bones[name].length for name in chain])
+    middles = np.cumsum(lengths) - 0.5 * lengths
+    known = [number for number, name in enumerate(chain) if len(measured.get(name, ())) >= _FEW]
+    joints = np.concatenate([[0.0], np.cumsum(lengths)])
+    whole = float(lengths.sum())
+    if not known:
+        return np.interp(joints, [0.0, whole], [_BONE_ROOT * whole, _BONE_TIP * whole])
+    radii = np.array([float(np.median(measured[chain[number]])) for number in known])
+    places = middles[known]
+    result = np.interp(joints, places, radii)
+    if len(known) > 1:
+        # Beyond the last middle it goes on as it went, not below a third of what it was.
+        slope = (radii[-1] - radii[-2]) / (places[-1] - places[-2])
+        beyond = joints > places[-1]
+        result[beyond] = radii[-1] + slope * (joints[beyond] - places[-1])
+        result = np.maximum(result, 0.3 * radii[-1])
+    return result
+
+
+def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
+    """Of each mesh, the points at rest that follow a bone of that name most."""
+    to_armature = np.array(armature.matrix_world.inverted_safe(), dtype=np.float64)
+    for item in bpy.data.objects:
+        if item.type != "MESH" or item.find_armature() != armature:
+            continue
+        mesh = item.data
+        assert isinstance(mesh, bpy.types.Mesh)
+        count = len(mesh.vertices)
+        step = max(1, -(-count // _MOST_VERTICES))
+        points = np.empty((count, 3), dtype=np.float32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        matrix = to_armature @ np.array(item.matrix_world, dtype=np.float64)
+        moved = points[::step] @ matrix[:3, :3].T + matrix[:3, 3]
+        owner = np.full(len(moved), -1)
+        for number in range(0, count, step):
+            groups = mesh.vertices[number].groups
+            if len(groups) > 0:
+                owner[number // step] = max(groups, key=lambda each: each.weight).group
+        for group in item.vertex_groups:
+            yield group.name, moved[owner == group.index]

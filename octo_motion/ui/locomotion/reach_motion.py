@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reaches of the list, from properties to arms that reach: read, then computed on arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import bpy
+import numpy as np
+
+from ...blender.grasp_target import hangs_on, read_form, read_places
+from ...blender.skin_radii import skin_radii
+from ...core.errors import RigError, SettingsError
+from ...core.locomotion.arm_frames import ArmFrames, arm_frames
+from ...core.locomotion.chains import BodyFrame
+from ...core.locomotion.coil import Profile, profile_of
+from ...core.locomotion.curl import curled
+from ...core.locomotion.generator import Arm
+from ...core.locomotion.grasp import Mode, Places, plan_grasp
+from ...core.locomotion.reach import Timeline
+from ...core.rotations import Floats, conjugate, multiply, rotate
+from ...core.skeleton import Skeleton
+
+_AXES: Final = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+
+
+@dataclass(frozen=True, eq=False)
+class Travelling:
+    """Where the armature is, as the motion carries it."""
+
+    locations: Floats
+    """(frames, 3) world."""
+    orientations: Floats
+    """(frames, 4) world."""
+    scale: float
+
+    def seen(self, positions: Floats, rotations: Floats) -> Places:
+        """Places in the world (frames, 3), (frames, 4) from the armature, in its units."""
+        back = conjugate(self.orientations)
+        return Places(
+            rotate(back, positions - self.locations) / self.scale, multiply(back, rotations)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """One reach as plain data."""
+
+    name: str
+    arm: str
+    """"" for the nearest."""
+    mode: str
+    turns: float
+    timeline: Timeline
+    target: str
+    profile: Profile | None
+    """Metres in the object's frame; a curl has none."""
+    positions: Floats
+    """(frames, 3) of the object, world."""
+    rotations: Floats
+    """(frames, 4)"""
+
+
+@dataclass(frozen=True, eq=False)
+class Reaching:
+    """All reaches of a motion; see :func:`read_reaches`."""
+
+    arms: tuple[Arm, ...]
+    frames: tuple[ArmFrames, ...]
+    radii: tuple[Floats, ...]
+    up: Floats
+    reaches: tuple[Reach, ...]
+
+    def apply(self, times: Floats, rotations: Floats, travelling: Travelling) -> tuple[str, ...]:
+        """Let arms reach, in place, and say what they do.
+
+        Args:
+            times: (frames,) of the motion.
+            rotations: (frames, bones, 4) of all arms, one after the other.
+            travelling: where the armature is.
+
+        Raises:
+            OctoMotionError: an object is out of reach at a frame, which is named; two reaches of
+                one arm overlap.
+        """
+        ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)])
+        busy: list[tuple[int, Reach]] = []
+        notes: list[str] = []
+        for reach in sorted(self.reaches, key=lambda each: each.timeline.start):
+            places = travelling.seen(reach.positions, reach.rotations)
+            number = self._arm(reach, times, places)
+            _check_free(busy, number, reach, self.arms[number].name)
+            busy.append((number, reach))
+            columns = slice(int(ends[number]), int(ends[number + 1]))
+            own, arm = rotations[:, columns], self.frames[number]
+            if reach.profile is None:
+                rotations[:, columns] = curled(arm, reach.timeline, times, own)
+                continue
+            mode: Mode = "TOUCH" if reach.mode == "TOUCH" else "COIL"
+            grasp = plan_grasp(
+                arm,
+                self.radii[number],
+                reach.profile.scaled(1.0 / travelling.scale),
+                reach.timeline,
+                times,
+                places,
+                mode=mode,
+                turns=reach.turns,
+                up=self.up,
+                name=f"'{self.arms[number].name}'",
+                target=f"'{reach.target}'",
+            )
+            rotations[:, columns] = grasp.apply(times, places, own)
+            if mode == "COIL":
+                notes.append(
+                    f"'{self.arms[number].name}' winds {grasp.turns:.1f} times round "
+                    f"'{reach.target}'."
+                )
+        return tuple(notes)
+
+    def _arm(self, reach: Reach, times: Floats, places: Places) -> int:
+        """The arm that is named; else the one whose root the object is nearest to at the touch."""
+        for number, arm in enumerate(self.arms):
+            if arm.name == reach.arm:
+                return number
+        if reach.arm:
+            raise RigError(
+                f"The reach '{reach.name}' has no arm '{reach.arm}' that moves.",
+                "Choose an arm of the list that is switched on.",
+            )
+        if reach.profile is None:
+            raise SettingsError(
+                f"It is not said which arm curls in '{reach.name}'.", "Choose its arm."
+            )
+        at = int(np.argmin(np.abs(times - reach.timeline.contact)))
+        goal = places.seen(reach.profile.center)[at]
+        away = [float(np.linalg.norm(goal - arm.root) / arm.length) for arm in self.frames]
+        return int(np.argmin(away))
+
+
+def _check_free(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach, arm: str) -> None:
+    for other, before in busy:
+        if other == number and reach.timeline.start < before.timeline.end:
+            raise SettingsError(
+                f"'{arm}' reaches in '{before.name}' until frame {before.timeline.end:g} and in "
+                f"'{reach.name}' from frame {reach.timeline.start:g}.",
+                "Let one end before the other starts, or choose another arm.",
+            )
+
+
+def read_reaches(
+    settings: Any,
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    arms: tuple[Arm, ...],
+    body: BodyFrame,
+    frames: Floats,
+) -> Reaching | None:
+    """What the list of reaches asks for; none if it is empty or muted.
+
+    Raises:
+        OctoMotionError: an object is missing, has no surface, or moves with the armature; frames
+            are out of order.
+    """
+    items = [item for item in settings.reaches if not item.mute]
+    if not items:
+        return None
+    radii = skin_radii(armature, [arm.bones for arm in arms])
+    return Reaching(
+        arms=arms,
+        frames=tuple(arm_frames(skeleton, arm.bones, body) for arm in arms),
+        radii=tuple(radii),
+        up=body.rotation[:, 2],
+        reaches=tuple(_reach(item, armature, frames) for item in items),
+    )
+
+
+def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
+    closed = item.frame_contact + (item.coil_frames if item.mode == "COIL" else 0)
+    timeline = Timeline(
+        *(item.frame_start, item.frame_contact, min(closed, item.frame_release)),
+        *(item.frame_release, item.frame_release + item.back_frames),
+    )
+    still = np.zeros((len(frames), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(frames), 1))
+    if item.mode == "CURL":
+        return Reach(item.name, item.arm, item.mode, 0.0, timeline, "", None, *still)
+    if item.target is None:
+        raise SettingsError(
+            f"The reach '{item.name}' has no object.", "Choose what it reaches for, or mute it."
+        )
+    if hangs_on(item.target, armature):
+        raise SettingsError(
+            f"'{item.target.name}' hangs on '{armature.name}', which reaches for it.",
+            "Clear its parent and its constraints to the armature.",
+        )
+    axis = np.array(_AXES[item.axis]) if item.axis in _AXES else None
+    profile = profile_of(*read_form(item.target), axis)
+    asked = (frames >= timeline.start) & (frames <= timeline.end)
+    positions, rotations = still
+    if np.any(asked):
+        positions[asked], rotations[asked] = read_places(item.target, frames[asked])
+        # Before and after, nothing asks where it is.
+        first, last = np.flatnonzero(asked)[[0, -1]]
+        positions[:first], rotations[:first] = positions[first], rotations[first]
+        positions[last + 1 :], rotations[last + 1 :] = positions[last], rotations[last]
+    return Reach(
+        item.name, item.arm, item.mode, item.turns, timeline, item.target.name, profile,
+        positions, rotations,
+    )  # fmt: skip
