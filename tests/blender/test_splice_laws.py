@@ -21,9 +21,10 @@ from octo_motion.core.rotations import (
 )
 from octo_motion.core.splicing.clip import Clip
 from octo_motion.core.splicing.frames import chest_frame, pelvis_frame
+from octo_motion.core.splicing.joint_rotation import SOFT
 from octo_motion.core.splicing.landmarks import Landmarks
 from octo_motion.core.splicing.mapping import map_skeleton
-from octo_motion.core.splicing.parts import LEFT_ARM, LEGS, PARTS, RIGHT_ARM, part_bones
+from octo_motion.core.splicing.parts import LEFT_ARM, LEGS, PARTS, RIGHT_ARM, Part, part_bones
 from octo_motion.core.splicing.posture import posture_of, sampled
 from octo_motion.core.splicing.splice import Reach, Splice, build, spliced
 from octo_motion.core.splicing.timing import Timing
@@ -218,14 +219,17 @@ def test_the_hand_goes_past_the_chest_as_in_the_splice_clip(shared_data: SharedD
         result = spliced(base, landmarks, Splice(RIGHT_ARM, clip, Timing(1, 1), marks, reach))
         missed = np.linalg.norm(in_chest(result, landmarks, "hand.R") - wanted, axis=-1)
         assert missed.max() < 1e-3 * arm
-    # The source's joint is the shoulder: the hand's place is met where the arm is long enough.
+    # The source's joint is the shoulder: the hand's place is met where the arm is long enough, but
+    # for the last stretch of its reach, over which the elbow straightens gently.
     splice = Splice(RIGHT_ARM, clip, Timing(1, 1), marks, "exact", clavicle=False)
     result = spliced(base, landmarks, splice)
     missed = np.linalg.norm(in_chest(result, landmarks, "hand.R") - wanted, axis=-1)
     shoulder = in_chest(base, landmarks, "upper_arm.R")
     needed = np.linalg.norm(wanted - shoulder, axis=-1)
-    assert (needed < arm).any()
-    assert missed[needed < arm].max() < 1e-3 * arm
+    within = needed < (1.0 - 2.0 * SOFT) * arm
+    assert within.any()
+    assert missed[within].max() < 1e-3 * arm
+    assert (missed <= np.maximum(needed - arm, 0.0) + 0.6 * SOFT * arm).all()
 
 
 def at_pace(clip: Clip, seconds: float, pace: float) -> Clip:
@@ -245,26 +249,63 @@ def at_pace(clip: Clip, seconds: float, pace: float) -> Clip:
     )
 
 
+def largest_steps(
+    base: tuple[Clip, Landmarks], splice: tuple[Clip, Landmarks], paces: tuple[float, ...], how: Any
+) -> list[tuple[float, float]]:
+    """How far a bone turns at most from frame to frame: in the result, and in the two clips."""
+    (clip, landmarks), (other, marks) = base, splice
+    seconds = min((other.frames[-1] - other.frames[0]) / other.rate, 4.0)
+    found = []
+    for pace in paces:
+        ease = 0.2 * pace
+        timing = Timing(0.0, 0.0, 1.0, 0.95 * seconds * pace, ease, ease)
+        fine, played = (at_pace(each, seconds, pace) for each in (clip, other))
+        result = spliced(
+            fine, landmarks, Splice(clip=played, timing=timing, landmarks=marks, **how)
+        )
+        steps = [
+            float(angle_between(each.rotations[1:], each.rotations[:-1]).max())
+            for each in (result, fine, played)
+        ]
+        found.append((steps[0], max(steps[1:])))
+    return found
+
+
 @pytest.mark.parametrize("name", ["clap", "stretch", "dance1", "throw_R", "backflip"])
 @pytest.mark.parametrize("base_name", ["secondlife/avatar_jump.bvh", "cmu/02_02_walk_daz43.bvh"])
 def test_nothing_pops_neither_at_straight_elbows_nor_at_seams(
     shared_data: SharedData, name: str, base_name: str
 ):
-    base, landmarks = load(shared_data(base_name))
-    clip, marks = load(shared_data(f"secondlife/avatar_{name}.bvh"))
-    seconds = (clip.frames[-1] - clip.frames[0]) / clip.rate
+    base, clip = load(shared_data(base_name)), load(shared_data(f"secondlife/avatar_{name}.bvh"))
     for part in (RIGHT_ARM, LEFT_ARM, LEGS):
-        for clavicle in (False, True):
-            steps = []
-            for pace in (60.0, 240.0):
-                ease = 0.2 * pace
-                fine = at_pace(base, seconds, pace)
-                timing = Timing(0.0, clip.frames[0], 1.0, 0.95 * seconds * pace, ease, ease)
-                splice = Splice(part, clip, timing, marks, clavicle=clavicle)
-                result = spliced(fine, landmarks, splice)
-                steps.append(angle_between(result.rotations[1:], result.rotations[:-1]).max())
+        for reach, clavicle in (("direction", False), ("exact", False), ("exact", True)):
+            how = {"part": part, "reach": reach, "clavicle": clavicle}
+            coarse, fine = largest_steps(base, clip, (60.0, 240.0), how)
             # A jump would be as large at four times the frames; smooth motion has a quarter.
-            assert steps[1] < 0.5 * steps[0]
+            assert fine[0] < 0.5 * coarse[0]
+
+
+@pytest.mark.parametrize("reach", REACHES)
+@pytest.mark.parametrize(
+    ("base_name", "name", "part"),
+    [
+        # A game's knees that leave straight within a few frames, onto a body of other proportions.
+        ("secondlife/avatar_jump.bvh", "rigs_with_actions/KayKit_Knight.glb", LEGS),
+        ("makehuman/walk1.bvh", "rigs_with_actions/KayKit_Knight.glb", LEGS),
+        ("rigs_with_actions/KayKit_Knight.glb", "secondlife/avatar_backflip.bvh", LEGS),
+        # Hands that are thrown out of the other arm's reach.
+        ("makehuman/walk1.bvh", "secondlife/avatar_throw_R.bvh", RIGHT_ARM),
+        ("makehuman/walk1.bvh", "secondlife/avatar_punch_L.bvh", LEFT_ARM),
+    ],
+)
+def test_limbs_turn_hardly_faster_than_in_the_clips_they_are_made_from(
+    shared_data: SharedData, base_name: str, name: str, part: Part, reach: Reach
+):
+    base, clip = load(shared_data(base_name)), load(shared_data(name))
+    ((step, own),) = largest_steps(base, clip, (240.0,), {"part": part, "reach": reach})
+    # An elbow that has to reach further than the other one straightens faster; a pop is faster by
+    # far, five times and more.
+    assert step < 3.0 * own
 
 
 def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: SharedData):

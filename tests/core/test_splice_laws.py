@@ -18,6 +18,7 @@ from octo_motion.core.rotations import (
 )
 from octo_motion.core.skeleton import Skeleton
 from octo_motion.core.splicing.clip import Clip
+from octo_motion.core.splicing.joint_rotation import SOFT
 from octo_motion.core.splicing.landmarks import Landmarks
 from octo_motion.core.splicing.parts import (
     HEAD,
@@ -175,9 +176,10 @@ def test_without_the_clavicle_the_hand_still_lands_exactly_where_it_reaches(seed
     needed = np.linalg.norm(wanted - relative(base, "upper_arm.R", "chest"), axis=-1)
     heads = skeleton.heads[[skeleton.index[f"{n}.R"] for n in ("upper_arm", "forearm", "hand")]]
     arm = np.linalg.norm(np.diff(heads, axis=0), axis=1).sum()
-    assert (missed[needed < arm] < 1e-3 * arm).all()
+    # Up to the last stretch of its reach, over which the elbow straightens gently.
+    assert (missed[needed < (1.0 - 2.0 * SOFT) * arm] < 1e-3 * arm).all()
     # Out of reach the arm is stretched towards it.
-    assert (missed <= np.maximum(needed - arm, 0.0) + 1e-3 * arm).all()
+    assert (missed <= np.maximum(needed - arm, 0.0) + 0.6 * SOFT * arm).all()
 
 
 def test_trunk_and_head_take_the_whole_orientation():

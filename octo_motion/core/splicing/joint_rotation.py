@@ -25,25 +25,36 @@ from ..rotations import (
     shortest_arc,
 )
 
-_STRAIGHT: Final = float(np.sin(np.radians(5.0)))
-"""Sine of the bend below which a triangle says nothing of how a limb is turned about itself."""
+_STRAIGHT: Final = np.radians(5.0)
+"""Bend below which a triangle says nothing of how a limb is turned about itself."""
 
-_BENT: Final = float(np.sin(np.radians(20.0)))
-"""Sine of the bend above which it says all."""
+_BENT: Final = np.radians(60.0)
+"""Bend above which it says all. In between it is believed little by little: on a body of other
+proportions the triangle of a limb that is almost straight is another one, and a knee or an elbow
+that leaves straight fast would spin the limb."""
+
+_SHAPED: Final = np.radians(40.0)
+"""Bend above which a limb of other proportions bends as far as its point asks."""
 
 _AGREES: Final = np.radians(45.0)
 _DISAGREES: Final = np.radians(120.0)
 """Angles between the normals up to which they are made to agree, and from which the triangles are
 so unlike (bodies of other proportions) that their normals say nothing."""
 
+_FOLDED: Final = np.radians(130.0)
+"""Bend from which a triangle says less and less again, down to nothing as the limb is folded."""
+
+_TIGHT: Final = np.radians(150.0)
+_TIGHTEST: Final = np.radians(170.0)
+"""Bends beyond which no limb folds of itself to reach a point: the first is left slowly."""
+
 _MOVED: Final = np.radians(5.0)
 """Change of a bend that is worth turning a straight limb to its hinge."""
 
-SOFT_ALIKE: Final = 5e-4
-_SOFT: Final = 1e-2
-"""Of a limb's length: how far short of a point a limb may stay when it is almost stretched, so that
-the elbow does not shoot out and in as the point passes the end of its reach. The first where hands
-are to be where they were; the second where bodies are of other proportions anyway."""
+SOFT: Final = 0.03
+"""Of a limb's length: the last stretch of its reach, over which it straightens slowly. To follow a
+point exactly up to the end of its reach an elbow would have to open ever faster there, without
+bound, and to stop at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +86,7 @@ def joint_turn(limb: Limb, wanted: Limb) -> Floats:
     angle = np.arctan2(sine, np.sum(normal * other, axis=-1))
     # It has faded out long before half a turn, where the way round would jump.
     trust = _smooth((_DISAGREES - np.abs(angle)) / (_DISAGREES - _AGREES))
-    share = _bend(limb) * _bend(wanted) * trust
+    share = np.minimum(_bend(limb), _bend(wanted)) * trust
     return multiply(from_axis_angle(goal, angle * share), aimed)
 
 
@@ -83,6 +94,9 @@ def reach(
     limb: Limb, target: Floats, hinge: Floats, *, alike: bool = True
 ) -> tuple[Floats, Floats]:
     """Bend a limb so that its hand, which points at the target already, lands on it.
+
+    It does so exactly up to the last stretch of its reach (:data:`SOFT`), and where it is already.
+    How fast the elbow opens is bounded by how fast hand and target move.
 
     The elbow stays on the side on which it is. A straight limb has no side: it bends about its
     hinge, and so does one that is bent the wrong way by a trifle.
@@ -97,36 +111,71 @@ def reach(
     Returns:
         Rotations (frames, 4) of the upper and of the lower limb.
     """
-    upper = np.linalg.norm(limb.elbow - limb.joint, axis=-1)
-    lower = np.linalg.norm(limb.hand - limb.elbow, axis=-1)
-    now = np.linalg.norm(limb.hand - limb.joint, axis=-1)
-    wanted = np.linalg.norm(target - limb.joint, axis=-1)
-    whole = upper + lower
-    # Measured as a change, so that a limb whose hand is there already does not move at all.
-    soft = SOFT_ALIKE if alike else _SOFT
-    change = _soft_reach(wanted, whole, soft) - _soft_reach(now, whole, soft)
-    distance = now + (change if alike else _bend(limb) * change)
-    distance = np.clip(distance, np.abs(upper - lower), whole)
-    opened = _angle(upper, lower, now) - _angle(upper, lower, distance)
-    swung = _angle(upper, now, lower) - _angle(upper, distance, lower)
+    first, second = limb.elbow - limb.joint, limb.hand - limb.elbow
+    upper, lower = np.linalg.norm(first, axis=-1), np.linalg.norm(second, axis=-1)
+    normal = cross(first, second)
+    now = np.arctan2(np.linalg.norm(normal, axis=-1), np.sum(first * second, axis=-1))
+    wanted = _wanted_bend(upper, lower, limb, target, now)
+    bend = wanted if alike else now + _told(now, _SHAPED) * (wanted - now)
+    swung = _lift(upper, lower, bend) - _lift(upper, lower, now)
     direction = normalized(limb.hand - limb.joint)
-    normal = cross(limb.elbow - limb.joint, limb.hand - limb.elbow)
     across = normalized(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
     plane = normal / np.maximum(upper * lower, 1e-12)[:, None]
-    missing = np.maximum(_STRAIGHT - np.linalg.norm(plane, axis=-1), 0.0)
-    missing = missing * _smooth(np.abs(opened) / _MOVED)
+    missing = np.maximum(np.sin(_STRAIGHT) - np.linalg.norm(plane, axis=-1), 0.0)
+    missing = missing * _smooth(np.abs(bend - now) / _MOVED)
     axis = normalized(plane + missing[:, None] * across)
     straight = ~np.any(axis, axis=-1)
     axis[straight] = across[straight]
     # About the limb's line: from its own plane to that in which it bends.
     sine = np.sum(cross(normal, axis) * direction, axis=-1)
     turn = from_axis_angle(direction, np.arctan2(sine, np.sum(normal * axis, axis=-1)))
-    upper_turn = multiply(from_axis_angle(axis, swung), turn)
-    lower_turn = multiply(from_axis_angle(axis, swung + opened), turn)
+    upper_turn = multiply(from_axis_angle(axis, -swung), turn)
+    lower_turn = multiply(from_axis_angle(axis, bend - now - swung), turn)
     # The elbow goes round the limb's line to its new side, the bones do not twist with it.
-    return _untwisted(upper_turn, limb.elbow - limb.joint), _untwisted(
-        lower_turn, limb.hand - limb.elbow
-    )
+    return _untwisted(upper_turn, first), _untwisted(lower_turn, second)
+
+
+def _wanted_bend(upper: Floats, lower: Floats, limb: Limb, target: Floats, now: Floats) -> Floats:
+    """The bend (frames,) with which a hand is as far from the joint as its target, softened.
+
+    Args:
+        upper: (frames,) length of the upper limb.
+        lower: (frames,) of the lower limb.
+        limb: the limb.
+        target: (frames, 3)
+        now: (frames,) the bend that the limb has.
+    """
+    product = np.maximum(upper * lower, 1e-12)
+    distance = np.linalg.norm(target - limb.joint, axis=-1)
+
+    def bend_at(reached: Floats) -> Floats:
+        cosine = (reached**2 - upper**2 - lower**2) / (2.0 * product)
+        return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+    def eased(passed: Floats, edge: Floats, bend: Floats, room: Floats) -> Floats:
+        """Beyond an edge: on as fast as it came there, and gently to rest."""
+        speed = edge / np.maximum(product * np.sin(bend), 1e-12)
+        share = np.clip(passed * speed / np.maximum(room, 1e-12), 0.0, 2.0)
+        return room * (1.0 - (1.0 - 0.5 * share) ** 2)
+
+    soft = SOFT * (upper + lower)
+    far = upper + lower - soft
+    near = np.sqrt(upper**2 + lower**2 + 2.0 * product * np.cos(_TIGHT))
+    straight, tight = bend_at(far), np.full(len(far), _TIGHT)
+    bend = bend_at(np.clip(distance, near, far))
+    bend -= eased(distance - far, far, straight, straight)
+    bend += eased(near - distance, near, tight, _TIGHTEST - tight)
+    # At both ends of its reach a limb that is there already stays as it is.
+    ends = np.maximum(1.0 - now / np.maximum(straight, 1e-12), (now - _TIGHT) / (np.pi - _TIGHT))
+    span = soft * np.clip(ends, 0.0, 1.0)
+    off = np.abs(distance - np.linalg.norm(limb.hand - limb.joint, axis=-1))
+    own = 1.0 - _smooth(off / np.maximum(span, 1e-9 * (upper + lower)))
+    return own * now + (1.0 - own) * bend
+
+
+def _lift(upper: Floats, lower: Floats, bend: Floats) -> Floats:
+    """The angle (frames,) at the joint between the upper limb and the line to the hand."""
+    return np.arctan2(lower * np.sin(bend), upper + lower * np.cos(bend))
 
 
 def _untwisted(turn: Floats, segment: Floats) -> Floats:
@@ -154,24 +203,17 @@ def hinge_axis(limb: Limb, orientation: Floats) -> Floats:
 def _bend(limb: Limb) -> Floats:
     """0 … 1: how much a limb's triangle says of its turn."""
     upper, lower = limb.elbow - limb.joint, limb.hand - limb.elbow
-    sine = np.linalg.norm(cross(upper, lower), axis=-1) / np.maximum(
-        np.linalg.norm(upper, axis=-1) * np.linalg.norm(lower, axis=-1), 1e-12
-    )
-    return _smooth((sine - _STRAIGHT) / (_BENT - _STRAIGHT))
+    sine = np.linalg.norm(cross(upper, lower), axis=-1)
+    return _told(np.arctan2(sine, np.sum(upper * lower, axis=-1)), _BENT)
+
+
+def _told(bend: Floats, bent: float) -> Floats:
+    """0 … 1: how much a bend (frames,) says, if one as large as ``bent`` says all."""
+    opened = _smooth((bend - _STRAIGHT) / (bent - _STRAIGHT))
+    shut = np.pi - _STRAIGHT
+    return np.minimum(opened, _smooth((shut - bend) / (shut - _FOLDED)))
 
 
 def _smooth(share: Floats) -> Floats:
     bounded = np.clip(share, 0.0, 1.0)
     return bounded * bounded * (3.0 - 2.0 * bounded)
-
-
-def _soft_reach(distance: Floats, whole: Floats, soft: float) -> Floats:
-    """The distance itself well within reach; close to the whole length beyond, without a corner."""
-    slack = whole - distance
-    return whole - 0.5 * (slack + np.sqrt(slack**2 + (2.0 * soft * whole) ** 2))
-
-
-def _angle(first: Floats, second: Floats, opposite: Floats) -> Floats:
-    """The angle between two sides of a triangle, from its three lengths."""
-    cosine = (first**2 + second**2 - opposite**2) / np.maximum(2.0 * first * second, 1e-12)
-    return np.arccos(np.clip(cosine, -1.0, 1.0))
