@@ -235,7 +235,7 @@ def _ik_limits(bone: bpy.types.PoseBone) -> dict[str, tuple[float, float]]:
 
 def _locked_bones(armature: bpy.types.Object) -> frozenset[str]:
     assert armature.pose is not None
-    return frozenset(bone.name for bone in armature.pose.bones if all(bone.lock_rotation))
+    return frozenset(bone.name for bone in armature.pose.bones if all(np.array(bone.lock_rotation)))
 
 
 @dataclass(frozen=True, eq=False)

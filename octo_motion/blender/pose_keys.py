@@ -1,0 +1,458 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys that a session of posing makes, by the rules of Blender's own keying, and can take back.
+
+As long as the session lasts, everything that it changes in an action is noted: each curve as it
+was before its first key, the action and the NLA tracks. ``take_back`` restores all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+import bpy
+import numpy as np
+
+from ..core.errors import WriteError
+from ..core.keys import LOCATION, Limb, Track, reduce_keys
+from ..core.rotations import Floats
+from .actions import Channel, location_channel, rotation_channels, writable_armature
+from .key_arrays import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
+from .unkeyed import rotation_channel
+
+Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
+
+_SETS: Final[tuple[tuple[str, str], ...]] = (
+    ("Loc", "location"),
+    ("Rot", "rotation"),
+    ("Scal", "scale"),
+)
+"""Parts of the names of Blender's own keying sets, and what they key."""
+
+
+@dataclass(frozen=True)
+class Keyed:
+    """A bone to key: its rotation has changed, and perhaps its location."""
+
+    bone: str
+    placed: bool = False
+
+
+@dataclass(eq=False)
+class _Before:
+    """An action as it was before the session's first key."""
+
+    had_data: bool
+    action: str | None
+    slot: int
+    blend: str = "REPLACE"
+    curves: dict[tuple[str, int], KeyArrays | None] = field(default_factory=dict)
+    groups: set[str] = field(default_factory=set)
+    made: str | None = None
+    """The action that was made, if one was."""
+    track: str | None = None
+    """The NLA track that was made, if one was."""
+    fake_user: bool = False
+    new_slot: int | None = None
+    """Handle of the slot that was made in a chosen action."""
+
+
+class PoseKeys:
+    """Keys on one armature.
+
+    Args:
+        armature: the armature object.
+        target: where keys go: the action that the armature has (a new one if it has none), a copy
+            of it, a new action over it in the NLA, or a chosen one.
+        chosen: name of the chosen action.
+
+    Raises:
+        WriteError: it cannot be animated here, or the chosen action is gone or read-only.
+    """
+
+    def __init__(
+        self, armature: bpy.types.Object, target: Target = "CURRENT", chosen: str = ""
+    ) -> None:
+        writable_armature(armature)
+        self._target: Target = target
+        self._chosen = chosen
+        self._before: _Before | None = None
+        self.count = 0
+        """How many times keys were made."""
+        if target == "CHOSEN":
+            _chosen_action(chosen)
+        data = armature.animation_data
+        if target == "CURRENT" and data is not None and data.action is not None:
+            _writable_action(data.action)
+
+    def insert(self, armature: bpy.types.Object, keyed: Iterable[Keyed], frame: float) -> list[str]:
+        """Key bones as they are, by the scene's keying set and the settings of keying.
+
+        Without a keying set the channels that posing moves get keys: rotation, and the location
+        of bones that were moved as a whole.
+
+        Returns:
+            Names of the bones that got a key: with *Only Insert Needed* not all may.
+
+        Raises:
+            WriteError: the action cannot be written.
+        """
+        bones = list(keyed)
+        scene = bpy.context.scene
+        assert scene is not None
+        self._prepare(armature)
+        options, kind = _options(scene), _key_type(scene)
+        active = scene.keying_sets_all.active
+        if active is not None and active.is_path_absolute:
+            done = self._insert_paths(armature, active, frame, (options, kind))
+        else:
+            done = []
+            for each in bones:
+                bone = armature.pose.bones[each.bone] if armature.pose is not None else None
+                if bone is None:
+                    continue
+                how = options | _set_options(active), kind
+                results = [
+                    self._insert(armature, bone.path_from_id(channel), frame, each.bone, how)
+                    for channel in _channels(bone, active, placed=each.placed)
+                ]
+                if any(results):
+                    done.append(each.bone)
+        self.count += bool(done)
+        return done
+
+    def insert_motion(
+        self,
+        armature: bpy.types.Object,
+        frames: Floats,
+        rotations: Mapping[str, Floats],
+        locations: Mapping[str, Floats],
+        *,
+        angle: float,
+        distance: float,
+    ) -> int:
+        """Write a motion as few keys, in place of what the bones had between its ends.
+
+        Args:
+            armature: the armature object.
+            frames: (frames,) ascending.
+            rotations: (frames, 4) from rest, by bone.
+            locations: (frames, 3) in the bone's rest frame, by bone.
+            angle: radians by which each bone may be off.
+            distance: armature units by which locations may be off.
+
+        Returns:
+            Number of key frames.
+        """
+        if not rotations or len(frames) < 2:
+            return 0
+        self._prepare(armature)
+        names = list(rotations)
+        turned = rotation_channels(
+            armature, names, np.stack([rotations[name] for name in names], axis=1)
+        )
+        placed = [location_channel(armature, name, each) for name, each in locations.items()]
+        assert armature.pose is not None
+        modes = [armature.pose.bones[name].rotation_mode for name in names]
+        tracks = [Track(each.values, mode) for each, mode in zip(turned, modes, strict=True)]
+        tracks += [Track(each.values, LOCATION) for each in placed]
+        (found,) = reduce_keys(frames, [Limb(tracks, angle, distance)])
+        for channel, keys in zip([*turned, *placed], found, strict=True):
+            self._replace(
+                armature, channel, [bezier_arrays(keys, n) for n in range(channel.values.shape[1])]
+            )
+        self.count += 1
+        return len(found[0])
+
+    def take_back(self, armature: bpy.types.Object) -> None:
+        """Undo all keys, actions and tracks of this session; safe to call twice."""
+        before, self._before = self._before, None
+        if before is None:
+            return
+        data = armature.animation_data
+        if data is None:
+            return
+        if before.made is None:
+            self._restore_curves(armature, before)
+            if data.action is not None and before.new_slot is not None:
+                for slot in data.action.slots:
+                    if slot.handle == before.new_slot:
+                        data.action.slots.remove(slot)
+                        break
+        action = bpy.data.actions.get(before.action) if before.action else None
+        data.action = action
+        if action is not None:
+            data.action_slot = next(
+                (slot for slot in action.slots if slot.handle == before.slot), None
+            )
+            action.use_fake_user = before.fake_user
+        data.action_blend_type = before.blend  # type: ignore[assignment]
+        if before.track is not None and before.track in data.nla_tracks:
+            data.nla_tracks.remove(data.nla_tracks[before.track])
+        made = bpy.data.actions.get(before.made) if before.made else None
+        if made is not None:
+            bpy.data.actions.remove(made)
+        if not before.had_data:
+            armature.animation_data_clear()
+
+    # --- Where keys go ----------------------------------------------------------------------
+
+    def _prepare(self, armature: bpy.types.Object) -> None:
+        """Note how things are, and give the armature the action that keys go to."""
+        if self._before is not None:
+            return
+        writable_armature(armature)
+        had_data = armature.animation_data is not None
+        data = armature.animation_data or armature.animation_data_create()
+        assert data is not None
+        action = data.action
+        before = _Before(
+            had_data=had_data,
+            action=action.name if action else None,
+            slot=data.action_slot_handle,
+            blend=data.action_blend_type,
+            fake_user=action.use_fake_user if action else False,
+        )
+        slot = data.action_slot
+        if self._target == "CHOSEN":
+            chosen = _chosen_action(self._chosen)
+            if chosen != action:
+                _keep(action)
+                data.action = chosen
+                before.new_slot = _use_slot(data, armature)
+        elif self._target == "COPY" and action is not None:
+            copy = _copy(action)
+            _keep(action)
+            data.action = copy
+            data.action_slot = next(
+                (each for each in copy.slots if slot and each.identifier == slot.identifier), None
+            )
+            before.made = copy.name
+        elif self._target == "LAYER" and action is not None and slot is not None:
+            track = data.nla_tracks.new()
+            track.name = f"{action.name} below"
+            strip = track.strips.new(action.name, round(action.frame_range[0]), action)
+            strip.action_slot = slot
+            before.track = track.name
+        if data.action is None or before.track is not None:
+            made = bpy.data.actions.new(f"{armature.name} Pose")
+            made.slots.new("OBJECT", armature.name)
+            made.layers.new("Layer").strips.new(type="KEYFRAME")
+            data.action = made
+            data.action_slot = made.slots[made.slots[0].identifier]
+            data.action_blend_type = "REPLACE"
+            before.made = made.name
+        assert data.action is not None
+        _writable_action(data.action)
+        if data.action_slot is None:
+            before.new_slot = _use_slot(data, armature)
+        slot = data.action_slot
+        channelbag = None if slot is None else _channelbag(data.action, slot)
+        if channelbag is not None:
+            before.groups = {group.name for group in channelbag.groups}
+        self._before = before
+
+    def _restore_curves(self, armature: bpy.types.Object, before: _Before) -> None:
+        data = armature.animation_data
+        assert data is not None
+        if data.action is None or data.action_slot is None:
+            return
+        channelbag = _channelbag(data.action, data.action_slot)
+        if channelbag is None:
+            return
+        for curve in list(channelbag.fcurves):
+            place = curve.data_path, curve.array_index
+            if place not in before.curves:
+                continue
+            keys = before.curves[place]
+            if keys is None:
+                channelbag.fcurves.remove(curve)
+            else:
+                write_keys(curve, keys)
+        for group in list(channelbag.groups):
+            if group.name not in before.groups and not len(group.channels):
+                channelbag.groups.remove(group)
+
+    # --- Single keys ------------------------------------------------------------------------
+
+    def _note(self, armature: bpy.types.Object, path: str) -> None:
+        """Keep the curves of a property as they were before their first key."""
+        before, data = self._before, armature.animation_data
+        assert before is not None
+        assert data is not None
+        assert data.action is not None
+        if data.action_slot is None or (path, 0) in before.curves:
+            return
+        channelbag = _channelbag(data.action, data.action_slot)
+        curves = (
+            {}
+            if channelbag is None
+            else {
+                curve.array_index: curve for curve in channelbag.fcurves if curve.data_path == path
+            }
+        )
+        for component in range(4):
+            curve = curves.get(component)
+            before.curves[path, component] = None if curve is None else read_keys(curve)
+
+    def _insert(
+        self,
+        armature: bpy.types.Object,
+        path: str,
+        frame: float,
+        group: str,
+        how: tuple[set[str], str],
+    ) -> bool:
+        self._note(armature, path)
+        options, kind = how
+        try:
+            return armature.keyframe_insert(
+                path,
+                frame=frame,
+                group=group,
+                options=options,  # type: ignore[arg-type]
+                keytype=kind,  # type: ignore[arg-type]
+            )
+        except RuntimeError:
+            # Blender raises where a key is not needed, or a curve is locked.
+            return False
+
+    def _insert_paths(
+        self,
+        armature: bpy.types.Object,
+        keying_set: bpy.types.KeyingSet,
+        frame: float,
+        how: tuple[set[str], str],
+    ) -> list[str]:
+        done: list[str] = []
+        for path in keying_set.paths:
+            if path.id != armature:
+                continue
+            name = path.data_path.partition('pose.bones["')[2].partition('"]')[0]
+            if self._insert(armature, path.data_path, frame, name, how) and name:
+                done.append(bpy.utils.unescape_identifier(name))
+        return list(dict.fromkeys(done))
+
+    def _replace(
+        self, armature: bpy.types.Object, channel: Channel, keys: Sequence[KeyArrays]
+    ) -> None:
+        self._note(armature, channel.data_path)
+        data = armature.animation_data
+        assert data is not None
+        assert data.action is not None
+        assert data.action_slot is not None
+        channelbag = _channelbag(data.action, data.action_slot, ensure=True)
+        assert channelbag is not None
+        for component, each in enumerate(keys):
+            curve = channelbag.fcurves.find(channel.data_path, index=component)
+            if curve is None:
+                curve = channelbag.fcurves.new(channel.data_path, index=component)
+                group = channelbag.groups.get(channel.group)
+                curve.group = group or channelbag.groups.new(channel.group)
+            replace_stretch(curve, each)
+
+
+def _options(scene: bpy.types.Scene) -> set[str]:
+    """The artist's settings of keying, as Blender's Insert Keyframe takes them."""
+    preferences = bpy.context.preferences
+    assert preferences is not None
+    assert scene.tool_settings is not None
+    options: set[str] = set()
+    if preferences.edit.use_keyframe_insert_needed:
+        options.add("INSERTKEY_NEEDED")
+    if preferences.edit.use_visual_keying:
+        options.add("INSERTKEY_VISUAL")
+    if scene.tool_settings.use_keyframe_cycle_aware:
+        options.add("INSERTKEY_CYCLE_AWARE")
+    return options
+
+
+def _key_type(scene: bpy.types.Scene) -> str:
+    assert scene.tool_settings is not None
+    return scene.tool_settings.keyframe_type
+
+
+def _set_options(active: bpy.types.KeyingSet | None) -> set[str]:
+    if active is None:
+        return set()
+    if active.bl_idname == "Available":
+        return {"INSERTKEY_AVAILABLE"}
+    return {"INSERTKEY_VISUAL"} if "Visual" in active.bl_idname else set()
+
+
+def _channels(
+    bone: bpy.types.PoseBone, active: bpy.types.KeyingSet | None, *, placed: bool
+) -> list[str]:
+    """Properties of a bone that get a key."""
+    rotation = rotation_channel(bone.rotation_mode)
+    if active is not None:
+        name = active.bl_idname
+        if name.startswith(("Available", "WholeCharacter")):
+            return ["location", rotation, "scale"]
+        found = [channel for part, channel in _SETS if part in name and "Delta" not in name]
+        if found:
+            return [rotation if each == "rotation" else each for each in found]
+    return ["location", rotation] if placed else [rotation]
+
+
+def _chosen_action(name: str) -> bpy.types.Action:
+    action = bpy.data.actions.get((name, None)) if name else None
+    if action is None:
+        raise WriteError("The action for the keys is gone.", "Choose another one.")
+    return action
+
+
+def _writable_action(action: bpy.types.Action) -> None:
+    if action.library is not None or not action.is_editable:
+        raise WriteError(
+            f"Action '{action.name}' is linked and read-only.",
+            "Let the keys go to a copy, or to a layer.",
+        )
+
+
+def _copy(action: bpy.types.Action) -> bpy.types.Action:
+    copied = action.copy()
+    assert isinstance(copied, bpy.types.Action)
+    return copied
+
+
+def _keep(action: bpy.types.Action | None) -> None:
+    """Save an action that is taken off from being purged."""
+    if action is not None and action.library is None:
+        action.use_fake_user = True
+
+
+def _use_slot(data: bpy.types.AnimData, armature: bpy.types.Object) -> int | None:
+    """Take the slot of the action that is the armature's, by name or as the only one.
+
+    Returns:
+        The handle of a slot that had to be made.
+    """
+    action = data.action
+    assert action is not None
+    fitting = [slot for slot in action.slots if slot.target_id_type in ("OBJECT", "UNSPECIFIED")]
+    for slot in fitting:
+        if slot.identifier == f"OB{armature.name}" or armature in slot.users():
+            data.action_slot = slot
+            return None
+    if len(fitting) == 1:
+        data.action_slot = fitting[0]
+        return None
+    made = action.slots.new("OBJECT", armature.name)
+    data.action_slot = made
+    return made.handle
+
+
+def _channelbag(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot, *, ensure: bool = False
+) -> bpy.types.ActionChannelbag | None:
+    if ensure and not action.layers:
+        action.layers.new("Layer")
+    for layer in action.layers:
+        if ensure and not layer.strips:
+            layer.strips.new(type="KEYFRAME")
+        for strip in layer.strips:
+            if isinstance(strip, bpy.types.ActionKeyframeStrip):
+                return strip.channelbag(slot, ensure=ensure)
+    return None

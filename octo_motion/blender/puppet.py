@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A puppet's pose to and from an armature's bones, each in its own rotation mode.
+
+Nothing of Blender's is held between calls: only names, and numbers that were read at the start.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Quaternion, Vector
+
+from ..core.errors import RigError
+from ..core.posing.figure import Figure, Pose
+from ..core.rotations import Floats, conjugate, from_matrix, multiply, rotate
+from .figure_reading import Rig, even_scale, posed_bones, read_rig
+
+_STILL = 1e-6
+"""Quaternion components and puppet metres by which a body may be off its bone unnoticed."""
+
+
+class Puppet:
+    """An armature in the hands of a session.
+
+    Args:
+        armature: the armature object, local to this file.
+        rig: what was read of it; read now if none is given.
+    """
+
+    def __init__(self, armature: bpy.types.Object, rig: Rig | None = None) -> None:
+        self.name = armature.name
+        self.rig = rig or read_rig(armature)
+        self._bones = armature_bones(armature)
+        self._written: Pose | None = None
+        self._set_frames(armature)
+
+    @property
+    def figure(self) -> Figure:
+        """What the puppet is made of."""
+        return self.rig.figure
+
+    def armature(self) -> bpy.types.Object:
+        """The armature object, as it is now.
+
+        Raises:
+            RigError: it is gone, or its bones are others.
+        """
+        found = bpy.data.objects.get((self.name, None))
+        if found is None or found.pose is None:
+            raise RigError(f"'{self.name}' is gone.", "Start posing again with another armature.")
+        if armature_bones(found) != self._bones:
+            raise RigError(f"The bones of '{self.name}' have changed.", "Start posing again.")
+        return found
+
+    def read(self) -> Pose:
+        """Where the bodies are, as the armature is shown now."""
+        armature = self.armature()
+        posed = posed_bones(armature, even_scale(armature))
+        bodies = list(self.rig.roles.bodies)
+        pose = Pose(posed.heads[bodies] * self.rig.unit, posed.rotations[bodies])
+        self._written = None
+        return pose
+
+    def write(self, pose: Pose) -> list[str]:
+        """Give bones the pose; the names of those whose values have changed."""
+        armature = self.armature()
+        assert armature.pose is not None
+        rotations, locations = self._local(armature, pose)
+        moved = self._moved(pose)
+        changed: list[str] = []
+        names = self.figure.names
+        for body in np.flatnonzero(moved).tolist():
+            bone = armature.pose.bones[names[body]]
+            set_rotation(bone, Quaternion(rotations[body].tolist()))
+            if self._places[body]:
+                place = Vector(locations[body].tolist())
+                if not bone.bone.use_local_location:
+                    place = carrying_axes(bone.bone) @ place
+                bone.location = place
+            changed.append(bone.name)
+        self._written = pose
+        return changed
+
+    def places(self, body: int) -> bool:
+        """Whether a body's bone is placed by its location too, not only turned."""
+        return bool(self._places[body])
+
+    def _moved(self, pose: Pose) -> np.ndarray:
+        """Bodies whose bones have to be written: those that are turned against their carrier."""
+        count = len(self.figure)
+        if self._written is None:
+            return np.ones(count, dtype=bool)
+        before, after = self._written, pose
+        turned = np.abs(_seen(self._carriers, before) - _seen(self._carriers, after)).max(axis=1)
+        shifted = np.abs(before.positions - after.positions).max(axis=1)
+        return (turned > _STILL) | (self._places & (shifted > _STILL))
+
+    def _set_frames(self, armature: bpy.types.Object) -> None:
+        """How each bone's rest frame rides on the body that carries it."""
+        rig = self.rig
+        bones = list(rig.roles.bodies)
+        self._carriers = np.array(rig.roles.carriers)
+        object_turn = _object_turn(armature)
+        posed = posed_bones(armature, even_scale(armature))
+        turned = multiply(conjugate(object_turn), posed.rotations)
+        heads = self._to_armature(armature, posed.heads * rig.unit)
+        rest, rest_heads = rig.skeleton.rest_rotations, rig.skeleton.heads
+        sizes = posed.lengths / np.maximum(rig.skeleton.lengths, 1e-12)
+        sizes /= even_scale(armature)
+
+        count = len(bones)
+        self._turns = np.zeros((count, 4))
+        self._offsets = np.zeros((count, 3))
+        self._sizes = np.ones(count)
+        self._free_turn = np.zeros(count, dtype=bool)
+        for body, bone in enumerate(bones):
+            parent = rig.skeleton.parents[bone]
+            if parent < 0:
+                turn, place = rest[bone], rest_heads[bone]
+            else:
+                carry = multiply(turned[parent], conjugate(rest[parent]))
+                turn = multiply(carry, rest[bone])
+                way = rest_heads[bone] - rest_heads[parent]
+                self._sizes[body] = sizes[parent]
+                place = heads[parent] + sizes[parent] * rotate(carry, way)
+            self._free_turn[body] = not rig.skeleton.inherits_rotation[bone]
+            carrier = self._carriers[body]
+            if carrier >= 0:
+                base = bones[carrier]
+                turn = multiply(conjugate(turned[base]), turn)
+                place = rotate(conjugate(turned[base]), place - heads[base])
+            self._turns[body], self._offsets[body] = turn, place
+        parents = np.array(rig.roles.parents)
+        connected = np.array([rig.skeleton.connected[bone] for bone in bones])
+        self._places = ((parents < 0) | (parents != self._carriers)) & ~connected
+
+    def _local(self, armature: bpy.types.Object, pose: Pose) -> tuple[Floats, Floats]:
+        """Rotations (bodies, 4) and locations (bodies, 3) in the bones' own rest frames."""
+        turned = multiply(conjugate(_object_turn(armature)), pose.orientations)
+        heads = self._to_armature(armature, pose.positions)
+        carried, place = self._turns.copy(), self._offsets.copy()
+        rides = self._carriers >= 0
+        base = self._carriers[rides]
+        carried[rides] = multiply(turned[base], self._turns[rides])
+        place[rides] = heads[base] + rotate(turned[base], self._offsets[rides])
+        along = rotate(conjugate(carried), heads - place) / self._sizes[:, None]
+        bones = list(self.rig.roles.bodies)
+        rest = self.rig.skeleton.rest_rotations[bones]
+        carried = np.where(self._free_turn[:, None], rest, carried)
+        return multiply(conjugate(carried), turned), along
+
+    def _to_armature(self, armature: bpy.types.Object, positions: Floats) -> Floats:
+        """Puppet metres in the world (…, 3) to the armature's own space."""
+        world = np.array(armature.matrix_world, dtype=np.float64)
+        inverse = np.linalg.inv(world)
+        return (positions / self.rig.unit) @ inverse[:3, :3].T + inverse[:3, 3]
+
+
+def armature_bones(armature: bpy.types.Object) -> tuple[str, ...]:
+    """Names of an armature's bones in their order."""
+    data = armature.data
+    return tuple(bone.name for bone in data.bones) if isinstance(data, bpy.types.Armature) else ()
+
+
+def set_rotation(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
+    """Turn a bone in its own rotation mode, on from the values that it has."""
+    mode = bone.rotation_mode
+    if mode == "QUATERNION":
+        turn.make_compatible(bone.rotation_quaternion)
+        bone.rotation_quaternion = turn
+    elif mode == "AXIS_ANGLE":
+        axis, angle = turn.to_axis_angle()
+        if Vector(np.array(bone.rotation_axis_angle)[1:].tolist()).dot(axis) < 0.0:
+            axis, angle = -axis, -angle
+        bone.rotation_axis_angle = (angle, *axis)  # type: ignore[assignment]
+    else:
+        bone.rotation_euler = turn.to_euler(mode, bone.rotation_euler)
+
+
+def carrying_axes(bone: bpy.types.Bone) -> Matrix:
+    """A bone's axes, seen along those in which its location is given when it is not local."""
+    axes = bone.matrix_local.to_3x3()
+    return axes if bone.parent is None else bone.parent.matrix_local.to_3x3().inverted() @ axes
+
+
+def _object_turn(armature: bpy.types.Object) -> Floats:
+    axes = np.array(armature.matrix_world, dtype=np.float64)[:3, :3]
+    return from_matrix(axes / np.linalg.norm(axes, axis=0))
+
+
+def _seen(carriers: np.ndarray, pose: Pose) -> Floats:
+    """Orientations (bodies, 4) seen from the bodies that carry them, signs made alike."""
+    seen = pose.orientations.copy()
+    rides = carriers >= 0
+    seen[rides] = multiply(conjugate(pose.orientations[carriers[rides]]), pose.orientations[rides])
+    return np.where(seen[:, :1] < 0.0, -seen, seen)
