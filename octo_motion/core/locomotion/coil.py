@@ -27,6 +27,12 @@ _SNAP: Final = np.cos(np.radians(10.0))
 _WIDEST: Final = 0.1
 """Cosine of the widest angle at which a slice's outline is looked at."""
 _HALVINGS: Final = 32
+_PRESSED: Final = 0.3
+"""Share of the skin's radius by which the middle of a bone presses into the object: flesh gives."""
+_ROUND: Final = 1.5
+"""An object less long than so many times its width is held where it is wide."""
+_WIDE: Final = 0.95
+"""Share of the largest radius that counts as wide."""
 
 _ANGLES: Final = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
 _CIRCLE: Final = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)])
@@ -69,6 +75,12 @@ class Profile:
         """The same in another unit."""
         sizes = (factor * self.heights, factor * self.support)
         return Profile(factor * self.center, self.axes, *sizes)
+
+    def way_out(self, points: Floats) -> Floats:
+        """Unit vectors (…, 3) from the axis to points (…, 3), across it; object's frame."""
+        local = self.to_profile(points)
+        local[..., 2] = 0.0
+        return normalized(local) @ self.axes.T
 
     def grown(self, skin: float) -> Floats:
         """Support (slices, directions) of the object with a skin of this thickness all over it."""
@@ -225,7 +237,8 @@ def wind(
     def point(joint: int, angle: float, height: float) -> Floats:
         table = tables[joint]
         clear = _radius(heights, table, angle, height)
-        out = float(np.hypot(clear, half[joint]))
+        pressed = clear - _PRESSED * float(radii[joint])
+        out = max(clear, float(np.hypot(pressed, half[joint])))
         return np.array([out * np.cos(angle), out * np.sin(angle), height])
 
     root = profile.to_profile(start)
@@ -235,6 +248,10 @@ def wind(
         heights[0] + min(skin, 0.5 * np.ptp(heights)),
         heights[-1] - min(skin, 0.5 * np.ptp(heights)),
     )
+    widths = profile.support.mean(axis=1)
+    if np.ptp(heights) < 2.0 * _ROUND * widths.max():
+        wide = heights[widths > _WIDE * widths.max()]
+        limits = max(limits[0], float(wide[0])), min(limits[1], float(wide[-1]))
     level = float(np.clip(root[2], *limits))
     beside = heights[0] < root[2] < heights[-1]
     climb = 1.0 if limits[1] - level >= level - limits[0] else -1.0

@@ -16,7 +16,15 @@ from typing import Final, Literal
 import numpy as np
 
 from ..errors import SettingsError
-from ..rotations import Floats, conjugate, from_axis_angle, multiply, normalized, rotate
+from ..rotations import (
+    Floats,
+    conjugate,
+    from_axis_angle,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+)
 from .arm_frames import (
     ArmFrames,
     blended,
@@ -27,7 +35,7 @@ from .arm_frames import (
 )
 from .ccd import closed
 from .coil import Coil, Profile, Winding, wind
-from .reach import Timeline, first_place, folded, front_width, passed
+from .reach import Timeline, eased, first_place, folded, front_width, passed
 
 Mode = Literal["TOUCH", "COIL"]
 
@@ -35,13 +43,18 @@ TOUCH_TURNS: Final = 0.12
 """Of a turn that an arm lays itself on what it only touches."""
 _SLACK: Final = 1.04
 """The free part of an arm is at least so many times as long as its way."""
-_LOOSE: Final = 1.3
+_LOOSE: Final = 1.5
 """A free part longer than this is not made for the sake of a shorter coil."""
-_LEAST_FREE: Final = 2
-"""Bones between the body and the coil."""
-_TWISTED: Final = 0.5
+_LEAST_FREE: Final = 0.3
+"""Share of the arm between the body and the coil, at least."""
+_TWISTED: Final = 0.8
 """The twist that brings suckers to the object lies in this last share of the free part."""
 _LIFT: Final = 0.25
+_CLEAR: Final = 0.85
+"""Of the skin's radius: joints on their way keep so far from the object."""
+_CLEAR_ROUNDING: Final = 0.3
+"""Of the skin's radius: within it, joints begin to give way."""
+_CLEARINGS: Final = 4
 _X: Final = np.array([1.0, 0.0, 0.0])
 _Y: Final = np.array([0.0, 1.0, 0.0])
 _UP: Final = np.array([0.0, 0.0, 1.0])
@@ -78,6 +91,9 @@ class Grasp:
     """What has been planned; see :func:`plan_grasp`."""
 
     arm: ArmFrames
+    radii: Floats
+    """(bones + 1,) of the skin at the joints."""
+    profile: Profile
     timeline: Timeline
     mode: Mode
     coil: Coil
@@ -113,7 +129,17 @@ class Grasp:
         lengths = arm.lengths[:first]
         along, facing = rotate(held, _X), rotate(held, _Y)
         shape = _approach(lengths, goal, along, facing, rotate(arm.at_rest[0], _X), self.up)
-        directions = np.moveaxis(closed(np.ascontiguousarray(shape), lengths, goal.T), -1, 0)
+        shape = closed(np.ascontiguousarray(shape), lengths, goal.T)
+        for _ in range(_CLEARINGS):
+            steps = lengths[:, None] * np.moveaxis(shape, -1, 0)
+            joints = arm.root + np.cumsum(steps, axis=1)
+            moved = joints[:, :-1] + self._out_of_the_way(joints[:, :-1], places)
+            joints = np.concatenate(
+                [np.zeros_like(goal)[:, None] + arm.root, moved, joints[:, -1:]], axis=1
+            )
+            pushed = np.moveaxis(normalized(np.diff(joints, axis=1)), 0, -1)
+            shape = closed(np.ascontiguousarray(pushed), lengths, goal.T)
+        directions = np.moveaxis(shape, -1, 0)
         frames = transported(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
         twist = _twist(frames[:, -1], held)
         twist = self.twist + np.angle(np.exp(1j * (twist - self.twist)))
@@ -121,6 +147,29 @@ class Grasp:
         ramp = np.clip((share - 1.0 + _TWISTED) / _TWISTED, 0.0, 1.0)
         angle = twist[:, None] * (ramp * ramp * (3.0 - 2.0 * ramp))
         return multiply(frames, from_axis_angle(_X, angle))
+
+    def _out_of_the_way(self, joints: Floats, places: Places) -> Floats:
+        """Shifts (frames, joints, 3) that bring joints 1 … out of the object; armature space."""
+        inside = places.into(joints)
+        skin = self.radii[1 : joints.shape[1] + 1]
+        lacking = _CLEAR * skin - self.profile.clearance(inside)
+        rounding = _CLEAR_ROUNDING * skin
+        # Not more than halfway through: beyond that there is no telling which side is nearer.
+        shift = 0.5 * (lacking + np.sqrt(lacking * lacking + rounding * rounding))
+        shift = np.where(lacking < -3.0 * rounding, 0.0, shift - _at(3.0) * rounding)
+        out = self.profile.way_out(inside) * np.maximum(shift, 0.0)[..., None]
+        return rotate(places.rotations[:, None], out)
+
+    def _cleared(self, frames: Floats, places: Places, amount: Floats) -> Floats:
+        """An arm (frames, segments, 4) bent round the object by an amount (frames,) of 0…1."""
+        arm = self.arm
+        for _ in range(_CLEARINGS):
+            joints = arm.joints(frames)
+            shifts = self._out_of_the_way(joints[:, 1:], places) * amount[:, None, None]
+            joints[:, 1:] += shifts
+            along = normalized(np.diff(joints, axis=1))
+            frames = multiply(shortest_arc(rotate(frames, _X), along), frames)
+        return frames
 
     def apply(self, times: Floats, places: Places, otherwise: Floats) -> Floats:
         """Rotations (frames, bones, 4) of the arm, of what it does otherwise (frames, bones, 4).
@@ -139,7 +188,8 @@ class Grasp:
         width = front_width(lengths)
         touches = arm.reach[self.coil.first] + width
         ends = arm.length + width if self.wraps else touches
-        front = timeline.front(times[moves], first_place(lengths), touches, ends)
+        front_at = first_place(lengths)
+        front = timeline.front(times[moves], front_at, touches, ends)
         holding = relative(self.holding(places[moves]))
         reached = passed(lengths, front)
         last = self.coil.first + len(self.coil.facing)
@@ -148,6 +198,10 @@ class Grasp:
         fold = folded(lengths, front)
         fold[:, 0] = holding[:, 0]
         reaching = blended(fold, holding, reached)
+        # What holds is out of the way already.
+        loose = 1.0 - eased((front - front_at) / (touches - front_at))
+        cleared = self._cleared(composed(reaching), places[moves], loose)
+        reaching = relative(cleared)
         usual = relative(arm.from_bones(otherwise[moves]))
         shape = composed(blended(usual, reaching, weight[moves]))
         result[moves] = arm.to_bones(shape)
@@ -200,10 +254,13 @@ def plan_grasp(
     wanted = TOUCH_TURNS if mode == "TOUCH" else turns
     best: tuple[float, Grasp] | None = None
     missing = (0.0, 0)
+    # At least two bones, and one is left to take hold.
+    least = int(np.searchsorted(arm.reach, _LEAST_FREE * arm.length))
+    least = min(max(least, 2), len(arm.bones) - 1)
     for sense in (1, -1):
         winding = Winding(wanted, sense)
         found: Coil | None = None
-        for first in range(min(_LEAST_FREE, len(arm.bones) - 1), len(arm.bones)):
+        for first in range(least, len(arm.bones)):
             coil = wind(profile, arm.lengths, radii, first, root, winding)
             ways = np.linalg.norm(places[held].seen(coil.joints[0]) - arm.root, axis=-1)
             far = float(ways.max())
@@ -218,13 +275,14 @@ def plan_grasp(
             found = coil
         if found is None:
             continue
-        grasp = Grasp(arm, timeline, mode, found, 0.0, up, mode == "COIL")
+        common = (arm, radii, profile, timeline, mode, found)
+        grasp = Grasp(*common, 0.0, up, mode == "COIL")
         whole = grasp.holding(places[touch])
         free = found.first
         twist = float(_twist_without(arm, whole[0], free))
         cost = abs(twist) - 1e-3 * sense
         if best is None or cost < best[0]:
-            best = cost, Grasp(arm, timeline, mode, found, twist, up, mode == "COIL")
+            best = cost, Grasp(*common, twist, up, mode == "COIL")
     if best is None:
         far, at = missing
         raise SettingsError(
@@ -233,6 +291,11 @@ def plan_grasp(
             "Move it nearer, or change the frames of the reach.",
         )
     return best[1]
+
+
+def _at(slacks: float) -> float:
+    """What the rounding leaves at so many roundings from the surface."""
+    return 0.5 * (np.sqrt(slacks * slacks + 1.0) - slacks)
 
 
 def _approach(
