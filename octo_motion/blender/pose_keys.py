@@ -180,7 +180,7 @@ class PoseKeys:
                     if slot.handle == before.new_slot:
                         data.action.slots.remove(slot)
                         break
-        action = bpy.data.actions.get(before.action) if before.action else None
+        action = bpy.data.actions.get((before.action, None)) if before.action else None
         data.action = action
         if action is not None:
             data.action_slot = next(
@@ -190,7 +190,7 @@ class PoseKeys:
         data.action_blend_type = before.blend  # type: ignore[assignment]
         if before.track is not None and before.track in data.nla_tracks:
             data.nla_tracks.remove(data.nla_tracks[before.track])
-        made = bpy.data.actions.get(before.made) if before.made else None
+        made = bpy.data.actions.get((before.made, None)) if before.made else None
         if made is not None:
             bpy.data.actions.remove(made)
         if not before.had_data:
