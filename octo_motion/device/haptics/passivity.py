@@ -15,7 +15,6 @@ times the device's own damping calms all from 0.05 to 0.4 kg at eight times the 
 from __future__ import annotations
 
 from dataclasses import dataclass
-
 from typing import Final
 
 from ..spatial import ZERO, Vector, dot, scale

@@ -1,0 +1,225 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The process at the devices: reads them, gives force, a thousand times a second, and no more.
+
+One thread, no simulation, nothing that waits. Whoever started it is told what the hands do, and
+tells where the held bodies are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import platform
+from collections.abc import Iterable
+from typing import Final
+
+from ..core.errors import DeviceError
+from .channel import Channel, ChannelClosedError, Listener
+from .discovery import Discovery, Sources
+from .driver import DeviceLostError, Driver
+from .haptics.pointer import Pointer
+from .haptics.schedule import Schedule, make_real_time
+from .hid.space_mouse import SpaceMouse
+from .messages import (
+    Button,
+    DeviceMessage,
+    Goodbye,
+    Grab,
+    HeldMessage,
+    Hello,
+    LoopTimesMessage,
+    Message,
+    MessageError,
+    Notice,
+    Settings,
+    Test,
+    Workspace,
+)
+from .process import Parent, end_after
+
+log = logging.getLogger(__name__)
+
+PERIOD: Final = 0.001
+MOST_POINTERS: Final = 8
+_TELL_EVERY: Final = 2
+"""Ticks between two words on where the hands are."""
+_TIMES_EVERY: Final = 1.0
+_LOOK_EVERY: Final = 100
+"""Ticks between two looks for devices; how costly one may be is the discovery's business."""
+
+
+class HandLoop:
+    """All devices of this machine, tick by tick."""
+
+    def __init__(
+        self, channel: Channel, discovery: Discovery, schedule: Schedule, period: float = PERIOD
+    ) -> None:
+        self._channel = channel
+        self._discovery = discovery
+        self._schedule = schedule
+        self._period = period
+        self._pointers: dict[int, Pointer] = {}
+        self._numbers: dict[str, int] = {}
+        self._workspaces: dict[int, Workspace] = {}
+        self._settings = Settings()
+        self._ticks = 0
+        self._told_times = 0.0
+
+    @property
+    def pointers(self) -> Iterable[Pointer]:
+        """Of the devices that are there."""
+        return self._pointers.values()
+
+    def tick(self, now: float) -> None:
+        """Hear, feel, tell.
+
+        Raises:
+            ChannelClosedError: whoever started us is gone.
+        """
+        for message in self._channel.receive():
+            self._hear(message, now)
+        for number, pointer in list(self._pointers.items()):
+            try:
+                pointer.tick(now)
+            except DeviceLostError:
+                self._lose(number)
+        self._tell(now)
+        self._ticks += 1
+        if self._ticks % _LOOK_EVERY == 1 and not any(each.grab for each in self.pointers):
+            self._look()
+
+    def _hear(self, message: Message, now: float) -> None:
+        match message:
+            case HeldMessage():
+                pointer = self._pointers.get(message.pointer)
+                if pointer is not None:
+                    pointer.hold(message.grab, message.held(), message.time, now)
+            case Settings():
+                self._take_settings(message)
+            case Workspace():
+                if message.scale > 0.0 and len(self._workspaces) < MOST_POINTERS:
+                    self._workspaces[message.pointer] = message
+                    if message.pointer in self._pointers:
+                        self._pointers[message.pointer].place(message)
+            case Grab():
+                pointer = self._pointers.get(message.pointer)
+                if pointer is not None:
+                    pointer.want(grab=message.grab)
+            case Test():
+                pointer = self._pointers.get(message.pointer)
+                if pointer is not None:
+                    pointer.test(now)
+            case Goodbye():
+                raise ChannelClosedError("goodbye")
+            case _:
+                log.warning("A message that is not for here: %s", type(message).__name__)
+
+    def _take_settings(self, settings: Settings) -> None:
+        try:
+            response = settings.response()
+        except MessageError as error:
+            self._channel.send(Notice(f"The device's settings were not taken: {error}", ""))
+            return
+        self._settings = settings
+        for pointer in self.pointers:
+            pointer.use(settings)
+            if isinstance(pointer.driver, SpaceMouse):
+                pointer.driver.response = response
+
+    def _tell(self, now: float) -> None:
+        for pointer in self.pointers:
+            for index, pressed in pointer.presses:
+                self._channel.send(Button(pointer.number, index, pressed))
+            changed = bool(pointer.presses)
+            pointer.presses.clear()
+            if changed or self._ticks % _TELL_EVERY == 0:
+                self._channel.send(pointer.message(now), droppable=not changed)
+        if now - self._told_times > _TIMES_EVERY:
+            self._told_times = now
+            times = self._schedule.times()
+            self._channel.send(
+                LoopTimesMessage(times.rate, times.late, times.computing, times.missed)
+            )
+
+    def _look(self) -> None:
+        for driver in self._discovery.look():
+            self._welcome(driver)
+        problems, self._discovery.problems = self._discovery.problems, []
+        for problem in problems:
+            self._channel.send(Notice(problem.problem, problem.remedy))
+
+    def _welcome(self, driver: Driver) -> None:
+        who = driver.description
+        number = self._numbers.setdefault(who.identity, len(self._numbers))
+        if number >= MOST_POINTERS:
+            del self._numbers[who.identity]
+            driver.close()
+            return
+        pointer = Pointer(number, driver, self._period, self._settings)
+        if isinstance(driver, SpaceMouse):
+            with contextlib.suppress(MessageError):
+                driver.response = self._settings.response()
+        if number in self._workspaces:
+            pointer.place(self._workspaces[number])
+        self._pointers[number] = pointer
+        log.info("Found: %s", who.name)
+        self._say_device(pointer, present=True)
+
+    def _lose(self, number: int) -> None:
+        pointer = self._pointers.pop(number)
+        pointer.close()
+        self._discovery.lost(pointer.driver.description.identity)
+        log.info("Gone: %s", pointer.driver.description.name)
+        self._say_device(pointer, present=False)
+
+    def _say_device(self, pointer: Pointer, *, present: bool) -> None:
+        who = pointer.driver.description
+        self._channel.send(
+            DeviceMessage(
+                *(pointer.number, present, who.kind),
+                *(who.dynamics.force if who.dynamics else 0.0, pointer.gains.stiffness),
+                *(who.name, who.buttons),
+            )
+        )
+
+    def close(self) -> None:
+        """Take all force away."""
+        for pointer in self.pointers:
+            pointer.close()
+        self._pointers.clear()
+        self._discovery.close()
+
+
+def run(sources: Sources) -> int:
+    """Serve whoever started this process until it is gone; the exit status."""
+    parent = Parent()
+    listener = Listener(parent.secret)
+    parent.announce(listener.port)
+    channel = listener.accept(10.0)
+    if channel is None:
+        log.error("Nobody connected")
+        return 2
+    try:
+        discovery = Discovery(sources)
+    except (OSError, ValueError) as error:
+        channel.send(Notice(f"The network port cannot be used: {error}.", "Choose another one."))
+        discovery = Discovery(Sources(sources.hid, sources.haply, simulated=sources.simulated))
+    priority = make_real_time()
+    end_after(1.0, lambda: parent.gone)
+    channel.send(Hello(os.getpid(), platform.python_version(), priority))
+    schedule = Schedule(PERIOD)
+    loop = HandLoop(channel, discovery, schedule)
+    try:
+        while not parent.gone:
+            now = schedule.begin()
+            loop.tick(now)
+            schedule.end()
+    except ChannelClosedError:
+        pass
+    except DeviceError as error:
+        log.error("%s", error)
+    finally:
+        loop.close()
+        channel.close()
+    return 0

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One device in the loop: its pointer in the scene, what it holds, and what the hand feels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
+from ..messages import HandMessage, Settings, Workspace
+from ..spatial import (
+    IDENTITY,
+    ZERO,
+    Quaternion,
+    Vector,
+    add,
+    add_scaled,
+    conjugate,
+    multiply,
+    rotate,
+    scale,
+    subtract,
+    to_rotation_vector,
+    turned,
+    unit,
+)
+from .coupling import Gains, gains_for, wrench
+from .local_model import Held, LocalModel
+from .passivity import DAMPING, STORED, Observer
+from .safety import Limits, Shaper
+
+_FULL_PUSH: Final = 0.1
+"""s: a rate device that has not been read for so long stands still."""
+_GIVE_UP: Final = 0.25
+"""s without a word from the simulation, after which the hand has let go for good."""
+_TEST_SECONDS: Final = 0.6
+_TEST_SHARE: Final = 0.15
+"""Of the device's force, for the test of a device."""
+
+
+@dataclass
+class Pointer:
+    """State of one device between two ticks."""
+
+    number: int
+    driver: Driver
+    period: float
+    settings: Settings = field(default_factory=Settings)
+    workspace: Workspace = field(default_factory=lambda: Workspace(0))
+    sample: Sample = field(default_factory=lambda: Sample(-math.inf))
+    position: Vector = ZERO
+    orientation: Quaternion = IDENTITY
+    velocity: Vector = ZERO
+    angular_velocity: Vector = ZERO
+    grab: int = 0
+    """Number of the grab that is wanted; 0: none."""
+    presses: list[tuple[int, bool]] = field(default_factory=list[tuple[int, bool]])
+    """Buttons pressed and let go since they were last told."""
+
+    def __post_init__(self) -> None:
+        """Choose the coupling for the device."""
+        device = self.driver.description.dynamics
+        self.gains = gains_for(device, self.period) if device else Gains(0.0, 0.0, 0.0, 0.0)
+        self._limits = Limits(device.force, device.torque) if device else Limits(0.0, 0.0)
+        self._shaper = Shaper(self._limits)
+        self._push = _observer(device, turning=False)
+        self._turn = _observer(device, turning=True)
+        self._model = LocalModel()
+        self._answered = 0
+        self._heard = -math.inf
+        self._grabs = 0
+        self._told_place = False
+        self._test_until = -math.inf
+        self._last: tuple[Vector, Quaternion] | None = None
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the device has motors."""
+        return self.driver.description.dynamics is not None
+
+    @property
+    def force(self) -> Vector:
+        """N on the hand, the device's axes."""
+        return self._shaper.force
+
+    @property
+    def torque(self) -> Vector:
+        """N·m on the hand, the device's axes."""
+        return self._shaper.torque
+
+    @property
+    def given(self) -> float:
+        """J that the hand got beyond what it had given."""
+        return self._push.given + self._turn.given
+
+    # --- What is told ----------------------------------------------------------------------------
+
+    def use(self, settings: Settings) -> None:
+        """Take over settings."""
+        self.settings = settings
+
+    def place(self, workspace: Workspace) -> None:
+        """Take over where the device's room lies in the scene; lets go, for nothing may jump."""
+        if self._told_place and workspace == self.workspace:
+            return
+        moved = not self._told_place or workspace.origin != self.workspace.origin
+        self.workspace = workspace
+        self._told_place = True
+        if self.driver.description.kind is Kind.RATE:
+            if moved:
+                self.position, self.orientation = workspace.origin, workspace.orientation
+        else:
+            self.want(grab=False)
+
+    def want(self, *, grab: bool) -> None:
+        """Grab what is near, or let go."""
+        if grab and not self.grab:
+            self._grabs += 1
+            self.grab = self._grabs
+        elif not grab:
+            self.grab = 0
+
+    def hold(self, grab: int, held: Held, time: float, now: float) -> None:
+        """Take over where the simulation says that the held body is.
+
+        Args:
+            grab: The grab that this answers; 0: nothing is held.
+            held: The body at the point where it is held.
+            time: When that was true.
+            now: Now.
+        """
+        if not grab or grab != self.grab:
+            self._answered = 0
+            return
+        if self._answered == grab:
+            self._model.correct(held, max(0.0, min(FRESH_SECONDS, now - time)))
+        else:
+            self._answered = grab
+            self._model.begin(held)
+            self._push.forget()
+            self._turn.forget()
+        self._heard = now
+
+    def test(self, now: float) -> None:
+        """Let the hand feel that the device works: gently to the right, then to the left."""
+        self._test_until = now + _TEST_SECONDS
+
+    # --- One tick --------------------------------------------------------------------------------
+
+    def tick(self, now: float) -> None:
+        """Read the device, go on with the model, and give the hand its force.
+
+        Raises:
+            DeviceLostError: the device is gone.
+        """
+        sample = self.driver.read()
+        if sample is not None:
+            self._press(sample.buttons)
+            self.sample = sample
+            self._move(now)
+        if not self.has_force:
+            return
+        force, torque, age = self._asked(now)
+        self._observe()
+        velocity, spin = self.sample.velocity, self.sample.angular_velocity
+        if self._answered and now - self._heard > _GIVE_UP:
+            self.want(grab=False)
+            self._answered = 0
+        if self._answered:
+            force = add(force, self._push.damping(force, velocity, self.period))
+            torque = add(torque, self._turn.damping(torque, spin, self.period))
+        alive = self.sample.held or not self.settings.dead_man
+        holding = alive and (bool(self._answered and self.grab) or now < self._test_until)
+        self._shaper.shape(force, torque, self.period, holding=holding, age=age)
+        self.driver.send(self._shaper.force, self._shaper.torque)
+
+    def _press(self, buttons: int) -> None:
+        changed = buttons ^ self.sample.buttons
+        index = 0
+        while changed:
+            if changed & 1:
+                pressed = bool(buttons >> index & 1)
+                self.presses.append((index, pressed))
+                if index == self.settings.grab_button:
+                    self._grab_pressed(pressed=pressed)
+            changed >>= 1
+            index += 1
+
+    def _grab_pressed(self, *, pressed: bool) -> None:
+        if not self.settings.toggle:
+            self.want(grab=pressed)
+        elif pressed:
+            self.want(grab=not self.grab)
+
+    def _move(self, now: float) -> None:
+        space, sample = self.workspace, self.sample
+        self.velocity = scale(rotate(space.orientation, sample.velocity), space.scale)
+        self.angular_velocity = rotate(space.orientation, sample.angular_velocity)
+        if self.driver.description.kind is Kind.POSE:
+            self.position = add(
+                space.origin, scale(rotate(space.orientation, sample.position), space.scale)
+            )
+            turn = multiply(space.orientation, sample.orientation)
+            self.orientation = unit(turn) or self.orientation
+        elif now - sample.time < _FULL_PUSH:
+            self.position = add_scaled(self.position, self.velocity, self.period)
+            self.orientation = turned(self.orientation, self.angular_velocity, self.period)
+
+    def _asked(self, now: float) -> tuple[Vector, Vector, float]:
+        """Force and torque that the coupling asks for, in the device's axes, and how old it is."""
+        age = now - self.sample.time
+        if now < self._test_until and not self._answered:
+            size = _TEST_SHARE * self._limits.force * self.settings.force
+            late = self._test_until - now
+            return (size if late > 0.5 * _TEST_SECONDS else -size, 0.0, 0.0), ZERO, age
+        if not self._answered:
+            return ZERO, ZERO, age
+        model, space = self._model, self.workspace
+        model.advance(
+            *(self.period, self.position, self.orientation),
+            *(self.velocity, self.angular_velocity),
+        )
+        place, turn = model.felt()
+        back = conjugate(space.orientation)
+        share = max(0.0, min(1.0, self.settings.force))
+        apart = scale(rotate(back, subtract(place, self.position)), share / space.scale)
+        drift = scale(rotate(back, subtract(model.velocity, self.velocity)), share / space.scale)
+        twist = to_rotation_vector(multiply(turn, conjugate(self.orientation)))
+        spin = subtract(model.angular_velocity, self.angular_velocity)
+        force, torque = wrench(
+            *(self.gains, apart, scale(rotate(back, twist), share), drift),
+            scale(rotate(back, spin), share),
+        )
+        return force, torque, max(age, now - self._heard)
+
+    def _observe(self) -> None:
+        """Account for the force of the last period, over the way that the hand went in it."""
+        place, turn = self.sample.position, self.sample.orientation
+        if self._last is not None:
+            before, turn_before = self._last
+            self._push.observe(self._shaper.force, subtract(place, before))
+            moved = to_rotation_vector(multiply(turn, conjugate(turn_before)))
+            self._turn.observe(self._shaper.torque, moved)
+        self._last = place, turn
+
+    def message(self, now: float) -> HandMessage:
+        """What the bridge needs to know of this tick."""
+        return HandMessage(
+            *(self.number, now, self.grab, self.position, self.orientation),
+            *(self.velocity, self.angular_velocity, self.force, self.torque),
+            self.sample.buttons & 0xFFFFFFFF,
+        )
+
+    def close(self) -> None:
+        """Take force away and let the device go."""
+        self._shaper.drop()
+        self.driver.close()
+
+
+def _observer(device: Dynamics | None, *, turning: bool) -> Observer:
+    if device is None:
+        return Observer(0.0, 0.0)
+    damping = device.angular_damping if turning else device.damping
+    return Observer(STORED, DAMPING * damping)

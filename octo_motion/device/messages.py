@@ -1,0 +1,407 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender, the bridge and the loop at the device say to each other.
+
+A message is a header (magic, version, kind, length of what follows) and fields of fixed layout;
+docs/device.md has the table. Whoever reads one gets a frozen object or a ``MessageError``.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, fields
+from typing import Annotated, ClassVar, Final, get_args, get_type_hints
+
+import numpy as np
+
+from ..core.errors import DeviceError
+from ..core.posing.figure import Elements, Figure, Limits
+from ..core.rotations import Floats
+from .codec import (
+    F64,
+    FLAG,
+    I32,
+    QUATERNION,
+    SIX,
+    U8,
+    U32,
+    VECTOR,
+    Many,
+    MessageError,
+    Number,
+    Record,
+    Table,
+    Text,
+)
+from .haptics.local_model import Held, Pull
+from .hid.response import Axes, Response
+from .spatial import IDENTITY, ZERO, Quaternion, Vector
+
+VERSION: Final = 1
+MAGIC: Final = b"OMDV"
+HEADER: Final = struct.Struct("<4sHHI")
+MOST_BYTES: Final = 4_000_000
+"""Of one message: a figure of 4096 bodies needs 2 MB."""
+
+
+@dataclass(frozen=True)
+class Message:
+    """What all messages have in common."""
+
+    KIND: ClassVar[int]
+    _record: ClassVar[Record]
+    _names: ClassVar[tuple[str, ...]]
+
+
+# --- Blender and the bridge ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Hello(Message):
+    """The bridge's first word: who it is, and how well it may keep time."""
+
+    KIND = 1
+    process: Annotated[int, U32]
+    python: Annotated[str, Text(64)]
+    priority: Annotated[str, Text(32)]
+    """Of the loop at the device: real-time, raised or normal."""
+
+
+@dataclass(frozen=True, eq=False)
+class FigureMessage(Message):
+    """The puppet; ends what was simulated before."""
+
+    KIND = 2
+    names: Annotated[tuple[str, ...], Many(Text(256), 4096)]
+    parents: Annotated[tuple[int, ...], Many(I32, 4096)]
+    anchors: Annotated[Floats, Table((3,))]
+    rest: Annotated[Floats, Table((4,))]
+    lengths: Annotated[Floats, Table()]
+    masses: Annotated[Floats, Table()]
+    centres: Annotated[Floats, Table((3,))]
+    inertias: Annotated[Floats, Table((3, 3))]
+    capsules: Annotated[Floats, Table((2, 3))]
+    radii: Annotated[Floats, Table()]
+    swing: Annotated[Floats, Table()]
+    twist: Annotated[Floats, Table((2,))]
+    stiffness: Annotated[Floats, Table((3,))]
+    damping: Annotated[Floats, Table((3,))]
+    flow: Annotated[Floats, Table((3,))]
+    yield_torque: Annotated[Floats, Table()]
+
+    @classmethod
+    def of(cls, figure: Figure) -> FigureMessage:
+        """The message that carries a figure."""
+        return cls(
+            *(figure.names, tuple(map(int, figure.parents)), figure.anchors, figure.rest),
+            *(figure.lengths, figure.masses, figure.centres, figure.inertias),
+            *(figure.capsules, figure.radii, figure.limits.swing, figure.limits.twist),
+            *(figure.elements.stiffness, figure.elements.damping, figure.elements.flow),
+            figure.elements.yield_torque,
+        )
+
+    def figure(self) -> Figure:
+        """The figure that came.
+
+        Raises:
+            MessageError: its arrays do not fit each other, or it is no tree.
+        """
+        count = len(self.names)
+        if len(self.parents) != count or any(
+            len(value) != count
+            for each in fields(self)
+            if isinstance(value := getattr(self, each.name), np.ndarray)
+        ):
+            raise MessageError("arrays of different lengths")
+        if any(not -1 <= parent < index for index, parent in enumerate(self.parents)):
+            raise MessageError("a parent does not come before its child")
+        if count == 0 or (self.masses <= 0.0).any() or (self.lengths <= 0.0).any():
+            raise MessageError("a body without mass or length")
+        return Figure(
+            *(self.names, self.parents, self.anchors, self.rest, self.lengths, self.masses),
+            *(self.centres, self.inertias, self.capsules, self.radii),
+            Limits(self.swing, self.twist),
+            Elements(self.stiffness, self.damping, self.flow, self.yield_torque),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Place(Message):
+    """Blender to bridge: the puppet is to stand like this, at rest."""
+
+    KIND = 3
+    positions: Annotated[Floats, Table((3,))]
+    orientations: Annotated[Floats, Table((4,))]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseMessage(Message):
+    """Bridge to Blender: the puppet stands like this."""
+
+    KIND = 4
+    step: Annotated[int, U32]
+    time: Annotated[float, F64]
+    """s simulated since the figure came."""
+    positions: Annotated[Floats, Table((3,))]
+    orientations: Annotated[Floats, Table((4,))]
+
+
+@dataclass(frozen=True)
+class Pins(Message):
+    """Blender to bridge: which bodies stay where they are."""
+
+    KIND = 5
+    pinned: Annotated[tuple[bool, ...], Many(FLAG, 4096)]
+
+
+@dataclass(frozen=True)
+class Grab(Message):
+    """Blender to bridge: a key stands in for a device's button."""
+
+    KIND = 6
+    pointer: Annotated[int, U8]
+    grab: Annotated[bool, FLAG]
+    """False lets go."""
+
+
+@dataclass(frozen=True)
+class Settings(Message):
+    """Blender to bridge: how devices behave."""
+
+    KIND = 7
+    force: Annotated[float, F64] = 1.0
+    """0 to 1 of the force that the device can give."""
+    grab_button: Annotated[int, U8] = 0
+    """255: none."""
+    key_button: Annotated[int, U8] = 1
+    """255: none."""
+    toggle: Annotated[bool, FLAG] = False
+    """One press grabs and another lets go; else the button is held."""
+    dead_man: Annotated[bool, FLAG] = True
+    """Without a hand on a device that can tell, there is no force."""
+    reach: Annotated[float, F64] = 0.1
+    """m, how near to a body the pointer must be to grab it."""
+    speed: Annotated[float, F64] = Response.speed
+    angular_speed: Annotated[float, F64] = Response.angular_speed
+    gain: Annotated[Axes, SIX] = Response.gain
+    dead_zone: Annotated[Axes, SIX] = Response.dead_zone
+    curve: Annotated[Axes, SIX] = Response.curve
+
+    def response(self) -> Response:
+        """Of space mice.
+
+        Raises:
+            MessageError: a value is out of range.
+        """
+        try:
+            return Response(self.speed, self.angular_speed, self.gain, self.dead_zone, self.curve)
+        except DeviceError as error:
+            raise MessageError(error.problem) from error
+
+
+@dataclass(frozen=True)
+class Workspace(Message):
+    """Blender to bridge: where a device's room lies in the scene."""
+
+    KIND = 8
+    pointer: Annotated[int, U8]
+    origin: Annotated[Vector, VECTOR] = ZERO
+    """World, of the middle of the device's room."""
+    orientation: Annotated[Quaternion, QUATERNION] = IDENTITY
+    """World, of the device's axes: the view's, so that right is right."""
+    scale: Annotated[float, F64] = 1.0
+    """m in the scene for each m of the hand."""
+
+
+@dataclass(frozen=True)
+class DeviceMessage(Message):
+    """Bridge to Blender: a device came, changed or went."""
+
+    KIND = 9
+    pointer: Annotated[int, U8]
+    present: Annotated[bool, FLAG]
+    kind: Annotated[int, U8]
+    """As ``driver.Kind``."""
+    force: Annotated[float, F64]
+    """N, 0 without force."""
+    stiffness: Annotated[float, F64]
+    """N/m of the coupling, 0 without force."""
+    name: Annotated[str, Text(128)]
+    buttons: Annotated[tuple[str, ...], Many(Text(64), 64)]
+
+
+@dataclass(frozen=True)
+class PointerMessage(Message):
+    """Bridge to Blender, as often as poses: where a pointer is and what it feels."""
+
+    KIND = 10
+    pointer: Annotated[int, U8]
+    body: Annotated[int, I32]
+    """Held, −1: none."""
+    position: Annotated[Vector, VECTOR]
+    """World, of the device."""
+    orientation: Annotated[Quaternion, QUATERNION]
+    coupled_position: Annotated[Vector, VECTOR]
+    """World, of the point that is held; the device's own where nothing is."""
+    coupled_orientation: Annotated[Quaternion, QUATERNION]
+    force: Annotated[Vector, VECTOR]
+    """N on the hand, device axes."""
+    torque: Annotated[Vector, VECTOR]
+    buttons: Annotated[int, U32]
+
+
+@dataclass(frozen=True)
+class Button(Message):
+    """Bridge to Blender: a device's button was pressed or let go."""
+
+    KIND = 11
+    pointer: Annotated[int, U8]
+    button: Annotated[int, U8]
+    pressed: Annotated[bool, FLAG]
+
+
+@dataclass(frozen=True)
+class Times(Message):
+    """Bridge to Blender, once a second: how well time is kept."""
+
+    KIND = 12
+    rate: Annotated[float, F64]
+    """Hz of the loop at the device."""
+    late: Annotated[tuple[float, ...], Number("d", 4)]
+    """s at 50, 99, 99.9 % and the longest."""
+    computing: Annotated[tuple[float, ...], Number("d", 4)]
+    missed: Annotated[int, U32]
+    step: Annotated[float, F64]
+    """s that a step of the simulation takes to compute."""
+    lag: Annotated[float, F64]
+    """s that the simulation is behind the clock."""
+
+
+@dataclass(frozen=True)
+class Notice(Message):
+    """Bridge to Blender: something to tell the user."""
+
+    KIND = 13
+    problem: Annotated[str, Text(1000)]
+    remedy: Annotated[str, Text(1000)]
+
+
+@dataclass(frozen=True)
+class Goodbye(Message):
+    """Either way: this ends."""
+
+    KIND = 14
+
+
+@dataclass(frozen=True)
+class Test(Message):
+    """Blender to bridge: let a device push gently, a moment each way."""
+
+    KIND = 15
+    pointer: Annotated[int, U8]
+
+
+# --- The bridge and the loop at the device -------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class HandMessage(Message):
+    """Loop to bridge, each tick: what a hand does."""
+
+    KIND = 20
+    pointer: Annotated[int, U8]
+    time: Annotated[float, F64]
+    grab: Annotated[int, U32]
+    """Counts grabs; 0 while nothing is wanted."""
+    position: Annotated[Vector, VECTOR]
+    orientation: Annotated[Quaternion, QUATERNION]
+    velocity: Annotated[Vector, VECTOR]
+    angular_velocity: Annotated[Vector, VECTOR]
+    force: Annotated[Vector, VECTOR]
+    torque: Annotated[Vector, VECTOR]
+    buttons: Annotated[int, U32]
+
+
+@dataclass(frozen=True)
+class HeldMessage(Message):
+    """Bridge to loop, each step: where the held body is."""
+
+    KIND = 21
+    pointer: Annotated[int, U8]
+    grab: Annotated[int, U32]
+    """Which grab this answers; 0: nothing is held."""
+    time: Annotated[float, F64]
+    """When this was true, by ``time.perf_counter``."""
+    position: Annotated[Vector, VECTOR]
+    orientation: Annotated[Quaternion, QUATERNION]
+    velocity: Annotated[Vector, VECTOR]
+    angular_velocity: Annotated[Vector, VECTOR]
+    pull: Annotated[tuple[float, ...], SIX]
+    force: Annotated[Vector, VECTOR]
+    torque: Annotated[Vector, VECTOR]
+
+    def held(self) -> Held:
+        """As the local model takes it."""
+        return Held(
+            *(self.position, self.orientation, self.velocity, self.angular_velocity),
+            *(Pull(*self.pull), self.force, self.torque),
+        )
+
+
+@dataclass(frozen=True)
+class LoopTimesMessage(Message):
+    """Loop to bridge, once a second."""
+
+    KIND = 22
+    rate: Annotated[float, F64]
+    late: Annotated[tuple[float, ...], Number("d", 4)]
+    computing: Annotated[tuple[float, ...], Number("d", 4)]
+    missed: Annotated[int, U32]
+
+
+def _kinds() -> dict[int, type[Message]]:
+    kinds: dict[int, type[Message]] = {}
+    for kind in Message.__subclasses__():
+        hints = get_type_hints(kind, include_extras=True)
+        kind._names = tuple(each.name for each in fields(kind))  # noqa: SLF001 - ours
+        codecs = tuple(get_args(hints[name])[1] for name in kind._names)  # noqa: SLF001
+        kind._record = Record(codecs)  # noqa: SLF001
+        kinds[kind.KIND] = kind
+    return kinds
+
+
+KINDS: Final = _kinds()
+
+
+def pack(message: Message) -> bytes:
+    """A message with its header."""
+    values = tuple(getattr(message, name) for name in message._names)  # noqa: SLF001 - ours
+    body = message._record.pack(values)  # noqa: SLF001
+    return HEADER.pack(MAGIC, VERSION, message.KIND, len(body)) + body
+
+
+def read_header(data: bytes) -> tuple[int, int]:
+    """Kind of a message, and how many bytes follow its header.
+
+    Raises:
+        MessageError: no header of ours, another version, an unknown kind, or too long.
+    """
+    magic, version, kind, length = HEADER.unpack(data)
+    if magic != MAGIC:
+        raise MessageError("not one of our messages")
+    if version != VERSION:
+        raise MessageError(f"version {version} of the messages, not {VERSION}")
+    if kind not in KINDS:
+        raise MessageError(f"an unknown kind of message, {kind}")
+    if length > MOST_BYTES:
+        raise MessageError("a message is too long")
+    return kind, length
+
+
+def read_body(kind: int, body: bytes) -> Message:
+    """The message of a kind whose bytes these are.
+
+    Raises:
+        MessageError: they are not.
+    """
+    values = KINDS[kind]._record.unpack(body)  # noqa: SLF001 - ours
+    return KINDS[kind](*values)

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""As much of a WebSocket client (RFC 6455) as a service on this computer asks for."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import socket
+import struct
+from typing import Final
+
+_GUID: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
+_MOST_BYTES: Final = 1_000_000
+_TEXT, _CLOSE, _PING, _PONG = 0x1, 0x8, 0x9, 0xA
+
+
+class WebSocketError(Exception):
+    """The other side is no WebSocket server, broke the rules, or is gone."""
+
+
+def accept_key(key: bytes) -> bytes:
+    """What a server answers to a client's key."""
+    return base64.b64encode(hashlib.sha1(key + _GUID, usedforsecurity=False).digest())
+
+
+def frame(opcode: int, payload: bytes, mask: bytes = b"") -> bytes:
+    """One whole frame; a client's are masked, a server's are not."""
+    marked = 0x80 if mask else 0
+    size = len(payload)
+    if size < 126:
+        head = struct.pack("!BB", 0x80 | opcode, marked | size)
+    elif size < 65536:
+        head = struct.pack("!BBH", 0x80 | opcode, marked | 126, size)
+    else:
+        head = struct.pack("!BBQ", 0x80 | opcode, marked | 127, size)
+    return head + mask + (masked(payload, mask) if mask else payload)
+
+
+def masked(payload: bytes, mask: bytes) -> bytes:
+    """A payload with its mask put on, or taken off."""
+    size = len(payload)
+    pattern = (mask * (size // 4 + 1))[:size]
+    mixed = int.from_bytes(payload, "little") ^ int.from_bytes(pattern, "little")
+    return mixed.to_bytes(size, "little")
+
+
+class FrameReader:
+    """Frames from a server, put together to messages."""
+
+    def __init__(self) -> None:
+        self._data = bytearray()
+        self._message = bytearray()
+        self._opcode = 0
+
+    def feed(self, data: bytes) -> list[tuple[int, bytes]]:
+        """Opcode and payload of the messages and control frames that are whole now.
+
+        Raises:
+            WebSocketError: this is not what a server sends.
+        """
+        self._data += data
+        done: list[tuple[int, bytes]] = []
+        while (taken := self._frame()) is not None:
+            last, opcode, payload = taken
+            if opcode >= 0x8:
+                if not last or len(payload) > 125:
+                    raise WebSocketError("a broken control frame")
+                done.append((opcode, payload))
+                continue
+            if (opcode == 0) != bool(self._opcode):
+                raise WebSocketError("frames in a wrong order")
+            self._opcode = self._opcode or opcode
+            self._message += payload
+            if len(self._message) > _MOST_BYTES:
+                raise WebSocketError("a message is too long")
+            if last:
+                done.append((self._opcode, bytes(self._message)))
+                self._message.clear()
+                self._opcode = 0
+        return done
+
+    def _frame(self) -> tuple[bool, int, bytes] | None:
+        if len(self._data) < 2:
+            return None
+        first, second = self._data[0], self._data[1]
+        if first & 0x70 or second & 0x80 or first & 0xF not in {0, 1, 2, 8, 9, 10}:
+            raise WebSocketError("a frame that no server sends")
+        size, at = second & 0x7F, 2
+        if size >= 126:
+            width = 2 if size == 126 else 8
+            if len(self._data) < at + width:
+                return None
+            size, at = int.from_bytes(self._data[at : at + width], "big"), at + width
+        if size > _MOST_BYTES:
+            raise WebSocketError("a frame is too long")
+        if len(self._data) < at + size:
+            return None
+        payload = bytes(self._data[at : at + size])
+        del self._data[: at + size]
+        return bool(first & 0x80), first & 0xF, payload
+
+
+class WebSocket:
+    """A connection that sends and receives text, never waiting once it is open."""
+
+    def __init__(self, connection: socket.socket, rest: bytes) -> None:
+        self._socket = connection
+        self._reader = FrameReader()
+        self._messages = [] if not rest else self._reader.feed(rest)
+        self._waiting = bytearray()
+        connection.settimeout(0.0)
+
+    @classmethod
+    def connect(cls, host: str, port: int, seconds: float = 0.3) -> WebSocket:
+        """Open a connection.
+
+        Raises:
+            WebSocketError: nobody is there, or no WebSocket server.
+        """
+        key = base64.b64encode(os.urandom(16))
+        request = (
+            f"GET / HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\n"
+            f"Connection: Upgrade\r\nSec-WebSocket-Key: {key.decode()}\r\n"
+            "Sec-WebSocket-Version: 13\r\n\r\n"
+        )
+        try:
+            connection = socket.create_connection((host, port), timeout=seconds)
+        except OSError as error:
+            raise WebSocketError("nobody is there") from error
+        try:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            connection.sendall(request.encode())
+            return cls(connection, _read_upgrade(connection, key))
+        except OSError as error:
+            connection.close()
+            raise WebSocketError("no answer") from error
+        except WebSocketError:
+            connection.close()
+            raise
+
+    def send(self, text: str) -> None:
+        """Send a text.
+
+        Raises:
+            WebSocketError: the connection is gone.
+        """
+        self._waiting += frame(_TEXT, text.encode(), os.urandom(4))
+        self._flush()
+
+    def receive(self) -> list[str]:
+        """All texts that have come.
+
+        Raises:
+            WebSocketError: the connection is gone, or broke the rules.
+        """
+        self._flush()
+        try:
+            while data := self._socket.recv(65536):
+                self._messages += self._reader.feed(data)
+            raise WebSocketError("the connection ended")
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError as error:
+            raise WebSocketError("the connection ended") from error
+        messages, self._messages = self._messages, []
+        texts: list[str] = []
+        for opcode, payload in messages:
+            if opcode == _TEXT:
+                texts.append(payload.decode(errors="replace"))
+            elif opcode == _PING:
+                self._waiting += frame(_PONG, payload, os.urandom(4))
+            elif opcode == _CLOSE:
+                raise WebSocketError("the connection was closed")
+        return texts
+
+    def _flush(self) -> None:
+        while self._waiting:
+            try:
+                sent = self._socket.send(self._waiting)
+            except (BlockingIOError, InterruptedError):
+                return
+            except OSError as error:
+                raise WebSocketError("the connection ended") from error
+            del self._waiting[:sent]
+
+    def close(self) -> None:
+        """Close the connection, politely if that does not wait."""
+        try:
+            self._waiting += frame(_CLOSE, b"\x03\xe8", os.urandom(4))
+            self._flush()
+        except WebSocketError:
+            pass
+        self._socket.close()
+
+
+def _read_upgrade(connection: socket.socket, key: bytes) -> bytes:
+    """Check a server's answer; what came after it."""
+    answer = b""
+    while b"\r\n\r\n" not in answer:
+        data = connection.recv(4096)
+        if not data or len(answer) > 65536:
+            raise WebSocketError("no answer")
+        answer += data
+    head, rest = answer.split(b"\r\n\r\n", 1)
+    status, *lines = head.split(b"\r\n")
+    values = {
+        name.strip().lower(): value.strip()
+        for name, _, value in (line.partition(b":") for line in lines)
+    }
+    if b" 101" not in status or values.get(b"sec-websocket-accept") != accept_key(key):
+        raise WebSocketError("no WebSocket server")
+    return rest
