@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plastic element: a spring beside a damper, and a second damper in series that gives way.
+
+[Plastic, eq. 16–26] puts a Voigt part (K_f beside D_f, displacement q_f) in series with a damper
+D_d. Ours has a threshold as well: the series damper moves only where the load λ exceeds the yield
+torque τ (a Bingham element),
+
+    λ = −K_f q_f − D_f w_f,    w = w_f + w_d,    D_d w_d = −(|λ| − τ)₊ λ/|λ|.
+
+With τ = 0 this is the source's element. Over a backward step h, with G = K_f h + D_f and the load
+that the element would bear if it did not flow, λ_e = −K_f q_f[t] − G w[t+1],
+
+    |λ_e| ≤ τ:   λ = λ_e,                                      w_d = 0
+    otherwise:   λ = (D_d λ_e + G τ s) / (D_d + G),            w_d = −s (|λ_e| − τ) / (D_d + G),
+
+with s = λ_e/|λ_e|, and q_f[t+1] = q_f[t] + h (w − w_d). At τ = 0 that is eq. 25 with
+C = (D_d + G)/(D_d G) and D = K_f/G, and eq. 21 for q_f. λ falls as w grows and λ·w_d ≤ 0 whatever
+the step: the element stores or loses energy and never makes any. Axes are the parent's, all
+functions work on arrays ``(…, 3)``; a scalar element is one whose other two axes are zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..rotations import Floats
+from .figure import Elements
+
+_TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How the elements answer a relative angular velocity w over one step."""
+
+    load: Floats
+    """(…, 3) λ, the torque on the child, N·m."""
+    slope: Floats
+    """(…, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
+    flow: Floats
+    """(…, 3) w_d: how fast the series damper moves, rad/s; zero where it holds."""
+
+
+class PlasticLaw:
+    """The elements of a figure for one step length, with what hangs on both alone worked out."""
+
+    def __init__(self, elements: Elements, step: float) -> None:
+        self.step = step
+        self.stiffness = np.array(elements.stiffness, dtype=np.float64)
+        self.backward = self.stiffness * step + elements.damping
+        """G = K_f h + D_f."""
+        whole = np.asarray(elements.flow, dtype=np.float64) + self.backward
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.compliance = np.where(whole > 0.0, 1.0 / whole, 0.0)
+            """1/(D_d + G), zero where the series damper is rigid."""
+        self.share = self.backward * self.compliance
+        """G/(D_d + G), of a load above yield: what the flow takes away."""
+        self.kept = 1.0 - self.share
+        self.yield_torque = np.array(elements.yield_torque, dtype=np.float64)
+        self._shared_yield = (
+            self.share * np.where(np.isfinite(self.yield_torque), self.yield_torque, 0.0)[..., None]
+        )
+        self.can_flow = bool(
+            np.any((self.compliance > 0.0) & np.isfinite(self.yield_torque)[..., None])
+        )
+        self.diagonal = np.zeros((*self.backward.shape, 3))
+        index = np.arange(3)
+        self.diagonal[..., index, index] = self.backward
+        """(…, 3, 3) slope of an element that holds."""
+
+    def trial(self, spring: Floats, speed: Floats) -> Floats:
+        """λ_e, the load without flow, from q_f at the step's start and w at its end."""
+        return -(self.stiffness * spring) - self.backward * speed
+
+    def respond(self, spring: Floats, speed: Floats) -> Response:
+        """Load, its slope and the flow, from q_f at the step's start and w at its end."""
+        load = self.trial(spring, speed)
+        size = np.sqrt((load * load).sum(axis=-1))
+        flows = size > self.yield_torque
+        if not (self.can_flow and flows.any()):
+            return Response(load, self.diagonal, np.zeros_like(load))
+        toward = load / (size + _TINY)[..., None]
+        flowing = flows[..., None]
+        held = self._shared_yield * toward
+        # Along s only what the flow leaves, across it also the turning of s. With unequal axes the
+        # exact slope is not symmetric; its symmetric neighbour leads to the same solution.
+        root = np.sqrt(self.backward)
+        ratio = self._shared_yield / (size + _TINY)[..., None]
+        middle = -(np.sqrt(ratio)[..., :, None] * np.sqrt(ratio)[..., None, :]) * (
+            toward[..., :, None] * toward[..., None, :]
+        )
+        index = np.arange(3)
+        middle[..., index, index] += self.kept + ratio
+        slope = np.where(
+            flowing[..., None],
+            root[..., :, None] * middle * root[..., None, :],
+            self.diagonal,
+        )
+        excess = np.where(flows, size - self.yield_torque, 0.0)[..., None]
+        return Response(
+            np.where(flowing, self.kept * load + held, load),
+            slope,
+            -toward * excess * self.compliance,
+        )
