@@ -13,6 +13,7 @@ from typing import Final
 
 import bpy
 import contact_sheet
+import experiment
 import numpy as np
 import plot
 import shots
@@ -121,6 +122,11 @@ def gaits() -> Pixels:
     return plot.gait_pixels([presets["walk"], presets["swim"]], (1000, 600))
 
 
+def splices() -> Pixels:
+    """The paper's experiment with clips of the project's own."""
+    return experiment.sheet(experiment.find_clips(experiment.CLIPS))
+
+
 PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "hero": hero,
     "walk_side": cycle_of(shots.WALK, contact_sheet.SIDE),
@@ -131,6 +137,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "swim_route": along_route(shots.SWIM, 5),
     "rig": rig,
     "gaits": gaits,
+    "splices": splices,
 }
 """By file name."""
 

@@ -146,13 +146,19 @@ def _moved(matrix: Matrix, points: NDArray[np.floating]) -> Points:
     return points @ array[:3, :3].T + array[:3, 3]
 
 
-def add_ground(points: Points, height: float, margin: float = 0.8) -> bpy.types.Object:
+def add_ground(
+    points: Points,
+    height: float,
+    margin: float = 0.8,
+    colours: tuple[Colour, Colour] = _TILES,
+) -> bpy.types.Object:
     """A tiled floor below the points (…, 3); one sees on its tiles whether an arm slides.
 
     Args:
         points: what the floor reaches beneath.
         height: its height in world space.
         margin: how far it goes on, as a share of the points' extent.
+        colours: of its tiles.
     """
     flat = points.reshape(-1, 3)[:, :2]
     low, high = flat.min(axis=0), flat.max(axis=0)
@@ -168,7 +174,7 @@ def add_ground(points: Points, height: float, margin: float = 0.8) -> bpy.types.
     faces = corner[:, None] + [0, 1, counts[0] + 2, counts[0] + 1]
     mesh = bpy.data.meshes.new("Ground")
     mesh.from_pydata(vertices.tolist(), [], faces.tolist())
-    for colour in _TILES:
+    for colour in colours:
         mesh.materials.append(new_material("Ground", colour, roughness=1.0))
     across, along = np.meshgrid(np.arange(counts[0]), np.arange(counts[1]))
     mesh.polygons.foreach_set("material_index", ((across + along) % 2).ravel().astype(np.int32))

@@ -154,6 +154,11 @@ def splice(
     """
     actions.writable_armature(armature)
     stack = _stack(armature)
+    if work.splices is None and not has_splices(armature):
+        raise ClipError(
+            f"'{armature.name}' has no splices in its list.",
+            "Say what to splice, a part and a motion file at least.",
+        )
     if work.base or base_file is not None:
         stack.base = _base(work.base, clips, base_file)
         stack.base_slot = ""
