@@ -28,13 +28,14 @@ def normalized(vectors: ArrayLike) -> Floats:
 
 def multiply(first: ArrayLike, second: ArrayLike) -> Floats:
     """Hamilton product ``first ∘ second``: rotates by ``second`` and then by ``first``."""
-    a, b = np.broadcast_arrays(
-        np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-    )
-    result = np.empty_like(a)
+    a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
     bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
-    result[..., 0] = aw * bw - ax * bx - ay * by - az * bz
+    # Its shape is the whole's: numpy's own broadcasting of two arrays takes longer than the product
+    # where there are few.
+    w = aw * bw - ax * bx - ay * by - az * bz
+    result = np.empty((*w.shape, 4))
+    result[..., 0] = w
     result[..., 1] = aw * bx + ax * bw + ay * bz - az * by
     result[..., 2] = aw * by - ax * bz + ay * bw + az * bx
     result[..., 3] = aw * bz + ax * by - ay * bx + az * bw
@@ -56,11 +57,13 @@ def rotate(quaternion: ArrayLike, vectors: ArrayLike) -> Floats:
 
 def cross(first: Floats, second: Floats) -> Floats:
     """Cross product in the last axis; several times faster than ``numpy.cross`` in batch."""
-    a, b = np.broadcast_arrays(first, second)
-    result = np.empty(a.shape, dtype=np.float64)
-    result[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    result[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    result[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    ax, ay, az = first[..., 0], first[..., 1], first[..., 2]
+    bx, by, bz = second[..., 0], second[..., 1], second[..., 2]
+    x = ay * bz - az * by
+    result = np.empty((*x.shape, 3))
+    result[..., 0] = x
+    result[..., 1] = az * bx - ax * bz
+    result[..., 2] = ax * by - ay * bx
     return result
 
 

@@ -219,7 +219,7 @@ def test_frames_in_sight_are_those_of_the_whole(travel: bool):  # noqa: FBT001
     splicer = Splicer(base, LANDMARKS, Splice(LEGS, clip, FROM_START, LANDMARKS, travel=travel))
     timing = Timing(7.5, 3.0, 0.8, 30.0, ease_in=5.0, ease_out=5.0)
     whole = splicer.at(timing)
-    for frames in (slice(0, 60, 7), slice(20, 21), slice(8, 16), slice(50, 60)):
+    for frames in (range(0, 60, 7), [20], range(8, 16), range(50, 60), [9], [34], [36]):
         part = splicer.at(timing, frames)
         assert np.array_equal(part.frames, whole.frames[frames])
         assert angle_between(part.rotations, whole.rotations[frames]).max() < 1e-6

@@ -134,6 +134,14 @@ class Carrier:
         return _Joined(tuple(bones), tuple(answers), before, after)
 
     @cached_property
+    def ratio(self) -> float:
+        """How much longer the base's limb is than the splice's."""
+        assert self.limb is not None
+        ours, theirs = self.limb
+        longer = chain_length(self.base.skeleton, ours)
+        return longer / max(chain_length(self.splice.skeleton, theirs), 1e-12)
+
+    @cached_property
     def hinge(self) -> Floats:
         """Along the base's upper limb (3,): the axis about which the splice clip bends it."""
         assert self.limb is not None
@@ -193,16 +201,13 @@ def carry(
     _carry_inner(carrier, between, (result, splice), rotations, locations)
     if carrier.limb is None:
         return
-    (joint, elbow, hand), (other_joint, other_elbow, other_hand) = carrier.limb
+    (joint, elbow, hand), (_, other_elbow, other_hand) = carrier.limb
     result = posture_of(base.skeleton, rotations, locations)
     limb = Limb(result.head(joint), result.head(elbow), result.head(hand))
-    ratio = chain_length(base.skeleton, (joint, elbow, hand)) / max(
-        chain_length(splice.skeleton, (other_joint, other_elbow, other_hand)), 1e-12
-    )
     our_place, their_place = ours.place(base), theirs.place(splice)
 
     def seen(bone: int) -> Floats:
-        return our_place + ratio * rotate(between, splice.head(bone) - their_place)
+        return our_place + carrier.ratio * rotate(between, splice.head(bone) - their_place)
 
     wanted = Limb(limb.joint, seen(other_elbow), seen(other_hand))
     turn = joint_turn(limb, wanted)

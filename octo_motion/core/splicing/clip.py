@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..rotations import Floats, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
@@ -32,7 +34,7 @@ class Clip:
         """Number of frames."""
         return len(self.frames)
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """World size of one armature unit, metres."""
         return float(np.cbrt(abs(np.linalg.det(self.world[0, :3, :3]))))
@@ -43,3 +45,14 @@ class Clip:
         turn = from_matrix(self.world[:, :3, :3] / self.scale)[:, None]
         shift = self.world[:, None, :3, 3]
         return multiply(turn, orientations), shift + self.scale * rotate(turn, heads)
+
+    def taken(self, rows: ArrayLike) -> Clip:
+        """Some of its frames alone, by number from 0, ascending."""
+        chosen = np.asarray(rows, dtype=np.intp)
+        return replace(
+            self,
+            frames=self.frames[chosen],
+            rotations=self.rotations[chosen],
+            locations=self.locations[chosen],
+            world=self.world[chosen],
+        )

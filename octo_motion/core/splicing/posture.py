@@ -7,7 +7,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..rotations import Floats, conjugate, from_matrix, multiply, normalized, rotate
+from ..rotations import (
+    Floats,
+    conjugate,
+    from_matrix,
+    from_rotation_vector,
+    multiply,
+    normalized,
+    rotate,
+    to_rotation_vector,
+)
 from ..skeleton import Skeleton
 from .clip import Clip
 
@@ -87,22 +96,39 @@ def posture_of(skeleton: Skeleton, rotations: Floats, locations: Floats) -> Post
     return Posture(skeleton, lambda bones: rotations[:, bones], lambda bone: locations[:, bone])
 
 
-def sampled(clip: Clip, frames: Floats) -> Posture:
-    """A clip at any times, in its own frame numbers; beyond its ends it stands still."""
+def sampled(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
+    """A clip at any times, in its own frame numbers; beyond its ends it stands still.
+
+    Args:
+        clip: the clip.
+        frames: (frames,)
+        seams: (frames,) how much of the step from the clip's last pose to its first is added.
+    """
     before, after, share = _between(clip, frames)
     between = share.any()
+    looped = seams is not None and seams.any()
 
     def rotations(bones: Sequence[int]) -> Floats:
-        values = clip.rotations[:, bones]
-        if not between:
-            return values[before]
-        return slerp(values[before], values[after], share[:, None])
+        own = np.asarray(bones, dtype=np.intp)
+        values = clip.rotations[before[:, None], own]
+        if between:
+            values = slerp(values, clip.rotations[after[:, None], own], share[:, None])
+        if looped:
+            assert seams is not None
+            step = multiply(conjugate(clip.rotations[-1, own]), clip.rotations[0, own])
+            added = seams[:, None, None] * to_rotation_vector(step)
+            values = multiply(values, from_rotation_vector(added))
+        return values
 
     def location(bone: int) -> Floats:
-        values = clip.locations[:, bone]
-        if not np.any(values):
-            return np.zeros((len(before), 3))
-        return values[before] + share[:, None] * (values[after] - values[before])
+        values = clip.locations[before, bone]
+        if between:
+            values = values + share[:, None] * (clip.locations[after, bone] - values)
+        if looped:
+            assert seams is not None
+            step = clip.locations[0, bone] - clip.locations[-1, bone]
+            values = values + seams[:, None] * step
+        return values
 
     return Posture(clip.skeleton, rotations, location)
 
@@ -110,13 +136,12 @@ def sampled(clip: Clip, frames: Floats) -> Posture:
 def sampled_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
     """The armature object at any times: rotations (frames, 4), places (frames, 3), and scale."""
     before, after, share = _between(clip, frames)
-    turns = from_matrix(clip.world[:, :3, :3] / clip.scale)
-    places = clip.world[:, :3, 3]
-    return (
-        slerp(turns[before], turns[after], share),
-        places[before] + share[:, None] * (places[after] - places[before]),
-        clip.scale,
-    )
+    first, second = clip.world[before], clip.world[after]
+    turns = from_matrix(first[:, :3, :3] / clip.scale)
+    if share.any():
+        turns = slerp(turns, from_matrix(second[:, :3, :3] / clip.scale), share)
+    places = first[:, :3, 3] + share[:, None] * (second[:, :3, 3] - first[:, :3, 3])
+    return turns, places, clip.scale
 
 
 def slerp(first: Floats, second: Floats, share: Floats) -> Floats:

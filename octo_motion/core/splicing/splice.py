@@ -10,7 +10,7 @@ the exact point; clavicles may belong to the arm.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -30,8 +30,8 @@ from .clip import Clip
 from .landmarks import Landmarks
 from .parts import Part
 from .posture import posture_of, sampled
-from .timing import Timing, Window, window
-from .travel import move_hips
+from .timing import Timing, Window, middle, window
+from .travel import Travel, ground_height
 
 Reach = Literal["direction", "exact"]
 SeenFrom = Literal["", "chest", "pelvis"]
@@ -67,9 +67,8 @@ def build(base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice]) ->
         ClipError: a bone or landmark is missing, or a timing makes no sense.
     """
     result = base
-    for each in splices:
-        if not each.mute:
-            result = spliced(result, landmarks, each)
+    for each in splicers(base, landmarks, splices):
+        result = each.onto(result, each.window(each.splice.timing))
     return result
 
 
@@ -82,10 +81,21 @@ def spliced(base: Clip, landmarks: Landmarks | None, splice: Splice) -> Clip:
     return Splicer(base, landmarks, splice).at(splice.timing)
 
 
+def splicers(base: Clip, landmarks: Landmarks | None, splices: Iterable[Splice]) -> list[Splicer]:
+    """All splices of a stack that are not muted, made ready.
+
+    Raises:
+        ClipError: a bone or landmark is missing.
+    """
+    # The ground is where the base stands on it, whatever is done to its legs on the way.
+    return [Splicer(base, landmarks, each) for each in splices if not each.mute]
+
+
 class Splicer:
     """A splice made ready: what does not hang on its timing is found once.
 
-    For a timing that is dragged, with few frames in sight: poses do not hang on each other.
+    For a timing that is dragged, with few frames in sight: poses do not hang on each other, but
+    for where legs have led to by then, and for the way round that easing takes.
     """
 
     def __init__(self, base: Clip, landmarks: Landmarks | None, splice: Splice) -> None:
@@ -100,47 +110,72 @@ class Splicer:
             )
         seen_from = "pelvis" if splice.travel else splice.seen_from
         sides = Side(base, landmarks), Side(splice.clip, splice.landmarks)
-        self._base, self._splice = base, splice
+        self.splice = splice
+        self._base = base
         self._pieces = carriers(splice.part, *sides, clavicle=splice.clavicle, seen_from=seen_from)
+        self._bones = sorted({bone for piece in self._pieces for bone in piece.bones})
+        self._travel = None
+        if splice.travel:
+            self._travel = Travel(self._pieces[0], ground_height(sides[0]))
 
-    def at(self, timing: Timing, frames: slice | None = None) -> Clip:
-        """The base with the part spliced on at this timing, all of it or these frames.
+    def window(self, timing: Timing) -> Window:
+        """What a timing means for the base.
 
         Raises:
             ClipError: the timing makes no sense.
         """
-        if frames is not None and self._splice.travel:
-            # Where the legs have led to by then is known only from the start on.
-            return _cut(self.at(timing), frames)
-        base = self._base if frames is None else _cut(self._base, frames)
-        span = window(timing, base, self._splice.clip)
+        return window(timing, self._base, self.splice.clip)
+
+    def at(self, timing: Timing, rows: Iterable[int] | None = None) -> Clip:
+        """The base with the part spliced on at this timing, all of it or some of its frames.
+
+        Args:
+            timing: when the splice acts.
+            rows: numbers of frames, from 0.
+
+        Raises:
+            ClipError: the timing makes no sense.
+        """
+        span = self.window(timing)
+        if rows is None:
+            return self.onto(self._base, span)
+        wanted = sorted(set(rows))
+        needed = self.needed(span, wanted)
+        few = self.onto(self._base.taken(needed), span.taken(np.asarray(needed, dtype=np.intp)))
+        return few.taken(np.searchsorted(needed, wanted))
+
+    def needed(self, span: Window, rows: Iterable[int]) -> list[int]:
+        """Frames on which the result at these hangs, themselves included, ascending."""
+        needed = set(rows)
+        for row in tuple(needed):
+            needed.update(span.easing(row))
+        if self._travel is not None and max(needed, default=0) >= span.frames.start:
+            needed |= {span.frames.start, span.frames.stop - 1} if len(span.weights) else set()
+        return sorted(needed)
+
+    def onto(self, base: Clip, span: Window) -> Clip:
+        """Put the part onto a clip of the base's skeleton.
+
+        Args:
+            base: the clip, or of its frames those that are :meth:`needed`.
+            span: when the splice acts on these frames.
+        """
         if span.frames.stop == span.frames.start:
             return base
         rotations, locations = base.rotations.copy(), base.locations.copy()
         before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
-        moment = sampled(self._splice.clip, span.splice_frames)
+        moment = sampled(self.splice.clip, span.splice_frames, span.seams)
         # Views: what is written here is written into the whole.
         turned, moved = rotations[span.frames], locations[span.frames]
-        exact = self._splice.reach == "exact"
+        exact = self.splice.reach == "exact"
         for piece in self._pieces:
             carry(piece, before, moment, turned, moved, exact=exact)
         if (span.weights < 1.0).any():
-            bones = sorted({bone for piece in self._pieces for bone in piece.bones})
-            _ease(base, span, bones, turned, moved)
-        if self._splice.travel:
+            _ease(base, span, self._bones, turned, moved)
+        if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
-            move_hips(self._pieces[0], span, whole, rotations, locations)
+            self._travel.move(base, span, whole, rotations, locations)
         return replace(base, rotations=rotations, locations=locations)
-
-
-def _cut(clip: Clip, frames: slice) -> Clip:
-    return replace(
-        clip,
-        frames=clip.frames[frames],
-        rotations=clip.rotations[frames],
-        locations=clip.locations[frames],
-        world=clip.world[frames],
-    )
 
 
 def _ease(
@@ -157,8 +192,8 @@ def _ease(
         # The way round is chosen once, where the two are about equally strong, and kept: the short
         # way frame by frame would jump where they are half a turn apart.
         between = continuous(multiply(conjugate(own), rotations[chosen][:, bones]))
-        middle = np.argmin(np.abs(weights[:, 0] - 0.5))
-        between = np.where(between[middle, :, :1] < 0.0, -between, between)
+        center = middle(weights[:, 0])
+        between = np.where(between[center, :, :1] < 0.0, -between, between)
         mixed = multiply(own, _power(between, weights))
         # Where the splice has no weight yet, the very values of the base.
         rotations[np.ix_(chosen, bones)] = np.where(weights[..., None] == 0.0, own, mixed)

@@ -14,7 +14,15 @@ from typing import Final
 
 import numpy as np
 
-from ..rotations import Floats, conjugate, from_axis_angle, multiply, rotate
+from ..rotations import (
+    Floats,
+    conjugate,
+    from_axis_angle,
+    from_rotation_vector,
+    multiply,
+    rotate,
+    to_rotation_vector,
+)
 from .carry import Carrier, Side
 from .clip import Clip
 from .correspondence import chain_length
@@ -38,56 +46,96 @@ class _Path:
     places: Floats
 
 
-def move_hips(
-    carrier: Carrier, span: Window, base: Posture, rotations: Floats, locations: Floats
-) -> None:
-    """Write rotation and location of the hips into the base's arrays.
+class Travel:
+    """What of the way through the world does not hang on its timing.
 
     Args:
         carrier: a leg, seen from the pelvis.
-        span: when the splice acts.
-        base: the whole base, as it was.
-        rotations: (frames, bones, 4) of the whole base, to be changed.
-        locations: (frames, bones, 3), likewise.
+        ground: height of the ground on which the base stands, world units.
     """
-    ours, theirs = carrier.frames
-    clip, other = carrier.base.clip, carrier.splice.clip
-    own = _path(clip, ours, base, clip.frames)
-    path = _path(other, theirs, sampled(other, span.splice_frames), span.splice_frames)
-    ratio = _leg(carrier.base) * clip.scale / (_leg(carrier.splice) * other.scale)
-    first, last = span.frames.start, span.frames.stop - 1
-    # Begin where the base is, and the way it faces.
-    turn = _heading(own.orientations[first], path.orientations[0])
-    places = own.places[first] + ratio * rotate(turn, path.places - path.places[0])
-    places[:, 2] = _ground(carrier.base) + ratio * (path.places[:, 2] - _ground(carrier.splice))
-    orientations = multiply(turn, path.orientations)
-    # Go on from where it ends.
-    away = _heading(orientations[-1], own.orientations[last])
-    shift = (places[-1] - rotate(away, own.places[last])) * _LEVEL
-    later = _Path(
-        multiply(away, own.orientations[first:]), rotate(away, own.places[first:]) + shift
-    )
-    count = len(places)
-    leaving = span.weights < span.entering
-    goal_turns = np.where(
-        leaving[:, None], later.orientations[:count], own.orientations[span.frames]
-    )
-    goal_places = np.where(leaving[:, None], later.places[:count], own.places[span.frames])
-    weights = span.weights
-    later.orientations[:count] = slerp(goal_turns, orientations, weights)
-    later.places[:count] = goal_places + weights[:, None] * (places - goal_places)
-    _write_hips(carrier.base, ours, base, later, (rotations, locations))
+
+    def __init__(self, carrier: Carrier, ground: float) -> None:
+        self._carrier = carrier
+        self._ground = ground
+        self._other_ground = ground_height(carrier.splice)
+        ours, theirs = carrier.base, carrier.splice
+        self._ratio = _leg(ours) * ours.clip.scale / (_leg(theirs) * theirs.clip.scale)
+
+    def move(
+        self, clip: Clip, span: Window, base: Posture, rotations: Floats, locations: Floats
+    ) -> None:
+        """Write rotation and location of the hips into the base's arrays.
+
+        Args:
+            clip: the base; of its frames at least the first and last of the splice.
+            span: when the splice acts on these frames.
+            base: the posture of all these frames, as it was.
+            rotations: (frames, bones, 4) of them, to be changed.
+            locations: (frames, bones, 3), likewise.
+        """
+        ours = self._carrier.frames[0]
+        own = _path(clip, ours, base, clip.frames)
+        path = self._path(span)
+        first, last = span.frames.start, span.frames.stop - 1
+        # Begin where the base is, and the way it faces.
+        turn = _heading(own.orientations[first], path.orientations[0])
+        places = own.places[first] + self._ratio * rotate(turn, path.places - path.places[0])
+        heights = path.places[:, 2] - self._other_ground
+        places[:, 2] = self._ground + self._ratio * heights
+        orientations = multiply(turn, path.orientations)
+        # Go on from where it ends.
+        away = _heading(orientations[-1], own.orientations[last])
+        shift = (places[-1] - rotate(away, own.places[last])) * _LEVEL
+        later = _Path(
+            multiply(away, own.orientations[first:]), rotate(away, own.places[first:]) + shift
+        )
+        count = len(places)
+        leaving = (span.weights < span.entering)[:, None]
+        goal_turns = np.where(leaving, later.orientations[:count], own.orientations[span.frames])
+        goal_places = np.where(leaving, later.places[:count], own.places[span.frames])
+        weights = span.weights
+        later.orientations[:count] = slerp(goal_turns, orientations, weights)
+        later.places[:count] = goal_places + weights[:, None] * (places - goal_places)
+        _write_hips(clip, ours, base, later, (rotations, locations))
+
+    def _path(self, span: Window) -> _Path:
+        """The splice's pelvis through the world, round after round where it loops."""
+        clip, frame = self._carrier.splice.clip, self._carrier.frames[1]
+        path = _path(clip, frame, sampled(clip, span.splice_frames), span.splice_frames)
+        if not (span.rounds.any() or span.seams.any()):
+            return path
+        ends = np.array([clip.frames[0], clip.frames[-1]])
+        ends = _path(clip, frame, sampled(clip, ends), ends)
+        # Each round goes on from where the one before has led, and the way it faced then.
+        turn = _heading(ends.orientations[1], ends.orientations[0])
+        numbers = np.arange(span.rounds.max() + 1.0)
+        angle = 2.0 * np.arctan2(turn[3], turn[0])
+        turns = from_axis_angle(_UP, angle * numbers)
+        step = rotate(turns, (ends.places[1] - ends.places[0]) * _LEVEL)
+        shifts = np.concatenate([np.zeros((1, 3)), np.cumsum(step, axis=0)[:-1]])
+        # What is left of the step at the seam: how the pelvis leans, and how high it is.
+        lean = to_rotation_vector(
+            multiply(conjugate(ends.orientations[1]), multiply(turn, ends.orientations[0]))
+        )
+        rise = (ends.places[0] - ends.places[1]) * _UP
+        own = turns[span.rounds]
+        added = from_rotation_vector(span.seams[:, None] * lean)
+        places = rotate(own, path.places - ends.places[0]) + shifts[span.rounds] + ends.places[0]
+        return _Path(
+            multiply(multiply(own, path.orientations), added),
+            places + span.seams[:, None] * rise,
+        )
 
 
 def _write_hips(
-    side: Side,
+    clip: Clip,
     frame: BodyFrame,
     base: Posture,
     path: _Path,
     arrays: tuple[Floats, Floats],
 ) -> None:
     """Write a path of the pelvis from some frame on to the end."""
-    clip, (rotations, locations) = side.clip, arrays
+    rotations, locations = arrays
     first = len(clip) - len(path.places)
     chosen = slice(first, None)
     turns, shifts, scale = sampled_world(clip, clip.frames[chosen])
@@ -130,7 +178,7 @@ def _leg(side: Side) -> float:
     )
 
 
-def _ground(side: Side) -> float:
+def ground_height(side: Side) -> float:
     """Height of the lowest point that a foot reaches in a clip, world units."""
     clip, marks = side.clip, side.humanoid()
     count = min(len(clip), _GROUND_SAMPLES)

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import Final, Literal
 
 import bpy
 
 from ...blender.shown_pose import pose_values, restore_pose, show_pose
 from ...core.errors import OctoMotionError, WriteError
-from .preview import Preview
+from ...core.splicing.live import Live
 from .stack import Stack, local_object
 
 PER_PIXEL: Final = 0.1
@@ -110,7 +111,12 @@ class DragSession:
         self.number = number
         self.stack = stack
         self.drag = TimingDrag(splice.timing.base_start, splice.timing.splice_start)
-        self._preview = Preview(stack, number)
+        self._timing = splice.timing
+        beneath = [each for each in stack.splices[:number] if each is not None]
+        above = [each for each in stack.splices[number + 1 :] if each is not None]
+        self._live = Live(
+            stack.base.clip, stack.base.landmarks, [*beneath, splice, *above], len(beneath)
+        )
         self._pose = pose_values(local_object(stack.armature))
         self._scene = scene.name
         self._frame = scene.frame_current_final
@@ -128,7 +134,9 @@ class DragSession:
         if self._down or scene is None:
             return
         armature = local_object(self.stack.armature)
-        clip = self._preview.at(scene.frame_current_final, *self.drag.starts)
+        base_start, splice_start = self.drag.starts
+        timing = replace(self._timing, base_start=base_start, splice_start=splice_start)
+        clip = self._live.at(scene.frame_current_final, timing)
         show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0])
 
     def step(self, frames: int) -> None:
