@@ -208,7 +208,13 @@ class Winding:
 
 
 def wind(
-    profile: Profile, lengths: Floats, radii: Floats, first: int, start: Floats, winding: Winding
+    profile: Profile,
+    lengths: Floats,
+    radii: Floats,
+    *,
+    first: int,
+    start: Floats,
+    winding: Winding,
 ) -> Coil:
     """Wind the segments from joint ``first`` on about an object.
 

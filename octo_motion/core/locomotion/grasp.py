@@ -10,12 +10,13 @@ blended joint by joint in angle space.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from operator import itemgetter
 from typing import Final, Literal
 
 import numpy as np
 
-from ..errors import SettingsError
+from ..errors import RigError, SettingsError
 from ..rotations import (
     Floats,
     conjugate,
@@ -52,8 +53,13 @@ _TWISTED: Final = 0.8
 _LIFT: Final = 0.25
 _CLEAR: Final = 0.85
 """Of the skin's radius: joints on their way keep so far from the object."""
+_CLEAR_BETWEEN: Final = 0.65
+"""The same for the middles of bones, which press in where an arm is wound."""
 _CLEAR_ROUNDING: Final = 0.3
-"""Of the skin's radius: within it, joints begin to give way."""
+"""Share of that distance within which joints begin to give way."""
+_FAR: Final = 3.0
+_AT_FAR: Final = 0.5 * (np.sqrt(_FAR * _FAR + 1.0) - _FAR)
+"""What the rounding leaves at so many roundings from the surface."""
 _CLEARINGS: Final = 4
 _X: Final = np.array([1.0, 0.0, 0.0])
 _Y: Final = np.array([0.0, 1.0, 0.0])
@@ -84,6 +90,17 @@ class Places:
         shape = (len(self.positions), *(1,) * (points.ndim - 2))
         moved = points - self.positions.reshape(*shape, 3)
         return rotate(conjugate(self.rotations).reshape(*shape, 4), moved)
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """An object to grasp."""
+
+    profile: Profile
+    """In its own frame, armature units."""
+    places: Places
+    name: str = "The object"
+    """What errors call it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,18 +144,23 @@ class Grasp:
         arm, first = self.arm, self.coil.first
         goal = places.seen(self.coil.joints[0]) - arm.root
         lengths = arm.lengths[:first]
-        along, facing = rotate(held, _X), rotate(held, _Y)
-        shape = _approach(lengths, goal, along, facing, rotate(arm.at_rest[0], _X), self.up)
+        outward = rotate(arm.at_rest[0], _X)
+        shape = _approach(lengths, goal, held, outward=outward, up=self.up)
         shape = closed(np.ascontiguousarray(shape), lengths, goal.T)
+        near = np.arange(len(goal))
         for _ in range(_CLEARINGS):
-            steps = lengths[:, None] * np.moveaxis(shape, -1, 0)
-            joints = arm.root + np.cumsum(steps, axis=1)
-            moved = joints[:, :-1] + self._out_of_the_way(joints[:, :-1], places)
-            joints = np.concatenate(
-                [np.zeros_like(goal)[:, None] + arm.root, moved, joints[:, -1:]], axis=1
+            joints = arm.root + np.cumsum(
+                lengths[:, None] * np.moveaxis(shape[..., near], -1, 0), axis=1
             )
-            pushed = np.moveaxis(normalized(np.diff(joints, axis=1)), 0, -1)
-            shape = closed(np.ascontiguousarray(pushed), lengths, goal.T)
+            shifts = self._out_of_the_way(joints[:, :-1], places[near])
+            moves = np.any(shifts != 0.0, axis=(1, 2))
+            near, joints = near[moves], joints[moves]
+            if len(near) == 0:
+                break
+            joints[:, :-1] += shifts[moves]
+            pushed = np.diff(joints, axis=1, prepend=np.broadcast_to(arm.root, (len(near), 1, 3)))
+            pushed = np.ascontiguousarray(np.moveaxis(normalized(pushed), 0, -1))
+            shape[..., near] = closed(pushed, lengths, goal[near].T)
         directions = np.moveaxis(shape, -1, 0)
         frames = transported(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
         twist = _twist(frames[:, -1], held)
@@ -150,26 +172,38 @@ class Grasp:
 
     def _out_of_the_way(self, joints: Floats, places: Places) -> Floats:
         """Shifts (frames, joints, 3) that bring joints 1 … out of the object; armature space."""
-        inside = places.into(joints)
-        skin = self.radii[1 : joints.shape[1] + 1]
-        lacking = _CLEAR * skin - self.profile.clearance(inside)
-        rounding = _CLEAR_ROUNDING * skin
-        # Not more than halfway through: beyond that there is no telling which side is nearer.
+        count = joints.shape[1]
+        middles = 0.5 * (joints[:, 1:] + joints[:, :-1])
+        skin = self.radii[1 : count + 1]
+        between = 0.5 * (skin[1:] + skin[:-1])
+        inside = places.into(np.concatenate([joints, middles], axis=1))
+        thick = np.concatenate([_CLEAR * skin, _CLEAR_BETWEEN * between])
+        lacking = thick - self.profile.clearance(inside)
+        rounding = _CLEAR_ROUNDING * thick
         shift = 0.5 * (lacking + np.sqrt(lacking * lacking + rounding * rounding))
-        shift = np.where(lacking < -3.0 * rounding, 0.0, shift - _at(3.0) * rounding)
-        out = self.profile.way_out(inside) * np.maximum(shift, 0.0)[..., None]
+        # Nothing gives way from afar.
+        shift = np.where(lacking < -_FAR * rounding, 0.0, shift - _AT_FAR * rounding)
+        most = np.maximum(shift[:, :count], 0.0)
+        most[:, 1:] = np.maximum(most[:, 1:], shift[:, count:])
+        most[:, :-1] = np.maximum(most[:, :-1], shift[:, count:])
+        out = self.profile.way_out(inside[:, :count]) * most[..., None]
         return rotate(places.rotations[:, None], out)
 
     def _cleared(self, frames: Floats, places: Places, amount: Floats) -> Floats:
         """An arm (frames, segments, 4) bent round the object by an amount (frames,) of 0…1."""
-        arm = self.arm
+        arm, result = self.arm, frames.copy()
+        near = np.flatnonzero(amount > 0.0)
         for _ in range(_CLEARINGS):
-            joints = arm.joints(frames)
-            shifts = self._out_of_the_way(joints[:, 1:], places) * amount[:, None, None]
-            joints[:, 1:] += shifts
+            joints = arm.joints(result[near])
+            shifts = self._out_of_the_way(joints[:, 1:], places[near])
+            moves = np.any(shifts != 0.0, axis=(1, 2))
+            near, joints = near[moves], joints[moves]
+            if len(near) == 0:
+                break
+            joints[:, 1:] += shifts[moves] * amount[near, None, None]
             along = normalized(np.diff(joints, axis=1))
-            frames = multiply(shortest_arc(rotate(frames, _X), along), frames)
-        return frames
+            result[near] = multiply(shortest_arc(rotate(result[near], _X), along), result[near])
+        return result
 
     def apply(self, times: Floats, places: Places, otherwise: Floats) -> Floats:
         """Rotations (frames, bones, 4) of the arm, of what it does otherwise (frames, bones, 4).
@@ -199,7 +233,7 @@ class Grasp:
         fold[:, 0] = holding[:, 0]
         reaching = blended(fold, holding, reached)
         # What holds is out of the way already.
-        loose = 1.0 - eased((front - front_at) / (touches - front_at))
+        loose = 1.0 - eased((front - touches + width) / width)
         cleared = self._cleared(composed(reaching), places[moves], loose)
         reaching = relative(cleared)
         usual = relative(arm.from_bones(otherwise[moves]))
@@ -211,31 +245,27 @@ class Grasp:
 def plan_grasp(
     arm: ArmFrames,
     radii: Floats,
-    profile: Profile,
+    target: Target,
     timeline: Timeline,
     times: Floats,
-    places: Places,
     *,
     mode: Mode = "COIL",
     turns: float = 2.0,
     up: Floats = _UP,
     name: str = "The arm",
-    target: str = "the object",
 ) -> Grasp:
     """Decide which stretch of the arm takes hold, and where.
 
     Args:
         arm: which.
         radii: (bones + 1,) of its skin at the joints, armature units.
-        profile: the object's, in its own frame, armature units.
+        target: the object, at these times.
         timeline: when.
         times: (frames,) ascending, at which the object is known.
-        places: where it is then.
         mode: touch it, or wind about it.
         turns: at most so many.
         up: (3,) away from the ground, armature space.
         name: what errors call the arm.
-        target: what they call the object.
 
     Raises:
         SettingsError: the motion does not last from the touch to the release; the object is out
@@ -245,67 +275,85 @@ def plan_grasp(
     held = (times >= timeline.contact - 1e-6) & (times <= timeline.release + 1e-6)
     if not np.any(held):
         raise SettingsError(
-            f"{name} would touch {target} at frame {timeline.contact:g}, outside of the motion, "
+            f"{name} would touch {target.name} at frame {timeline.contact:g}, outside of the motion, "
             f"which lasts from frame {times[0]:g} to {times[-1]:g}.",
             "Change the frames of the reach, or make the motion longer.",
         )
-    touch = np.flatnonzero(held)[:1]
-    root = places[touch].into(arm.root[None])[0]
+    profile, places = target.profile, target.places
     wanted = TOUCH_TURNS if mode == "TOUCH" else turns
-    best: tuple[float, Grasp] | None = None
-    missing = (0.0, 0)
-    # At least two bones, and one is left to take hold.
+    holding = places[held]
+    plans: list[tuple[float, Grasp]] = []
+    for sense in (1, -1):
+        coil = _coil(arm, radii, profile, holding, Winding(wanted, sense))
+        if isinstance(coil, Coil):
+            loose = Grasp(arm, radii, profile, timeline, mode, coil, 0.0, up, mode == "COIL")
+            twist = float(_twist_without(arm, loose.holding(holding[:1])[0], coil.first))
+            # Suckers come to the object with as little twist as can be.
+            plans.append((abs(twist) - 1e-3 * sense, replace(loose, twist=twist)))
+    if not plans:
+        raise _too_far(arm, target, times[held], holding, name)
+    return min(plans, key=itemgetter(0))[1]
+
+
+def _coil(
+    arm: ArmFrames, radii: Floats, profile: Profile, places: Places, winding: Winding
+) -> Coil | None:
+    """The coil of the stretch that takes hold, none if the arm is too short at some place.
+
+    The arm takes hold with as much of it as the free part can spare at every place; where that
+    is more than all the turns need, with a stretch further out, as far as that leaves the free
+    part not too loose.
+    """
+    root = places[:1].into(arm.root[None])[0]
+    # At least two bones are free, and one is left to take hold.
     least = int(np.searchsorted(arm.reach, _LEAST_FREE * arm.length))
     least = min(max(least, 2), len(arm.bones) - 1)
-    for sense in (1, -1):
-        winding = Winding(wanted, sense)
-        found: Coil | None = None
-        for first in range(least, len(arm.bones)):
-            coil = wind(profile, arm.lengths, radii, first, root, winding)
-            ways = np.linalg.norm(places[held].seen(coil.joints[0]) - arm.root, axis=-1)
-            far = float(ways.max())
-            if arm.reach[first] < _SLACK * far:
-                if first == len(arm.bones) - 1:
-                    missing = (far, int(np.flatnonzero(held)[np.argmax(ways)]))
-                continue
-            if found is not None and (
-                coil.angle < 2.0 * np.pi * wanted - 1e-6 or arm.reach[first] > _LOOSE * far
-            ):
-                break
-            found = coil
-        if found is None:
+    found: Coil | None = None
+    within: RigError | None = None
+    for first in range(least, len(arm.bones)):
+        try:
+            coil = wind(profile, arm.lengths, radii, first=first, start=root, winding=winding)
+        except RigError as error:
+            # With a thinner stretch it may just do.
+            within = error
             continue
-        common = (arm, radii, profile, timeline, mode, found)
-        grasp = Grasp(*common, 0.0, up, mode == "COIL")
-        whole = grasp.holding(places[touch])
-        free = found.first
-        twist = float(_twist_without(arm, whole[0], free))
-        cost = abs(twist) - 1e-3 * sense
-        if best is None or cost < best[0]:
-            best = cost, Grasp(*common, twist, up, mode == "COIL")
-    if best is None:
-        far, at = missing
-        raise SettingsError(
-            f"{target} is out of reach of {name} at frame {times[at]:g}: it is "
-            f"{far / arm.length:.2f} arm lengths away.",
-            "Move it nearer, or change the frames of the reach.",
-        )
-    return best[1]
+        far = float(np.max(np.linalg.norm(places.seen(coil.joints[0]) - arm.root, axis=-1)))
+        if arm.reach[first] < _SLACK * far:
+            continue
+        short = coil.angle < 2.0 * np.pi * winding.turns - 1e-6
+        if found is not None and (short or arm.reach[first] > _LOOSE * far):
+            break
+        found = coil
+    if found is None and within is not None:
+        raise within
+    return found
 
 
-def _at(slacks: float) -> float:
-    """What the rounding leaves at so many roundings from the surface."""
-    return 0.5 * (np.sqrt(slacks * slacks + 1.0) - slacks)
+def _too_far(
+    arm: ArmFrames, target: Target, times: Floats, places: Places, name: str
+) -> SettingsError:
+    """What to say of an object that the arm cannot hold at all of these times."""
+    profile = target.profile
+    axis = np.linspace(profile.heights[0], profile.heights[-1], 9)[:, None] * _UP
+    ways = places.seen(profile.to_object(axis)) - arm.root
+    far = np.min(np.linalg.norm(ways, axis=-1), axis=-1) / arm.length
+    at = int(np.argmax(far))
+    return SettingsError(
+        f"{target.name} is out of reach of {name} at frame {times[at]:g}: it is {far[at]:.2f} "
+        "arm lengths away, and some of the arm has to lie on it.",
+        "Move it nearer, or change the frames of the reach.",
+    )
 
 
 def _approach(
-    lengths: Floats, goal: Floats, along: Floats, facing: Floats, outward: Floats, up: Floats
+    lengths: Floats, goal: Floats, held: Floats, *, outward: Floats, up: Floats
 ) -> Floats:
     """Shape (segments, 3, frames) of the way to a goal (frames, 3), before it is closed.
 
     A cubic Hermite curve that leaves the body half outwards and arrives as the coil begins; what
     the arm is too long bows away from the object and from the ground.
     """
+    along, facing = rotate(held, _X), rotate(held, _Y)
     far = np.linalg.norm(goal, axis=-1, keepdims=True)
     straight = goal / np.maximum(far, 1e-9)
     leaves = normalized(straight + 0.5 * outward) * far

@@ -172,7 +172,9 @@ def _pairs(
     _, at = np.unique(key[order], return_index=True)
     best = order[at]
     found = [
-        Overlap(every[first[i]].name, every[second[i]].name, int(number[i]), float(depth[i]))
+        Overlap(
+            every[int(first[i])].name, every[int(second[i])].name, int(number[i]), float(depth[i])
+        )
         for i in best
     ]
     return tuple(sorted(found, key=lambda each: -each.depth))

@@ -18,7 +18,7 @@ from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.coil import Profile, profile_of
 from ...core.locomotion.curl import curled
 from ...core.locomotion.generator import Arm
-from ...core.locomotion.grasp import Mode, Places, plan_grasp
+from ...core.locomotion.grasp import Mode, Places, Target, plan_grasp
 from ...core.locomotion.reach import Timeline
 from ...core.rotations import Floats, conjugate, multiply, rotate
 from ...core.skeleton import Skeleton
@@ -102,15 +102,13 @@ class Reaching:
             grasp = plan_grasp(
                 arm,
                 self.radii[number],
-                reach.profile.scaled(1.0 / travelling.scale),
+                Target(reach.profile.scaled(1.0 / travelling.scale), places, f"'{reach.target}'"),
                 reach.timeline,
                 times,
-                places,
                 mode=mode,
                 turns=reach.turns,
                 up=self.up,
                 name=f"'{self.arms[number].name}'",
-                target=f"'{reach.target}'",
             )
             rotations[:, columns] = grasp.apply(times, places, own)
             if mode == "COIL":
@@ -151,10 +149,11 @@ def _check_free(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach, ar
 
 
 def read_reaches(
-    settings: Any,
     armature: bpy.types.Object,
+    settings: Any,
     skeleton: Skeleton,
     arms: tuple[Arm, ...],
+    *,
     body: BodyFrame,
     frames: Floats,
 ) -> Reaching | None:

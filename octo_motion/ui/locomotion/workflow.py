@@ -336,7 +336,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
         tolerances=_tolerances(settings, generator.arm_length),
         extend_scene_range=settings.extend_scene_range,
-        reaching=read_reaches(settings, armature, skeleton, arms, body, frames),
+        reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
         note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
         # Detection has looked for constraints itself.
         warnings=[
