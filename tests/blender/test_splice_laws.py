@@ -27,7 +27,7 @@ from octo_motion.core.splicing.mapping import map_skeleton
 from octo_motion.core.splicing.parts import LEFT_ARM, LEGS, PARTS, RIGHT_ARM, Part, part_bones
 from octo_motion.core.splicing.posture import posture_of, sampled
 from octo_motion.core.splicing.splice import Reach, Splice, build, spliced
-from octo_motion.core.splicing.timing import Timing
+from octo_motion.core.splicing.timing import Timing, window
 
 # Blender's importer leaves the file open.
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
@@ -306,6 +306,53 @@ def test_limbs_turn_hardly_faster_than_in_the_clips_they_are_made_from(
     # An elbow that has to reach further than the other one straightens faster; a pop is faster by
     # far, five times and more.
     assert step < 3.0 * own
+
+
+@pytest.mark.parametrize("name", ["cmu/02_02_walk_daz43.bvh", "secondlife/avatar_dance1.bvh"])
+def test_a_clip_that_loops_has_no_pop_where_it_begins_again(shared_data: SharedData, name: str):
+    base, landmarks = load(shared_data("secondlife/avatar_walk.bvh"))
+    clip, marks = load(shared_data(name))
+    seconds = 2.6 * (clip.frames[-1] - clip.frames[0]) / clip.rate
+    for part, travel in ((RIGHT_ARM, False), (LEGS, False), (LEGS, True)):
+        jumps = []
+        for ease in (0.0, 0.25):
+            pace = 240.0
+            timing = Timing(0.0, clip.frames[0], 1.0, None, ease * pace, ease * pace, "loop")
+            fine = at_pace(base, seconds, pace)
+            splice = Splice(part, clip, timing, marks, travel=travel)
+            result = spliced(fine, landmarks, splice)
+            seams = np.flatnonzero(np.diff(window(timing, fine, clip).rounds))
+            assert len(seams) == 2
+            turns = angle_between(result.rotations[1:], result.rotations[:-1]).max(axis=1)
+            jumps.append((turns[seams].max(), np.delete(turns, seams).max()))
+        # Travelling, the body goes on from where it is, at its own pace.
+        hips = positions(result)[:, result.skeleton.index[landmarks["hips"]]]
+        level = np.linalg.norm(np.diff(hips[:, :2], axis=0), axis=1)
+        assert level[seams].max() < 1.5 * np.delete(level, seams).max()
+        # The first frame of one of the clips is no part of its walk: 27° and more at a hard cut.
+        hard, eased = jumps
+        assert hard[0] > np.radians(10.0)
+        assert eased[0] < eased[1]
+
+
+def test_a_clip_that_ends_where_it_began_loops_as_it_is(shared_data: SharedData):
+    base, landmarks = load(shared_data("secondlife/avatar_jump.bvh"))
+    walk, marks = load(shared_data("secondlife/avatar_walk.bvh"))
+    order = [*range(len(walk)), 0]
+    closed = replace(
+        walk,
+        frames=np.arange(float(len(order))),
+        rotations=walk.rotations[order],
+        locations=walk.locations[order],
+        world=walk.world[order],
+    )
+    base = replace(repeated(base, 4 * len(walk)), rate=walk.rate)
+    timing = Timing(1.0, 0.0, after="loop")
+    results = [
+        spliced(base, landmarks, Splice(RIGHT_ARM, closed, each, marks))
+        for each in (timing, replace(timing, ease_in=1e-3, ease_out=4.0))
+    ]
+    assert angle_between(results[0].rotations, results[1].rotations)[1:].max() < 1e-6
 
 
 def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: SharedData):
