@@ -192,6 +192,32 @@ def test_only_the_bones_of_the_part_change(part: str) -> None:
     assert changed_bones(hero, base, result) == wanted[part]
 
 
+def test_an_arm_can_leave_the_collar_bone_to_the_base() -> None:
+    hero, _ = hero_and_source()
+    base = hero.animation_data.action
+    OPERATORS.splice_add()
+    stack_of(hero).splices[0].with_clavicle = False
+    OPERATORS.splice_build()
+    changed = changed_bones(hero, base, stack_of(hero).result)
+    assert changed == {"upper_arm.R", "forearm.R", "hand.R"}
+
+
+def test_legs_can_be_seen_from_the_chest() -> None:
+    hero, _ = hero_and_source()
+    OPERATORS.splice_add(part="LEGS")
+    (item,) = stack_of(hero).splices
+    seen = {}
+    for travel in (False, True):
+        for seen_from in ("PELVIS", "CHEST"):
+            item.with_travel, item.seen_from = travel, seen_from
+            OPERATORS.splice_build()
+            seen[travel, seen_from] = motion(hero, stack_of(hero).result)["thigh.R"]
+    apart = [angle_between(seen[each, "PELVIS"], seen[each, "CHEST"]).max() for each in (0, 1)]
+    assert apart[0] > 0.05
+    # With travel it is always the pelvis.
+    assert apart[1] < 10 * ROUNDING
+
+
 def test_base_and_clips_stay_as_they_are() -> None:
     hero, _ = hero_and_source()
     before = {action.name: keys(action) for action in bpy.data.actions}
@@ -803,8 +829,10 @@ def test_the_panel_is_there_for_armatures_alone_and_closed_at_first() -> None:
     assert set(drawn()) == {"splicing", "splice", "splice_timing", "landmarks"}
     assert all(panel.bl_options == {"DEFAULT_CLOSED"} for panel in splice_panels.CLASSES)
     assert "with_travel" not in drawn()["splice"]
+    assert "with_clavicle" in drawn()["splice"]
     stack_of(hero).splices[0].part = "LEGS"
-    assert "with_travel" in drawn()["splice"]
+    assert {"with_travel", "seen_from"} <= set(drawn()["splice"])
+    assert "with_clavicle" not in drawn()["splice"]
     stack_of(hero).splices[0].part = "CHAIN"
     assert {"bone", "source_bone"} <= set(drawn()["splice"])
 

@@ -20,7 +20,7 @@ from .splice_list import (
     OCTO_MOTION_UL_splices,
     active_splice,
 )
-from .stack import LEG_PARTS
+from .stack import ARM_PARTS, LEG_PARTS
 
 
 class _Panel:
@@ -136,8 +136,13 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
         layout.prop(item, "visual")
         if item.part != "CHAIN":
             layout.row().prop(item, "mode", expand=True)
+        if item.part in ARM_PARTS:
+            layout.prop(item, "with_clavicle")
         if item.part in LEG_PARTS:
             layout.prop(item, "with_travel")
+            seen = layout.row()
+            seen.active = not item.with_travel
+            seen.prop(item, "seen_from", expand=True)
 
 
 class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):

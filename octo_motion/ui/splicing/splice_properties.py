@@ -45,6 +45,17 @@ MODES: Final = (
 )
 
 
+SEEN_FROM: Final = (
+    ("PELVIS", "Pelvis", "Feet stay under the hips, however the trunk leans", 0),
+    (
+        "CHEST",
+        "Chest",
+        "As the method that this follows has it: legs go along with a trunk that leans or turns",
+        1,
+    ),
+)
+
+
 def _is_armature(_: Any, candidate: bpy.types.Object) -> bool:
     return candidate.type == "ARMATURE"
 
@@ -130,7 +141,7 @@ class SpliceItem(bpy.types.PropertyGroup):
     )
     ease_in: FloatProperty(
         name="Ease In",
-        description="Frames over which the splice comes in",
+        description="Frames over which the splice comes in, and each further round of a loop",
         default=6.0,
         min=0.0,
         step=100,
@@ -139,7 +150,8 @@ class SpliceItem(bpy.types.PropertyGroup):
     )
     ease_out: FloatProperty(
         name="Ease Out",
-        description="Frames over which the splice goes, if it ends before the base",
+        description="Frames over which the splice goes, if it ends before the base; over which a "
+        "round of a loop goes; and over which a clip that is held comes to rest",
         default=6.0,
         min=0.0,
         step=100,
@@ -156,6 +168,20 @@ class SpliceItem(bpy.types.PropertyGroup):
         name="Reach",
         description="Where hands and feet go on a body of other proportions",
         items=MODES,
+        override=OVERRIDE,
+    )
+    with_clavicle: BoolProperty(
+        name="With Collar Bone",
+        description="An arm takes its collar bone along, where both armatures have one: the hand "
+        "is then where it was seen. Without, the shoulder stays the base's",
+        default=True,
+        override=OVERRIDE,
+    )
+    seen_from: EnumProperty(
+        name="Seen From",
+        description="From where the clip's legs are seen, so that they lie alike on the base. Legs "
+        "with travel are always seen from the pelvis",
+        items=SEEN_FROM,
         override=OVERRIDE,
     )
     with_travel: BoolProperty(

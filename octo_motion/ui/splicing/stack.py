@@ -23,11 +23,14 @@ from ...core.splicing.clip import Clip
 from ...core.splicing.landmarks import LANDMARKS, OPTIONAL, Landmarks
 from ...core.splicing.mapping import map_skeleton
 from ...core.splicing.parts import PARTS, Part, chain
-from ...core.splicing.splice import Reach, Splice, build
+from ...core.splicing.splice import Reach, SeenFrom, Splice, build
 from ...core.splicing.timing import After, Timing
 from ..plain import plain
 from .landmark_properties import read_landmarks, write_landmarks
 from .properties import OCTO_MOTION_PG_splicing, splicing_settings
+
+ARM_PARTS: Final = frozenset({"RIGHT_ARM", "LEFT_ARM"})
+"""Parts that may begin at the collar bone."""
 
 LEG_PARTS: Final = frozenset({"LEGS", "RIGHT_LEG", "LEFT_LEG"})
 """Parts that can bring their travel along."""
@@ -191,9 +194,15 @@ def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, 
 def _splice(reader: Reader, item: Any, base: Source) -> Splice:
     source = reader.item(item)
     part = _part(item, base, source)
+    how = _How(
+        clavicle=item.with_clavicle,
+        seen_from=cast("SeenFrom", item.seen_from.lower() if item.part in LEG_PARTS else ""),
+        # The panel offers it for legs alone.
+        travel=item.with_travel and item.part in LEG_PARTS,
+    )
     if part.pieces:
         for each in (base, source):
-            _check_landmarks(part, each)
+            _check_landmarks(part, each, how)
     splice = Splice(
         part=part,
         clip=source.clip,
@@ -208,12 +217,27 @@ def _splice(reader: Reader, item: Any, base: Source) -> Splice:
         ),
         landmarks=source.landmarks,
         reach=cast("Reach", item.mode.lower()),
-        # The panel offers it for legs alone.
-        travel=item.with_travel and item.part in LEG_PARTS,
+        travel=how.travel,
+        clavicle=how.clavicle,
+        seen_from=how.seen_from,
     )
     # What only both together can tell.
-    carriers(part, *_sides(base, source), clavicle=True, seen_from="")
+    how.check(part, *_sides(base, source))
     return splice
+
+
+@dataclass(frozen=True)
+class _How:
+    """What of a splice's settings decides which bones it needs."""
+
+    clavicle: bool
+    seen_from: SeenFrom
+    travel: bool
+
+    def check(self, part: Part, base: Side, source: Side) -> None:
+        """Raise if a bone is missing."""
+        seen_from = "pelvis" if self.travel else self.seen_from
+        carriers(part, base, source, clavicle=self.clavicle, seen_from=seen_from)
 
 
 def _sides(base: Source, source: Source) -> tuple[Side, Side]:
@@ -239,7 +263,7 @@ def _part(item: Any, base: Source, source: Source) -> Part:
     return part
 
 
-def _check_landmarks(part: Part, source: Source) -> None:
+def _check_landmarks(part: Part, source: Source, how: _How) -> None:
     """Ask for what cannot be told, with the name of whose it is."""
     remedy = (
         f"Make '{source.armature}' active, click Find Landmarks in the panel Splicing > Landmarks "
@@ -249,7 +273,7 @@ def _check_landmarks(part: Part, source: Source) -> None:
         raise ClipError(f"'{source.armature}' has no landmarks. {source.problem}", remedy)
     side = Side(source.clip, source.landmarks)
     try:
-        carriers(part, side, side, clavicle=True, seen_from="")
+        how.check(part, side, side)
     except ClipError as error:
         known = source.landmarks.bones
         bones = source.clip.skeleton.index
