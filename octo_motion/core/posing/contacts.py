@@ -42,6 +42,8 @@ class Contacts:
     """(contacts, 3) of the obstacle's surface there; zero for another body."""
     friction: Floats
     """(contacts,)"""
+    labels: Integers
+    """(contacts,) the same number for the same place on the same thing in every step."""
 
     def __len__(self) -> int:
         """Number of contacts."""
@@ -56,6 +58,7 @@ _NONE: Final = Contacts(
     np.zeros(0),
     np.zeros((0, 3)),
     np.zeros(0),
+    np.zeros(0, np.int64),
 )
 
 
@@ -69,6 +72,8 @@ class Detector:
         keep = _separate_ends(figure)
         bodies, ends = np.nonzero(keep)
         self._end_bodies, self._end_flat = bodies, 2 * bodies + ends
+        self._end_labels = 3 * bodies + ends
+        self._first_label = len(figure) ** 2
         self._end_radii = figure.radii[bodies]
         self._keep = keep
         lengths = np.linalg.norm(figure.capsules[:, 1] - figure.capsules[:, 0], axis=-1)
@@ -96,13 +101,16 @@ class Detector:
         ends += positions[:, None]
         found: list[Contacts] = []
         boxes: tuple[Floats, Floats] | None = None
+        # Three places on each capsule: its ends and between.
+        label = self._first_label
         for obstacle in obstacles:
             if isinstance(obstacle, Plane):
-                contacts = self._on_plane(ends, obstacle, margin)
+                contacts = self._on_plane(ends, obstacle, margin, label)
             else:
                 if boxes is None:
                     boxes = self._boxes(ends, margin)
-                contacts = self._on_solid(ends, boxes, obstacle, margin)
+                contacts = self._on_solid(ends, boxes, obstacle, margin, label)
+            label += 3 * len(self._radii)
             if contacts is not None:
                 found.append(contacts)
         if self._pairs is not None:
@@ -116,7 +124,7 @@ class Detector:
         first, second = ends[:, 0], ends[:, 1]
         return np.minimum(first, second) - around, np.maximum(first, second) + around
 
-    def _on_plane(self, ends: Floats, plane: Plane, margin: float) -> Contacts | None:
+    def _on_plane(self, ends: Floats, plane: Plane, margin: float, label: int) -> Contacts | None:
         normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
         centres = ends.reshape(-1, 3)[self._end_flat]
         gaps = centres @ normal
@@ -128,10 +136,17 @@ class Detector:
         normals = np.empty((len(near), 3))
         normals[:] = normal
         points = centres[near] - self._end_radii[near, None] * normal
-        return self._contacts(self._end_bodies[near], points, normals, gaps[near], plane)
+        bodies = self._end_bodies[near]
+        labels = self._end_labels[near] + label
+        return self._contacts(bodies, points, normals, gaps[near], plane, labels)
 
     def _on_solid(
-        self, ends: Floats, boxes: tuple[Floats, Floats], obstacle: Obstacle, margin: float
+        self,
+        ends: Floats,
+        boxes: tuple[Floats, Floats],
+        obstacle: Obstacle,
+        margin: float,
+        label: int,
     ) -> Contacts | None:
         low, high = boxes
         box = self._world_box(obstacle)
@@ -155,16 +170,18 @@ class Detector:
         gaps: list[Floats] = []
         normals: list[Floats] = []
         centres: list[Floats] = []
+        labels: list[Integers] = []
 
-        def add(which: Integers, sample: Integers | int) -> None:
+        def add(which: Integers, sample: Integers | int, place: int) -> None:
             bodies.append(near[which])
+            labels.append(3 * near[which] + place + label)
             gaps.append(distances[which, sample])
             normals.append(outs[which, sample])
             centres.append(start[which, 0] + shares[which, sample, None] * along[which, 0])
 
         for end, sample in ((0, 0), (1, self._samples - 1)):
             kept = self._keep[near, end] & (distances[:, sample] < limits)
-            add(np.flatnonzero(kept), sample)
+            add(np.flatnonzero(kept), sample, end)
         best = np.argmin(distances, axis=1)
         inner = (best > 0) & (best < self._samples - 1) & self._long[near]
         inner &= distances[rows, best] < limits
@@ -180,14 +197,15 @@ class Detector:
                 best = np.argmin(distances, axis=1)
                 middle = shares[rows, best]
                 width *= _AROUND[1] - _AROUND[0]
-            add(rows, best)
+            add(rows, best, 2)
         chosen = np.concatenate(bodies)
         if not len(chosen):
             return None
         radii = self._radii[chosen]
         way = np.concatenate(normals) @ frame.T
         points = np.concatenate(centres) @ frame.T + obstacle.position - radii[:, None] * way
-        return self._contacts(chosen, points, way, np.concatenate(gaps) - radii, obstacle)
+        gap = np.concatenate(gaps) - radii
+        return self._contacts(chosen, points, way, gap, obstacle, np.concatenate(labels))
 
     def _on_itself(
         self, ends: Floats, boxes: tuple[Floats, Floats], margin: float
@@ -219,10 +237,17 @@ class Detector:
             gaps[near],
             np.zeros((len(near), 3)),
             np.full(len(near), self._friction),
+            bodies * len(self._radii) + second[near],
         )
 
     def _contacts(
-        self, bodies: Integers, points: Floats, normals: Floats, gaps: Floats, obstacle: Obstacle
+        self,
+        bodies: Integers,
+        points: Floats,
+        normals: Floats,
+        gaps: Floats,
+        obstacle: Obstacle,
+        labels: Integers,
     ) -> Contacts:
         count = len(bodies)
         others = np.empty(count, np.int64)
@@ -234,7 +259,7 @@ class Detector:
             speeds += cross(turning, points - obstacle.position)
         friction = np.empty(count)
         friction.fill(self._friction if obstacle.friction is None else obstacle.friction)
-        return Contacts(bodies, others, points, normals, gaps, speeds, friction)
+        return Contacts(bodies, others, points, normals, gaps, speeds, friction, labels)
 
     def _world_box(self, obstacle: Obstacle) -> Floats | None:
         """Lower and upper corner in the world; kept as long as the obstacle stays the same."""
@@ -329,6 +354,7 @@ def _joined(found: list[Contacts]) -> Contacts:
         np.concatenate([each.gaps for each in found]),
         np.concatenate([each.speeds for each in found]),
         np.concatenate([each.friction for each in found]),
+        np.concatenate([each.labels for each in found]),
     )
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rotations import Floats
+from ..rotations import Floats, cross
 from .contacts import Contacts
 from .kinematics import skew
 
@@ -53,24 +53,34 @@ class Holds:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """What the rows do at given velocities."""
+class Tangent:
+    """Rows replaced by linear ones: p = offsets − slopes w."""
 
-    impulses: Floats
-    """(rows, 3) p on the body."""
+    offsets: Floats
+    """(rows, 3)"""
     slopes: Floats
-    """(rows, 3, 3) −∂p/∂w."""
-    pressing: NDArray[np.bool_]
-    """(contacts,) which contacts carry load."""
+    """(rows, 3, 3)"""
     symmetric: bool
-    """Whether all slopes are; not where a contact slips under a bound that its load sets."""
+    """Whether all slopes are; not where a contact slips, for its load sets its friction."""
+    miss: float
+    """How far the impulses that this is made from were from what the laws ask, N·s."""
+
+    def impulses(self, speeds: Floats) -> Floats:
+        """p (rows, 3) at w (rows, 3)."""
+        return self.offsets - (self.slopes @ speeds[:, :, None])[:, :, 0]
 
 
 class Rows:
     """Contacts and holds of one step, as arrays: contacts first."""
 
     def __init__(
-        self, contacts: Contacts, holds: Holds | None, origin: Floats, gain: float, step: float
+        self,
+        contacts: Contacts,
+        holds: Holds | None,
+        origin: Floats,
+        masses: Floats,
+        gain: float,
+        step: float,
     ) -> None:
         self.contacts = contacts
         self.holds = holds
@@ -91,13 +101,12 @@ class Rows:
         self.reach = np.empty((size, 3, 6))
         """(rows, 3, 6) from a spatial velocity to that of the point or turn."""
         self.reach[:, :, :3] = skew(-points)
-        self.reach[:, :, 3:] = np.eye(3)
+        self.reach[:, :, 3:] = _UNIT
         if holds is not None:
             turning = count + np.flatnonzero(holds.turns)
-            self.reach[turning, :, :3] = np.eye(3)
+            self.reach[turning, :, :3] = _UNIT
             self.reach[turning, :, 3:] = 0.0
-        normals = contacts.normals
-        self._along_normal = normals[:, :, None] * normals[:, None, :]
+        self._scales = masses[contacts.bodies]
         self.paired = np.flatnonzero(self.others >= 0)
         """Rows between two bodies of the figure."""
 
@@ -112,62 +121,99 @@ class Rows:
             own[self.paired] -= velocities[self.others[self.paired]]
         return (self.reach @ own[:, :, None])[:, :, 0] - self.targets
 
-    def answer(self, speeds: Floats, limits: Floats | None = None) -> Answer:
-        """Impulses and slopes at w (rows, 3).
+    def tangent(self, impulses: Floats | None, speeds: Floats) -> Tangent:
+        """The linear rows next to impulses and velocities that need not fit each other.
+
+        A contact's law is p = Π(p − r (w + p/a)), Π the nearest point of Coulomb's cone at the
+        load p_n, for any r > 0 [Alart and Curnier 1991]. The piece of Π that the argument lies in
+        tells whether the contact is apart, sticks or slips, and which way. With r near the mass
+        that the contact feels, a foot that would slip back and forth is found to stick.
 
         Args:
-            speeds: w.
-            limits: (contacts,) bounds of the friction; what the contacts' own load sets if None.
+            impulses: (rows, 3); where None, or NaN in a row, nothing is known of them and
+                contacts that close are taken to stick.
+            speeds: (rows, 3) w.
         """
         count = len(self.contacts)
         size = len(self.bodies)
-        impulses = np.empty((size, 3))
+        offsets = np.empty((size, 3))
         slopes = np.empty((size, 3, 3))
-        pressing = np.zeros(0, dtype=bool)
         symmetric = True
+        miss = 0.0
         if count:
-            normals = self.contacts.normals
-            w = speeds[:count]
-            into = (w * normals).sum(axis=1)
-            push = -self.gain * (into + self._rates)
-            pressing = push >= 0.0
-            np.maximum(push, 0.0, out=push)
-            along = w - into[:, None] * normals
-            slip = np.sqrt((along * along).sum(axis=1))
-            bound = self.contacts.friction * push if limits is None else limits
-            slip += _TINY
-            factor = bound / slip
-            slips = factor < self.gain
-            np.minimum(factor, self.gain, out=factor)
-            impulses[:count] = push[:, None] * normals - factor[:, None] * along
-            # factor (1 − n nᵀ) + a n nᵀ, less the part along the slip, where friction is constant.
-            stiff = np.where(pressing, self.gain, 0.0) - factor
-            block = stiff[:, None, None] * self._along_normal
-            if slips.any():
-                toward = np.where(slips, 1.0 / slip, 0.0)[:, None] * along
-                lost = factor[:, None] * toward
-                if limits is None:
-                    # As the load grows with the speed into the surface, friction's bound does.
-                    symmetric = False
-                    slope = np.where(pressing, self.gain * self.contacts.friction, 0.0)
-                    lost = lost + slope[:, None] * normals
-                block -= toward[:, :, None] * lost[:, None, :]
-            index = _DIAGONAL
-            block[:, index, index] += factor[:, None]
-            slopes[:count] = block
+            known = impulses[:count] if impulses is not None else None
+            symmetric, miss = self._contact_tangent(
+                known, speeds[:count], offsets[:count], slopes[:count]
+            )
         holds = self.holds
         if holds is not None:
-            wanted = holds.biases - holds.gains[:, None] * speeds[count:]
+            w = speeds[count:]
+            wanted = holds.biases - holds.gains[:, None] * w
             length = np.sqrt((wanted * wanted).sum(axis=1)) + _TINY
             share = np.minimum(holds.bounds / length, 1.0)
-            impulses[count:] = share[:, None] * wanted
-            slope = (holds.gains * share)[:, None, None] * np.eye(3)
+            slope = (holds.gains * share)[:, None, None] * _UNIT
             full = share < 1.0
             if full.any():
                 way = np.where(full, np.sqrt(holds.gains * share) / length, 0.0)[:, None] * wanted
                 slope -= way[:, :, None] * way[:, None, :]
+            right = share[:, None] * wanted
+            if impulses is not None:
+                miss = max(miss, float(np.abs(impulses[count:] - right).max()))
             slopes[count:] = slope
-        return Answer(impulses, slopes, pressing, symmetric)
+            offsets[count:] = right + (slope @ w[:, :, None])[:, :, 0]
+        return Tangent(offsets, slopes, symmetric, miss)
+
+    def _contact_tangent(
+        self, known: Floats | None, w: Floats, offsets: Floats, slopes: Floats
+    ) -> tuple[bool, float]:
+        """Fill ``offsets`` and ``slopes`` of the contacts; symmetric or not, and the miss."""
+        normals = self.contacts.normals
+        gain = self.gain
+        into = (w * normals).sum(axis=1)
+        closing = into + self._rates
+        if known is None:
+            acts = closing <= 0.0
+            slips = _NO_SLIP
+            miss = 0.0
+        else:
+            # Of new ones nothing is known but whether they close.
+            fresh = np.isnan(known[:, 0])
+            some_fresh = bool(fresh.any())
+            if some_fresh:
+                known = np.where(fresh[:, None], 0.0, known)
+            push = (known * normals).sum(axis=1)
+            load = push - self._scales * (closing + push / gain)
+            acts = load >= 0.0
+            np.maximum(load, 0.0, out=load)
+            across = known - push[:, None] * normals
+            drift = w - into[:, None] * normals
+            slide = across * (1.0 - self._scales / gain)[:, None] - self._scales[:, None] * drift
+            size = np.sqrt((slide * slide).sum(axis=1))
+            size += _TINY
+            bound = self.contacts.friction * load
+            share = np.minimum(bound / size, 1.0)
+            slips = acts & (share < 1.0)
+            if some_fresh:
+                slips &= ~fresh
+            right = share[:, None] * slide + load[:, None] * normals
+            miss = float(np.abs(right - known).max())
+        stiff = np.where(acts, gain, 0.0)
+        if not slips.any():
+            # Sticks or is apart: a (1 or 0), the same in all directions.
+            slopes[:] = stiff[:, None, None] * _UNIT
+            offsets[:] = (-stiff * self._rates)[:, None] * normals
+            return True, miss
+        sticks = np.where(slips, 0.0, stiff)
+        toward = slide / size[:, None]
+        aside = np.where(slips, self._scales * share / np.maximum(1.0 - share, 1e-9), 0.0)
+        np.minimum(aside, gain, out=aside)
+        sideways = cross(normals, toward)
+        push_way = normals + np.where(slips, self.contacts.friction, 0.0)[:, None] * toward
+        slopes[:] = sticks[:, None, None] * _UNIT
+        slopes += (np.where(slips, gain, 0.0)[:, None] * push_way)[:, :, None] * normals[:, None, :]
+        slopes += (aside[:, None] * sideways)[:, :, None] * sideways[:, None, :]
+        offsets[:] = (-stiff * self._rates)[:, None] * np.where(slips[:, None], push_way, normals)
+        return False, miss
 
     def corrections(self, step: float, slack: float, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.
@@ -193,4 +239,5 @@ class Rows:
         return result
 
 
-_DIAGONAL = np.arange(3)
+_UNIT = np.eye(3)
+_NO_SLIP = np.zeros(1, dtype=bool)

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SettingsError
 from ..rotations import Floats, conjugate, multiply, normalized, rotate
@@ -89,6 +90,10 @@ class WorldState:
     """(bodies, 3) angular momentum about the centre of mass, world axes."""
     speeds: Floats
     """(slots, 3) where the solver begins."""
+    impulses: Floats
+    """(rows, 3) of the last step, where it begins as well."""
+    labels: NDArray[np.int64]
+    """(contacts,) to know them by."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +180,8 @@ class World:
         self._angular = np.zeros((count, 3))
         self._spin = np.zeros((count, 3))
         self._speeds = np.zeros((len(self._tree.layout.bodies), 3))
+        self._impulses = np.zeros((0, 3))
+        self._labels = np.zeros(0, np.int64)
         self._loads = np.zeros((count, 3))
         self._place(pose)
         self._plastic_rest = self._turns()
@@ -370,6 +377,8 @@ class World:
             self._angular.copy(),
             self._spin.copy(),
             self._speeds.copy(),
+            self._impulses.copy(),
+            self._labels.copy(),
         )
 
     def restore(self, state: WorldState) -> None:
@@ -382,6 +391,8 @@ class World:
         self._angular = state.angular.copy()
         self._spin = state.spin.copy()
         self._speeds = state.speeds.copy()
+        self._impulses = state.impulses.copy()
+        self._labels = state.labels.copy()
         self._refresh()
 
     # The step
@@ -393,10 +404,14 @@ class World:
         corrections = None
         if len(problem.rows):
             corrections = problem.rows.corrections(h, 1e-3 * self._size, 0.5 * self._size)
-        solution = self._newton.solve(problem, inertias, self._speeds, corrections)
+        solution = self._newton.solve(
+            problem, inertias, self._speeds, self._known(problem.rows), corrections
+        )
         self.last = solution
         self.contacts = problem.rows.contacts
         self._take_velocities(problem, solution, body_inertias)
+        self._impulses = solution.impulses
+        self._labels = problem.rows.contacts.labels
         self._take_wrenches(problem, solution)
         self._move(problem, solution)
         self.time += h
@@ -434,7 +449,7 @@ class World:
         speed = np.sqrt((self._linear * self._linear).sum(axis=1).max())
         margin = 2e-3 * self._size + 2.0 * h * float(speed)
         contacts = self._detector.find(self._positions, frames, self.obstacles, margin)
-        rows = Rows(contacts, self._holds(), origin, _CONTACT_GAIN * self._mass, h)
+        rows = Rows(contacts, self._holds(), origin, figure.masses, _CONTACT_GAIN * self._mass, h)
         problem = Problem(
             h,
             joints,
@@ -585,6 +600,23 @@ class World:
         if problem.frames is None:
             springs = (springs[:, None, :] @ parents)[:, 0]
         return springs
+
+    def _known(self, rows: Rows) -> Floats | None:
+        """(rows, 3) impulses of the step before, NaN for contacts that are new."""
+        before, impulses = self._labels, self._impulses
+        now = rows.contacts
+        if not (len(before) and len(now)):
+            return None
+        if len(rows) == len(impulses) and np.array_equal(before, now.labels):
+            return impulses
+        known = np.full((len(rows), 3), np.nan)
+        order = np.argsort(before)
+        labels = before[order]
+        place = np.minimum(np.searchsorted(labels, now.labels), len(labels) - 1)
+        same = np.flatnonzero(labels[place] == now.labels)
+        known[same] = impulses[order[place[same]]]
+        known[len(now) :] = 0.0
+        return known
 
     # Geometry
 
