@@ -45,11 +45,11 @@ class Even:
     """(arms,) radians that each arm is ahead of the body."""
 
     def phases(self, distance: Floats) -> Floats:
-        """(frames, arms)"""
+        """(frames, arms)."""
         return _CYCLE * distance[:, None] / self.stride + self.offsets
 
     def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
-        """(arms, …)"""
+        """(arms, …)."""
         ahead = self.offsets[list(arms)] / _CYCLE
         return self.stride * (cycles - ahead.reshape(-1, *[1] * (cycles.ndim - 1)))
 
@@ -67,12 +67,12 @@ class Free:
         self._tables = [_table(holds, arm, duty) for arm in range(arms)]
 
     def phases(self, distance: Floats) -> Floats:
-        """(frames, arms)"""
+        """(frames, arms)."""
         columns = [_CYCLE * table.cycles(distance) for table in self._tables]
         return np.stack(columns, axis=1) + self._middle
 
     def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
-        """(arms, …)"""
+        """(arms, …)."""
         since = cycles - self._middle / _CYCLE
         return np.stack(
             [self._tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
@@ -117,9 +117,9 @@ class _Table:
 def _table(holds: Holds, arm: int, duty: float) -> _Table:
     own: NDArray[np.bool_] = holds.arm == arm
     start, end = holds.start[own], holds.end[own]
-    number = np.arange(len(start))
+    number = np.arange(len(start), dtype=np.float64)
     at = np.stack([start, end], axis=1).ravel()
-    values = np.stack([number - 0.5 * duty, number + 0.5 * duty], axis=1).ravel()
+    values: Floats = np.stack([number - 0.5 * duty, number + 0.5 * duty], axis=1).ravel()
     if not len(start):
         at, values = np.array([0.0, 1.0]), np.array([-0.5, -0.4])
     # A cycle more at either end, as long as those that are there are in the mean.
