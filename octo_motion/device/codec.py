@@ -158,22 +158,24 @@ MOST_BODIES: Final = 4096
 
 @dataclass(frozen=True)
 class Table:
-    """An array of float64, a row for each body, its shape within a row fixed."""
+    """An array of float64, mostly a row for each body; its shape within a row is fixed."""
 
     row: tuple[int, ...] = ()
+    most: int = MOST_BODIES
+    """Rows."""
 
     def put(self, value: Any, out: bytearray) -> None:
         """Append the array."""
         array = np.ascontiguousarray(value, dtype="<f8")
         if array.shape[1:] != self.row:
             raise MessageError(f"an array of shape {array.shape}")
-        out += struct.pack("<H", len(array)) + array.tobytes()
+        out += struct.pack("<I", len(array)) + array.tobytes()
 
     def take(self, reader: Reader) -> Any:
         """Read the array; it may be written to."""
-        (count,) = struct.unpack("<H", reader.take(2))
-        if count > MOST_BODIES:
-            raise MessageError("too many bodies")
+        (count,) = struct.unpack("<I", reader.take(4))
+        if count > self.most:
+            raise MessageError("too many rows")
         width = 1
         for each in self.row:
             width *= each

@@ -11,8 +11,8 @@ from typing import Final
 
 from ..core.errors import DeviceError
 from .driver import Driver
-from .haply import Haply
 from .haply import PORT as HAPLY_PORT
+from .haply import Haply
 from .hid import system
 from .hid.force_device import ForceDevice, is_force_device
 from .hid.response import Response

@@ -175,11 +175,14 @@ class HandLoop:
 
     def _say_device(self, pointer: Pointer, *, present: bool) -> None:
         who = pointer.driver.description
+        force = torque = 0.0
+        if who.dynamics is not None:
+            force, torque = who.dynamics.force, who.dynamics.torque
+        gains = pointer.gains
         self._channel.send(
             DeviceMessage(
-                *(pointer.number, present, who.kind),
-                *(who.dynamics.force if who.dynamics else 0.0, pointer.gains.stiffness),
-                *(who.name, who.buttons),
+                *(pointer.number, present, who.kind, force, torque),
+                *(gains.stiffness, gains.angular_stiffness, who.name, who.buttons),
             )
         )
 

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, fields
-from typing import Annotated, ClassVar, Final, get_args, get_type_hints
+from typing import Annotated, ClassVar, Final, TypedDict, get_args, get_type_hints
 
 import numpy as np
 
-from ..core.errors import DeviceError
+from ..core.errors import DeviceError, OctoMotionError
 from ..core.posing.figure import Elements, Figure, Limits
+from ..core.posing.obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
+from ..core.posing.world import WorldSettings
 from ..core.rotations import Floats
 from .codec import (
     F64,
@@ -23,6 +25,7 @@ from .codec import (
     QUATERNION,
     SIX,
     U8,
+    U16,
     U32,
     VECTOR,
     Many,
@@ -34,13 +37,14 @@ from .codec import (
 )
 from .haptics.local_model import Held, Pull
 from .hid.response import Axes, Response
-from .spatial import IDENTITY, ZERO, Quaternion, Vector
+from .spatial import IDENTITY, ZERO, Quaternion, Vector, unit
 
 VERSION: Final = 1
 MAGIC: Final = b"OMDV"
 HEADER: Final = struct.Struct("<4sHHI")
 MOST_BYTES: Final = 4_000_000
-"""Of one message: a figure of 4096 bodies needs 2 MB."""
+"""Of one message: a figure of 4096 bodies needs 2 MB, a mesh of 50,000 triangles 3.6 MB."""
+MOST_POINTS: Final = 150_000
 
 
 @dataclass(frozen=True)
@@ -223,8 +227,12 @@ class DeviceMessage(Message):
     """As ``driver.Kind``."""
     force: Annotated[float, F64]
     """N, 0 without force."""
+    torque: Annotated[float, F64]
+    """N·m, 0 without torque."""
     stiffness: Annotated[float, F64]
     """N/m of the coupling, 0 without force."""
+    angular_stiffness: Annotated[float, F64]
+    """N·m/rad of the coupling."""
     name: Annotated[str, Text(128)]
     buttons: Annotated[tuple[str, ...], Many(Text(64), 64)]
 
@@ -298,6 +306,134 @@ class Test(Message):
 
     KIND = 15
     pointer: Annotated[int, U8]
+
+
+@dataclass(frozen=True)
+class WorldMessage(Message):
+    """Blender to bridge: what holds for the whole simulation, see ``WorldSettings``."""
+
+    KIND = 16
+    step: Annotated[float, F64] = 2e-3
+    gravity: Annotated[Vector, VECTOR] = ZERO
+    self_collision: Annotated[bool, FLAG] = False
+    friction: Annotated[float, F64] = 0.6
+    drag: Annotated[float, F64] = 0.0
+
+    def settings(self) -> WorldSettings:
+        """The settings that came.
+
+        Raises:
+            MessageError: a value is out of range.
+        """
+        if not 1e-4 <= self.step <= 0.02 or self.friction < 0.0 or self.drag < 0.0:
+            raise MessageError("settings of the world that cannot be")
+        return WorldSettings(
+            step=self.step,
+            gravity=self.gravity,
+            self_collision=self.self_collision,
+            friction=self.friction,
+            drag=self.drag,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleMessage(Message):
+    """Blender to bridge: something that the puppet can touch, new or elsewhere."""
+
+    KIND = 17
+    number: Annotated[int, U16]
+    """The sender's; the same number replaces."""
+    shape: Annotated[int, U8]
+    """0: gone; 1 plane, 2 sphere, 3 capsule, 4 box, 5 convex hull, 6 mesh."""
+    position: Annotated[Vector, VECTOR]
+    orientation: Annotated[Quaternion, QUATERNION]
+    velocity: Annotated[Vector, VECTOR]
+    angular_velocity: Annotated[Vector, VECTOR]
+    friction: Annotated[float, F64]
+    """−1: the world's."""
+    size: Annotated[float, F64]
+    """Radius of sphere and capsule, thickness of a mesh."""
+    points: Annotated[Floats, Table((3,), MOST_POINTS)]
+    """Ends of a capsule, half sizes of a box, three corners for each triangle; own frame."""
+
+    @classmethod
+    def of(cls, number: int, obstacle: Obstacle | None) -> ObstacleMessage:
+        """The message that carries an obstacle; None takes it away."""
+        if obstacle is None:
+            none = np.zeros((0, 3))
+            return cls(number, 0, ZERO, IDENTITY, ZERO, ZERO, -1.0, 0.0, none)
+        size, points = 0.0, np.zeros((0, 3))
+        match obstacle:
+            case Plane():
+                shape = 1
+            case Sphere():
+                shape, size = 2, obstacle.radius
+            case Capsule():
+                shape, size, points = 3, obstacle.radius, obstacle.ends
+            case Box():
+                shape, points = 4, obstacle.half[None]
+            case Hull():
+                shape, points = 5, obstacle.corners.reshape(-1, 3)
+            case Mesh():
+                shape, size = 6, obstacle.thickness
+                points = obstacle.corners.reshape(-1, 3)
+            case _:
+                raise MessageError(f"no message carries a {type(obstacle).__name__}")
+        return cls(
+            *(number, shape, tuple(obstacle.position), tuple(obstacle.orientation)),
+            *(tuple(obstacle.velocity), tuple(obstacle.angular_velocity)),
+            -1.0 if obstacle.friction is None else obstacle.friction,
+            *(size, points),
+        )
+
+    def obstacle(self) -> Obstacle | None:
+        """The obstacle that came; None: it is gone.
+
+        Raises:
+            MessageError: it makes no sense.
+        """
+        turn = unit(self.orientation)
+        if turn is None or self.size < 0.0:
+            raise MessageError("an obstacle that cannot be")
+        place = _Placed(
+            position=np.array(self.position),
+            orientation=np.array(turn),
+            velocity=np.array(self.velocity),
+            angular_velocity=np.array(self.angular_velocity),
+            friction=None if self.friction < 0.0 else self.friction,
+        )
+        count = len(self.points)
+        wanted = {0: 0, 1: 0, 2: 0, 3: 2, 4: 1}.get(self.shape, count)
+        if count != wanted or (self.shape >= 5 and (count == 0 or count % 3)):
+            raise MessageError("an obstacle with a wrong number of points")
+        try:
+            match self.shape:
+                case 0:
+                    return None
+                case 1:
+                    return Plane(**place)
+                case 2:
+                    return Sphere(**place, radius=self.size)
+                case 3:
+                    return Capsule(**place, ends=self.points, radius=self.size)
+                case 4:
+                    return Box(**place, half=np.abs(self.points[0]))
+                case 5:
+                    return Hull(**place, corners=self.points.reshape(-1, 3, 3))
+                case 6:
+                    corners = self.points.reshape(-1, 3, 3)
+                    return Mesh(**place, corners=corners, thickness=self.size)
+        except OctoMotionError as error:
+            raise MessageError(error.problem) from error
+        raise MessageError(f"an obstacle of shape {self.shape}")
+
+
+class _Placed(TypedDict):
+    position: Floats
+    orientation: Floats
+    velocity: Floats
+    angular_velocity: Floats
+    friction: float | None
 
 
 # --- The bridge and the loop at the device -------------------------------------------------------

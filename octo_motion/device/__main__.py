@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``python -m octo_motion.device``: the program at the devices, and what helps to set them up."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .discovery import Sources
+    from .driver import Driver
+
+# Arrays here are small: threads of a numerical library would only wait for each other. This must be
+# set before numpy is first imported.
+for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m octo_motion.device",
+        description="Six-degree-of-freedom devices of Octo Motion: find, try and serve them.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("list", help="list the devices that are plugged in, and what they lack")
+    watch = commands.add_parser("watch", help="print what the devices say")
+    watch.add_argument("--seconds", type=float, default=10.0, help="for how long")
+    descriptor = commands.add_parser(
+        "descriptor", help="print the report descriptor of the open force profile, for firmware"
+    )
+    descriptor.add_argument("--table", action="store_true", help="print its reports as tables")
+    bridge = commands.add_parser("bridge", help="what Blender starts: simulate, and serve devices")
+    hands = commands.add_parser("hands", help="what the bridge starts: the loop at the devices")
+    for each in (watch, bridge, hands):
+        each.add_argument("--no-hid", action="store_true", help="leave HID devices alone")
+        each.add_argument("--no-haply", action="store_true", help="do not look for Haply's service")
+        each.add_argument("--haply-port", type=int, default=10001, help="of Haply's service")
+        each.add_argument("--simulate", action="store_true", help="add a hand made of numbers")
+        each.add_argument("--udp", type=int, help="port at which a program may be a device")
+        each.add_argument("--tcp", type=int, help="the same over TCP")
+        each.add_argument("--key", default="", help="32 hexadecimal digits, for --udp and --tcp")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    parser = _parser()
+    options = parser.parse_args(given)
+    logging.basicConfig(level=logging.INFO, format="Octo Motion device: %(message)s")
+    if options.command == "list":
+        return _list()
+    if options.command == "descriptor":
+        return _descriptor(table=options.table)
+    sources = _sources(parser, options)
+    if options.command == "watch":
+        return _watch(sources, options.seconds)
+    if options.command == "hands":
+        from . import hand_process  # noqa: PLC0415
+
+        return hand_process.run(sources)
+    from . import bridge_process  # noqa: PLC0415
+
+    return bridge_process.run(given[1:])
+
+
+def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Sources:
+    from .discovery import Sources  # noqa: PLC0415 - numpy after the variables above
+    from .network import KEY_BYTES  # noqa: PLC0415
+
+    if options.udp is not None and options.tcp is not None:
+        parser.error("--udp and --tcp exclude each other")
+    network: tuple[str, int] | None = None
+    key = b""
+    port: int | None = options.tcp if options.udp is None else options.udp
+    if port is not None:
+        network = ("tcp" if options.udp is None else "udp", port)
+        try:
+            key = bytes.fromhex(options.key)
+        except ValueError:
+            key = b""
+        if len(key) != KEY_BYTES:
+            parser.error(f"--key must be {2 * KEY_BYTES} hexadecimal digits")
+        if not 0 <= port <= 0xFFFF:
+            parser.error("a port is a number from 0 to 65535")
+    return Sources(
+        hid=not options.no_hid,
+        haply=not options.no_haply,
+        haply_port=options.haply_port,
+        simulated=options.simulate,
+        network=network,
+        key=key,
+    )
+
+
+def _list() -> int:
+    from ..core.errors import DeviceError  # noqa: PLC0415
+    from .hid import system  # noqa: PLC0415
+    from .hid.force_device import is_force_device  # noqa: PLC0415
+    from .hid.models import model_of  # noqa: PLC0415
+    from .hid.space_mouse import is_space_mouse  # noqa: PLC0415
+
+    try:
+        found = [
+            each for each in system.list_devices() if is_space_mouse(each) or is_force_device(each)
+        ]
+    except DeviceError as error:
+        print(error, file=sys.stderr)
+        return 1
+    if not found:
+        print("No space mouse and no force device is plugged in.")
+    for each in found:
+        model = model_of(each.vendor, each.product)
+        kind = "space mouse" if is_space_mouse(each) else "force device"
+        name = model.name if model else each.name or "unknown"
+        print(f"{each.vendor:04x}:{each.product:04x}  {name} ({kind})")
+        try:
+            system.open_device(each).close()
+        except DeviceError as error:
+            print(f"           {error}")
+    return 0
+
+
+def _descriptor(*, table: bool) -> int:
+    from .hid import force_profile  # noqa: PLC0415
+
+    if table:
+        for number, (way, items) in force_profile.REPORTS.items():
+            print(f"Report {number}, {way}, {force_profile.SIZES[number]} bytes with its number")
+            for each in items:
+                kind = {"B": "u8", "H": "u16", "I": "u32", "h": "i16", "i": "i32"}[each.code]
+                print(f"  {each.name:<20}{kind} × {each.count}  {each.unit}")
+        return 0
+    data = force_profile.report_descriptor()
+    for at in range(0, len(data), 12):
+        print(", ".join(f"0x{byte:02x}" for byte in data[at : at + 12]) + ",")
+    return 0
+
+
+def _watch(sources: Sources, seconds: float) -> int:
+    from .discovery import Discovery  # noqa: PLC0415
+    from .driver import DeviceLostError  # noqa: PLC0415
+
+    discovery = Discovery(sources)
+    drivers: list[Driver] = []
+    end = time.monotonic() + seconds
+    told = 0.0
+    try:
+        while time.monotonic() < end:
+            drivers.extend(discovery.look())
+            for problem in discovery.problems:
+                print(problem, file=sys.stderr)
+            discovery.problems.clear()
+            tell = time.monotonic() - told > 0.1
+            told = time.monotonic() if tell else told
+            for driver in list(drivers):
+                try:
+                    sample = driver.read()
+                    driver.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+                except DeviceLostError:
+                    print(f"{driver.description.name}: gone")
+                    drivers.remove(driver)
+                    discovery.lost(driver.description.identity)
+                    continue
+                if sample is not None and tell:
+                    numbers = (*sample.position, *sample.velocity, *sample.angular_velocity)
+                    shown = " ".join(f"{each:8.4f}" for each in numbers)
+                    print(f"{driver.description.name}: {shown} buttons {sample.buttons:b}")
+            time.sleep(0.002)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        for driver in drivers:
+            driver.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

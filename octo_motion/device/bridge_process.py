@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bridge: the process between Blender and the devices, in which the puppet is simulated.
+
+It starts the process at the devices, steps the puppet, tells Blender poses sixty times a second
+and the devices, at each step, where the held bodies are. When Blender is gone it ends, and with it
+the process at the devices, which takes all force away.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import platform
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from ..core.errors import DeviceError, OctoMotionError
+from ..core.posing.figure import Pose
+from ..core.posing.world import WorldSettings
+from .channel import Channel, ChannelClosedError, Listener
+from .haptics.schedule import Schedule
+from .messages import (
+    Button,
+    DeviceMessage,
+    FigureMessage,
+    Goodbye,
+    Grab,
+    HandMessage,
+    Hello,
+    LoopTimesMessage,
+    Message,
+    MessageError,
+    Notice,
+    ObstacleMessage,
+    Pins,
+    Place,
+    PointerMessage,
+    PoseMessage,
+    Settings,
+    Test,
+    Times,
+    Workspace,
+    WorldMessage,
+)
+from .process import Child, Parent, end_after
+from .simulation import Hand, Simulation
+
+log = logging.getLogger(__name__)
+
+_TELL_EVERY: Final = 1.0 / 60.0
+_IDLE_PERIOD: Final = 2e-3
+_RESTARTS: Final = 3
+
+
+class Bridge:
+    """What the bridge does, turn by turn."""
+
+    def __init__(self, blender: Channel, hand_arguments: Sequence[str]) -> None:
+        self._blender = blender
+        self._hand_arguments = tuple(hand_arguments)
+        self._hands: Child | None = None
+        self._restarts = 0
+        self._told_hello = False
+        self._figure: FigureMessage | None = None
+        self._world = WorldSettings(step=WorldMessage.step)
+        self._obstacles: dict[int, ObstacleMessage] = {}
+        self._remembered: dict[tuple[type[Message], int], Message] = {}
+        self._devices: dict[int, DeviceMessage] = {}
+        self._workspaces: dict[int, Workspace] = {}
+        self._heard: dict[int, HandMessage] = {}
+        self.simulation: Simulation | None = None
+        self._told = 0.0
+
+    @property
+    def period(self) -> float:
+        """S from one turn to the next."""
+        return _IDLE_PERIOD if self.simulation is None else self.simulation.step_seconds
+
+    def start_hands(self) -> None:
+        """Start the process at the devices, and tell it what it needs to know."""
+        python = Path(sys.executable)
+        self._hands = Child.start(("hands", *self._hand_arguments), python)
+        for message in self._remembered.values():
+            self._hands.channel.send(message)
+
+    def turn(self, now: float) -> None:
+        """Hear both sides, go on by a step, tell both sides.
+
+        Raises:
+            ChannelClosedError: Blender is gone.
+        """
+        for message in self._blender.receive():
+            self._hear_blender(message)
+        self._hear_hands()
+        simulation = self.simulation
+        if simulation is not None:
+            for message in self._heard.values():
+                device = self._devices.get(message.pointer)
+                space = self._workspaces.get(message.pointer)
+                simulation.hear(message, device, space.scale if space else 1.0)
+            simulation.step(now)
+            for held in simulation.held(now):
+                self._say_to_hands(held)
+        if now - self._told >= _TELL_EVERY:
+            self._told = now
+            self._tell_blender()
+
+    # --- Blender ---------------------------------------------------------------------------------
+
+    def _hear_blender(self, message: Message) -> None:
+        try:
+            self._take(message)
+        except (MessageError, OctoMotionError) as error:
+            log.warning("Not taken: %s", error)
+            remedy = error.remedy if isinstance(error, OctoMotionError) else ""
+            self._blender.send(Notice(f"The bridge did not take a message: {error}", remedy))
+
+    def _take(self, message: Message) -> None:
+        simulation = self.simulation
+        match message:
+            case FigureMessage():
+                message.figure()  # refused here if it is none
+                self._figure, self.simulation = message, None
+            case Place():
+                self._place(message)
+            case Pins():
+                if simulation is not None:
+                    pinned = frozenset(i for i, pin in enumerate(message.pinned) if pin)
+                    if pinned and max(pinned) >= len(simulation.world.figure):
+                        raise MessageError("a pin on a body that does not exist")
+                    simulation.pin(pinned)
+            case WorldMessage():
+                self._world = message.settings()
+                if simulation is not None:
+                    simulation.change(self._world)
+            case ObstacleMessage():
+                obstacle = message.obstacle()
+                self._obstacles[message.number] = message
+                if simulation is not None:
+                    simulation.put_obstacle(message.number, obstacle)
+            case Settings():
+                message.response()
+                if simulation is not None:
+                    simulation.reach = message.reach
+                self._pass_on(message, 0)
+            case Workspace():
+                if message.scale <= 0.0:
+                    raise MessageError("a workspace without size")
+                self._workspaces[message.pointer] = message
+                self._pass_on(message, message.pointer)
+            case Grab() | Test():
+                self._say_to_hands(message)
+            case Goodbye():
+                raise ChannelClosedError("goodbye")
+            case _:
+                raise MessageError(f"{type(message).__name__} is not for here")
+
+    def _place(self, message: Place) -> None:
+        if self._figure is None:
+            raise MessageError("a pose came before a figure")
+        pose = Pose(message.positions, message.orientations)
+        count = len(self._figure.names)
+        if len(pose.positions) != count or len(pose.orientations) != count:
+            raise MessageError("a pose of another figure")
+        if self.simulation is not None:
+            self.simulation.place(pose)
+            return
+        simulation = Simulation(self._figure.figure(), pose, self._world)
+        for number, obstacle in self._obstacles.items():
+            simulation.put_obstacle(number, obstacle.obstacle())
+        settings = self._remembered.get((Settings, 0))
+        if isinstance(settings, Settings):
+            simulation.reach = settings.reach
+        self.simulation = simulation
+
+    def _pass_on(self, message: Message, number: int) -> None:
+        self._remembered[type(message), number] = message
+        self._say_to_hands(message)
+
+    def _tell_blender(self) -> None:
+        simulation = self.simulation
+        if simulation is not None and simulation.changed:
+            simulation.changed = False
+            pose = simulation.world.pose()
+            self._blender.send(
+                PoseMessage(simulation.steps, simulation.time, pose.positions, pose.orientations),
+                droppable=True,
+            )
+        for pointer, told in self._heard.items():
+            hand = simulation.hands.get(pointer) if simulation else None
+            self._blender.send(self._pointer(told, hand), droppable=True)
+
+    def _pointer(self, told: HandMessage, hand: Hand | None) -> PointerMessage:
+        place, turn, body = told.position, told.orientation, -1
+        if hand is not None and hand.handle is not None and self.simulation is not None:
+            held, turned = self.simulation.coupled(hand.handle)
+            place, turn, body = tuple(held), tuple(turned), hand.handle.body
+        return PointerMessage(
+            *(told.pointer, body, told.position, told.orientation, place, turn),
+            *(told.force, told.torque, told.buttons),
+        )
+
+    # --- The devices -----------------------------------------------------------------------------
+
+    def _say_to_hands(self, message: Message) -> None:
+        if self._hands is not None:
+            try:
+                self._hands.channel.send(message)
+            except ChannelClosedError:
+                self._lose_hands()
+
+    def _hear_hands(self) -> None:
+        if self._hands is None:
+            return
+        try:
+            messages = self._hands.channel.receive()
+        except ChannelClosedError:
+            self._lose_hands()
+            return
+        for message in messages:
+            match message:
+                case HandMessage():
+                    self._heard[message.pointer] = message
+                case DeviceMessage():
+                    self._hear_device(message)
+                case LoopTimesMessage():
+                    self._tell_times(message)
+                case Hello():
+                    self._tell_hello(message)
+                case Button() | Notice():
+                    self._blender.send(message)
+                case _:
+                    log.warning("The devices' process says %s", type(message).__name__)
+
+    def _hear_device(self, message: DeviceMessage) -> None:
+        if message.present:
+            self._devices[message.pointer] = message
+        else:
+            self._devices.pop(message.pointer, None)
+            self._heard.pop(message.pointer, None)
+            if self.simulation is not None:
+                self.simulation.forget(message.pointer)
+        self._blender.send(message)
+
+    def _tell_hello(self, message: Hello) -> None:
+        if not self._told_hello:
+            self._told_hello = True
+            self._blender.send(Hello(os.getpid(), platform.python_version(), message.priority))
+
+    def _tell_times(self, message: LoopTimesMessage) -> None:
+        simulation = self.simulation
+        cost = simulation.cost if simulation else 0.0
+        behind = max(0.0, cost - simulation.step_seconds) if simulation else 0.0
+        self._blender.send(
+            Times(message.rate, message.late, message.computing, message.missed, cost, behind),
+            droppable=True,
+        )
+
+    def _lose_hands(self) -> None:
+        """The process at the devices ended: let go of everything, and start it again."""
+        if self._hands is not None:
+            self._hands.stop(0.0)
+        self._hands = None
+        for pointer, device in list(self._devices.items()):
+            gone = DeviceMessage(
+                *(pointer, False, device.kind, 0.0, 0.0, 0.0, 0.0, device.name, ())
+            )
+            self._hear_device(gone)
+        self._restarts += 1
+        if self._restarts > _RESTARTS:
+            self._blender.send(
+                Notice(
+                    "The program at the devices ends again and again.",
+                    "Unplug the device, then start the bridge again.",
+                )
+            )
+            return
+        log.warning("The process at the devices ended; it is started again")
+        try:
+            self.start_hands()
+        except DeviceError as error:
+            self._blender.send(Notice(error.problem, error.remedy))
+
+    def close(self) -> None:
+        """End the process at the devices."""
+        if self._hands is not None:
+            self._hands.stop(0.5)
+            self._hands = None
+
+
+def run(hand_arguments: Sequence[str]) -> int:
+    """Serve whoever started this process until it is gone; the exit status."""
+    parent = Parent()
+    listener = Listener(parent.secret)
+    parent.announce(listener.port)
+    blender = listener.accept(10.0)
+    if blender is None:
+        log.error("Nobody connected")
+        return 2
+    end_after(1.0, lambda: parent.gone)
+    bridge = Bridge(blender, hand_arguments)
+    schedule = Schedule(bridge.period, sleep=time.sleep)
+    try:
+        try:
+            bridge.start_hands()
+        except DeviceError as error:
+            blender.send(Notice(error.problem, error.remedy))
+        while not parent.gone:
+            schedule.period = bridge.period
+            now = schedule.begin()
+            bridge.turn(now)
+            schedule.end()
+    except ChannelClosedError:
+        pass
+    finally:
+        bridge.close()
+        blender.close()
+    return 0

@@ -1,0 +1,343 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The puppet in the bridge: stepped in real time, held by the hands at the devices."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from ..core.posing.coupling import Coupling
+from ..core.posing.coupling import Grab as Handle
+from ..core.posing.figure import Figure, Pose
+from ..core.posing.obstacles import Obstacle
+from ..core.posing.picking import capsules_in_world
+from ..core.posing.world import World, WorldSettings
+from ..core.rotations import Floats, conjugate, multiply, rotate
+from .haptics.local_model import Pull
+from .messages import DeviceMessage, HandMessage, HeldMessage, Settings
+from .spatial import IDENTITY, ZERO, Vector
+
+log = logging.getLogger(__name__)
+
+COARSEST: Final = 8e-3
+"""s: longer steps are not taken; then simulated time falls behind the clock."""
+BUSY: Final = 0.7
+"""Share of real time that steps may take; above, they get longer."""
+FELT: Final = 0.1
+"""Of the puppet's weight, held with all the force that a device has: what bends a limb is then
+felt as a good part of that."""
+_STILL: Final = 2e-3
+_REST_SECONDS: Final = 0.3
+_PROBE: Final = 1e-3
+"""Of the puppet's weight: the push with which a held body's mobility is measured."""
+_STALE: Final = 0.1
+"""s without a word from a hand: it has let go."""
+
+
+@dataclass
+class Hand:
+    """A pointer, as the simulation knows it."""
+
+    told: HandMessage
+    device: DeviceMessage | None = None
+    scale: float = 1.0
+    """m of the scene for a metre of the hand."""
+    handle: Handle | None = None
+    grab: int = 0
+    """The grab that the handle answers."""
+    refused: int = 0
+    """The grab that found nothing near."""
+    pull: Pull = field(default_factory=Pull)
+
+
+class Simulation:
+    """A world, and the hands in it."""
+
+    def __init__(
+        self,
+        figure: Figure,
+        pose: Pose,
+        settings: WorldSettings,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self.world = World(figure, pose, settings)
+        self.hands: dict[int, Hand] = {}
+        self.reach = Settings.reach
+        self.steps = 0
+        self.cost = 0.0
+        """s that a step takes to compute, of late."""
+        self.time = 0.0
+        """s simulated since the figure came."""
+        self.changed = True
+        """Whether something may have moved since the last time that the pose was told."""
+        self._nominal = settings.step
+        self._clock = clock
+        self._calm = 0.0
+        self._obstacles: dict[int, Obstacle] = {}
+
+    @property
+    def resting(self) -> bool:
+        """Whether nothing is held and nothing moves."""
+        return self._calm >= _REST_SECONDS and not any(each.handle for each in self.hands.values())
+
+    @property
+    def step_seconds(self) -> float:
+        """Of one step, h."""
+        return self.world.settings.step
+
+    # --- What is told ----------------------------------------------------------------------------
+
+    def place(self, pose: Pose) -> None:
+        """Put the puppet into a pose, at rest; hands let go."""
+        for hand in self.hands.values():
+            self._release(hand)
+        self.world.set_pose(pose)
+        self._pin_again(self.world.pinned)
+        self._wake()
+
+    def pin(self, pinned: frozenset[int]) -> None:
+        """Pin these bodies where they are, and no others."""
+        for body in self.world.pinned - pinned:
+            self.world.unpin(body)
+        for body in sorted(pinned - self.world.pinned):
+            self.world.pin(body)
+        self._wake()
+
+    def _pin_again(self, pinned: frozenset[int]) -> None:
+        for body in sorted(pinned):
+            self.world.pin(body)
+
+    def put_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
+        """Add, move or take away something solid."""
+        if obstacle is None:
+            self._obstacles.pop(number, None)
+        else:
+            self._obstacles[number] = obstacle
+        self.world.obstacles = tuple(self._obstacles.values())
+        self._wake()
+
+    def change(self, settings: WorldSettings) -> None:
+        """Take other settings; motion goes on."""
+        self._nominal = settings.step
+        self._rebuild(settings)
+
+    def hear(
+        self, message: HandMessage, device: DeviceMessage | None = None, scale: float = 1.0
+    ) -> None:
+        """Take over where a hand is, what it wants, and grab or let go.
+
+        Args:
+            message: The hand's newest word.
+            device: What it holds in reality.
+            scale: m of the scene for a metre of the hand.
+        """
+        hand = self.hands.setdefault(message.pointer, Hand(message))
+        hand.told, hand.device, hand.scale = message, device, scale
+        if hand.handle is not None and message.grab != hand.grab:
+            self._release(hand)
+        if message.grab and hand.handle is None and message.grab != hand.refused:
+            self._grab(hand)
+
+    def forget(self, pointer: int) -> None:
+        """A hand is gone."""
+        hand = self.hands.pop(pointer, None)
+        if hand is not None:
+            self._release(hand)
+
+    def nearest(self, point: Floats) -> tuple[int, float]:
+        """The body nearest to a point, and how far its surface is; less than 0 within."""
+        figure = self.world.figure
+        ends = capsules_in_world(figure, self.world.pose())
+        axis = ends[:, 1] - ends[:, 0]
+        along = ((point - ends[:, 0]) * axis).sum(axis=1)
+        share = np.clip(along / np.maximum((axis * axis).sum(axis=1), 1e-12), 0.0, 1.0)
+        gaps = np.linalg.norm(ends[:, 0] + share[:, None] * axis - point, axis=1) - figure.radii
+        body = int(np.argmin(gaps))
+        return body, float(gaps[body])
+
+    def _grab(self, hand: Hand) -> None:
+        point, turn = np.array(hand.told.position), np.array(hand.told.orientation)
+        body, gap = self.nearest(point)
+        if gap > self.reach:
+            hand.refused = hand.told.grab
+            return
+        mobility, angular = self._mobility(body, point)
+        coupling = self._coupling(hand)
+        hand.handle = self.world.grab(body, point, turn, coupling)
+        self.world.pull(hand.handle, point, turn)
+        hand.grab = hand.told.grab
+        hand.pull = Pull(
+            *(coupling.stiffness, coupling.damping, coupling.turning_stiffness),
+            *(coupling.turning_damping, mobility, angular),
+        )
+        self._wake()
+
+    def _release(self, hand: Hand) -> None:
+        if hand.handle is not None:
+            self.world.release(hand.handle)
+        hand.handle, hand.grab = None, 0
+        self._wake()
+
+    def _coupling(self, hand: Hand) -> Coupling:
+        """How firmly a hand holds: so that what it can feel fits the puppet's weight.
+
+        The hand feels its own spring over the way by which the body lags behind. A world's
+        spring r times as stiff then means that r newtons on the puppet are one on the hand.
+        """
+        figure = self.world.figure
+        firm = Coupling.for_figure(figure)
+        device = hand.device
+        if device is None or device.force <= 0.0 or device.stiffness <= 0.0:
+            return firm
+        mass = float(figure.masses.sum())
+        ratio = FELT * mass * 9.81 / device.force
+        stiffness = min(firm.stiffness, ratio * device.stiffness / hand.scale)
+        soft = stiffness / firm.stiffness
+        damping = firm.damping * float(np.sqrt(soft))
+        turning, turning_damping = firm.turning_stiffness, firm.turning_damping
+        if device.angular_stiffness > 0.0 and device.torque > 0.0:
+            arm = float(np.median(figure.lengths))
+            torque_ratio = FELT * mass * 9.81 * arm / device.torque
+            wanted = min(turning, torque_ratio * device.angular_stiffness)
+            turning_damping *= float(np.sqrt(wanted / turning))
+            turning = wanted
+        return replace(
+            firm,
+            stiffness=stiffness,
+            damping=damping,
+            turning_stiffness=turning,
+            turning_damping=turning_damping,
+        )
+
+    def _mobility(self, body: int, point: Floats) -> tuple[float, float]:
+        """How easily a body gives way at a point: 1/kg and 1/(kg·m²), averaged over directions.
+
+        Measured, with everything that holds it: one step with a small push each way, against one
+        without, and time turned back after each.
+        """
+        world = self.world
+        before = world.state()
+        h = world.settings.step
+        size = _PROBE * float(world.figure.masses.sum()) * 9.81
+        pose = world.pose()
+        centre = pose.positions[body] + rotate(pose.orientations[body], world.figure.centres[body])
+        lever = point - centre
+
+        def after(force: Floats, torque: Floats) -> tuple[Floats, Floats]:
+            kept = world.forces[body].copy()
+            world.forces[body] += np.concatenate([force, torque + np.cross(lever, force)])
+            world.step()
+            velocity = world.velocities()[body]
+            world.forces[body] = kept
+            world.restore(before)
+            return velocity[:3] + np.cross(velocity[3:], lever), velocity[3:]
+
+        still, still_turning = after(np.zeros(3), np.zeros(3))
+        gives = turns = 0.0
+        for axis in np.eye(3):
+            moved, _ = after(size * axis, np.zeros(3))
+            _, turned = after(np.zeros(3), size * axis)
+            gives += float((moved - still) @ axis)
+            turns += float((turned - still_turning) @ axis)
+        return max(0.0, gives) / (3.0 * size * h), max(0.0, turns) / (3.0 * size * h)
+
+    # --- Time ------------------------------------------------------------------------------------
+
+    def step(self, now: float) -> None:
+        """Go on by one step, with the hands where they were last heard of."""
+        for hand in self.hands.values():
+            if hand.handle is None:
+                continue
+            told = hand.told
+            if now - told.time > _STALE:
+                self._release(hand)
+                continue
+            self.world.pull(
+                hand.handle,
+                np.array(told.position),
+                np.array(told.orientation),
+                np.array((*told.velocity, *told.angular_velocity)),
+            )
+        if self.resting:
+            return
+        before = self._clock()
+        self.world.step()
+        spent = self._clock() - before
+        h = self.step_seconds
+        self.steps += 1
+        self.time += h
+        self.changed = True
+        calm = float(np.abs(self.world.velocities()).max(initial=0.0)) < _STILL
+        self._calm = self._calm + h if calm else 0.0
+        self.cost += 0.05 * (spent - self.cost)
+        self._keep_up()
+
+    def _keep_up(self) -> None:
+        """Lengthen steps that take too long, shorten them when there is time again."""
+        h = self.step_seconds
+        if self.cost > BUSY * h and h < COARSEST:
+            self._rebuild(replace(self.world.settings, step=min(2.0 * h, COARSEST)))
+        elif self.cost < 0.3 * BUSY * h and h > self._nominal:
+            self._rebuild(replace(self.world.settings, step=max(0.5 * h, self._nominal)))
+
+    def _rebuild(self, settings: WorldSettings) -> None:
+        old = self.world
+        self.world = World(
+            *(old.figure, old.pose(), replace(settings, pinned=frozenset()), old.obstacles)
+        )
+        self.world.restore(old.state())
+        self._pin_again(old.pinned)
+        for hand in self.hands.values():
+            if hand.handle is not None:
+                held = hand.handle
+                hand.handle = self.world.grab(
+                    *(held.body, old.held_point(held), held.target_orientation, held.coupling)
+                )
+                hand.handle.point, hand.handle.grip = held.point, held.grip
+                hand.handle.wrench = held.wrench
+        self._wake()
+
+    def _wake(self) -> None:
+        self._calm = 0.0
+        self.changed = True
+
+    # --- What is told back -----------------------------------------------------------------------
+
+    def held(self, now: float) -> Iterator[HeldMessage]:
+        """For each hand that wants something: where what it holds is."""
+        for pointer, hand in self.hands.items():
+            if hand.told.grab:
+                yield self._held(pointer, hand, now)
+
+    def _held(self, pointer: int, hand: Hand, now: float) -> HeldMessage:
+        grab = hand.handle
+        if grab is None:
+            return HeldMessage(pointer, 0, now, ZERO, IDENTITY, ZERO, ZERO, Pull(), ZERO, ZERO)
+        place, turn = self.coupled(grab)
+        velocity = self.world.velocities()[grab.body]
+        pose = self.world.pose()
+        centre = pose.positions[grab.body] + rotate(
+            pose.orientations[grab.body], self.world.figure.centres[grab.body]
+        )
+        at_point = velocity[:3] + np.cross(velocity[3:], place - centre)
+        w, x, y, z = map(float, turn)
+        return HeldMessage(
+            *(pointer, hand.grab, now, _tuple(place), (w, x, y, z)),
+            *(_tuple(at_point), _tuple(velocity[3:]), hand.pull),
+            *(_tuple(grab.wrench[:3]), _tuple(grab.wrench[3:])),
+        )
+
+    def coupled(self, grab: Handle) -> tuple[Floats, Floats]:
+        """Where the held point is, and how a hand would be turned that held it without lag."""
+        turn = multiply(self.world.pose().orientations[grab.body], conjugate(grab.grip))
+        return self.world.held_point(grab), turn
+
+
+def _tuple(values: Floats) -> Vector:
+    x, y, z = map(float, values)
+    return (x, y, z)
