@@ -81,6 +81,14 @@ class Puppet:
         self._written = pose
         return changed
 
+    def local(self, pose: Pose) -> tuple[Floats, Floats]:
+        """A pose as rotations (bodies, 4) from rest and locations (bodies, 3) in the rest frame."""
+        return self._local(self.armature(), pose)
+
+    def forget(self) -> None:
+        """Something else has posed the armature: the next pose is written whole."""
+        self._written = None
+
     def places(self, body: int) -> bool:
         """Whether a body's bone is placed by its location too, not only turned."""
         return bool(self._places[body])

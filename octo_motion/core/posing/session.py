@@ -118,7 +118,10 @@ class Session:
         self._load = 0.0
         self._ratio = 1.0
         self._calm = 0.0
+        self._firm: dict[int, bool] = {}
         self._before: list[WorldState] = []
+        for body in sorted(settings.pinned):
+            self.pin(body, state=True)
 
     # --- The hand -----------------------------------------------------------------------------
 
@@ -157,13 +160,26 @@ class Session:
         """(3,) with which the hand pulls, newton."""
         return np.zeros(3) if self.grip is None else self.grip.handle.wrench[:3].copy()
 
-    def pin(self, body: int, *, state: bool) -> None:
-        """Nail a body to where it is, or take the nail out. A root still turns about its joint."""
+    def pin(self, body: int, *, state: bool, firm: bool = True) -> None:
+        """Nail a body to where it is, or take the nail out.
+
+        Args:
+            body: its index.
+            state: whether it is pinned from now on.
+            firm: whether it keeps its orientation as well as the place of its joint.
+        """
         if state:
-            self.world.pin(body)
+            self._firm[body] = firm
+            self.world.pin(body, firm=firm)
         else:
+            self._firm.pop(body, None)
             self.world.unpin(body)
         self._calm = 0.0
+
+    def _pin_again(self) -> None:
+        """Pins hold where bodies are now: they were put elsewhere."""
+        for body, firm in sorted(self._firm.items()):
+            self.world.pin(body, firm=firm)
 
     # --- Time -----------------------------------------------------------------------------------
 
@@ -249,8 +265,7 @@ class Session:
         old, grip = self.world, self.grip
         self.world = World(self.figure, old.pose(), settings, old.obstacles)
         self.world.restore(old.state())
-        for body in sorted(old.pinned):
-            self.world.pin(body)
+        self._pin_again()
         if grip is not None:
             held = grip.handle
             grip.handle = self.world.grab(
@@ -271,8 +286,7 @@ class Session:
         """Take a pose that was given from elsewhere, at rest; the hand lets go."""
         self.release()
         self.world.set_pose(pose)
-        for body in sorted(self.world.pinned):
-            self.world.pin(body)
+        self._pin_again()
         self._reference = self.world.pose()
         self._before.clear()
         self._calm = 0.0
@@ -282,8 +296,7 @@ class Session:
         self.release()
         self._before.append(self.world.state())
         self.world.set_pose(self._start)
-        for body in sorted(self.world.pinned):
-            self.world.pin(body)
+        self._pin_again()
         self._calm = 0.0
 
     def step_back(self) -> bool:
@@ -292,6 +305,7 @@ class Session:
         if not self._before:
             return False
         self.world.restore(self._before.pop())
+        self._pin_again()
         self._calm = 0.0
         return True
 

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scripts of sessions: JSON with grabs, pulls, pins, waits and keys, checked before they play."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from ..errors import SettingsError
+
+FORMAT: Final = "octo_motion.pose"
+VERSION: Final = 1
+LONGEST: Final = 600.0
+"""Seconds of one step: more is a slip of the pen."""
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of a script; what it does not need is left as it is."""
+
+    do: str
+    bone: str = ""
+    at: float = 0.5
+    """Share of the bone's length, 0 at its head."""
+    by: Vector | None = None
+    """Metres from where the hand is."""
+    to: Vector | None = None
+    """Where the hand goes, world."""
+    turn: Vector = (0.0, 0.0, 0.0)
+    """Axis times angle in degrees, world: how the hand turns on the way."""
+    seconds: float = 0.0
+    frame: int = 0
+    bones: str | tuple[str, ...] = "touched"
+
+
+@dataclass(frozen=True)
+class PoseScript:
+    """A session as data."""
+
+    steps: tuple[Step, ...]
+    settings: Mapping[str, Any]
+    """By name, of ``Object.octo_motion.posing``."""
+
+
+_NEEDED: Final[dict[str, frozenset[str]]] = {
+    "grab": frozenset({"bone"}),
+    "pull": frozenset({"seconds"}),
+    "release": frozenset(),
+    "wait": frozenset({"seconds"}),
+    "pin": frozenset({"bone"}),
+    "unpin": frozenset({"bone"}),
+    "frame": frozenset({"frame"}),
+    "key": frozenset(),
+    "record": frozenset(),
+    "stop": frozenset(),
+    "restore": frozenset(),
+}
+"""Steps, and what each must say."""
+_ALLOWED: Final[dict[str, frozenset[str]]] = {
+    "grab": frozenset({"bone", "at"}),
+    "pull": frozenset({"by", "to", "turn", "seconds"}),
+    "key": frozenset({"bones"}),
+}
+"""What else a step may say, where that is more than it must."""
+
+
+def parse_script(text: str, name: str) -> PoseScript:
+    """Read a script.
+
+    Args:
+        text: JSON.
+        name: of the file, for messages.
+
+    Raises:
+        SettingsError: it is no such script, or a step makes no sense; the message says which.
+    """
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise SettingsError(f"'{name}' is not JSON: {error}.", "Repair it there.") from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise SettingsError(
+            f"'{name}' is no script of posing.", f'It begins with "format": "{FORMAT}".'
+        )
+    if data.get("version") != VERSION:
+        raise SettingsError(
+            f"'{name}' has format version {data.get('version')}.",
+            f"This version of Octo Motion reads version {VERSION}.",
+        )
+    extra = sorted(set(data) - {"format", "version", "settings", "steps"})
+    settings, steps = data.get("settings", {}), data.get("steps")
+    if extra or not isinstance(settings, dict) or not isinstance(steps, list):
+        what = f"an unknown entry '{extra[0]}'" if extra else "no list of steps, or odd settings"
+        raise SettingsError(f"'{name}' has {what}.", "See the scripting reference.")
+    return PoseScript(
+        steps=tuple(_step(each, number) for number, each in enumerate(steps, 1)),
+        settings=settings,
+    )
+
+
+def _step(data: Any, number: int) -> Step:
+    def wrong(what: str) -> SettingsError:
+        return SettingsError(f"Step {number} of the script {what}.", "See the scripting reference.")
+
+    if not isinstance(data, dict) or data.get("do") not in _NEEDED:
+        raise wrong(f"does not say what to do, one of {', '.join(_NEEDED)}")
+    do = data["do"]
+    needed = _NEEDED[do]
+    allowed = _ALLOWED.get(do, needed) | {"do"}
+    if missing := sorted(needed - set(data)):
+        raise wrong(f"('{do}') lacks '{missing[0]}'")
+    if extra := sorted(set(data) - allowed):
+        raise wrong(f"('{do}') has an unknown entry '{extra[0]}'")
+    if (
+        do == "pull"
+        and ("by" in data) == ("to" in data)
+        and not ("turn" in data and "by" not in data)
+    ):
+        raise wrong("('pull') says either 'by' or 'to'")
+    values: dict[str, Any] = {"do": do}
+    for key in set(data) - {"do"}:
+        value = _READERS[key](data[key])
+        if value is None:
+            raise wrong(f"('{do}') has a '{key}' that makes no sense")
+        values[key] = value
+    return Step(**values)
+
+
+def _text(value: Any) -> str | None:
+    return value if isinstance(value, str) and value else None
+
+
+def _share(value: Any) -> float | None:
+    number = _number(value)
+    return number if number is not None and 0.0 <= number <= 1.0 else None
+
+
+def _seconds(value: Any) -> float | None:
+    number = _number(value)
+    return number if number is not None and 0.0 <= number <= LONGEST else None
+
+
+def _number(value: Any) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def _whole(value: Any) -> int | None:
+    return value if isinstance(value, int) and not isinstance(value, bool) else None
+
+
+def _vector(value: Any) -> Vector | None:
+    if not isinstance(value, list) or len(value) != 3:
+        return None
+    numbers = [_number(each) for each in value]
+    x, y, z = numbers
+    return None if x is None or y is None or z is None else (x, y, z)
+
+
+def _names(value: Any) -> str | tuple[str, ...] | None:
+    if value in ("touched", "all"):
+        return value
+    if isinstance(value, list) and value and all(_text(each) for each in value):
+        return tuple(value)
+    return None
+
+
+_READERS: Final[dict[str, Callable[[Any], Any]]] = {
+    "bone": _text,
+    "at": _share,
+    "by": _vector,
+    "to": _vector,
+    "turn": _vector,
+    "seconds": _seconds,
+    "frame": _whole,
+    "bones": _names,
+}

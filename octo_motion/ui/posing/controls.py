@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What mouse and keys do while a puppet is posed: a plain class that needs no window."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any, Final, Protocol
+
+import numpy as np
+
+from ...core.posing.picking import Hit
+from ...core.rotations import IDENTITY, Floats, from_axis_angle, multiply
+from .puppet_session import PuppetSession
+
+HELP: Final = (
+    ("Drag", "pull"),
+    ("Wheel", "depth"),
+    ("R Drag, Ctrl Wheel", "turn"),
+    ("Shift", "fine"),
+    ("G", "grab or free"),
+    ("P", "pin"),
+    ("K", "key touched"),
+    ("Shift K", "key all"),
+    ("O", "record"),
+    ("R", "restore"),
+    ("Ctrl Z", "back"),
+    ("Enter", "keep"),
+    ("Esc", "as it was"),
+)
+FINE: Final = 0.1
+"""Of a movement, with Shift."""
+DEPTH_STEP: Final = 0.03
+"""Of the puppet's size, per notch of the wheel."""
+TURN_STEP: Final = float(np.radians(5.0))
+"""Per notch of the wheel."""
+TURN_PER_PIXEL: Final = float(np.radians(0.5))
+MARGIN: Final = 0.012
+"""By how much a limb may be missed, as a share of its distance."""
+
+_PASSED: Final = frozenset(
+    {
+        *("MIDDLEMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "SPACE", "INBETWEEN_MOUSEMOVE"),
+        *("NDOF_MOTION", "HOME"),
+    }
+)
+_ARROWS: Final = {"LEFT_ARROW": -1, "RIGHT_ARROW": 1}
+
+
+class EyeOn(Protocol):
+    """A viewport."""
+
+    def ray(self, x: float, y: float) -> tuple[Floats, Floats]: ...
+
+    def at_depth(self, x: float, y: float, point: Floats) -> Floats: ...
+
+    def axes(self) -> Floats: ...
+
+
+class Outcome(Enum):
+    """What becomes of an event."""
+
+    TAKEN = "taken"
+    PASSED = "passed"
+    FINISH = "finish"
+    CANCEL = "cancel"
+
+
+class PoseControls:
+    """Mouse and keys on a session.
+
+    Args:
+        session: what they act on.
+    """
+
+    def __init__(self, session: PuppetSession) -> None:
+        self.session = session
+        self.hover: Hit | None = None
+        self.said = ""
+        """The last thing worth telling."""
+        self.hand: Floats | None = None
+        """(3,) where the hand is while it holds, world."""
+        self._turn = IDENTITY.copy()
+        self._latched = False
+        self._turning = False
+        self._pixel: tuple[float, float] | None = None
+
+    @property
+    def holding(self) -> bool:
+        """Whether the hand holds something."""
+        return self.hand is not None
+
+    def tick(self, seconds: float) -> None:
+        """Time has passed."""
+        if self.session.core.grip is None:
+            # A change of frame has taken the puppet out of the hand.
+            self.hand = None
+        self.session.tick(seconds, self.hand, self._turn)
+
+    def handle(self, event: Any, view: EyeOn | None, x: float = 0.0, y: float = 0.0) -> Outcome:
+        """One event.
+
+        Args:
+            event: with Blender's ``type``, ``value``, ``shift``, ``ctrl`` and ``alt``.
+            view: the viewport under the mouse, none beside it.
+            x: the mouse in it, pixels.
+            y: likewise.
+        """
+        kind, press = event.type, event.value == "PRESS"
+        if kind == "LEFTMOUSE" and event.value == "RELEASE" and self.holding and not self._latched:
+            # Wherever the button is let go.
+            self._let_go()
+            return Outcome.TAKEN
+        if view is None:
+            self.hover = None if not self.holding else self.hover
+            return Outcome.PASSED
+        if kind == "MOUSEMOVE":
+            self._move(view, x, y, fine=event.shift)
+            return Outcome.TAKEN if self.holding else Outcome.PASSED
+        if kind in _PASSED or (event.alt and kind == "LEFTMOUSE"):
+            return Outcome.PASSED
+        if kind in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
+            return self._wheel(view, 1.0 if kind == "WHEELUPMOUSE" else -1.0, event)
+        if kind == "R" and event.value == "RELEASE":
+            self._turning = False
+            return Outcome.TAKEN
+        if not press:
+            return Outcome.PASSED
+        return self._press(event, view, x, y)
+
+    def _press(self, event: Any, view: EyeOn, x: float, y: float) -> Outcome:
+        kind = event.type
+        if kind in {"ESC", "RIGHTMOUSE"}:
+            if kind == "RIGHTMOUSE" and not self.holding:
+                return Outcome.PASSED
+            if kind == "RIGHTMOUSE":
+                self._let_go(keep=False)
+                return Outcome.TAKEN
+            return Outcome.CANCEL
+        if kind in {"RET", "NUMPAD_ENTER"}:
+            return Outcome.FINISH
+        if kind == "LEFTMOUSE":
+            if self._latched:
+                self._let_go()
+                return Outcome.TAKEN
+            return self._take(view, x, y)
+        if kind in _ARROWS:
+            scene = self.session.scene()
+            scene.frame_set(scene.frame_current + _ARROWS[kind])
+            return Outcome.TAKEN
+        return self._key(event, view, x, y)
+
+    def _key(self, event: Any, view: EyeOn, x: float, y: float) -> Outcome:
+        session, kind = self.session, event.type
+        if kind == "G":
+            if self.holding:
+                self._let_go()
+            elif self._take(view, x, y) is Outcome.TAKEN:
+                self._latched = True
+        elif kind == "P":
+            self._pin()
+        elif kind == "K":
+            self._say_keys(session.key(all_bones=event.shift))
+        elif kind == "O":
+            self._record()
+        elif kind == "R":
+            if self.holding:
+                self._turning = True
+            else:
+                session.restore()
+                self.said = "As at the start"
+        elif kind == "Z" and (event.ctrl or getattr(event, "oskey", False)):
+            self.hand = None
+            self.said = "Back" if session.step_back() else "Nothing to take back"
+        else:
+            return Outcome.PASSED
+        return Outcome.TAKEN
+
+    # --- The hand -------------------------------------------------------------------------------
+
+    def _take(self, view: EyeOn, x: float, y: float) -> Outcome:
+        hit = self._look(view, x, y)
+        if hit is None:
+            return Outcome.PASSED
+        self.session.grab(hit)
+        self.hand = hit.point / self.session.unit
+        self._turn = IDENTITY.copy()
+        self._pixel = x, y
+        self._turning = False
+        self.said = ""
+        return Outcome.TAKEN
+
+    def _let_go(self, *, keep: bool = True) -> None:
+        self._latched = self._turning = False
+        self.hand = None
+        if keep:
+            self._say_keys(self.session.release(), quiet=True)
+        else:
+            self.session.step_back()
+
+    def _look(self, view: EyeOn, x: float, y: float) -> Hit | None:
+        origin, way = view.ray(x, y)
+        return self.session.pick(origin, way, margin=MARGIN)
+
+    def _move(self, view: EyeOn, x: float, y: float, *, fine: bool) -> None:
+        if not self.holding or self._pixel is None:
+            self.hover = self._look(view, x, y)
+            return
+        assert self.hand is not None
+        (old_x, old_y), self._pixel = self._pixel, (x, y)
+        share = FINE if fine else 1.0
+        if self._turning:
+            right, up, _ = view.axes().T
+            angle = share * TURN_PER_PIXEL
+            turn = multiply(
+                from_axis_angle(up, angle * (x - old_x)),
+                from_axis_angle(right, angle * (old_y - y)),
+            )
+            self._turn = multiply(turn, self._turn)
+            return
+        way = view.at_depth(x, y, self.hand) - view.at_depth(old_x, old_y, self.hand)
+        self.hand = self.hand + share * way
+
+    def _wheel(self, view: EyeOn, notches: float, event: Any) -> Outcome:
+        if self.hand is None:
+            return Outcome.PASSED
+        towards = view.axes()[:, 2]
+        share = notches * (FINE if event.shift else 1.0)
+        if event.ctrl:
+            self._turn = multiply(from_axis_angle(towards, share * TURN_STEP), self._turn)
+        else:
+            size = float(np.ptp(self.session.capsules()[0].reshape(-1, 3), axis=0).max())
+            self.hand = self.hand - share * DEPTH_STEP * size * towards
+        return Outcome.TAKEN
+
+    def _pin(self) -> None:
+        grip = self.session.core.grip
+        body = grip.body if grip is not None else self.hover.body if self.hover else None
+        if body is None:
+            self.said = "Point at a limb to pin it"
+            return
+        pinned = self.session.toggle_pin(body)
+        self.said = f"{self.session.bone(body)} {'pinned' if pinned else 'free again'}"
+
+    def _record(self) -> None:
+        if self.session.recording:
+            bones, count = self.session.stop_record()
+            self.said = f"Recorded {bones} bones on {count} key frames"
+        else:
+            self.session.record()
+            self.said = "Recording while the frames go by: play, and drag"
+
+    def _say_keys(self, names: list[str], *, quiet: bool = False) -> None:
+        if names:
+            self.said = f"Keyed {len(names)} bones at frame {self.session.scene().frame_current}"
+        elif not quiet:
+            self.said = "Nothing to key: no bone was moved"
+
+    def told(self) -> str:
+        """One line about the session, for the header."""
+        session = self.session
+        parts = [f"Posing {session.puppet.name}"]
+        if self.holding and session.core.grip is not None:
+            force = float(np.linalg.norm(session.core.force()))
+            parts.append(f"{session.bone(session.core.grip.body)}: {force:.1f} N")
+        elif self.hover is not None:
+            parts.append(session.bone(self.hover.body))
+        if session.recording:
+            parts.append("● Recording")
+        told = session.told
+        if told is not None and not told.resting and told.ratio < SLOW:
+            parts.append(f"slower than real time: {100.0 * told.ratio:.0f} %")
+        if self.said:
+            parts.append(self.said)
+        return "    ".join(parts)
+
+
+SLOW: Final = 0.9
+"""Simulated against real time, below which the header says so."""

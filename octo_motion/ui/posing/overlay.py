@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn over the viewport while a puppet is posed."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from ...core.posing.wireframe import arrow_lines, capsule_lines, load_colours, pin_lines
+from ...core.rotations import Floats
+from .controls import PoseControls
+from .properties import posing_settings
+
+_HOVERED: Final = (1.0, 1.0, 1.0, 0.9)
+_HELD: Final = (1.0, 0.6, 0.1, 1.0)
+_PIN: Final = (0.2, 0.9, 0.9, 1.0)
+_ARROW: Final = (1.0, 0.45, 0.05, 1.0)
+_ALPHA: Final = 0.55
+
+Lines = list[tuple[Floats, Floats, float]]
+"""Points (2 · lines, 3), colours (2 · lines, 4) and width in pixels."""
+
+
+def overlay_lines(controls: PoseControls, eye: Floats, *, loads: bool = True) -> Lines:
+    """All lines of a session, in the world.
+
+    Args:
+        controls: of the session.
+        eye: (3,) direction towards the eye.
+        loads: whether all limbs are shown, by what they bear.
+    """
+    session = controls.session
+    ends, radii = session.capsules()
+    lines = capsule_lines(ends, radii)
+    found: Lines = []
+    if loads:
+        colours = np.concatenate(
+            [load_colours(session.loads()), np.full((len(radii), 1), _ALPHA)], axis=1
+        )
+        each = np.repeat(colours, 2 * lines.shape[1], axis=0)
+        found.append((lines.reshape(-1, 3), each, 1.0))
+    grip = session.core.grip
+    if grip is not None:
+        found.append(_one_colour(lines[grip.body], _HELD, 2.0))
+        point = session.held_point()
+        if point is not None and controls.hand is not None:
+            found.append(_one_colour(arrow_lines(point, controls.hand, eye), _ARROW, 3.0))
+    elif controls.hover is not None:
+        found.append(_one_colour(lines[controls.hover.body], _HOVERED, 2.0))
+    pins = session.pins()
+    if pins:
+        size = 0.012 * float(np.ptp(ends.reshape(-1, 3), axis=0).max())
+        joints = session.core.pose.positions[pins] / session.unit
+        found.append(_one_colour(pin_lines(joints, size), _PIN, 2.0))
+    return found
+
+
+def _one_colour(lines: Floats, colour: tuple[float, ...], width: float) -> Any:
+    points = lines.reshape(-1, 3)
+    return points, np.tile(np.array(colour), (len(points), 1)), width
+
+
+class Overlay:
+    """The drawing of one session, in all 3D viewports, until it is taken down.
+
+    Args:
+        controls: of the session.
+    """
+
+    def __init__(self, controls: PoseControls) -> None:
+        self._controls = controls
+        self._handle: Any = bpy.types.SpaceView3D.draw_handler_add(
+            self._draw, (), "WINDOW", "POST_VIEW"
+        )
+
+    def take_down(self) -> None:
+        """Draw no more; safe to call twice."""
+        handle, self._handle = self._handle, None
+        if handle is not None:
+            bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
+
+    def _draw(self) -> None:
+        context: Any = bpy.context
+        session = self._controls.session
+        armature = bpy.data.objects.get((session.puppet.name, None))
+        if armature is None or context.region_data is None:
+            return
+        settings: Any = posing_settings(armature)
+        eye = np.array(context.region_data.view_matrix.inverted(), dtype=np.float64)[:3, 2]
+        shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
+        gpu.state.blend_set("ALPHA")
+        gpu.state.depth_test_set("NONE")
+        try:
+            for points, colours, width in overlay_lines(
+                self._controls, eye, loads=settings.show_loads
+            ):
+                if not len(points):
+                    continue
+                batch = batch_for_shader(
+                    shader,
+                    "LINES",
+                    {"pos": points.astype(np.float32), "color": colours.astype(np.float32)},
+                )
+                shader.bind()
+                shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+                shader.uniform_float("lineWidth", width * context.preferences.system.pixel_size)
+                batch.draw(shader)
+        finally:
+            gpu.state.blend_set("NONE")
+            gpu.state.depth_test_set("NONE")

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Pose: the material, the world, the keys."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import bpy
+
+from ...blender.armature import active_armature
+from ...core.errors import RigError
+from .marks import OCTO_MOTION_OT_pose_mark_bones, OCTO_MOTION_OT_pose_obstacle
+from .pose_script import OCTO_MOTION_OT_pose_script
+from .pose_start import OCTO_MOTION_OT_pose_start
+from .properties import posing_settings
+from .puppet_session import active_session
+
+
+class _Panel:
+    """A panel of the tab that is there for armatures."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Octo Motion"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _armature(context) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        armature = _armature(context)
+        assert armature is not None
+        layout = cast("Any", self).layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        # Greyed out where nothing that is set would be saved.
+        layout.enabled = armature.is_editable
+        self.show(context, layout, posing_settings(armature))
+
+    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
+        raise NotImplementedError
+
+
+def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
+    try:
+        return active_armature(context)
+    except RigError:
+        return None
+
+
+class OCTO_MOTION_PT_posing(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_posing"
+    bl_label = "Pose"
+    bl_order = 7
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: Any,
+    ) -> None:
+        layout.prop(settings, "material")
+        layout.prop(settings, "strength")
+        layout.prop(settings, "root")
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(OCTO_MOTION_OT_pose_start.bl_idname, icon="VIEW_PAN")
+        session = active_session()
+        if session is not None:
+            layout.label(text="Enter keeps, Esc takes back", icon="INFO")
+
+
+class OCTO_MOTION_PT_posing_world(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_posing_world"
+    bl_label = "World"
+    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+
+    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
+        layout.prop(settings, "gravity")
+        row = layout.row(heading="Floor")
+        row.prop(settings, "floor", text="")
+        height = row.row()
+        height.active = settings.floor
+        height.prop(settings, "floor_height", text="")
+        layout.prop(settings, "use_obstacles")
+        layout.prop(settings, "self_collision")
+        layout.prop(settings, "friction")
+        item: Any = context.object
+        if item is not None and item.type != "ARMATURE":
+            layout.prop(item.octo_motion.posing, "obstacle")
+        layout.operator_menu_enum(
+            OCTO_MOTION_OT_pose_obstacle.bl_idname, "kind", text="Mark Selected As"
+        )
+
+
+class OCTO_MOTION_PT_posing_bones(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_posing_bones"
+    bl_label = "Limbs"
+    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: Any,
+    ) -> None:
+        layout.prop(settings, "smallest")
+        layout.prop(settings, "show_loads")
+        layout.operator_menu_enum(
+            OCTO_MOTION_OT_pose_mark_bones.bl_idname, "mark", text="Mark Selected Bones"
+        )
+
+
+class OCTO_MOTION_PT_posing_keys(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_posing_keys"
+    bl_label = "Keys"
+    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: Any,
+    ) -> None:
+        layout.prop(settings, "keys_to")
+        if settings.keys_to == "CHOSEN":
+            row = layout.row()
+            row.alert = settings.action is None
+            row.prop(settings, "action")
+        layout.prop(settings, "record_angle")
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator(OCTO_MOTION_OT_pose_script.bl_idname, icon="FILE_SCRIPT")
+
+
+CLASSES: Final[tuple[type, ...]] = (
+    OCTO_MOTION_PT_posing,
+    OCTO_MOTION_PT_posing_world,
+    OCTO_MOTION_PT_posing_bones,
+    OCTO_MOTION_PT_posing_keys,
+)

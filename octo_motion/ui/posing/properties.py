@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``Object.octo_motion.posing``: how an armature behaves in the hand, and what is solid."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
+
+from ...blender.armature import armature_data
+from ...core.posing.bone_roles import SMALLEST
+from ..locomotion.gait_properties import OVERRIDE
+from ..locomotion.properties import make_overridable
+
+MATERIALS: Final = (
+    ("CLAY", "Clay", "Gives way slowly and stays: as soft as it is pulled", 0),
+    ("WIRE", "Wire", "Springs back a little, then keeps its bend", 1),
+    ("DOLL", "Doll", "Ball joints that hold by friction and stay where they are put", 2),
+    ("RUBBER", "Rubber", "Springs back nearly all the way when it is let go", 3),
+    ("LIMP", "Limp", "Hardly resists at all, like a rag doll", 4),
+)
+
+OBSTACLES: Final = (
+    ("NONE", "None", "Puppets pass through this object", 0),
+    ("PLANE", "Plane", "Solid below the object's origin, as far as the eye reaches", 1),
+    ("BOX", "Box", "A solid box as large as the object", 2),
+    ("SPHERE", "Sphere", "A solid ball about the object", 3),
+    ("CAPSULE", "Capsule", "A solid rod with round ends, along the object's longest side", 4),
+    ("HULL", "Convex Hull", "The object's shape without its hollows", 5),
+    ("MESH", "Mesh", "The object's own surface; slow with many faces", 6),
+)
+
+TARGETS: Final = (
+    (
+        "CURRENT",
+        "Current Action",
+        "Keys go into the action that the armature has; without any, into a new one",
+        0,
+    ),
+    (
+        "COPY",
+        "Copy",
+        "Keys go into a copy of the armature's action, which itself stays as it is",
+        1,
+    ),
+    (
+        "LAYER",
+        "New Layer",
+        "The armature's action becomes an NLA strip, and the keys go into a new action above it",
+        2,
+    ),
+    ("CHOSEN", "Chosen Action", "Keys go into the action below, which the armature gets", 3),
+)
+
+
+class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
+    """Settings of posing by hand."""
+
+    # --- The puppet ----------------------------------------------------------------------------
+
+    material: EnumProperty(
+        name="Material",
+        description="What the joints are made of",
+        items=MATERIALS,
+        default="CLAY",
+        override=OVERRIDE,
+    )
+    strength: FloatProperty(
+        name="Strength",
+        description="How hard it is to bend: 1 lets each joint just bear what hangs on it",
+        default=1.0,
+        min=0.01,
+        max=100.0,
+        soft_min=0.1,
+        soft_max=10.0,
+        step=10,
+        override=OVERRIDE,
+    )
+    root: EnumProperty(
+        name="Root",
+        description="Whether the body stays in its place while its limbs are pulled",
+        items=(
+            ("HELD", "Held", "The root bone neither moves nor turns", 0),
+            ("PINNED", "Pinned", "The root bone stays in its place and turns as a joint", 1),
+            ("FREE", "Free", "The whole figure can be carried about", 2),
+        ),
+        override=OVERRIDE,
+    )
+    smallest: FloatProperty(
+        name="Smallest Bone",
+        description="Bones shorter than this share of the figure are no limbs of their own and "
+        "follow the bone they hang on. Raise it to pose a hand without its fingers",
+        subtype="FACTOR",
+        default=SMALLEST,
+        min=0.0,
+        max=1.0,
+        soft_max=0.1,
+        step=1,
+        precision=3,
+        override=OVERRIDE,
+    )
+
+    # --- The world -----------------------------------------------------------------------------
+
+    gravity: BoolProperty(
+        name="Gravity",
+        description="Let the figure have weight",
+        default=False,
+        override=OVERRIDE,
+    )
+    floor: BoolProperty(
+        name="Floor",
+        description="A solid floor through the whole scene",
+        default=False,
+        override=OVERRIDE,
+    )
+    floor_height: FloatProperty(
+        name="Height",
+        description="Height of the floor",
+        subtype="DISTANCE",
+        default=0.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+        override=OVERRIDE,
+    )
+    use_obstacles: BoolProperty(
+        name="Obstacles",
+        description="Objects that are marked as solid stop the figure",
+        default=True,
+        override=OVERRIDE,
+    )
+    self_collision: BoolProperty(
+        name="Self Collision",
+        description="Limbs stop each other. Takes longer to compute",
+        default=False,
+        override=OVERRIDE,
+    )
+    friction: FloatProperty(
+        name="Friction",
+        description="How hard the figure slides on what it touches",
+        default=0.6,
+        min=0.0,
+        max=10.0,
+        soft_max=2.0,
+        step=10,
+        override=OVERRIDE,
+    )
+
+    # --- Keys ------------------------------------------------------------------------------------
+
+    keys_to: EnumProperty(
+        name="Keys",
+        description="Which action gets the keys",
+        items=TARGETS,
+        default="CURRENT",
+        override=OVERRIDE,
+    )
+    action: PointerProperty(
+        name="Action",
+        description="The action that gets the keys",
+        type=bpy.types.Action,
+        override=OVERRIDE,
+    )
+    record_angle: FloatProperty(
+        name="Tolerance Angle",
+        description="How far a recorded motion's keys may be off the motion of the hand, per bone",
+        subtype="ANGLE",
+        default=float(np.radians(1.0)),
+        min=float(np.radians(0.01)),
+        max=float(np.radians(45.0)),
+        step=50,
+        precision=2,
+        override=OVERRIDE,
+    )
+
+    # --- What is shown ------------------------------------------------------------------------
+
+    show_loads: BoolProperty(
+        name="Loads",
+        description="Show the limbs as capsules, redder where a joint bears more",
+        default=True,
+        override=OVERRIDE,
+    )
+
+    # --- For other objects ---------------------------------------------------------------------
+
+    obstacle: EnumProperty(
+        name="Obstacle",
+        description="What puppets take this object for",
+        items=OBSTACLES,
+        default="NONE",
+        override=OVERRIDE,
+    )
+
+
+CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PG_posing,)
+
+
+def posing_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_posing:
+    """The settings of an armature object.
+
+    Raises:
+        RigError: the object is no armature.
+    """
+    armature_data(armature)
+    make_overridable(armature)
+    return cast("OCTO_MOTION_PG_posing", armature.octo_motion.posing)  # type: ignore[attr-defined]
+
+
+def marked_obstacles(scene: bpy.types.Scene) -> list[tuple[bpy.types.Object, str]]:
+    """Objects of a scene that are marked as solid, with what they are taken for."""
+    found: list[tuple[bpy.types.Object, str]] = []
+    for item in scene.objects:
+        own: Any = item
+        kind = own.octo_motion.posing.obstacle
+        if kind != "NONE" and item.visible_get():
+            found.append((item, kind))
+    return found

@@ -1,0 +1,458 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A session of posing on an armature, without a window: the mouse, a device and scripts share it.
+
+Points are in the world and in Blender's units; the puppet's own metres stay inside.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final
+
+import bpy
+import numpy as np
+
+from ...blender.actions import writable_armature
+from ...blender.figure_reading import read_rig
+from ...blender.obstacle_reading import read_obstacle
+from ...blender.pose_keys import Keyed, PoseKeys
+from ...blender.puppet import Puppet
+from ...blender.shown_pose import pose_values, restore_pose
+from ...core.errors import OctoMotionError, RigError
+from ...core.posing.figure import Figure, Pose
+from ...core.posing.figure_building import turned_bodies
+from ...core.posing.obstacles import Obstacle, Plane
+from ...core.posing.picking import Hit, capsules_in_world, pick
+from ...core.posing.presets import elements_for
+from ...core.posing.session import TOUCHED, Sample, Session, Told
+from ...core.posing.world import WorldSettings
+from ...core.rotations import IDENTITY, Floats
+from .properties import marked_obstacles, posing_settings
+
+GRAVITY: Final = (0.0, 0.0, -9.81)
+_CALMING: Final = 3.0
+"""1/s: how fast a free puppet without weight comes to rest."""
+_LOCATION_SHARE: Final = 0.002
+"""Of the figure's size: how far a recorded location's keys may be off."""
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """The settings that may be changed in the panel while the session goes on."""
+
+    material: str
+    strength: float
+    root: str
+    gravity: bool
+    floor: bool
+    floor_height: float
+    use_obstacles: bool
+    self_collision: bool
+    friction: float
+
+    @classmethod
+    def of(cls, settings: Any) -> _Shown:
+        return cls(**{each.name: getattr(settings, each.name) for each in fields(cls)})
+
+    @property
+    def ground(self) -> tuple[bool, float, bool]:
+        """What decides on obstacles."""
+        return self.floor, self.floor_height, self.use_obstacles
+
+
+_active: list[PuppetSession] = []
+
+
+def active_session() -> PuppetSession | None:
+    """The session that is going on, if one is."""
+    return _active[0] if _active else None
+
+
+class PuppetSession:
+    """An armature in a hand, from start to end.
+
+    Args:
+        armature: the armature object.
+        scene: whose frames and obstacles count.
+        clock: as of ``Session``; none makes it repeatable.
+
+    Raises:
+        OctoMotionError: it cannot be posed; nothing has changed then.
+    """
+
+    def __init__(
+        self,
+        armature: bpy.types.Object,
+        scene: bpy.types.Scene,
+        *,
+        clock: Callable[[], float] | None = time.perf_counter,
+    ) -> None:
+        going_on = active_session()
+        if going_on is not None:
+            raise RigError(
+                f"'{going_on.puppet.name}' is being posed already.",
+                "End that session first, with Enter or Esc over its viewport.",
+            )
+        writable_armature(armature)
+        settings: Any = posing_settings(armature)
+        self.puppet = Puppet(armature, read_rig(armature, smallest=settings.smallest))
+        chosen = settings.action.name if settings.action else ""
+        self.keys = PoseKeys(armature, settings.keys_to, chosen)
+        self._scene = scene.name
+        self._shown = _Shown.of(settings)
+        figure = replace(self.puppet.figure, elements=self._elements(self.puppet.figure))
+        self.core = Session(
+            figure,
+            self.puppet.rig.pose,
+            self._world_settings(),
+            self._obstacles(),
+            clock=clock,
+        )
+        self._hold_root()
+        self._values = pose_values(armature)
+        self._frame = self._started = scene.frame_current_final
+        self._recorded: dict[float, Pose] | None = None
+        self._down = False
+        self.told: Told | None = None
+        bpy.app.handlers.frame_change_post.append(self._follow)
+        bpy.app.handlers.load_pre.append(self._file_goes)
+        _active.append(self)
+
+    # --- What is there --------------------------------------------------------------------------
+
+    @property
+    def unit(self) -> float:
+        """Puppet metres of one unit of the world."""
+        return self.puppet.rig.unit
+
+    @property
+    def figure(self) -> Figure:
+        """The puppet."""
+        return self.core.figure
+
+    def scene(self) -> bpy.types.Scene:
+        """The scene of the session.
+
+        Raises:
+            RigError: it is gone.
+        """
+        found = bpy.data.scenes.get(self._scene)
+        if found is None:
+            raise RigError(f"The scene '{self._scene}' is gone.", "Start posing again.")
+        return found
+
+    def bone(self, body: int) -> str:
+        """The bone of a body."""
+        return self.figure.names[body]
+
+    def body(self, bone: str) -> int:
+        """The body of a bone, or the one that a helper bone follows.
+
+        Raises:
+            RigError: there is no such bone, or it follows nothing.
+        """
+        rig = self.puppet.rig
+        number = rig.skeleton.index.get(bone)
+        if number is None:
+            raise RigError(f"'{self.puppet.name}' has no bone '{bone}'.", "Check its name.")
+        body = rig.roles.follows[number]
+        if body < 0:
+            raise RigError(
+                f"The bone '{bone}' is no limb of the puppet.", "Choose one that it carries."
+            )
+        return body
+
+    def capsules(self) -> tuple[Floats, Floats]:
+        """Ends (bodies, 2, 3) and radii (bodies,) of the limbs in the world."""
+        return (
+            capsules_in_world(self.figure, self.core.pose) / self.unit,
+            self.figure.radii / self.unit,
+        )
+
+    def held_point(self) -> Floats | None:
+        """(3,) the point in the hand, world."""
+        point = self.core.held_point()
+        return None if point is None else point / self.unit
+
+    def loads(self) -> Floats:
+        """(bodies,) what each joint bears, 1 where it begins to give way."""
+        loads = np.linalg.norm(self.core.world.joint_loads(), axis=1)
+        limit = self.figure.elements.yield_torque
+        bounded = np.isfinite(limit) & (limit > 0.0)
+        return np.divide(loads, limit, out=np.zeros_like(loads), where=bounded)
+
+    def pins(self) -> list[int]:
+        """Bodies that the artist has nailed to their places, or that are by the settings."""
+        return sorted(self.core.pins)
+
+    # --- The hand -------------------------------------------------------------------------------
+
+    def pick(self, origin: Floats, direction: Floats, *, margin: float = 0.0) -> Hit | None:
+        """The body that a ray of the world meets; the hit's point is in the puppet's metres."""
+        return pick(self.figure, self.core.pose, origin * self.unit, direction, margin=margin)
+
+    def grab(self, hit: Hit) -> None:
+        """Take hold of a body."""
+        self.core.grab(hit)
+
+    def grab_bone(self, bone: str, share: float) -> Floats:
+        """Take hold of a bone by name, at a share of its length; the point (3,) in the world."""
+        body = self.body(bone)
+        pose = self.core.pose
+        start, end = capsules_in_world(self.figure, pose)[body]
+        # Capsules end a radius before the limb does.
+        way = end - start
+        size = float(np.linalg.norm(way))
+        radius = self.figure.radii[body] * (way / size if size > 0.0 else way)
+        point = (start - radius) + share * (way + 2.0 * radius) if size > 1e-9 else start
+        self.core.grab(Hit(body, point, 0.0))
+        return point / self.unit
+
+    def release(self) -> list[str]:
+        """Let go; with auto keying, what the hand has moved gets keys. The keyed bones."""
+        if self.core.grip is None:
+            return []
+        self.core.release()
+        tools = self.scene().tool_settings
+        if tools is not None and tools.use_keyframe_insert_auto and self._recorded is None:
+            return self.key()
+        return []
+
+    def toggle_pin(self, body: int) -> bool:
+        """Nail a body to its place or take the nail out; whether it is pinned now."""
+        state = body not in self.core.pins
+        self.core.pin(body, state=state)
+        return state
+
+    # --- Time -----------------------------------------------------------------------------------
+
+    def tick(
+        self, seconds: float, position: Floats | None = None, turn: Floats | None = None
+    ) -> Told:
+        """Simulate, and pose the armature.
+
+        Args:
+            seconds: real time since the last tick.
+            position: (3,) of the hand, world.
+            turn: (4,) of the hand since it took hold.
+
+        Raises:
+            RigError: the armature is gone, changed or in edit mode.
+        """
+        armature = self.puppet.armature()
+        if armature.mode == "EDIT":
+            raise RigError(f"'{armature.name}' is in edit mode.", "Leave it and start again.")
+        self._apply_settings(armature)
+        sample = None
+        if position is not None:
+            sample = Sample(position * self.unit, IDENTITY if turn is None else turn)
+        self.told = self.core.tick(seconds, sample)
+        if not self.told.resting:
+            self.puppet.write(self.core.pose)
+        return self.told
+
+    # --- Keys -----------------------------------------------------------------------------------
+
+    def key(self, *, all_bones: bool = False, bones: Iterable[str] | None = None) -> list[str]:
+        """Key the bones that were touched, or all limbs, at the current frame.
+
+        Returns:
+            The bones that got a key.
+        """
+        if bones is not None:
+            bodies = [self.body(each) for each in bones]
+        else:
+            bodies = list(range(len(self.figure))) if all_bones else self.core.touched()
+        keyed = [Keyed(self.bone(body), self.puppet.places(body)) for body in bodies]
+        if not keyed:
+            return []
+        return self.keys.insert(self.puppet.armature(), keyed, self.scene().frame_current_final)
+
+    @property
+    def recording(self) -> bool:
+        """Whether the motion of the drag is kept while the frames go by."""
+        return self._recorded is not None
+
+    def record(self) -> None:
+        """Begin to keep the pose at each frame, from this one on."""
+        self._recorded = {self.scene().frame_current_final: self.core.pose}
+
+    def stop_record(self) -> tuple[int, int]:
+        """Write what was kept as few keys; number of bones and of key frames."""
+        recorded, self._recorded = self._recorded, None
+        if recorded is None or len(recorded) < 2:
+            return 0, 0
+        frames = np.array(sorted(recorded))
+        poses = [recorded[frame] for frame in frames]
+        moved: set[int] = set()
+        for pose in poses[1:]:
+            moved |= set(turned_bodies(self.figure, poses[0], pose, TOUCHED))
+        if not moved:
+            return 0, 0
+        local = [self.puppet.local(pose) for pose in poses]
+        rotations = {
+            self.bone(body): np.stack([turns[body] for turns, _ in local]) for body in sorted(moved)
+        }
+        locations = {
+            self.bone(body): np.stack([places[body] for _, places in local])
+            for body in sorted(moved)
+            if self.puppet.places(body)
+        }
+        settings: Any = posing_settings(self.puppet.armature())
+        size = float(np.ptp(self.puppet.rig.skeleton.heads, axis=0).max())
+        count = self.keys.insert_motion(
+            self.puppet.armature(),
+            frames,
+            rotations,
+            locations,
+            angle=settings.record_angle,
+            distance=_LOCATION_SHARE * size,
+        )
+        return len(rotations), count
+
+    # --- Ends -----------------------------------------------------------------------------------
+
+    def restore(self) -> None:
+        """Back to the pose at the start; keys stay."""
+        self.core.restore()
+        self.puppet.write(self.core.pose)
+
+    def step_back(self) -> bool:
+        """Back to before the last grab; whether there was one."""
+        done = self.core.step_back()
+        if done:
+            self.puppet.write(self.core.pose)
+        return done
+
+    def finish(self) -> None:
+        """End, and keep the pose and the keys; safe to call twice."""
+        if not self._down:
+            self.core.release()
+            if self._recorded is not None:
+                self.stop_record()
+            self._leave()
+
+    def cancel(self) -> None:
+        """End, and put back pose and keys as they were; safe to call twice."""
+        if self._down:
+            return
+        self.core.release()
+        self._leave()
+        try:
+            armature = self.puppet.armature()
+            scene = self.scene()
+        except OctoMotionError:
+            return
+        self.keys.take_back(armature)
+        restore_pose(armature, self._values)
+        if scene.frame_current_final != self._started:
+            # What has keys is at another frame now.
+            scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
+
+    def abandon(self) -> None:
+        """End without touching the file, which is about to go; safe to call twice."""
+        if not self._down:
+            self._leave()
+
+    @property
+    def ended(self) -> bool:
+        """Whether it is over."""
+        return self._down
+
+    def _file_goes(self, *_: object) -> None:
+        self.abandon()
+
+    def _leave(self) -> None:
+        self._down = True
+        followers, loaders = bpy.app.handlers.frame_change_post, bpy.app.handlers.load_pre
+        if self._follow in followers:
+            followers.remove(self._follow)
+        if self._file_goes in loaders:
+            loaders.remove(self._file_goes)
+        if self in _active:
+            _active.remove(self)
+
+    # --- Inside ---------------------------------------------------------------------------------
+
+    def _follow(self, scene: bpy.types.Scene, *_: object) -> None:
+        """A change of frame poses the armature as its action says."""
+        if scene.name != self._scene or scene.frame_current_final == self._frame:
+            return
+        self._frame = scene.frame_current_final
+        try:
+            self.puppet.forget()
+            if self._recorded is None:
+                self.core.adopt(self.puppet.read())
+            else:
+                self._record_frame(self._frame)
+            if marked_obstacles(scene):
+                self.core.change_obstacles(self._obstacles())
+        except OctoMotionError:
+            # The next tick says what is wrong.
+            return
+
+    def _record_frame(self, frame: float) -> None:
+        assert self._recorded is not None
+        if self._recorded and frame < max(self._recorded):
+            # Playback has come round, or someone has gone back: the take is complete.
+            self.stop_record()
+            self.core.adopt(self.puppet.read())
+            return
+        self._recorded[frame] = self.core.pose
+        self.puppet.write(self.core.pose)
+
+    def _apply_settings(self, armature: bpy.types.Object) -> None:
+        settings: Any = posing_settings(armature)
+        shown = _Shown.of(settings)
+        if shown == self._shown:
+            return
+        before, self._shown = self._shown, shown
+        if (before.material, before.strength) != (shown.material, shown.strength):
+            self.core.change_elements(self._elements(self.figure))
+        if before.ground != shown.ground:
+            self.core.change_obstacles(self._obstacles())
+        wanted = self._world_settings()
+        self.core.change(
+            gravity=wanted.gravity,
+            self_collision=wanted.self_collision,
+            friction=wanted.friction,
+            drag=wanted.drag,
+        )
+        if before.root != shown.root:
+            self._hold_root()
+
+    def _elements(self, figure: Figure) -> Any:
+        return elements_for(figure, self._shown.material.lower(), self._shown.strength)
+
+    def _world_settings(self) -> WorldSettings:
+        shown = self._shown
+        calm = shown.root == "FREE" and not shown.gravity
+        return WorldSettings(
+            gravity=GRAVITY if shown.gravity else (0.0, 0.0, 0.0),
+            self_collision=shown.self_collision,
+            friction=shown.friction,
+            drag=_CALMING if calm else 0.0,
+        )
+
+    def _hold_root(self) -> None:
+        for body, parent in enumerate(self.figure.parents):
+            if parent < 0:
+                if self._shown.root == "FREE":
+                    self.core.pin(body, state=False)
+                else:
+                    self.core.pin(body, state=True, firm=self._shown.root == "HELD")
+
+    def _obstacles(self) -> list[Obstacle]:
+        obstacles: list[Obstacle] = []
+        if self._shown.floor:
+            height = self._shown.floor_height * self.unit
+            obstacles.append(Plane(position=np.array([0.0, 0.0, height])))
+        if self._shown.use_obstacles:
+            obstacles += [
+                read_obstacle(item, kind, self.unit)
+                for item, kind in marked_obstacles(self.scene())
+                if item.name != self.puppet.name
+            ]
+        return obstacles
