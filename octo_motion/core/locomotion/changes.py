@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From one way of moving to another along the route: walk, crawl and swim.
+
+Body and arms do not change together. The body goes over from one way to the other along a stretch
+of the route. An arm goes over while it holds on to nothing: from when it lets go of its last
+foothold of the one way until it takes its first of the other. So nothing slips, and a body that
+swims away is still pushed off by the arms that let go last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SettingsError
+from ..rotations import Floats, conjugate, from_rotation_vector, multiply, to_rotation_vector
+
+_LEAST: Final = 0.25
+"""Share of a change that an arm has at least to go over in."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Where one way of moving becomes another. Metres along the route."""
+
+    start: float
+    end: float
+    way: int
+    """Number of the way from here on; 0 is the one that the route begins with."""
+
+    @property
+    def middle(self) -> float:
+        """Halfway."""
+        return 0.5 * (self.start + self.end)
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """When each arm goes over at one change, and the footholds that it does without."""
+
+    start: Floats
+    """(arms,) metres along the route."""
+    end: Floats
+    """(arms,)"""
+    dropped_before: tuple[NDArray[np.bool_], ...]
+    """For each arm, which holds of the way before are left out."""
+    dropped_after: tuple[NDArray[np.bool_], ...]
+    """For each arm, which holds of the way after."""
+
+
+def check_changes(changes: Sequence[Change], length: float) -> tuple[Change, ...]:
+    """The changes in the order of the route.
+
+    Raises:
+        SettingsError: one is not on the route, or two overlap.
+    """
+    ordered = tuple(sorted(changes, key=lambda each: each.middle))
+    for each in ordered:
+        if not (np.isfinite(each.start) and np.isfinite(each.end) and each.end > each.start):
+            raise SettingsError("A change of gait has no length.", "Give it one above 0.")
+        if each.middle < 0.0 or each.middle > length:
+            raise SettingsError(
+                "A change of gait is not on the route.", "Give it a place from 0 to 1."
+            )
+    for before, after in pairwise(ordered):
+        if after.start < before.end - 1e-9:
+            raise SettingsError(
+                "Two changes of gait overlap.", "Move them apart, or make them shorter."
+            )
+    return ordered
+
+
+def changes_by_height(
+    distance: Floats, height: Floats, *, take_off: float, length: float
+) -> tuple[Change, ...]:
+    """Way 1 wherever the route is higher over the ground than so much, way 0 elsewhere.
+
+    Args:
+        distance: (samples,) metres along the route, ascending.
+        height: (samples,) metres over the ground.
+        take_off: metres.
+        length: metres that each change is long. Shorter stretches of either way are left out.
+    """
+    above = height > take_off
+    borders = np.flatnonzero(above[1:] != above[:-1])
+    found: list[Change] = [Change(-length, 0.0, 1)] if above[0] else []
+    for border in borders:
+        rise = height[border + 1] - height[border]
+        share = (take_off - height[border]) / rise
+        middle = distance[border] + share * (distance[border + 1] - distance[border])
+        way = int(above[border + 1])
+        if found and middle - found[-1].middle < 1.5 * length:
+            # There and back within one change: neither is worth its while.
+            found.pop()
+            continue
+        found.append(Change(float(middle - 0.5 * length), float(middle + 0.5 * length), way))
+    return tuple(found)
+
+
+def eased(share: Floats) -> Floats:
+    """From 0 to 1 with neither slope nor bend at the ends."""
+    t = np.clip(share, 0.0, 1.0)
+    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
+
+
+def way_weights(changes: Sequence[Change], ways: int, distance: Floats) -> Floats:
+    """How far the body goes each way (…, ways) at distances (…,); they sum to 1."""
+    weights = np.zeros((*distance.shape, ways))
+    weights[..., 0] = 1.0
+    for change in changes:
+        over = eased((distance - change.start) / (change.end - change.start))
+        weights *= (1.0 - over)[..., None]
+        weights[..., change.way] += over
+    return weights
+
+
+def windows(
+    change: Change,
+    before: Sequence[tuple[Floats, Floats]],
+    after: Sequence[tuple[Floats, Floats]],
+) -> Windows:
+    """When each arm goes over from one way to the other.
+
+    Args:
+        change: where.
+        before: for each arm, where its holds (holds,) of the way before begin and end, ascending.
+        after: the same of the way after.
+    """
+    least = _LEAST * (change.end - change.start)
+    starts, ends = np.empty(len(before)), np.empty(len(before))
+    first_drops, last_drops = [], []
+    for arm, ((on, off), (next_on, next_off)) in enumerate(zip(before, after, strict=True)):
+        # A hold that begins before the middle is held to its end, if that leaves time to go over.
+        dropped = (0.5 * (on + off) > change.middle) | (off > change.end - least)
+        kept = off[~dropped]
+        start = max(change.start, float(kept.max()) if len(kept) else change.start)
+        late = (0.5 * (next_on + next_off) < change.middle) | (next_on < start + least)
+        coming = next_on[~late]
+        end = min(change.end, float(coming.min()) if len(coming) else change.end)
+        starts[arm], ends[arm] = start, max(end, start + least)
+        first_drops.append(dropped)
+        last_drops.append(late)
+    return Windows(starts, ends, tuple(first_drops), tuple(last_drops))
+
+
+def between(first: Floats, second: Floats, share: Floats) -> Floats:
+    """Rotations (…, 4) a share (…,) of the shortest way from one to the other."""
+    turn = to_rotation_vector(multiply(conjugate(first), second))
+    return multiply(first, from_rotation_vector(share[..., None] * turn))
