@@ -40,11 +40,9 @@ class Solution:
     impulses: Floats
     """(rows, 3)"""
     iterations: int
-    """Linear systems solved."""
+    """Linear systems solved to find it."""
     miss: float
-    """Largest difference of an impulse from its law, N·s or N·m·s."""
-    converged: bool
-    """Whether that is within the tolerance."""
+    """Largest difference of an impulse from its law, against the largest impulse of its kind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,45 +92,40 @@ class Newton:
         tree.place(problem.joints)
         slots = len(tree.layout.bodies)
         composite = (tree.beyond @ inertias.reshape(-1, 36)).reshape(slots, 6, 6)
-        speeds, moving = start, start
+        speeds = start
         velocities = tree.velocities(speeds)
         joints = self._joints(problem, speeds)
         tangent = rows.tangent(impulses, rows.speeds(velocities)) if len(rows) else None
-        pushes = _NO_ROWS
-        miss = np.inf
-        converged = False
-        count = 0
-        while count < self._iterations and not converged:
-            count += 1
+        mean: tuple[Floats, Floats] | None = None
+        best: Solution | None = None
+        for count in range(1, self._iterations + 1):
             solved = self._linear(problem, composite, joints, tangent, corrections)
             speeds = np.ascontiguousarray(solved[..., 0])
-            moving = solved[..., -1]
             velocities = tree.velocities(speeds)
             now = self._joints(problem, speeds)
             change = (now.speeds - joints.speeds)[:, :, None]
             expected = joints.impulses - (joints.slopes @ change)[:, :, 0]
-            miss = float(np.abs(expected - now.impulses).max())
-            converged = miss <= self._tolerance * (float(np.abs(now.impulses).max()) + _LEAST)
+            miss = _relative(float(np.abs(expected - now.impulses).max()), now.impulses)
             joints = now
+            pushes = _NO_ROWS
             if tangent is not None:
                 row_speeds = rows.speeds(velocities)
                 pushes = tangent.impulses(row_speeds)
                 tangent = rows.tangent(pushes, row_speeds)
-                miss = max(miss, tangent.miss)
-                converged &= tangent.miss <= self._tolerance * (
-                    float(np.abs(pushes).max()) + _LEAST
+                miss = max(miss, _relative(tangent.miss, pushes))
+            if best is None or miss < best.miss:
+                moving = speeds if corrections is None else solved[..., 1]
+                best = Solution(
+                    speeds, velocities, moving, now.loads, now.flow, pushes, count, miss
                 )
-        return Solution(
-            speeds,
-            velocities,
-            speeds if corrections is None else moving,
-            joints.loads,
-            joints.flow,
-            pushes,
-            count,
-            miss,
-            converged,
-        )
+            if miss <= self._tolerance:
+                break
+            if tangent is not None and count > 1:
+                # Contacts that change their minds by turns settle on what they think on average.
+                mean = (pushes, row_speeds) if mean is None else _mixed(mean, pushes, row_speeds)
+                tangent = rows.tangent(*mean)
+        assert best is not None
+        return best
 
     def _joints(self, problem: Problem, speeds: Floats) -> _Joints:
         joint_speeds = speeds[self._tree.joint_slot]
@@ -239,5 +232,19 @@ def _add_stops(stops: Stops, step: float, speeds: Floats, impulses: Floats, slop
     slopes[stops.joints] += stiff[:, None, None] * (stops.axes[:, :, None] * stops.axes[:, None, :])
 
 
+def _relative(miss: float, impulses: Floats) -> float:
+    return miss / (float(np.abs(impulses).max()) + _LEAST)
+
+
+def _mixed(mean: tuple[Floats, Floats], impulses: Floats, speeds: Floats) -> tuple[Floats, Floats]:
+    old_impulses, old_speeds = mean
+    return (
+        old_impulses + _NEWS * (impulses - old_impulses),
+        old_speeds + _NEWS * (speeds - old_speeds),
+    )
+
+
 _LEAST = 1e-12
+_NEWS = 0.6
+"""Share of the newest impulses and velocities in their running mean."""
 _NO_ROWS = np.zeros((0, 3))

@@ -65,10 +65,11 @@ class WorldSettings:
     """Coulomb's coefficient where an obstacle has none of its own."""
     drag: float = 0.0
     """1/s: how fast all motion dies away, as under water; calms a free puppet without weight."""
-    tolerance: float = 1e-4
-    """Relative error of the impulses with which the solver is content."""
-    iterations: int = 24
-    """Most linear systems solved in a step."""
+    tolerance: float = 1e-3
+    """Error of an impulse, against the largest, with which the solver is content. Where contacts
+    neither slip nor open, and in all joints that hold, its answer is exact whatever this says."""
+    iterations: int = 12
+    """Most linear systems solved in a step; after that the best answer so far is taken."""
 
 
 @dataclass(frozen=True, eq=False)
