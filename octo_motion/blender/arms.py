@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import bpy
 import numpy as np
@@ -43,22 +42,6 @@ def require_editable(armature: bpy.types.Object) -> None:
             f"'{armature.name}' is a library override that is not editable.",
             "Make it editable: select it and choose Object > Library Override > Make.",
         )
-
-
-def linked_arm_names(settings: bpy.types.PropertyGroup) -> frozenset[str]:
-    """Names of the arms that a library override has from its linked file.
-
-    Blender allows to change their settings, but neither to rename, remove nor reorder them; arms
-    added in this file are free.
-
-    Args:
-        settings: the object's settings, with its list of arms.
-    """
-    override = settings.id_data.override_library if settings.id_data else None
-    if override is None or override.reference is None:
-        return frozenset()
-    original: Any = override.reference.path_resolve(settings.path_from_id())
-    return frozenset(arm.name for arm in original.arms)
 
 
 def hidden_bones(armature: bpy.types.Object, names: Iterable[str]) -> tuple[str, ...]:

@@ -10,7 +10,8 @@ from typing import Any, Final, cast
 import bpy
 
 from ...blender.armature import armature_data
-from ...blender.arms import linked_arm_names, world_directions
+from ...blender.arms import world_directions
+from ...blender.overrides import linked_names
 from ...core.locomotion.chains import ArmChain, Side, nearest_axis
 from ...core.locomotion.detection import Detection
 from ...core.skeleton import Skeleton
@@ -61,7 +62,7 @@ def write_arms(settings: OCTO_MOTION_PG_locomotion, arms: Iterable[ArmChain]) ->
 
     Returns how many arms of a linked file could only be switched off.
     """
-    linked = linked_arm_names(settings)
+    linked = linked_names(settings, "arms")
     kept: dict[tuple[str, ...], dict[str, Any]] = {}
     for number in reversed(range(len(settings.arms))):
         item = settings.arms[number]

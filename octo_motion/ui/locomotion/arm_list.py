@@ -13,7 +13,6 @@ from bpy.props import BoolProperty, EnumProperty
 from ...blender.armature import active_armature, armature_data, read_skeleton, selected_bones
 from ...blender.arms import (
     hidden_bones,
-    linked_arm_names,
     require_editable,
     select_pose_bones,
     world_directions,
@@ -26,6 +25,7 @@ from ...core.locomotion.chains import (
     place_added,
 )
 from ...core.locomotion.detection import detect_arms
+from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from . import arm_properties
 from .arm_items import (
     active_arm,
@@ -38,7 +38,6 @@ from .arm_items import (
     write_arms,
     write_body,
 )
-from .armature_operator import ArmatureOperator
 from .properties import AXES, OCTO_MOTION_PG_locomotion, locomotion_settings
 
 _SIDE_LETTERS: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": "-"}
@@ -81,35 +80,26 @@ class OCTO_MOTION_UL_arms(bpy.types.UIList):
         row.label(text=f"{math.degrees(item.phase):.0f}°")
 
 
-class _ArmListOperator(ArmatureOperator):
-    """An operator on the list of the active armature."""
-
-    def run(self, context: bpy.types.Context) -> None:
-        armature = active_armature(context)
-        require_editable(armature)
-        self.edit(context, armature, locomotion_settings(armature))
-
-    def edit(
-        self,
-        context: bpy.types.Context,
-        armature: bpy.types.Object,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
-        """Do the work on an armature that can be edited."""
-        raise NotImplementedError
+_ARMS: Final = ListKind(
+    settings=locomotion_settings,
+    check=require_editable,
+    items="arms",
+    active="active_arm",
+    one="an arm",
+    instead="Switch it off with its checkbox instead.",
+)
 
 
-class _ActiveArmOperator(_ArmListOperator):
+class _ArmListOperator(ListOperator):
+    """An operator on the list of arms."""
+
+    KIND = _ARMS
+
+
+class _ActiveArmOperator(ItemOperator):
     """An operator on the list's active arm."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if active_arm(locomotion_settings(active_armature(context))) is None:
-            cls.poll_message_set("Choose an arm in the list first")  # type: ignore[attr-defined]
-            return False
-        return True
+    KIND = _ARMS
 
 
 class OCTO_MOTION_OT_detect_arms(_ArmListOperator, bpy.types.Operator):
@@ -207,69 +197,20 @@ class OCTO_MOTION_OT_arm_add(_ArmListOperator, bpy.types.Operator):
             )
 
 
-class OCTO_MOTION_OT_arm_remove(_ActiveArmOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_arm_remove(RemoveOperator, bpy.types.Operator):
     bl_idname = "octo_motion.arm_remove"
     bl_label = "Remove Arm"
     bl_description = "Take the active arm off the list. Its bones and their keys stay as they are"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
-        name = settings.arms[settings.active_arm].name
-        if name in linked_arm_names(settings):
-            raise RigError(
-                f"'{name}' is in the linked file and cannot be removed here.",
-                "Switch it off with its checkbox instead.",
-            )
-        settings.arms.remove(settings.active_arm)
-        settings.active_arm = max(0, min(settings.active_arm, len(settings.arms) - 1))
+    KIND = _ARMS
 
 
-class OCTO_MOTION_OT_arm_move(_ActiveArmOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_arm_move(MoveOperator, bpy.types.Operator):
     bl_idname = "octo_motion.arm_move"
     bl_label = "Move Arm"
     bl_description = (
         "Move the active arm in the list. The order is for you; gaits go by side and pair"
     )
-    bl_options = {"REGISTER", "UNDO"}
-
-    direction: EnumProperty(
-        name="Direction",
-        items=(
-            ("UP", "Up", "Towards the first"),
-            ("DOWN", "Down", "Towards the last"),
-        ),
-    )
-
-    def execute(self, context: bpy.types.Context) -> set[Any]:
-        settings = locomotion_settings(active_armature(context))
-        if not 0 <= self._target(settings) < len(settings.arms):
-            # It is the first or the last already: no undo step for that.
-            return {"CANCELLED"}
-        return super().execute(context)
-
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
-        name = settings.arms[settings.active_arm].name
-        if name in linked_arm_names(settings):
-            raise RigError(
-                f"'{name}' is in the linked file, where the order of its arms is set.",
-                "Move arms that were added in this file, or change the order there.",
-            )
-        target = self._target(settings)
-        settings.arms.move(settings.active_arm, target)
-        settings.active_arm = target
-
-    def _target(self, settings: OCTO_MOTION_PG_locomotion) -> int:
-        return settings.active_arm + (-1 if self.direction == "UP" else 1)
+    KIND = _ARMS
 
 
 class OCTO_MOTION_OT_arm_flip(_ActiveArmOperator, bpy.types.Operator):

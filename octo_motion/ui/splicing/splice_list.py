@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final
 
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
 from ...blender.actions import writable_armature
 from ...blender.armature import active_armature
-from ...blender.overrides import linked_names
 from ...core.errors import ClipError
-from ..locomotion.armature_operator import ArmatureOperator
+from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from .properties import splicing_settings
 from .splice_properties import PARTS
 from .stack import Reader
@@ -22,12 +21,6 @@ if TYPE_CHECKING:
 
 _SPARE_EASE: Final = 0.25
 """Of a clip's length: longer easing would leave little of a short clip."""
-
-
-def active_splice(settings: Any) -> Any:
-    """The list's active splice, ``None`` in an empty list."""
-    number = settings.active_splice
-    return settings.splices[number] if 0 <= number < len(settings.splices) else None
 
 
 class OCTO_MOTION_UL_splices(bpy.types.UIList):
@@ -58,30 +51,31 @@ class OCTO_MOTION_UL_splices(bpy.types.UIList):
         start.label(text=f"{item.base_start:g}")
 
 
-class StackOperator(ArmatureOperator):
+_SPLICES: Final = ListKind(
+    settings=splicing_settings,
+    check=writable_armature,
+    items="splices",
+    active="active_splice",
+    one="a splice",
+    instead="Mute it instead.",
+)
+
+
+def active_splice(settings: Any) -> Any:
+    """The list's active splice, ``None`` in an empty list."""
+    return _SPLICES.active_item(settings)
+
+
+class StackOperator(ListOperator):
     """An operator on the stack of the active armature."""
 
-    def run(self, context: bpy.types.Context) -> None:
-        armature = active_armature(context)
-        writable_armature(armature)
-        self.edit(context, armature, splicing_settings(armature))
-
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
-        """Do the work on an armature that can be edited."""
-        raise NotImplementedError
+    KIND = _SPLICES
 
 
-class SpliceOperator(StackOperator):
+class SpliceOperator(ItemOperator):
     """An operator on the active splice."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if active_splice(splicing_settings(active_armature(context))) is None:
-            cls.poll_message_set("Choose a splice in the list first")  # type: ignore[attr-defined]
-            return False
-        return True
+    KIND = _SPLICES
 
 
 class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
@@ -213,69 +207,20 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
         return active.name
 
 
-class OCTO_MOTION_OT_splice_remove(SpliceOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_splice_remove(RemoveOperator, bpy.types.Operator):
     bl_idname = "octo_motion.splice_remove"
     bl_label = "Remove Splice"
     bl_description = "Take the active splice off the list. Its clip stays as it is"
-    bl_options = {"REGISTER", "UNDO"}
-
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: Any,
-    ) -> None:
-        name = settings.splices[settings.active_splice].name
-        if name in linked_names(settings, "splices"):
-            raise ClipError(
-                f"Splice '{name}' is in the linked file and cannot be removed here.",
-                "Mute it instead.",
-            )
-        settings.splices.remove(settings.active_splice)
-        settings.active_splice = max(0, min(settings.active_splice, len(settings.splices) - 1))
+    KIND = _SPLICES
 
 
-class OCTO_MOTION_OT_splice_move(SpliceOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_splice_move(MoveOperator, bpy.types.Operator):
     bl_idname = "octo_motion.splice_move"
     bl_label = "Move Splice"
     bl_description = (
         "Move the active splice in the list. Each goes onto the result of those above it"
     )
-    bl_options = {"REGISTER", "UNDO"}
-
-    direction: EnumProperty(
-        name="Direction",
-        items=(
-            ("UP", "Up", "Towards the first"),
-            ("DOWN", "Down", "Towards the last"),
-        ),
-    )
-
-    def execute(self, context: bpy.types.Context) -> set[Any]:
-        settings = cast("Any", splicing_settings(active_armature(context)))
-        if not 0 <= self._target(settings) < len(settings.splices):
-            # It is the first or the last already: no undo step for that.
-            return {"CANCELLED"}
-        return super().execute(context)
-
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: Any,
-    ) -> None:
-        name = settings.splices[settings.active_splice].name
-        if name in linked_names(settings, "splices"):
-            raise ClipError(
-                f"Splice '{name}' is in the linked file, where the order is set.",
-                "Move splices that were added in this file, or change the order there.",
-            )
-        target = self._target(settings)
-        settings.splices.move(settings.active_splice, target)
-        settings.active_splice = target
-
-    def _target(self, settings: Any) -> int:
-        return settings.active_splice + (-1 if self.direction == "UP" else 1)
+    KIND = _SPLICES
 
 
 def _other_armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
