@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The open profile: what firmware writes is what we read, and damaged reports are left out."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from octo_motion.core.errors import DeviceError
+from octo_motion.device.driver import DeviceLostError, Dynamics
+from octo_motion.device.hid import force_device
+from octo_motion.device.hid import force_profile as profile
+from octo_motion.device.hid.force_device import ForceDevice, is_force_device
+from octo_motion.device.spatial import from_rotation_vector
+from tests.device.parts import FakeHandle, found
+
+DYNAMICS = Dynamics(8.0, 0.4, 0.5, 0.001, 0.02, 0.0005, 1e-5, 1e-4, 0.001)
+metres = st.floats(-1.0, 1.0)
+vectors = st.tuples(metres, metres, metres)
+
+
+def state(**changes: object) -> profile.State:
+    values: dict[str, object] = {
+        "sequence": 7,
+        "clock": 123456,
+        "answered": 5,
+        "buttons": 0b101,
+        "held": True,
+        "powered": True,
+        "position": (0.01, -0.02, 0.03),
+        "orientation": from_rotation_vector((0.1, 0.2, 0.3)),
+        "velocity": (0.1, -0.2, 0.3),
+        "angular_velocity": (1.0, -2.0, 3.0),
+    }
+    return profile.State(**{**values, **changes})  # pyright: ignore[reportArgumentType]
+
+
+@given(place=vectors, turn=vectors, velocity=vectors)
+def test_state_survives_to_the_step_of_its_numbers(
+    place: tuple[float, float, float],
+    turn: tuple[float, float, float],
+    velocity: tuple[float, float, float],
+) -> None:
+    sent = state(position=place, orientation=from_rotation_vector(turn), velocity=velocity)
+    got = profile.parse_state(profile.pack_state(sent))
+    assert got.position == pytest.approx(sent.position, abs=6e-8)
+    assert got.orientation == pytest.approx(sent.orientation, abs=2e-9)
+    assert got.velocity == pytest.approx(sent.velocity, abs=6e-5)
+    assert (got.sequence, got.clock, got.answered, got.buttons) == (7, 123456, 5, 0b101)
+    assert got.held
+    assert got.powered
+
+
+def test_command_is_cut_to_what_its_numbers_hold() -> None:
+    command = profile.Command(
+        70000, 20, enabled=True, force=(100.0, -100.0, 1.5), torque=(0.0, 0.25, -9.0)
+    )
+    got = profile.parse_command(profile.pack_command(command))
+    assert got.sequence == 70000 & 0xFFFF
+    assert got.force == pytest.approx((32.767, -32.767, 1.5))
+    assert got.torque == pytest.approx((0.0, 0.25, -3.2767))
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_force_that_is_no_number_is_never_sent(bad: float) -> None:
+    none = (0.0, 0.0, 0.0)
+    command = profile.Command(1, 20, enabled=True, force=(bad, 0.0, 0.0), torque=none)
+    with pytest.raises(profile.ReportError):
+        profile.pack_command(command)
+
+
+def test_features_survive() -> None:
+    got = profile.parse_features(profile.pack_features(profile.Features(2, DYNAMICS)))
+    assert got.buttons == 2
+    for name in DYNAMICS.__dataclass_fields__:
+        assert getattr(got.dynamics, name) == pytest.approx(getattr(DYNAMICS, name), rel=1e-3)
+
+
+def test_other_version_of_the_profile_is_refused() -> None:
+    report = bytearray(profile.pack_features(profile.Features(2, DYNAMICS)))
+    report[1] = 2
+    with pytest.raises(profile.ReportError, match="version 2"):
+        profile.parse_features(bytes(report))
+
+
+@given(st.binary(max_size=80), st.sampled_from([1, 2, 3]))
+@settings(max_examples=300)
+def test_any_bytes_are_a_report_or_are_refused(data: bytes, number: int) -> None:
+    parsers = {1: profile.parse_state, 2: profile.parse_command, 3: profile.parse_features}
+    try:
+        got = parsers[number](bytes([number]) + data)
+    except profile.ReportError:
+        return
+    if isinstance(got, profile.State):
+        assert math.isclose(sum(each * each for each in got.orientation), 1.0, rel_tol=1e-9)
+        assert all(map(math.isfinite, (*got.position, *got.velocity)))
+
+
+def opened() -> tuple[ForceDevice, FakeHandle]:
+    handle = FakeHandle()
+    return ForceDevice(found(page=0xFF4F, usage=1), handle, profile.Features(2, DYNAMICS)), handle
+
+
+def test_newest_whole_report_counts() -> None:
+    device, handle = opened()
+    handle.reports.extend(profile.pack_state(state(buttons=value)) for value in (1, 2, 3))
+    handle.reports.append(b"\x01damaged")
+    sample = device.read()
+    assert sample
+    assert sample.buttons == 3
+    assert device.read() is None
+
+
+def test_letting_go_disables_the_motors_and_closing_does_so_once_more() -> None:
+    device, handle = opened()
+    device.send((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    device.close()
+    device.close()
+    commands = [profile.parse_command(report) for report in handle.written]
+    assert [command.enabled for command in commands] == [True, False, False]
+    assert [command.sequence for command in commands] == [1, 2, 3]
+    assert {command.watchdog for command in commands} == {20}
+    assert handle.closed == 1
+
+
+def test_unplugged_device_is_lost_when_read_and_when_given_force() -> None:
+    device, handle = opened()
+    handle.gone = True
+    with pytest.raises(DeviceLostError):
+        device.read()
+    with pytest.raises(DeviceLostError):
+        device.send((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    device.close()
+
+
+def test_device_that_says_nonsense_of_itself_is_refused_and_closed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    handle = FakeHandle(features=b"\x03\x02rest")
+    monkeypatch.setattr(force_device, "open_device", lambda _: handle)
+    with pytest.raises(DeviceError, match="does not follow the profile"):
+        ForceDevice.open(found(page=0xFF4F, usage=1))
+    assert handle.closed == 1
+    assert is_force_device(found(page=0xFF4F, usage=1))
+    assert not is_force_device(found())

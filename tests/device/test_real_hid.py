@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Devices in a real HID stack: found, moved, given force, unplugged in mid-grab, plugged in again.
+
+The kernel makes them (/dev/uhid) and hidapi finds them as it would find any other.
+"""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from octo_motion.device import messages as say
+from octo_motion.device.client import Client, State
+from octo_motion.device.discovery import Discovery, Sources
+from octo_motion.device.driver import DeviceLostError, Driver, Dynamics, Kind, Sample
+from octo_motion.device.hid import force_profile as profile
+from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector
+from tests.core.puppets import chain, posed, soft
+from tests.device import uhid
+from tests.device.parts import SPACE_MOUSE
+
+pytestmark = pytest.mark.skipif(not uhid.available(), reason=uhid.WHY_NOT)
+
+HID_ALONE = Sources(haply=False)
+DYNAMICS = Dynamics(8.0, 0.4, 0.5, 0.0012)
+PATIENCE = 60.0
+"""s: of a machine that is emulated; on a real one each wait is over at once."""
+
+
+@pytest.fixture
+def plug() -> Iterator[Callable[..., uhid.VirtualDevice]]:
+    devices: list[uhid.VirtualDevice] = []
+
+    def plug_in(*arguments: Any, **named: Any) -> uhid.VirtualDevice:
+        devices.append(uhid.VirtualDevice(*arguments, **named))
+        return devices[-1]
+
+    yield plug_in
+    for device in devices:
+        device.unplug()
+
+
+@pytest.fixture
+def client() -> Iterator[Client]:
+    client = Client()
+    yield client
+    client.stop()
+
+
+def space_mouse(plug: Callable[..., uhid.VirtualDevice]) -> uhid.VirtualDevice:
+    return plug("3Dconnexion SpaceMouse Compact", 0x256F, 0xC635, SPACE_MOUSE)
+
+
+def force_device(plug: Callable[..., uhid.VirtualDevice]) -> uhid.VirtualDevice:
+    def features(number: int) -> bytes:
+        described = profile.pack_features(profile.Features(2, DYNAMICS))
+        return described if number == profile.FEATURES else b""
+
+    return plug("Octo hand", 0x1209, 0x0001, profile.report_descriptor(), features=features)
+
+
+def wait_for(what: Callable[[], object], why: str, seconds: float = PATIENCE) -> None:
+    end = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < end, f"waited in vain: {why}"
+        time.sleep(0.002)
+
+
+def found_by(discovery: Discovery) -> Driver:
+    got: list[Driver] = []
+
+    def look() -> bool:
+        got.extend(discovery.look())
+        return bool(got)
+
+    wait_for(look, "hidapi finds the device")
+    assert discovery.problems == []
+    return got[0]
+
+
+def pose_report(position: Vector, buttons: int = 0, turn: Quaternion = IDENTITY) -> bytes:
+    return profile.pack_state(
+        profile.State(
+            *(0, 0, 0, buttons),
+            held=True,
+            powered=True,
+            position=position,
+            orientation=turn,
+            velocity=ZERO,
+            angular_velocity=ZERO,
+        )
+    )
+
+
+def test_space_mouse_is_found_moved_unplugged_and_plugged_in_again(
+    plug: Callable[..., uhid.VirtualDevice],
+) -> None:
+    device = space_mouse(plug)
+    discovery = Discovery(HID_ALONE)
+    driver = found_by(discovery)
+    assert driver.description.kind is Kind.RATE
+    assert driver.description.name == "SpaceMouse Compact"
+    device.report(struct.pack("<B3h", 1, 0, 0, -350))
+    device.report(struct.pack("<B3h", 2, 350, 0, 0))
+    device.report(b"\x03\x01\0\0\0")
+
+    def pushed() -> bool:
+        device.report(struct.pack("<B3h", 1, 0, 0, -350))
+        sample = driver.read()
+        return sample is not None and sample.velocity[2] > 0.0 and sample.buttons == 1
+
+    wait_for(pushed, "the push arrives")
+    sample = driver.read()
+    assert sample
+    assert sample.velocity == pytest.approx((0.0, 0.0, 0.4))
+    assert sample.angular_velocity == pytest.approx((2.0, 0.0, 0.0))
+
+    device.unplug()
+
+    def lost() -> bool:
+        try:
+            driver.read()
+        except DeviceLostError:
+            return True
+        return False
+
+    wait_for(lost, "the driver notices")
+    driver.close()
+    discovery.lost(driver.description.identity)
+    space_mouse(plug)
+    again = found_by(discovery)
+    assert again.description.identity == driver.description.identity
+    again.close()
+
+
+def test_force_device_tells_what_it_can_and_gets_force(
+    plug: Callable[..., uhid.VirtualDevice],
+) -> None:
+    device = force_device(plug)
+    driver = found_by(Discovery(HID_ALONE))
+    assert driver.description.kind is Kind.POSE
+    dynamics = driver.description.dynamics
+    assert dynamics
+    assert dynamics.force == pytest.approx(8.0)
+    device.report(pose_report((0.01, 0.02, 0.03), buttons=2))
+    sample = waited_for(driver)
+    assert sample.position == pytest.approx((0.01, 0.02, 0.03))
+    assert sample.buttons == 2
+    driver.send((1.5, 0.0, -2.0), (0.0, 0.1, 0.0))
+    wait_for(lambda: device.outputs, "the force arrives")
+    command = profile.parse_command(device.outputs[0])
+    assert command.enabled
+    assert command.force == pytest.approx((1.5, 0.0, -2.0))
+    assert command.torque == pytest.approx((0.0, 0.1, 0.0))
+    driver.close()
+    wait_for(lambda: len(device.outputs) == 2, "the last word arrives")
+    assert not profile.parse_command(device.outputs[-1]).enabled
+
+
+def waited_for(driver: Driver) -> Sample:
+    samples: list[Sample] = []
+
+    def came() -> bool:
+        sample = driver.read()
+        samples.extend([sample] if sample else [])
+        return bool(samples)
+
+    wait_for(came, "the pose arrives")
+    return samples[-1]
+
+
+class Hand:
+    """The hand on a virtual force device: moved by the test, reporting all the time."""
+
+    def __init__(self, device: uhid.VirtualDevice) -> None:
+        self.device = device
+        self.position: Vector = ZERO
+        self.buttons = 0
+
+    def report(self) -> None:
+        self.device.report(pose_report(self.position, self.buttons))
+
+    def forces(self) -> list[profile.Command]:
+        return [profile.parse_command(each) for each in self.device.outputs]
+
+
+def bent(client: Client, start: np.ndarray) -> float:
+    assert client.pose
+    return float(np.abs(client.pose.orientations - start).max())
+
+
+def test_force_device_bends_a_puppet_and_feels_it_until_it_is_unplugged_in_mid_grab(
+    plug: Callable[..., uhid.VirtualDevice], client: Client
+) -> None:
+    figure = chain(3, elements=soft(3, 40.0, 2.0, 100.0, 1.0))
+    pose = posed(figure)
+    hand = Hand(force_device(plug))
+    client.start(["--no-haply"])
+    client.send(say.WorldMessage(step=4e-3))
+    client.send_figure(figure, pose)
+    client.send_pins(figure, frozenset({0}))
+
+    def polled(what: Callable[[], object]) -> Callable[[], object]:
+        def look() -> object:
+            client.poll()
+            assert client.state is State.RUNNING
+            hand.report()
+            return what()
+
+        return look
+
+    wait_for(polled(lambda: client.devices), "the device is found")
+    tip = pose.positions[2] + [0.0, 0.15, 0.0]
+    x, y, z = map(float, tip)
+    client.send(say.Workspace(0, (x, y, z)))
+    wait_for(
+        polled(lambda: 0 in client.pointers and client.pointers[0].position == (x, y, z)),
+        "the pointer is at the tip",
+    )
+    hand.buttons = 1
+    wait_for(polled(lambda: client.pointers[0].body == 2), "the tip is held")
+    hand.position = (0.03, 0.0, 0.03)
+    wait_for(polled(lambda: bent(client, pose.orientations) > 0.05), "the puppet bends")
+    wait_for(
+        polled(lambda: any(np.linalg.norm(each.force) > 0.2 for each in hand.forces())),
+        "the hand feels it",
+    )
+    felt = max(hand.forces(), key=lambda each: float(np.linalg.norm(each.force)))
+    assert felt.enabled
+    assert felt.force[0] < 0.0, "the puppet pulls back"
+    assert max(np.linalg.norm(each.force) for each in hand.forces()) <= 8.0 + 1e-9
+
+    hand.device.unplug()
+    end = time.monotonic() + PATIENCE
+    while client.devices:
+        client.poll()
+        assert client.state is State.RUNNING
+        assert time.monotonic() < end
+        time.sleep(0.002)
+    assert client.pose
+    kept = bent(client, pose.orientations)
+    assert kept > 0.02, "the pose stays"
+
+    hand = Hand(force_device(plug))
+    wait_for(polled(lambda: client.devices), "the device is found again")
+    assert set(client.devices) == {0}, "it is the same pointer as before"
+    wait_for(polled(lambda: 0 in client.pointers), "the pointer is back")
+    assert client.pointers[0].body == -1, "nothing is held until it is grabbed again"
+    assert not any(each.enabled for each in hand.forces())
+
+
+def test_space_mouse_bends_a_puppet(
+    plug: Callable[..., uhid.VirtualDevice], client: Client
+) -> None:
+    figure = chain(3, elements=soft(3, 40.0, 2.0, 100.0, 1.0))
+    pose = posed(figure)
+    device = space_mouse(plug)
+    client.start(["--no-haply"])
+    client.send(say.WorldMessage(step=4e-3))
+    client.send_figure(figure, pose)
+    client.send_pins(figure, frozenset({0}))
+    push = struct.pack("<B3h", 1, 0, 0, 0)
+
+    def polled(what: Callable[[], object]) -> Callable[[], object]:
+        def look() -> object:
+            client.poll()
+            device.report(push)
+            return what()
+
+        return look
+
+    wait_for(polled(lambda: client.devices), "the device is found")
+    x, y, z = map(float, pose.positions[2] + [0.0, 0.15, 0.0])
+    client.send(say.Workspace(0, (x, y, z)))
+    device.report(b"\x03\x01\0\0\0")
+    wait_for(
+        polled(lambda: 0 in client.pointers and client.pointers[0].body == 2), "the tip is held"
+    )
+    push = struct.pack("<B3h", 1, 100, 0, -100)
+    wait_for(polled(lambda: bent(client, pose.orientations) > 0.05), "the puppet bends")
+    device.report(b"\x03\0\0\0\0")
+    wait_for(polled(lambda: client.pointers[0].body == -1), "the tip is let go")
