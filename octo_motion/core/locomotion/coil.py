@@ -26,7 +26,9 @@ _SNAP: Final = np.cos(np.radians(10.0))
 """An axis as close as this to one of the object's own is that."""
 _WIDEST: Final = 0.1
 """Cosine of the widest angle at which a slice's outline is looked at."""
-_HALVINGS: Final = 32
+_HALVINGS: Final = 20
+_THICKNESSES: Final = 5
+_LIFTINGS: Final = 6
 _PRESSED: Final = 0.3
 """Share of the skin's radius by which the middle of a bone presses into the object: flesh gives."""
 _ROUND: Final = 1.5
@@ -170,14 +172,6 @@ def _at_height(heights: Floats, support: Floats, queries: Floats) -> Floats:
     return (1.0 - share) * support[number] + share * support[number + 1]
 
 
-def _radius(heights: Floats, support: Floats, angle: float, height: float) -> float:
-    """Distance from the axis to the outline in one direction."""
-    outline = _at_height(heights, support, np.array([height]))[0]
-    facing = np.cos(_ANGLES - angle)
-    seen = facing > _WIDEST
-    return float(np.min(outline[seen] / facing[seen]))
-
-
 @dataclass(frozen=True, eq=False)
 class Coil:
     """The way of an arm's end about an object, in the object's frame."""
@@ -207,15 +201,44 @@ class Winding:
     """+1 anticlockwise seen from the axis' end, −1 clockwise."""
 
 
-def wind(
-    profile: Profile,
-    lengths: Floats,
-    radii: Floats,
-    *,
-    first: int,
-    start: Floats,
-    winding: Winding,
-) -> Coil:
+@dataclass(frozen=True, eq=False)
+class Skins:
+    """An object grown by the skin of an arm, as thick as it is at each of its joints."""
+
+    profile: Profile
+    radii: Floats
+    """(joints,)"""
+    thickness: Floats
+    """(tables,) ascending, for which there are tables."""
+    tables: Floats
+    """(tables, slices, directions) support."""
+
+    @staticmethod
+    def of(profile: Profile, radii: Floats) -> Skins:
+        """Tables for a few thicknesses; between them supports are linear enough."""
+        thickness = np.linspace(float(radii.min()), float(radii.max()) + 1e-9, _THICKNESSES)
+        tables = np.stack([profile.grown(float(each)) for each in thickness])
+        return Skins(profile, radii, thickness, tables)
+
+    def radius(self, joint: int, angle: float, height: float) -> float:
+        """Distance from the axis at which a joint's skin touches, in one direction."""
+        heights, thickness = self.profile.heights, self.thickness
+        place = (height - heights[0]) / (heights[1] - heights[0])
+        place = min(max(place, 0.0), len(heights) - 1.001)
+        row, share = int(place), place % 1.0
+        between = (self.radii[joint] - thickness[0]) / (thickness[1] - thickness[0])
+        table = min(int(between), len(thickness) - 2)
+        between -= table
+        four = self.tables[table : table + 2, row : row + 2]
+        outline = np.array([1.0 - between, between]) @ (
+            four[:, 0] * (1.0 - share) + four[:, 1] * share
+        )
+        facing = np.cos(_ANGLES - angle)
+        seen = facing > _WIDEST
+        return float(np.min(outline[seen] / facing[seen]))
+
+
+def wind(skins: Skins, lengths: Floats, *, first: int, start: Floats, winding: Winding) -> Coil:
     """Wind the segments from joint ``first`` on about an object.
 
     Where the arm comes from decides where it touches: on the line that only just passes the
@@ -224,9 +247,8 @@ def wind(
     to the side that has more room, as long as there is object.
 
     Args:
-        profile: the object.
+        skins: the object, and the arm's skin.
         lengths: (segments,) of the arm, in the profile's unit.
-        radii: (segments + 1,) of the skin at the joints.
         first: joint at which the coil begins.
         start: (3,) the arm's root, in the object's frame.
         winding: which way.
@@ -234,20 +256,44 @@ def wind(
     Raises:
         RigError: the arm starts within the object.
     """
+    lift = np.zeros(len(lengths) + 1)
+    for _ in range(_LIFTINGS):
+        coil = _wound(skins, lengths, first, skins.profile.to_profile(start), winding, lift)
+        lacking = _lacking(skins, coil)
+        if not np.any(lacking > 0.0):
+            break
+        # Round a corner a bone would cut in: its two joints move out.
+        joints = slice(first, first + len(coil.joints))
+        lift[joints] += np.maximum(np.append(lacking, 0.0), np.append(0.0, lacking))
+    return coil
+
+
+def _lacking(skins: Skins, coil: Coil) -> Floats:
+    """How far (segments,) each bone of a coil presses in more than it may."""
+    count = len(coil.facing)
+    share = np.linspace(0.0, 1.0, 7)[1:-1, None, None]
+    points = (1.0 - share) * coil.joints[:-1] + share * coil.joints[1:]
+    radii = skins.radii[coil.first : coil.first + count + 1]
+    skin = (1.0 - share[..., 0]) * radii[:-1] + share[..., 0] * radii[1:]
+    missing = (1.0 - _PRESSED) * skin - skins.profile.clearance(points)
+    return np.max(missing, axis=0) - 1e-3 * skin[0]
+
+
+def _wound(
+    skins: Skins, lengths: Floats, first: int, root: Floats, winding: Winding, lift: Floats
+) -> Coil:
     segments = np.arange(first, len(lengths))
-    tables = [profile.grown(float(skin)) for skin in radii]
+    profile, radii = skins.profile, skins.radii
     # Of the longer of the two bones that meet at a joint.
     half = 0.5 * np.maximum(np.append(lengths[0], lengths), np.append(lengths, lengths[-1]))
     heights = profile.heights
 
     def point(joint: int, angle: float, height: float) -> Floats:
-        table = tables[joint]
-        clear = _radius(heights, table, angle, height)
+        clear = skins.radius(joint, angle, height)
         pressed = clear - _PRESSED * float(radii[joint])
-        out = max(clear, float(np.hypot(pressed, half[joint])))
+        out = max(clear, float(np.hypot(pressed, half[joint]))) + float(lift[joint])
         return np.array([out * np.cos(angle), out * np.sin(angle), height])
 
-    root = profile.to_profile(start)
     distance, bearing = float(np.hypot(root[0], root[1])), float(np.arctan2(root[1], root[0]))
     skin = float(radii[first])
     limits = (

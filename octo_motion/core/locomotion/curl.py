@@ -13,6 +13,8 @@ from .reach import Timeline, eased, folded
 
 _FREE: Final = 0.3
 """Share of the arm, from its root, that hardly curls."""
+_TIGHT: Final = 2.5
+"""How much tighter than that of a reach the spiral is."""
 _WAVE: Final = 0.5
 """How much of the time the curl needs to run along the arm."""
 
@@ -36,7 +38,7 @@ def curled(arm: ArmFrames, timeline: Timeline, times: Floats, otherwise: Floats)
     share = up * (1.0 - down) * eased(along / _FREE)
     usual = relative(arm.from_bones(otherwise))
     # A front before the arm's root: all of it is behind.
-    spiral = folded(arm.lengths, np.full(len(times), -arm.length), 0.0)
+    spiral = folded(arm.lengths, np.full(len(times), -arm.length), bend=0.0, curl=_TIGHT)
     spiral[:, 0] = usual[:, 0]
     shape = composed(blended(usual, spiral, share))
     result = otherwise.copy()

@@ -10,6 +10,7 @@ blended joint by joint in angle space.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Final, Literal
@@ -35,7 +36,7 @@ from .arm_frames import (
     transported,
 )
 from .ccd import closed
-from .coil import Coil, Profile, Winding, wind
+from .coil import Coil, Profile, Skins, Winding, wind
 from .reach import Timeline, eased, first_place, folded, front_width, passed
 
 Mode = Literal["TOUCH", "COIL"]
@@ -275,16 +276,17 @@ def plan_grasp(
     held = (times >= timeline.contact - 1e-6) & (times <= timeline.release + 1e-6)
     if not np.any(held):
         raise SettingsError(
-            f"{name} would touch {target.name} at frame {timeline.contact:g}, outside of the motion, "
-            f"which lasts from frame {times[0]:g} to {times[-1]:g}.",
+            f"{name} would touch {target.name} at frame {timeline.contact:g}, outside of the "
+            f"motion, which lasts from frame {times[0]:g} to {times[-1]:g}.",
             "Change the frames of the reach, or make the motion longer.",
         )
     profile, places = target.profile, target.places
     wanted = TOUCH_TURNS if mode == "TOUCH" else turns
     holding = places[held]
+    skins = Skins.of(profile, radii)
     plans: list[tuple[float, Grasp]] = []
     for sense in (1, -1):
-        coil = _coil(arm, radii, profile, holding, Winding(wanted, sense))
+        coil = _coil(arm, skins, holding, Winding(wanted, sense))
         if isinstance(coil, Coil):
             loose = Grasp(arm, radii, profile, timeline, mode, coil, 0.0, up, mode == "COIL")
             twist = float(_twist_without(arm, loose.holding(holding[:1])[0], coil.first))
@@ -295,9 +297,7 @@ def plan_grasp(
     return min(plans, key=itemgetter(0))[1]
 
 
-def _coil(
-    arm: ArmFrames, radii: Floats, profile: Profile, places: Places, winding: Winding
-) -> Coil | None:
+def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coil | None:
     """The coil of the stretch that takes hold, none if the arm is too short at some place.
 
     The arm takes hold with as much of it as the free part can spare at every place; where that
@@ -305,28 +305,47 @@ def _coil(
     part not too loose.
     """
     root = places[:1].into(arm.root[None])[0]
+    last = len(arm.bones) - 1
+
+    def wound(first: int) -> Coil:
+        return wind(skins, arm.lengths, first=first, start=root, winding=winding)
+
+    def far(coil: Coil) -> float:
+        return float(np.max(np.linalg.norm(places.seen(coil.joints[0]) - arm.root, axis=-1)))
+
+    def enough(first: int) -> bool:
+        try:
+            return bool(arm.reach[first] >= _SLACK * far(wound(first)))
+        except RigError:
+            # With a thinner stretch it may just do.
+            return False
+
+    def spare(first: int) -> bool:
+        coil = wound(first)
+        short = coil.angle < 2.0 * np.pi * winding.turns - 1e-6
+        return not short and bool(arm.reach[first] <= _LOOSE * far(coil))
+
     # At least two bones are free, and one is left to take hold.
     least = int(np.searchsorted(arm.reach, _LEAST_FREE * arm.length))
-    least = min(max(least, 2), len(arm.bones) - 1)
-    found: Coil | None = None
-    within: RigError | None = None
-    for first in range(least, len(arm.bones)):
-        try:
-            coil = wind(profile, arm.lengths, radii, first=first, start=root, winding=winding)
-        except RigError as error:
-            # With a thinner stretch it may just do.
-            within = error
-            continue
-        far = float(np.max(np.linalg.norm(places.seen(coil.joints[0]) - arm.root, axis=-1)))
-        if arm.reach[first] < _SLACK * far:
-            continue
-        short = coil.angle < 2.0 * np.pi * winding.turns - 1e-6
-        if found is not None and (short or arm.reach[first] > _LOOSE * far):
-            break
-        found = coil
-    if found is None and within is not None:
-        raise within
-    return found
+    least = min(max(least, 2), last)
+    first = _first_true(enough, least, last)
+    if first > last:
+        wound(last)
+        return None
+    if first < last and spare(first):
+        first = _first_true(lambda each: not spare(each), first + 1, last) - 1
+    return wound(first)
+
+
+def _first_true(test: Callable[[int], bool], low: int, high: int) -> int:
+    """The first of low … high for which a test holds, and it holds from there on; else high + 1."""
+    while low <= high:
+        middle = (low + high) // 2
+        if test(middle):
+            high = middle - 1
+        else:
+            low = middle + 1
+    return low
 
 
 def _too_far(

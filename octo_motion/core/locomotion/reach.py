@@ -138,22 +138,23 @@ def passed(lengths: Floats, front: Floats) -> Floats:
     return result
 
 
-def folded(lengths: Floats, front: Floats, amount: float = 1.0) -> Floats:
+def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1.0) -> Floats:
     """Turns (…, segments, 4) of what the front (…) has not passed: bend, and spiral beyond it.
 
     Args:
         lengths: (segments,).
         front: (…) its place along the arm.
-        amount: how much of the bend.
+        bend: how much of the bend.
+        curl: how much of the spiral.
     """
     whole, width = float(lengths.sum()), front_width(lengths)
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
     left = whole - ends + _BLUNT * whole
-    curl = _SPIRAL * np.log(left[:-1] / left[1:])
+    spiral = curl * _SPIRAL * np.log(left[:-1] / left[1:])
     # The bend lies within the front: its angle up to each place along the arm runs as the front.
     behind = front[..., None] - 0.5 * width
     so_far = eased((ends - 0.5 * np.append(lengths, lengths[-1]) - behind) / width)
-    bend = amount * FOLD * np.diff(so_far, axis=-1)
-    angles = np.minimum(curl + bend, _MOST_BENT)
+    fold = bend * FOLD * np.diff(so_far, axis=-1)
+    angles = np.minimum(spiral + fold, _MOST_BENT)
     angles[..., 0] = 0.0
     return bends(angles)

@@ -145,6 +145,8 @@ def _depths(
     c, f = _dot(u, w), _dot(v, w)
     room = a * e - b * b
     s = np.where(room > _TINY, (b * f - c * e) / np.maximum(room, _TINY), 0.0)
+    # A capsule that is a ball is nearest to one point of the other.
+    s = np.where(e > _TINY, s, -c / np.maximum(a, _TINY))
     s = np.clip(s, 0.0, 1.0)
     t = (b * s + f) / np.maximum(e, _TINY)
     s = np.where(t < 0.0, np.clip(-c / np.maximum(a, _TINY), 0.0, 1.0), s)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How deep arms pass through each other is measured right, whatever way they lie."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from octo_motion.core.locomotion import gait
+from octo_motion.core.locomotion.arm_frames import arm_frames
+from octo_motion.core.locomotion.generator import GaitSettings, Generator
+from octo_motion.core.locomotion.separation import Capsules, measure
+from octo_motion.core.rotations import Floats
+from tests.core.rigs import body_with_arms
+
+FAR = np.array([[10.0, 0.0, 0.0], [11.0, 0.0, 0.0]])
+
+
+def capsule(name: str, start: Floats, end: Floats, radius: float, *, rest: float = 0.0) -> Capsules:
+    joints = np.stack([np.atleast_2d(start), np.atleast_2d(end)], axis=1)
+    return Capsules(name, joints, np.full(2, radius), FAR + [0.0, rest, 0.0])
+
+
+def nearest(a: Floats, b: Floats, c: Floats, d: Floats) -> float:
+    """Distance of two line segments, by search."""
+    s, t = np.meshgrid(np.linspace(0, 1, 401), np.linspace(0, 1, 401))
+    gap = a + s[..., None] * (b - a) - c - t[..., None] * (d - c)
+    return float(np.linalg.norm(gap, axis=-1).min())
+
+
+@given(st.integers(0, 2**31))
+@settings(max_examples=60)
+def test_depth_is_what_is_missing_to_the_sum_of_radii(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    a, b, c, d = random.normal(size=(4, 3))
+    if seed % 5 == 0:
+        d = c + 0.7 * (b - a)  # parallel
+    if seed % 7 == 0:
+        d = c  # no length
+    radii = random.uniform(0.1, 1.0, 2)
+    found = measure([capsule("one", a, b, radii[0]), capsule("two", c, d, radii[1], rest=9.0)])
+    expected = max((radii.sum() - nearest(a, b, c, d)) / radii.min(), 0.0)
+    assert found.depths[0] == pytest.approx(expected, abs=0.02 / radii.min())
+
+
+def test_the_worst_frame_and_the_pair_are_named() -> None:
+    start = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0]])
+    moving = capsule("moving", start, start + [1.0, 0.0, 0.0], 0.3, rest=9.0)
+    zero = np.zeros((3, 3))
+    lying = capsule("lying", zero, zero + [1.0, 0.0, 0.0], 0.3)
+    body = capsule("body", zero + [0.0, 0.0, 1.4], zero + [1.0, 0.0, 1.4], 0.3, rest=20.0)
+    found = measure([moving, lying], [body])
+    np.testing.assert_allclose(found.depths, [0.0, 1.0 / 3.0, 2.0 / 3.0], atol=1e-9)
+    assert [(each.first, each.second, each.frame) for each in found.overlaps] == [
+        ("moving", "body", 2),
+        ("moving", "lying", 1),
+    ]
+    assert found.worst == found.overlaps[0]
+
+
+def test_what_overlaps_at_rest_is_built_so() -> None:
+    zero = np.zeros((2, 3))
+    one = capsule("one", zero, zero + [1.0, 0.0, 0.0], 0.3)
+    two = capsule("two", zero, zero + [1.0, 0.0, 0.0], 0.3)
+    found = measure([one, two])
+    assert found.worst is None
+    assert not found.depths.any()
+
+
+def test_nothing_is_nothing() -> None:
+    assert measure([]).worst is None
+    one = capsule("one", np.zeros((4, 3)), np.ones((4, 3)), 0.1)
+    assert measure([one]).depths.shape == (4,)
+
+
+def posed_arms(preset: str, frames: int = 96, radius: float = 0.05) -> list[Capsules]:
+    skeleton, arms, body = body_with_arms(8, 12)
+    generator = Generator(skeleton, arms, body, GaitSettings(gait.presets()[preset]))
+    phases = np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False)
+    rotations = generator.pose(phases, np.zeros((frames, 2))).rotations
+    result = []
+    for number, each in enumerate(arms):
+        arm = arm_frames(skeleton, each.bones, body)
+        joints = arm.joints(arm.from_bones(rotations[:, 12 * number : 12 * number + 12]))
+        radii = np.interp(arm.reach, [0.0, 1.0], [radius, 0.1 * radius])
+        result.append(Capsules(each.name, joints, radii, arm.joints(arm.at_rest)))
+    return result
+
+
+@pytest.mark.parametrize("preset", ["walk", "walk_search", "swim"])
+def test_the_presets_keep_arms_apart(preset: str) -> None:
+    found = measure(posed_arms(preset))
+    assert found.worst is None or found.worst.depth <= 0.1
+
+
+def test_the_literal_walk_crosses_neighbouring_arms() -> None:
+    found = measure(posed_arms("walk_literal"))
+    assert found.worst is not None
+    assert found.worst.depth > 1.0
+
+
+def test_coarse_bounds_miss_nothing() -> None:
+    arms = posed_arms("walk_literal", 8)
+    shifted = [Capsules(each.name, each.joints + 1000.0, each.radii, each.at_rest) for each in arms]
+    np.testing.assert_allclose(measure(shifted).depths, measure(arms).depths, atol=1e-6)
