@@ -35,8 +35,8 @@ class Solution:
     """(slots, 3) u with which positions move: with corrections that are not kept."""
     loads: Floats
     """(bodies, 3) λ of the elements, in the problem's axes."""
-    flow: Floats
-    """(bodies, 3) w_d, in the problem's axes."""
+    flow: Floats | None
+    """(bodies, 3) w_d, in the problem's axes; None where nothing flows."""
     impulses: Floats
     """(rows, 3)"""
     iterations: int
@@ -56,7 +56,9 @@ class _Joints:
     slopes: Floats
     """(bodies, 3, 3)"""
     loads: Floats
-    flow: Floats
+    flow: Floats | None
+    linear: bool
+    """Whether no element flows and no stop is near: then the tangent is the law."""
 
 
 class Newton:
@@ -95,7 +97,11 @@ class Newton:
         speeds = start
         velocities = tree.velocities(speeds)
         joints = self._joints(problem, speeds)
-        tangent = rows.tangent(impulses, rows.speeds(velocities)) if len(rows) else None
+        tangent: Tangent | None = None
+        row_speeds = _NO_ROWS
+        if len(rows):
+            row_speeds = rows.speeds(velocities)
+            tangent = rows.tangent(rows.pieces(impulses, row_speeds), row_speeds)
         mean: tuple[Floats, Floats] | None = None
         best: Solution | None = None
         for count in range(1, self._iterations + 1):
@@ -103,16 +109,18 @@ class Newton:
             speeds = np.ascontiguousarray(solved[..., 0])
             velocities = tree.velocities(speeds)
             now = self._joints(problem, speeds)
-            change = (now.speeds - joints.speeds)[:, :, None]
-            expected = joints.impulses - (joints.slopes @ change)[:, :, 0]
-            miss = _relative(float(np.abs(expected - now.impulses).max()), now.impulses)
+            miss = 0.0
+            if not (now.linear and joints.linear):
+                change = (now.speeds - joints.speeds)[:, :, None]
+                expected = joints.impulses - (joints.slopes @ change)[:, :, 0]
+                miss = _relative(float(np.abs(expected - now.impulses).max()), now.impulses)
             joints = now
-            pushes = _NO_ROWS
+            pushes, pieces = _NO_ROWS, None
             if tangent is not None:
                 row_speeds = rows.speeds(velocities)
                 pushes = tangent.impulses(row_speeds)
-                tangent = rows.tangent(pushes, row_speeds)
-                miss = max(miss, _relative(tangent.miss, pushes))
+                pieces = rows.pieces(pushes, row_speeds)
+                miss = max(miss, _relative(pieces.miss, pushes))
             if best is None or miss < best.miss:
                 moving = speeds if corrections is None else solved[..., 1]
                 best = Solution(
@@ -120,10 +128,13 @@ class Newton:
                 )
             if miss <= self._tolerance:
                 break
-            if tangent is not None and count > 1:
+            if pieces is None:
+                continue
+            if count > 1:
                 # Contacts that change their minds by turns settle on what they think on average.
                 mean = (pushes, row_speeds) if mean is None else _mixed(mean, pushes, row_speeds)
-                tangent = rows.tangent(*mean)
+                pieces, row_speeds = rows.pieces(*mean), mean[1]
+            tangent = rows.tangent(pieces, row_speeds)
         assert best is not None
         return best
 
@@ -141,7 +152,8 @@ class Newton:
             slopes = problem.step * (frames @ response.slope @ frames.transpose(0, 2, 1))
         for stops in problem.stops:
             _add_stops(stops, problem.step, joint_speeds, impulses, slopes)
-        return _Joints(joint_speeds, impulses, slopes, response.load, response.flow)
+        linear = response.flow is None and not problem.stops
+        return _Joints(joint_speeds, impulses, slopes, response.load, response.flow, linear)
 
     def _linear(
         self,
@@ -165,7 +177,9 @@ class Newton:
             symmetric = tangent.symmetric
             pulls = np.empty((len(rows), 3, columns))
             # w is the velocity less the target: c − W w = (c + W target) − W X V.
-            pulls[:, :, 0] = tangent.offsets + (slopes @ rows.targets[:, :, None])[:, :, 0]
+            pulls[:, :, 0] = tangent.offsets
+            if not rows.still:
+                pulls[:, :, 0] += (slopes @ rows.targets[:, :, None])[:, :, 0]
             if corrections is not None:
                 pulls[:, :, 1] = pulls[:, :, 0] + (slopes @ corrections[:, :, None])[:, :, 0]
             if len(paired):

@@ -29,6 +29,7 @@ from ..rotations import Floats
 from .figure import Elements
 
 _TINY = 1e-300
+_ONES = np.ones(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +40,9 @@ class Response:
     """(…, 3) λ, the torque on the child, N·m."""
     slope: Floats
     """(…, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
-    flow: Floats
-    """(…, 3) w_d: how fast the series damper moves, rad/s; zero where it holds."""
+    flow: Floats | None
+    """(…, 3) w_d: how fast the series damper moves, rad/s, zero where it holds; None where all
+    hold, and the load is linear in w."""
 
 
 class PlasticLaw:
@@ -77,10 +79,12 @@ class PlasticLaw:
     def respond(self, spring: Floats, speed: Floats) -> Response:
         """Load, its slope and the flow, from q_f at the step's start and w at its end."""
         load = self.trial(spring, speed)
-        size = np.sqrt((load * load).sum(axis=-1))
+        if not self.can_flow:
+            return Response(load, self.diagonal, None)
+        size = np.sqrt((load * load) @ _ONES)
         flows = size > self.yield_torque
-        if not (self.can_flow and flows.any()):
-            return Response(load, self.diagonal, np.zeros_like(load))
+        if not flows.any():
+            return Response(load, self.diagonal, None)
         toward = load / (size + _TINY)[..., None]
         flowing = flows[..., None]
         held = self._shared_yield * toward

@@ -53,6 +53,26 @@ class Holds:
 
 
 @dataclass(frozen=True, eq=False)
+class Pieces:
+    """Which piece of its law each row is on, for some impulses and velocities."""
+
+    miss: float
+    """Largest difference of an impulse from what its law asks, N·s; 0 where none were given."""
+    acts: NDArray[np.bool_]
+    """(contacts,) pressing."""
+    slips: NDArray[np.bool_] | None
+    """(contacts,) pressing and slipping; None where none is."""
+    toward: Floats
+    """(contacts, 3) the way of friction where it slips."""
+    aside: Floats
+    """(contacts,) what holds against slipping another way."""
+    wanted: Floats
+    """(holds, 3) impulses of the holds without bounds."""
+    shares: Floats
+    """(holds,) of these that the bounds allow."""
+
+
+@dataclass(frozen=True, eq=False)
 class Tangent:
     """Rows replaced by linear ones: p = offsets − slopes w."""
 
@@ -62,8 +82,6 @@ class Tangent:
     """(rows, 3, 3)"""
     symmetric: bool
     """Whether all slopes are; not where a contact slips, for its load sets its friction."""
-    miss: float
-    """How far the impulses that this is made from were from what the laws ask, N·s."""
 
     def impulses(self, speeds: Floats) -> Floats:
         """p (rows, 3) at w (rows, 3)."""
@@ -107,6 +125,9 @@ class Rows:
             self.reach[turning, :, :3] = _UNIT
             self.reach[turning, :, 3:] = 0.0
         self._scales = masses[contacts.bodies]
+        self._kept = (1.0 - self._scales / gain)[:, None]
+        self.still = holds is None and not self.targets.any()
+        """Whether no obstacle moves: then w is the velocity of the points themselves."""
         self.paired = np.flatnonzero(self.others >= 0)
         """Rows between two bodies of the figure."""
 
@@ -119,10 +140,11 @@ class Rows:
         own = velocities[self.bodies]
         if len(self.paired):
             own[self.paired] -= velocities[self.others[self.paired]]
-        return (self.reach @ own[:, :, None])[:, :, 0] - self.targets
+        result = (self.reach @ own[:, :, None])[:, :, 0]
+        return result if self.still else result - self.targets
 
-    def tangent(self, impulses: Floats | None, speeds: Floats) -> Tangent:
-        """The linear rows next to impulses and velocities that need not fit each other.
+    def pieces(self, impulses: Floats | None, speeds: Floats) -> Pieces:
+        """The pieces next to impulses and velocities that need not fit each other.
 
         A contact's law is p = Π(p − r (w + p/a)), Π the nearest point of Coulomb's cone at the
         load p_n, for any r > 0 [Alart and Curnier 1991]. The piece of Π that the argument lies in
@@ -135,85 +157,93 @@ class Rows:
             speeds: (rows, 3) w.
         """
         count = len(self.contacts)
+        acts, slips, toward, aside = _NOTHING
+        miss = 0.0
+        if count:
+            w = speeds[:count]
+            normals = self.contacts.normals
+            into = (w * normals) @ _ONES
+            closing = into + self._rates
+            if impulses is None:
+                acts = closing <= 0.0
+            else:
+                known, scales = impulses[:count], self._scales
+                # Of new ones nothing is known but whether they close.
+                fresh = np.isnan(known[:, 0])
+                fresh = fresh if fresh.any() else None
+                if fresh is not None:
+                    known = np.where(fresh[:, None], 0.0, known)
+                push = (known * normals) @ _ONES
+                load = push - scales * (closing + push / self.gain)
+                acts = load >= 0.0
+                np.maximum(load, 0.0, out=load)
+                # Across the normal: p_t (1 − r/a) − r w_t.
+                slide = self._kept * known - scales[:, None] * w
+                slide -= ((slide * normals) @ _ONES)[:, None] * normals
+                size = np.sqrt((slide * slide) @ _ONES)
+                size += _TINY
+                share = np.minimum(self.contacts.friction * load / size, 1.0)
+                right = share[:, None] * slide + load[:, None] * normals
+                miss = float(np.abs(right - known).max())
+                slipping = acts & (share < 1.0)
+                if fresh is not None:
+                    slipping &= ~fresh
+                if slipping.any():
+                    slips = slipping
+                    toward = slide / size[:, None]
+                    aside = scales * share / np.maximum(1.0 - share, 1e-9)
+                    np.minimum(aside, self.gain, out=aside)
+        holds = self.holds
+        if holds is None:
+            return Pieces(miss, acts, slips, toward, aside, _NO_ROWS, _NO_ONES)
+        wanted = holds.biases - holds.gains[:, None] * speeds[count:]
+        shares = np.minimum(holds.bounds / (np.sqrt((wanted * wanted) @ _ONES) + _TINY), 1.0)
+        if impulses is not None:
+            right = shares[:, None] * wanted
+            miss = max(miss, float(np.abs(impulses[count:] - right).max()))
+        return Pieces(miss, acts, slips, toward, aside, wanted, shares)
+
+    def tangent(self, pieces: Pieces, speeds: Floats) -> Tangent:
+        """The linear rows of these pieces, found at w (rows, 3)."""
+        count = len(self.contacts)
         size = len(self.bodies)
         offsets = np.empty((size, 3))
         slopes = np.empty((size, 3, 3))
-        symmetric = True
-        miss = 0.0
         if count:
-            known = impulses[:count] if impulses is not None else None
-            symmetric, miss = self._contact_tangent(
-                known, speeds[:count], offsets[:count], slopes[:count]
-            )
+            self._contact_tangent(pieces, offsets[:count], slopes[:count])
         holds = self.holds
         if holds is not None:
-            w = speeds[count:]
-            wanted = holds.biases - holds.gains[:, None] * w
-            length = np.sqrt((wanted * wanted).sum(axis=1)) + _TINY
-            share = np.minimum(holds.bounds / length, 1.0)
-            slope = (holds.gains * share)[:, None, None] * _UNIT
-            full = share < 1.0
+            shares, wanted = pieces.shares, pieces.wanted
+            slope = (holds.gains * shares)[:, None, None] * _UNIT
+            full = shares < 1.0
             if full.any():
-                way = np.where(full, np.sqrt(holds.gains * share) / length, 0.0)[:, None] * wanted
+                length = np.sqrt((wanted * wanted) @ _ONES) + _TINY
+                way = np.where(full, np.sqrt(holds.gains * shares) / length, 0.0)[:, None] * wanted
                 slope -= way[:, :, None] * way[:, None, :]
-            right = share[:, None] * wanted
-            if impulses is not None:
-                miss = max(miss, float(np.abs(impulses[count:] - right).max()))
             slopes[count:] = slope
-            offsets[count:] = right + (slope @ w[:, :, None])[:, :, 0]
-        return Tangent(offsets, slopes, symmetric, miss)
+            offsets[count:] = shares[:, None] * wanted
+            offsets[count:] += (slope @ speeds[count:, :, None])[:, :, 0]
+        return Tangent(offsets, slopes, pieces.slips is None)
 
-    def _contact_tangent(
-        self, known: Floats | None, w: Floats, offsets: Floats, slopes: Floats
-    ) -> tuple[bool, float]:
-        """Fill ``offsets`` and ``slopes`` of the contacts; symmetric or not, and the miss."""
+    def _contact_tangent(self, pieces: Pieces, offsets: Floats, slopes: Floats) -> None:
         normals = self.contacts.normals
-        gain = self.gain
-        into = (w * normals).sum(axis=1)
-        closing = into + self._rates
-        if known is None:
-            acts = closing <= 0.0
-            slips = _NO_SLIP
-            miss = 0.0
-        else:
-            # Of new ones nothing is known but whether they close.
-            fresh = np.isnan(known[:, 0])
-            some_fresh = bool(fresh.any())
-            if some_fresh:
-                known = np.where(fresh[:, None], 0.0, known)
-            push = (known * normals).sum(axis=1)
-            load = push - self._scales * (closing + push / gain)
-            acts = load >= 0.0
-            np.maximum(load, 0.0, out=load)
-            across = known - push[:, None] * normals
-            drift = w - into[:, None] * normals
-            slide = across * (1.0 - self._scales / gain)[:, None] - self._scales[:, None] * drift
-            size = np.sqrt((slide * slide).sum(axis=1))
-            size += _TINY
-            bound = self.contacts.friction * load
-            share = np.minimum(bound / size, 1.0)
-            slips = acts & (share < 1.0)
-            if some_fresh:
-                slips &= ~fresh
-            right = share[:, None] * slide + load[:, None] * normals
-            miss = float(np.abs(right - known).max())
-        stiff = np.where(acts, gain, 0.0)
-        if not slips.any():
-            # Sticks or is apart: a (1 or 0), the same in all directions.
+        stiff = np.where(pieces.acts, self.gain, 0.0)
+        slips = pieces.slips
+        if slips is None:
+            # Sticks or is apart: a (or 0), the same in all directions.
             slopes[:] = stiff[:, None, None] * _UNIT
             offsets[:] = (-stiff * self._rates)[:, None] * normals
-            return True, miss
-        sticks = np.where(slips, 0.0, stiff)
-        toward = slide / size[:, None]
-        aside = np.where(slips, self._scales * share / np.maximum(1.0 - share, 1e-9), 0.0)
-        np.minimum(aside, gain, out=aside)
+            return
+        toward = pieces.toward
+        grip = np.where(slips, self.contacts.friction, 0.0)
+        push_way = normals + grip[:, None] * toward
         sideways = cross(normals, toward)
-        push_way = normals + np.where(slips, self.contacts.friction, 0.0)[:, None] * toward
-        slopes[:] = sticks[:, None, None] * _UNIT
-        slopes += (np.where(slips, gain, 0.0)[:, None] * push_way)[:, :, None] * normals[:, None, :]
-        slopes += (aside[:, None] * sideways)[:, :, None] * sideways[:, None, :]
-        offsets[:] = (-stiff * self._rates)[:, None] * np.where(slips[:, None], push_way, normals)
-        return False, miss
+        slopes[:] = np.where(slips, 0.0, stiff)[:, None, None] * _UNIT
+        pressed = (np.where(slips, stiff, 0.0)[:, None] * push_way)[:, :, None]
+        slopes += pressed * normals[:, None, :]
+        held = np.where(slips, pieces.aside, 0.0)
+        slopes += (held[:, None] * sideways)[:, :, None] * sideways[:, None, :]
+        offsets[:] = (-stiff * self._rates)[:, None] * push_way
 
     def corrections(self, step: float, slack: float, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.
@@ -240,4 +270,7 @@ class Rows:
 
 
 _UNIT = np.eye(3)
-_NO_SLIP = np.zeros(1, dtype=bool)
+_ONES = np.ones(3)
+_NO_ROWS = np.zeros((0, 3))
+_NO_ONES = np.zeros(0)
+_NOTHING = (np.zeros(0, dtype=bool), None, _NO_ROWS, _NO_ONES)

@@ -43,6 +43,8 @@ from .problem import Problem, Stops, spatial_inertias
 from .rows import Holds, Rows
 from .tree import Tree
 
+Integers = NDArray[np.int64]
+
 _CONTACT_GAIN = 1e4
 """Of contacts, in masses of the figure: at rest on one point it sinks by h·g/10⁴ a second."""
 _PIN_GAIN = 1e5
@@ -442,11 +444,11 @@ class World:
         turns = self._turns()
         springs = logarithm(product_inverse(turns, self._plastic_rest))
         if self._alike:
-            parents = self._parent_matrices()
+            parents = self._parent_frames
             springs = (parents @ springs[:, :, None])[:, :, 0]
             axes = None
         else:
-            axes = self._parent_matrices()
+            axes = self._parent_frames
         speed = np.sqrt((self._linear * self._linear).sum(axis=1).max())
         margin = 2e-3 * self._size + 2.0 * h * float(speed)
         contacts = self._detector.find(self._positions, frames, self.obstacles, margin)
@@ -507,7 +509,7 @@ class World:
         if not (len(self._swinging) or len(self._twisting)):
             return ()
         figure = self.figure
-        parents = self._parent_matrices()
+        parents = self._parent_frames
         found: list[Stops] = []
         which = self._swinging
         if len(which):
@@ -543,7 +545,7 @@ class World:
                 found.append(self._stop(joints, axes, gaps[near] / length, parents))
         return tuple(found)
 
-    def _stop(self, joints: np.ndarray, axes: Floats, gaps: Floats, parents: Floats) -> Stops:
+    def _stop(self, joints: Integers, axes: Floats, gaps: Floats, parents: Floats) -> Stops:
         turned = (parents[joints] @ axes[:, :, None])[:, :, 0]
         return Stops(joints, turned, gaps, self._stop_gains[joints])
 
@@ -577,8 +579,10 @@ class World:
         h = self.settings.step
         tree = self._tree
         speeds = solution.moving
-        flowing = np.flatnonzero(solution.flow.any(axis=1))
-        springs = self._springs_after(problem, solution, flowing) if len(flowing) else None
+        flowing, springs = _NOBODY, None
+        if solution.flow is not None:
+            flowing = np.flatnonzero(solution.flow.any(axis=1))
+            springs = self._springs_after(problem, solution, solution.flow[flowing], flowing)
         turning = tree.above @ speeds[tree.joint_slot]
         self._orientations = product(exponential(h * turning), self._orientations)
         size = (self._orientations * self._orientations).sum(axis=1, keepdims=True)
@@ -591,13 +595,15 @@ class World:
             rest = product(exponential(-springs), turns)
             self._plastic_rest[flowing] = rest / np.linalg.norm(rest, axis=1, keepdims=True)
 
-    def _springs_after(self, problem: Problem, solution: Solution, flowing: np.ndarray) -> Floats:
+    def _springs_after(
+        self, problem: Problem, solution: Solution, flow: Floats, flowing: Integers
+    ) -> Floats:
         """(flowing, 3) q_f at the step's end in the parents' frames: eq. 21."""
         speeds = solution.speeds[self._tree.joint_slot[flowing]]
-        parents = self._parent_matrices()[flowing]
+        parents = self._parent_frames[flowing]
         if problem.frames is not None:
             speeds = (speeds[:, None, :] @ parents)[:, 0]
-        springs = problem.springs[flowing] + self.settings.step * (speeds - solution.flow[flowing])
+        springs = problem.springs[flowing] + self.settings.step * (speeds - flow)
         if problem.frames is None:
             springs = (springs[:, None, :] @ parents)[:, 0]
         return springs
@@ -630,7 +636,10 @@ class World:
         """Matrices and positions, from orientations and roots."""
         tree = self._tree
         self._matrices = matrices(self._orientations)
-        arms = (self._matrices[self._parent_or_self] @ self._anchors)[:, :, 0]
+        parents = self._matrices[self._parent_or_self]
+        arms = (parents @ self._anchors)[:, :, 0]
+        parents[tree.roots] = _UNIT
+        self._parent_frames = parents
         arms[tree.roots] = self._roots
         self._positions = tree.above @ arms
 
@@ -638,11 +647,6 @@ class World:
         parents = self._orientations[self._parent_or_self]
         parents[self._tree.roots] = _UNTURNED
         return inverse_product(parents, self._orientations)
-
-    def _parent_matrices(self) -> Floats:
-        parents = self._matrices[self._parent_or_self]
-        parents[self._tree.roots] = np.eye(3)
-        return parents
 
     def _centre_positions(self) -> Floats:
         return self._positions + (self._matrices @ self._centres)[:, :, 0]
@@ -764,7 +768,9 @@ def _carried_inertias(figure: Figure) -> Floats:
     return result
 
 
+_NOBODY = np.zeros(0, np.int64)
 _ALONG = np.array([0.0, 1.0, 0.0])
+_UNIT = np.eye(3)
 _UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 _NEAR = 0.1
 """Radians from a stop at which it is watched."""
