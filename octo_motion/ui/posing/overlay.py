@@ -100,11 +100,11 @@ class Overlay:
             ):
                 if not len(points):
                     continue
-                batch = batch_for_shader(
-                    shader,
-                    "LINES",
-                    {"pos": points.astype(np.float32), "color": colours.astype(np.float32)},
-                )
+                content: Any = {
+                    "pos": points.astype(np.float32),
+                    "color": colours.astype(np.float32),
+                }
+                batch = batch_for_shader(shader, "LINES", content)
                 shader.bind()
                 shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
                 shader.uniform_float("lineWidth", width * context.preferences.system.pixel_size)

@@ -216,7 +216,7 @@ class PuppetSession:
             return []
         self.core.release()
         tools = self.scene().tool_settings
-        if tools is not None and tools.use_keyframe_insert_auto and self._recorded is None:
+        if tools.use_keyframe_insert_auto and self._recorded is None:
             return self.key()
         return []
 

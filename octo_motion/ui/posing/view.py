@@ -26,7 +26,7 @@ class View:
 
     def ray(self, x: float, y: float) -> tuple[Floats, Floats]:
         """Origin and direction (3,) of the ray under a pixel of the region."""
-        pixel = Vector((x, y))
+        pixel = x, y
         origin = view3d_utils.region_2d_to_origin_3d(self.region, self.data, pixel)
         way = view3d_utils.region_2d_to_vector_3d(self.region, self.data, pixel)
         return np.array(origin, dtype=np.float64), np.array(way, dtype=np.float64)
@@ -34,7 +34,7 @@ class View:
     def at_depth(self, x: float, y: float, point: Floats) -> Floats:
         """The place (3,) under a pixel, as far away as a point."""
         found = view3d_utils.region_2d_to_location_3d(
-            self.region, self.data, Vector((x, y)), Vector(point.tolist())
+            self.region, self.data, (x, y), Vector(point.tolist())
         )
         return np.array(found, dtype=np.float64)
 
@@ -48,10 +48,7 @@ def view_under(window: bpy.types.Window, x: int, y: int) -> tuple[View, float, f
 
     None over panels and headers, and over other editors.
     """
-    screen = window.screen
-    if screen is None:
-        return None
-    for area in screen.areas:
+    for area in window.screen.areas:
         if area.type != "VIEW_3D":
             continue
         main = None

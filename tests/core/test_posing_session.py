@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A hand that holds a puppet, and the time that passes meanwhile."""
+
+import numpy as np
+import pytest
+
+from octo_motion.core.posing.figure import Figure, Pose
+from octo_motion.core.posing.picking import Hit
+from octo_motion.core.posing.session import COARSEST, Sample, Session, Told
+from octo_motion.core.posing.world import WorldSettings
+from octo_motion.core.rotations import IDENTITY, angle_between, from_axis_angle
+from tests.core.puppets import chain, posed, soft
+
+TICK = 1.0 / 60.0
+
+
+def clay(count: int = 4) -> Figure:
+    """A rod of joints that give way: enough for what a session does with them."""
+    return chain(count, elements=soft(count, 40.0, 2.0, 4.0, 1.0))
+
+
+class Clock:
+    """Seconds that pass when they are told to, or a little each time someone looks."""
+
+    def __init__(self, each_look: float = 0.0) -> None:
+        self.now = 0.0
+        self.each_look = each_look
+
+    def __call__(self) -> float:
+        self.now += self.each_look
+        return self.now
+
+
+def session_of(step: float = 4e-3, clock: Clock | None = None) -> Session:
+    """A session with long steps: most of what it does hangs on none of that."""
+    figure = clay()
+    settings = WorldSettings(step=step, pinned=frozenset({0}))
+    return Session(figure, posed(figure), settings, clock=clock)
+
+
+def ticks(session: Session, count: int, seconds: float = TICK) -> Told:
+    """The last of several ticks."""
+    told = session.tick(seconds)
+    for _ in range(count - 1):
+        told = session.tick(seconds)
+    return told
+
+
+def tip(session: Session) -> Hit:
+    pose = session.pose
+    return Hit(len(session.figure) - 1, pose.positions[-1] + [0.0, 0.1, 0.0], 1.0)
+
+
+def pull(session: Session, way: tuple[float, float, float], seconds: float = 1.0) -> None:
+    hit = tip(session)
+    session.grab(hit)
+    count = round(seconds / TICK)
+    for number in range(count):
+        target = hit.point + (number + 1) / count * np.array(way)
+        session.tick(TICK, Sample(target, IDENTITY))
+
+
+def same(first: Pose, second: Pose) -> bool:
+    return bool(
+        (first.positions == second.positions).all()
+        and (first.orientations == second.orientations).all()
+    )
+
+
+def test_limb_follows_the_hand_and_stays_where_it_is_left() -> None:
+    session = session_of()
+    start = session.pose
+    pull(session, (0.25, -0.1, 0.1))
+    held = session.held_point()
+    assert held is not None
+    assert session.grip is not None
+    assert np.linalg.norm(held - session.grip.position) < 0.1
+    session.release()
+    ticks(session, 60)
+    left = session.pose
+    ticks(session, 60)
+    assert np.linalg.norm(left.positions[-1] - start.positions[-1]) > 0.1
+    assert np.abs(session.pose.positions - left.positions).max() < 5e-3
+
+
+def test_same_hand_gives_the_same_pose_bit_by_bit() -> None:
+    poses = []
+    for _ in range(2):
+        session = session_of()
+        pull(session, (0.25, -0.1, 0.1))
+        session.release()
+        session.tick(0.3)
+        poses.append(session.pose)
+    assert same(*poses)
+
+
+def test_puppet_that_nobody_touches_does_not_move_and_costs_nothing() -> None:
+    session = session_of()
+    told = ticks(session, 60)
+    assert told.resting
+    assert told.steps == 0
+    assert session.touched() == []
+
+
+def test_time_that_blender_was_busy_is_not_made_up_for() -> None:
+    session = session_of()
+    session.grab(tip(session))
+    assert session.tick(5.0).simulated == pytest.approx(0.1)
+
+
+def test_ticks_of_any_length_add_up_to_the_time_that_has_passed() -> None:
+    session = session_of(step=1e-3)
+    session.grab(tip(session))
+    for seconds in (0.0004, 0.0004, 0.0004, 0.0173, 0.0085, 0.0002):
+        session.tick(seconds)
+    assert session.time == pytest.approx(0.027)
+
+
+def test_steps_become_longer_while_the_computer_is_too_slow_and_shorter_again() -> None:
+    clock = Clock(each_look=0.05)
+    session = session_of(step=1e-3, clock=clock)
+    session.grab(tip(session))
+    told = ticks(session, 30)
+    assert told.step == COARSEST
+    clock.each_look = 0.0
+    told = ticks(session, 60)
+    assert told.step == pytest.approx(1e-3)
+
+
+def test_it_is_told_how_much_slower_than_real_time_the_puppet_is() -> None:
+    session = session_of(clock=Clock())
+    session.grab(tip(session))
+    told = ticks(session, 40, 0.2)
+    assert told.ratio == pytest.approx(0.5, abs=0.02)
+
+
+def test_longer_steps_keep_what_is_held_and_pinned() -> None:
+    session = session_of()
+    pull(session, (0.2, 0.0, 0.0), seconds=0.5)
+    before = session.held_point()
+    session.change(step=2e-3)
+    assert session.held_point() == pytest.approx(before)
+    assert session.pins == {0}
+    session.tick(0.1)
+    assert session.held_point() == pytest.approx(before, abs=0.02)
+
+
+def test_material_is_changed_in_the_hand() -> None:
+    session = session_of()
+    pull(session, (0.2, 0.0, 0.0), seconds=0.3)
+    before = session.pose
+    session.change_elements(soft(4, 1.0, 1.0, 1.0, 0.1))
+    assert same(session.pose, before)
+    session.tick(TICK)
+
+
+def test_turn_of_the_hand_turns_the_limb() -> None:
+    session = session_of()
+    hit = tip(session)
+    start = session.pose.orientations[-1]
+    session.grab(hit)
+    for number in range(60):
+        turn = from_axis_angle([0.0, 1.0, 0.0], 0.02 * (number + 1))
+        session.tick(TICK, Sample(hit.point, turn))
+    assert angle_between(start, session.pose.orientations[-1]) > 0.3
+
+
+def test_pinned_limb_stays_while_its_neighbours_are_pulled() -> None:
+    session = session_of()
+    session.pin(2, state=True)
+    place = session.pose.positions[2]
+    pull(session, (0.1, -0.1, 0.1))
+    assert session.pose.positions[2] == pytest.approx(place, abs=1e-3)
+    session.pin(2, state=False)
+    assert session.pins == {0}
+
+
+def test_touched_are_the_joints_that_were_bent() -> None:
+    session = session_of()
+    session.pin(2, state=True)
+    pull(session, (0.1, -0.05, 0.0))
+    session.release()
+    assert session.touched() == [3]
+
+
+def test_restore_brings_back_the_pose_at_the_start() -> None:
+    session = session_of()
+    start = session.pose
+    pull(session, (0.2, 0.0, 0.1))
+    session.restore()
+    assert session.grip is None
+    assert session.pose.positions == pytest.approx(start.positions, abs=1e-12)
+    assert np.abs(session.world.velocities()).max() == 0.0
+
+
+def test_each_step_back_is_one_drag() -> None:
+    session = session_of()
+    start = session.pose
+    pull(session, (0.2, 0.0, 0.1))
+    session.release()
+    first = session.pose
+    pull(session, (-0.2, 0.0, 0.1))
+    assert session.step_back()
+    assert session.pose.positions == pytest.approx(first.positions, abs=1e-12)
+    assert session.step_back()
+    assert session.pose.positions == pytest.approx(start.positions, abs=1e-12)
+    assert not session.step_back()
+
+
+def test_pose_of_another_frame_is_taken_over_at_rest() -> None:
+    session = session_of()
+    pull(session, (0.2, 0.0, 0.1))
+    other = posed(session.figure, np.tile([0.2, 0.0, 0.1], (4, 1)))
+    session.adopt(other)
+    assert session.grip is None
+    assert session.pose.positions == pytest.approx(other.positions, abs=1e-12)
+    ticks(session, 30)
+    assert session.pose.positions == pytest.approx(other.positions, abs=1e-4)
