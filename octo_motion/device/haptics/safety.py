@@ -25,8 +25,9 @@ class Limits:
     """N"""
     torque: float
     """N·m"""
-    full_in: float = 0.02
-    """s: from no force to the most, or from the most to none, takes at least so long."""
+    full_in: float = 0.01
+    """s: from no force to the most, or from the most to none, takes at least so long. As fast as
+    force fades when data grows old."""
 
 
 def freshness(age: float) -> float:

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A device in the loop: grabbing, feeling, letting go, and what happens when something fails."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from octo_motion.core.posing.world import WorldSettings
+from octo_motion.core.rotations import from_rotation_vector
+from octo_motion.device.driver import DeviceLostError, Kind, Sample
+from octo_motion.device.haptics.local_model import Held, Pull
+from octo_motion.device.haptics.pointer import Pointer
+from octo_motion.device.messages import Settings, Workspace
+from octo_motion.device.simulated_hand import Hand, SimulatedHand
+from octo_motion.device.simulation import Simulation
+from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector, length
+from tests.core.puppets import chain, posed, soft
+from tests.device.parts import FakeDriver
+
+PERIOD = 0.001
+
+
+class Table:
+    """A device on a table, a pointer, and a clock that the test turns."""
+
+    def __init__(self, driver: FakeDriver | None = None, settings: Settings | None = None) -> None:
+        self.driver = driver or FakeDriver()
+        self.pointer = Pointer(0, self.driver, PERIOD, settings or Settings())
+        self.now = 10.0
+        self.place: Vector = ZERO
+        self.turn: Quaternion = IDENTITY
+        self.velocity: Vector = ZERO
+        self.buttons = 0
+        self.hand_there = True
+        self.silent = False
+
+    def ticks(self, count: int = 1, held: Held | None = None, *, answer: bool = True) -> None:
+        for _ in range(count):
+            self.now += PERIOD
+            if not self.silent:
+                self.driver.samples.append(
+                    Sample(
+                        *(self.now, self.place, self.turn, self.velocity, ZERO),
+                        *(self.buttons, self.hand_there),
+                    )
+                )
+            if held is not None and answer:
+                self.pointer.hold(self.pointer.grab, held, self.now, self.now)
+            self.pointer.tick(self.now)
+
+    @property
+    def force(self) -> float:
+        return length(self.driver.sent[-1][0])
+
+
+ROCK = Held(ZERO, IDENTITY, ZERO, ZERO, Pull())
+
+
+def grabbed(settings: Settings | None = None) -> Table:
+    """A hand that holds a rock and has pulled 5 mm away from it."""
+    table = Table(settings=settings)
+    table.buttons = 1
+    table.ticks(5, ROCK)
+    table.place = (0.005, 0.0, 0.0)
+    table.ticks(400, ROCK)
+    return table
+
+
+def test_hand_that_holds_nothing_feels_nothing() -> None:
+    table = Table()
+    table.place = (0.1, 0.0, 0.0)
+    table.ticks(300)
+    assert table.force == 0.0
+
+
+def test_hand_is_drawn_back_to_what_it_holds() -> None:
+    table = grabbed()
+    force, _ = table.driver.sent[-1]
+    assert force[0] == pytest.approx(-0.005 * 640.0, rel=0.02)
+    assert force[1:] == (0.0, 0.0)
+
+
+def test_turning_away_is_felt_as_torque() -> None:
+    table = Table()
+    table.buttons = 1
+    table.ticks(5, ROCK)
+    w, x, y, z = map(float, from_rotation_vector([0.0, 0.1, 0.0]))
+    table.turn = (w, x, y, z)
+    table.ticks(400, ROCK)
+    _, torque = table.driver.sent[-1]
+    assert torque == pytest.approx((0.0, -0.1 * 1.536, 0.0), rel=0.02)
+
+
+def test_grab_begins_without_a_jump() -> None:
+    table = Table()
+    table.place = (0.005, 0.0, 0.0)
+    table.buttons = 1
+    table.ticks(1, ROCK)
+    table.ticks(30, ROCK)
+    sizes = [length(force) for force, _ in table.driver.sent]
+    changes = [b - a for a, b in zip(sizes, sizes[1:], strict=False)]
+    assert max(changes) < 0.03  # of 3.2 N within 0.2 s
+
+
+def test_letting_go_ends_the_force_within_a_moment() -> None:
+    table = grabbed()
+    table.buttons = 0
+    table.ticks(31, ROCK)
+    assert table.force == 0.0
+    assert table.pointer.grab == 0
+
+
+def test_button_held_or_toggled_as_the_artist_chose() -> None:
+    table = Table(settings=Settings(toggle=True))
+    for buttons, wanted in ((1, True), (0, True), (1, False), (0, False), (1, True)):
+        table.buttons = buttons
+        table.ticks(2)
+        assert bool(table.pointer.grab) is wanted
+    assert [press for press in table.pointer.presses if press[1]] == [(0, True)] * 3
+
+
+def test_silent_simulation_takes_the_force_away_in_twenty_milliseconds() -> None:
+    table = grabbed()
+    before = table.force
+    table.ticks(21, answer=False)
+    sizes = [length(force) for force, _ in table.driver.sent[-22:]]
+    assert before > 3.0
+    assert sizes[-1] == 0.0
+    assert all(b <= a + 1e-9 for a, b in zip(sizes, sizes[1:], strict=False))
+    assert max(a - b for a, b in zip(sizes, sizes[1:], strict=False)) <= 0.11 * 8.0
+
+
+def test_silent_device_takes_the_force_away_in_twenty_milliseconds() -> None:
+    table = grabbed()
+    table.silent = True
+    table.ticks(21, ROCK)
+    assert table.force == 0.0
+
+
+def test_simulation_that_stays_silent_ends_the_grab() -> None:
+    table = grabbed()
+    table.ticks(300)
+    assert table.pointer.grab == 0
+
+
+def test_force_comes_back_gently_after_a_short_stall() -> None:
+    table = grabbed()
+    table.ticks(25)
+    table.ticks(10, ROCK)
+    assert 0.0 < table.force < 0.3
+    table.ticks(300, ROCK)
+    assert table.force > 3.0
+
+
+def test_device_without_a_hand_on_it_gives_no_force() -> None:
+    table = grabbed()
+    table.hand_there = False
+    table.ticks(40, ROCK)
+    assert table.force == 0.0
+    ignoring = grabbed(Settings(dead_man=False))
+    ignoring.hand_there = False
+    ignoring.ticks(40, ROCK)
+    assert ignoring.force > 3.0
+
+
+def test_force_slider_scales_what_is_felt() -> None:
+    full, half = grabbed(), grabbed(Settings(force=0.5))
+    assert half.force == pytest.approx(0.5 * full.force, rel=1e-3)
+
+
+def test_lost_device_is_told_to_whoever_runs_the_loop() -> None:
+    table = grabbed()
+    table.driver.gone = True
+    with pytest.raises(DeviceLostError):
+        table.ticks(1, ROCK)
+    table.pointer.close()
+    assert table.driver.sent[-1] == (ZERO, ZERO)
+
+
+def test_answer_to_an_older_grab_is_not_felt() -> None:
+    table = grabbed()
+    table.buttons = 0
+    table.ticks(40, ROCK)
+    table.buttons = 1
+    table.ticks(1)
+    grab = table.pointer.grab
+    table.pointer.hold(grab - 1, ROCK, table.now, table.now)
+    table.ticks(50)
+    assert table.force == 0.0
+
+
+def test_workspace_says_where_the_hand_is_in_the_scene() -> None:
+    table = Table()
+    w, x, y, z = map(float, from_rotation_vector([0.0, 0.0, 0.5 * math.pi]))
+    table.pointer.place(Workspace(0, (1.0, 2.0, 3.0), (w, x, y, z), 10.0))
+    table.place = (0.1, 0.0, 0.0)
+    table.velocity = (0.0, 0.2, 0.0)
+    table.ticks(1)
+    assert table.pointer.position == pytest.approx((1.0, 3.0, 3.0))
+    assert table.pointer.velocity == pytest.approx((-2.0, 0.0, 0.0))
+
+
+def test_moving_the_workspace_lets_go_first() -> None:
+    table = grabbed()
+    table.pointer.place(table.pointer.workspace)
+    table.pointer.place(Workspace(0, (5.0, 0.0, 0.0)))
+    table.ticks(31, ROCK)
+    assert table.pointer.grab == 0
+    assert table.force == 0.0
+
+
+def test_scaled_workspace_is_as_stiff_to_the_hand() -> None:
+    table = Table()
+    table.pointer.place(Workspace(0, ZERO, IDENTITY, 10.0))
+    table.buttons = 1
+    table.ticks(5, ROCK)
+    table.place = (0.005, 0.0, 0.0)
+    table.ticks(400, ROCK)
+    assert table.force == pytest.approx(0.005 * 640.0, rel=0.02)
+
+
+def test_space_mouse_moves_its_pointer_with_the_speed_of_the_push() -> None:
+    table = Table(FakeDriver(dynamics=None, kind=Kind.RATE))
+    table.velocity = (0.4, 0.0, 0.0)
+    table.ticks(500)
+    assert table.pointer.position == pytest.approx((0.2, 0.0, 0.0))
+    assert table.driver.sent == []
+    table.pointer.place(Workspace(0, (1.0, 0.0, 0.0), IDENTITY, 2.0))
+    table.ticks(500)
+    assert table.pointer.position == pytest.approx((1.4, 0.0, 0.0))
+
+
+def test_test_of_a_device_is_a_gentle_push_each_way() -> None:
+    table = Table()
+    table.pointer.test(table.now)
+    table.ticks(800)
+    pushes = [force[0] for force, _ in table.driver.sent]
+    assert 0.3 < max(pushes) <= 0.15 * 8.0 + 1e-9
+    assert -0.15 * 8.0 - 1e-9 <= min(pushes) < -0.3
+    assert pushes[-1] == 0.0
+
+
+# --- With a real puppet --------------------------------------------------------------------------
+
+
+class Bench:
+    """A puppet in the simulation, a simulated hand, and a clock; sim every `every` ticks."""
+
+    def __init__(self, every: int = 4, yielding: float = 1.0) -> None:
+        self.figure = chain(3, elements=soft(3, 40.0, 2.0, 100.0, yielding))
+        self.simulation = Simulation(
+            *(self.figure, posed(self.figure)),
+            settings=WorldSettings(step=every * PERIOD),
+            clock=lambda: 0.0,
+        )
+        self.simulation.pin(frozenset({0}))
+        self.now = 0.0
+        self.hand = Hand(tremor=0.0)
+        self.driver = SimulatedHand(self.hand, clock=lambda: self.now)
+        self.pointer = Pointer(0, self.driver, PERIOD)
+        x, y, z = map(float, self.simulation.world.pose().positions[2] + [0.0, 0.15, 0.0])
+        self.pointer.place(Workspace(0, (x, y, z)))
+        self.every = every
+        self.log: list[tuple[Vector, Vector]] = []
+        self.work = 0.0
+        """J that the hand got."""
+
+    def run(self, seconds: float) -> None:
+        for tick in range(round(seconds / PERIOD)):
+            self.now += PERIOD
+            before = self.hand.position
+            force = self.pointer.force
+            self.pointer.tick(self.now)
+            moved = np.subtract(self.hand.position, before)
+            self.work += float(np.dot(force, moved))
+            if tick % self.every == 0:
+                self.simulation.hear(self.pointer.message(self.now))
+                self.simulation.step(self.now)
+                for held in self.simulation.held(self.now):
+                    self.pointer.hold(held.grab, held.held(), held.time, self.now)
+            self.log.append((self.pointer.force, self.pointer.torque))
+
+
+@pytest.mark.parametrize("every", [1, 4, 10])
+def test_puppet_follows_the_hand_and_the_hand_feels_it(every: int) -> None:
+    bench = Bench(every)
+    bench.run(0.1)
+    bench.driver.buttons = 1
+    bench.run(0.3)
+    hand = bench.simulation.hands[0]
+    assert hand.handle
+    assert hand.handle.body == 2
+    bench.hand.wish = lambda _t: ((0.04, 0.0, 0.02), IDENTITY)
+    start = bench.simulation.world.pose().orientations[1:]
+    bench.run(1.0)
+    assert np.abs(bench.simulation.world.pose().orientations[1:] - start).max() > 0.02
+    felt = max(length(force) for force, _ in bench.log)
+    assert 0.05 < felt <= 8.0
+    assert bench.work <= 0.02 + 1e-3, "no more than the store holds came out"
+    # Calm at the end: the hand stands still, whatever the step of the simulation.
+    assert length(bench.hand.velocity) < 0.02
+
+
+def test_twist_of_a_held_limb_is_felt() -> None:
+    bench = Bench(4, yielding=5.0)
+    bench.driver.buttons = 1
+    bench.run(0.3)
+    along = from_rotation_vector([0.0, 0.5, 0.0])
+    w, x, y, z = map(float, along)
+    bench.hand.wish = lambda _t: (ZERO, (w, x, y, z))
+    bench.run(0.5)
+    force, torque = bench.pointer.force, bench.pointer.torque
+    assert torque[1] < -0.01, "the limb turns back about its own axis"
+    assert abs(torque[1]) > 3.0 * max(abs(torque[0]), abs(torque[2]))
+    assert length(force) < 1.0
+
+
+def test_let_go_limb_keeps_its_pose() -> None:
+    bench = Bench(4, yielding=0.2)
+    bench.driver.buttons = 1
+    bench.run(0.2)
+    bench.hand.wish = lambda _t: ((0.05, 0.0, 0.0), IDENTITY)
+    bench.run(1.0)
+    bench.driver.buttons = 0
+    bench.run(0.5)
+    kept = bench.simulation.world.pose().orientations
+    assert bench.pointer.force == ZERO
+    bench.run(1.0)
+    assert np.abs(bench.simulation.world.pose().orientations - kept).max() < 0.02
