@@ -27,6 +27,10 @@ class RouteError(OctoMotionError):
     """The route cannot be followed."""
 
 
+class GroundError(OctoMotionError):
+    """The ground cannot be walked on."""
+
+
 class SettingsError(OctoMotionError):
     """A setting has a value that makes no sense, alone or with others."""
 

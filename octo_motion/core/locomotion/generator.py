@@ -23,7 +23,7 @@ from .ccd import Chain, asked_shape, raised, solve
 from .chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
 from .columns import turned
 from .gait import GaitCurve, GaitTable, evaluate, variation
-from .poses import arm_rest, bone_rotations
+from .poses import ArmRest, arm_rest, bone_rotations
 from .targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
@@ -117,7 +117,7 @@ class ArmPoses:
 
 
 @dataclass(frozen=True, eq=False)
-class _Build:
+class Build:
     """Arms whose segments have the same proportions, solved together."""
 
     arms: tuple[int, ...]
@@ -193,7 +193,7 @@ class Generator:
         depths = np.empty((_CYCLE_SAMPLES, len(self._arms)))
         for build in self._builds:
             columns = list(build.arms)
-            directions, _ = self._solve(build, angles[:, columns], np.zeros((1, len(columns))))
+            directions, _ = self.shapes(build, angles[:, columns], np.zeros((1, len(columns))))
             # Up is the same for the arm's frame and the body's.
             climbs = np.cumsum(build.chain.lengths[:, None, None] * directions[:, 2], axis=0)
             lowest = np.minimum(climbs.min(axis=0), 0.0)
@@ -211,6 +211,23 @@ class Generator:
             phase: (frames,) of the body's gait, radians.
             turn: (frames, 2) turn that lies ahead, in the body's XY plane (``Travel.turn``).
         """
+        angles, steering = self.asked(phase, turn)
+        step = max(1, _CHUNK // len(self._arms))
+        parts = [
+            self._pose(angles[start : start + step], steering[start : start + step])
+            for start in range(0, len(angles), step)
+        ]
+        if not parts:
+            parts = [self._pose(angles, steering)]
+        return ArmPoses(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+    def asked(self, phase: Floats, turn: Floats) -> tuple[Floats, Floats]:
+        """What the gait asks of the arms at some frames; arguments as of :meth:`pose`.
+
+        Returns:
+            Angles (frames, arms, links, 3), turns anticlockwise for every arm, and by how much the
+            arms steer (frames, arms), radians.
+        """
         settings = self._settings
         phases = self.arm_phases(np.asarray(phase, dtype=np.float64))
         angles = evaluate(settings.gait, phases, self._pairs) + variation(
@@ -219,14 +236,47 @@ class Generator:
         # Towards the goal: by the part of the turn that lies across the arm.
         across = rotate(self._outward, np.array([0.0, 1.0, 0.0]))[:, :2]
         steering = settings.turning * np.asarray(turn, dtype=np.float64) @ across.T
-        step = max(1, _CHUNK // len(self._arms))
-        parts = [
-            self._pose(angles[start : start + step], steering[start : start + step])
-            for start in range(0, len(phases), step)
-        ]
-        if not parts:
-            parts = [self._pose(angles, steering)]
-        return ArmPoses(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+        return self._mirrored(angles), steering
+
+    @property
+    def arms(self) -> tuple[Arm, ...]:
+        """The arms as they were given."""
+        return self._arms
+
+    @property
+    def builds(self) -> tuple[Build, ...]:
+        """The arms, by how they are built."""
+        return self._builds
+
+    @property
+    def settings(self) -> GaitSettings:
+        """How the arms move."""
+        return self._settings
+
+    @property
+    def offsets(self) -> Floats:
+        """(arms,) radians that each arm's phase is ahead of the body's."""
+        return self._offsets
+
+    @property
+    def roots(self) -> Floats:
+        """(arms, 3) P₀ in the body's frame, armature units."""
+        return self._roots
+
+    @property
+    def lengths(self) -> Floats:
+        """(arms,) armature units."""
+        return self._lengths
+
+    @property
+    def outward(self) -> Floats:
+        """(arms, 4) from an arm's own frame, x outward and z up, to the body's."""
+        return self._outward
+
+    @property
+    def rests(self) -> tuple[ArmRest, ...]:
+        """Each arm at rest."""
+        return tuple(self._rests)
 
     def _mirrored(self, angles: Floats) -> Floats:
         """The same angles (frames, arms, links, 3), but with turns anticlockwise for every arm."""
@@ -237,31 +287,33 @@ class Generator:
     def _pose(self, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
         """Rotations and misses from angles (frames, arms, links, 3) and steering (frames, arms)."""
         frames = len(angles)
-        angles = self._mirrored(angles)
         ends = np.cumsum([0] + [len(arm.bones) for arm in self._arms])
         rotations = np.empty((frames, ends[-1], 4))
         misses = np.empty((frames, len(self._arms), GROUPS))
         for build in self._builds:
             columns = list(build.arms)
             own = angles[:, columns]
-            directions, misses[:, columns] = self._solve(build, own, steering[:, columns])
+            directions, misses[:, columns] = self.shapes(build, own, steering[:, columns])
             count, size = len(directions), frames * len(columns)
             to_armature = np.tile(self._to_armature[columns].T, (1, frames))
             in_armature = turned(to_armature, directions.reshape(count, 3, size))
-            bank = np.repeat(
-                np.moveaxis(own[..., BANK], -1, 0) / np.array(build.chain.sizes)[:, None, None],
-                build.chain.sizes,
-                axis=0,
-            )
             posed = bone_rotations(
-                [self._rests[arm] for arm in columns], in_armature.reshape(directions.shape), bank
+                [self._rests[arm] for arm in columns],
+                in_armature.reshape(directions.shape),
+                twist(build, own),
             )
             for place, arm in enumerate(columns):
                 rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
         return rotations, misses
 
-    def _solve(self, build: _Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
-        """Directions (segments, 3, frames, arms) in the arms' frames; misses (frames, arms, 3)."""
+    def shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        """Directions (segments, 3, frames, arms) in the arms' frames; misses (frames, arms, 3).
+
+        Args:
+            build: which arms.
+            angles: (frames, arms, links, 3) of these, from :meth:`asked`.
+            steering: (frames, arms) of these.
+        """
         frames, arms = angles.shape[:2]
         batch = frames * arms
         width = build.widths * (1.0 + contraction(angles, self._settings.contraction)) ** (
@@ -297,7 +349,7 @@ class Generator:
             np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1),
         )
 
-    def _group(self, segments: Sequence[Floats]) -> tuple[_Build, ...]:
+    def _group(self, segments: Sequence[Floats]) -> tuple[Build, ...]:
         """Arms that are built alike, so that one solution in batch serves them."""
         alike: dict[tuple[float, ...], list[int]] = {}
         for arm, lengths in enumerate(segments):
@@ -312,8 +364,20 @@ class Generator:
             along = np.cumsum(shares) - shares
             sampled = np.interp(along, np.linspace(0.0, 1.0, len(weights)), weights)
             chain = Chain(shares, sizes, sampled)
-            builds.append(_Build(tuple(arms), chain, group_lengths(shares, sizes)))
+            builds.append(Build(tuple(arms), chain, group_lengths(shares, sizes)))
         return tuple(builds)
+
+
+def twist(build: Build, angles: Floats) -> Floats:
+    """Radians (segments, frames, arms) by which each bone is twisted against the one before.
+
+    Args:
+        build: which arms.
+        angles: (frames, arms, links, 3) of these; bank is spread evenly over its group.
+    """
+    sizes = build.chain.sizes
+    shares = np.moveaxis(angles[..., BANK], -1, 0) / np.array(sizes)[:, None, None]
+    return np.repeat(shares, sizes, axis=0)
 
 
 def _batch_last(values: Floats, batch: int) -> Floats:

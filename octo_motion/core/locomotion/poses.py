@@ -10,13 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from ..rotations import Floats, conjugate, multiply, normalized, rotate
 from ..skeleton import Skeleton
-from .chains import joint_positions
-from .columns import product, smallest_arc, turned
+from .chains import AXES, joint_positions
+from .columns import cross, dot, product, smallest_arc, turned
+
+
+_NO_SIDE: Final = 0.1
+"""Length of what is across a segment, of a unit vector that does not tell which side is which."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +60,44 @@ def arm_rest(skeleton: Skeleton, bones: Sequence[str]) -> ArmRest:
     return ArmRest(segments, carried, tuple(follows))
 
 
-def bone_rotations(rests: Sequence[ArmRest], directions: Floats, bank: Floats) -> Floats:
+@dataclass(frozen=True, eq=False)
+class Facing:
+    """Which side of each bone is to face which way, as far as twisting lets it."""
+
+    sides: Sequence[Floats]
+    """For each arm (bones, 3): unit vectors across the segments, in the bones' rest frames."""
+    towards: Floats
+    """(3, frames, arms) unit vectors, armature space."""
+    hold: Floats
+    """(bones, frames, arms) radians that a bone is turned at most against the one before."""
+
+
+def sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Floats:
+    """The side of each bone (bones, 3) that the suckers are on, in its rest frame.
+
+    Where the rig does not say, it is the side that looks down at rest.
+
+    Args:
+        skeleton: the rig.
+        bones: of an arm.
+        down: (3,) armature space.
+    """
+    rest = arm_rest(skeleton, bones)
+    order = [skeleton.index[name] for name in bones]
+    looking = rotate(conjugate(skeleton.rest_rotations[order]), down)
+    for place, number in enumerate(order):
+        if axis := AXES.get(skeleton.sucker_axes[number]):
+            looking[place] = axis
+    along = np.sum(looking * rest.segments, axis=-1, keepdims=True)
+    across = looking - along * rest.segments
+    # A bone that hangs straight down at rest has no side that looks down: it follows its parent.
+    size = np.linalg.norm(across, axis=-1, keepdims=True)
+    return np.where(size > _NO_SIDE, across / np.maximum(size, _NO_SIDE), 0.0)
+
+
+def bone_rotations(
+    rests: Sequence[ArmRest], directions: Floats, bank: Floats, facing: Facing | None = None
+) -> Floats:
     """Rotations (frames, arms, bones, 4) in each bone's rest frame (Blender's ``matrix_basis``).
 
     Args:
@@ -63,6 +105,9 @@ def bone_rotations(rests: Sequence[ArmRest], directions: Floats, bank: Floats) -
         directions: (bones, 3, frames, arms) unit vectors along the segments, armature space.
         bank: (bones, frames, arms) radians by which each bone is twisted about its own segment,
             against the bone before.
+        facing: which way a side of the arms turns besides. A bone that faces askew by θ is turned
+            by the sine of θ: nothing for one that faces right, and nothing for one that faces
+            quite away, which would have no better side to turn to. So it never flips.
     """
     bones, _, frames, arms = directions.shape
     batch = frames * arms
@@ -71,6 +116,7 @@ def bone_rotations(rests: Sequence[ArmRest], directions: Floats, bank: Floats) -
     result = np.empty((frames, arms, bones, 4))
     orientation = np.zeros((4, batch))
     orientation[0] = 1.0
+    banked = np.zeros(batch)
     for bone in range(bones):
         segment = _tiled([rest.segments[bone] for rest in rests], frames)
         carried = _tiled([rest.carried[bone] for rest in rests], frames)
@@ -81,9 +127,19 @@ def bone_rotations(rests: Sequence[ArmRest], directions: Floats, bank: Floats) -
             carried = np.where(np.tile(follows, frames), product(orientation, carried), carried)
         backwards = carried * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
         turn = smallest_arc(segment, turned(backwards, wanted[bone]))
-        if np.any(half[bone]):
-            twist = np.concatenate([np.cos(half[bone])[None], np.sin(half[bone]) * segment])
-            turn = product(turn, twist)
+        twisted = half[bone]
+        if facing is not None:
+            side = _tiled([each[bone] for each in facing.sides], frames)
+            side = turned(product(carried, turn), side)
+            # Bank is meant to be seen: it is what the side is turned away by.
+            banked = banked + 2.0 * half[bone]
+            towards = facing.towards.reshape(3, batch)
+            sine = dot(cross(side, towards), wanted[bone])
+            cosine = dot(side, towards) - dot(side, wanted[bone]) * dot(towards, wanted[bone])
+            askew = np.sin(banked) * cosine + np.cos(banked) * sine
+            twisted = twisted + 0.5 * facing.hold[bone].reshape(batch) * askew
+        if np.any(twisted):
+            turn = product(turn, np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segment]))
         orientation = product(carried, turn)
         result[:, :, bone] = turn.T.reshape(frames, arms, 4)
     return result

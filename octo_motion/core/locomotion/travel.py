@@ -11,7 +11,7 @@ The canonical body has its left side at +X, its front at −Y and its mantle at 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -119,7 +119,14 @@ class Travel:
     ahead from here; its length is the angle, at most π. Zero where the route is straight."""
 
 
-def plan_travel(route: Route, settings: TravelSettings, times: ArrayLike) -> Travel:
+def bearings_of(route: Route, settings: TravelSettings) -> Bearings:
+    """The table of directions that the functions here ask; made once for several of them."""
+    return bearings(route, settings.corner * settings.stride, _SETTLE * settings.stride)
+
+
+def plan_travel(
+    route: Route, settings: TravelSettings, times: ArrayLike, table: Bearings | None = None
+) -> Travel:
     """The motion at the given times.
 
     A frame is a function of its own time: times may come in any order and any density, and one
@@ -134,10 +141,11 @@ def plan_travel(route: Route, settings: TravelSettings, times: ArrayLike) -> Tra
         route: where to.
         settings: how.
         times: (frames,) in 0…1; earlier and later times hold the ends.
+        table: from ``bearings_of``, if it is there already.
     """
     at = np.clip(np.asarray(times, dtype=np.float64), 0.0, 1.0)
     distance, phase = _progress(route, settings, at)
-    table = bearings(route, settings.corner * settings.stride, _SETTLE * settings.stride)
+    table = bearings_of(route, settings) if table is None else table
     ahead = distance + min(settings.look_ahead * settings.stride, route.length)
     turning = _swum if settings.manner == "SWIM" else _walked
     rotations, turn = turning(table, settings, distance, ahead)
@@ -145,6 +153,28 @@ def plan_travel(route: Route, settings: TravelSettings, times: ArrayLike) -> Tra
     turn = turn * np.minimum(1.0, np.pi / np.maximum(size, np.pi))[:, None]
     positions = route.position(route.parameter_at(distance))
     return Travel(at, distance, phase, positions, rotations, turn)
+
+
+def walked_at(
+    route: Route, settings: TravelSettings, table: Bearings, distance: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Where a walking, upright body is at distances (…,) along its route, and before and after it.
+
+    Beyond the ends of an open route it goes straight on; a closed one it goes round again.
+
+    Returns:
+        World positions (n, 3) and orientations (n, 4).
+    """
+    wanted = np.asarray(distance, dtype=np.float64)
+    inside = np.mod(wanted, route.length) if route.cyclic else np.clip(wanted, 0.0, route.length)
+    positions = route.position(route.parameter_at(inside))
+    if not route.cyclic:
+        ends = route.tangent(np.array([0.0, 1.0]))
+        beyond = wanted - inside
+        positions = positions + beyond[:, None] * np.where(beyond[:, None] < 0.0, ends[0], ends[1])
+    upright = replace(settings, keep_upright=True)
+    rotations, _ = _walked(table, upright, inside, inside)
+    return positions, rotations
 
 
 def duration(route: Route, settings: TravelSettings, metres_per_second: float) -> float:

@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a creature walks on: a plane, or heights over a regular grid in the world's XY plane.
+
+However many faces a ground has, it is sampled once; after that every question is a look-up in a
+table, for all frames, arms and joints at once. Heights between the samples are bilinear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from ..errors import GroundError
+from ..rotations import Floats
+
+_EDGE: Final = 1e-6
+"""Share of a face by which it reaches beyond its edges, so that none falls between two."""
+_AT_ONCE: Final = 2_000_000
+"""Pairs of faces and samples that are looked at together."""
+_MOST_SAMPLES: Final = 4_000_000
+"""Samples of a ground; a longer route is sampled more coarsely."""
+
+
+class Ground(Protocol):
+    """A surface over the world's XY plane."""
+
+    def height(self, points: Floats) -> Floats:
+        """World Z (…,) of the ground at points (…, 2 or 3); Z of the points is not looked at."""
+        ...
+
+    def slope(self, points: Floats) -> Floats:
+        """Rise per metre along X and Y (…, 2)."""
+        ...
+
+
+def normals(ground: Ground, points: Floats) -> Floats:
+    """Unit normals (…, 3) of the ground, upwards."""
+    slope = ground.slope(points)
+    upward = np.concatenate([-slope, np.ones((*slope.shape[:-1], 1))], axis=-1)
+    return upward / np.sqrt(np.sum(upward * upward, axis=-1, keepdims=True))
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A level or sloping plane."""
+
+    z: float
+    """Height over the world's origin."""
+    rise: tuple[float, float] = (0.0, 0.0)
+    """Metres per metre along X and Y."""
+
+    def height(self, points: Floats) -> Floats:
+        """World Z (…,)."""
+        return self.z + points[..., 0] * self.rise[0] + points[..., 1] * self.rise[1]
+
+    def slope(self, points: Floats) -> Floats:
+        """Rise (…, 2)."""
+        return np.broadcast_to(np.array(self.rise), (*points.shape[:-1], 2))
+
+
+@dataclass(frozen=True, eq=False)
+class HeightField:
+    """Heights over a regular grid; beyond its border the ground goes on level."""
+
+    origin: tuple[float, float]
+    """World X and Y of the first sample."""
+    spacing: float
+    """Metres between samples."""
+    heights: Floats
+    """(nx, ny) world Z, at least 2 × 2."""
+
+    def height(self, points: Floats) -> Floats:
+        """World Z (…,)."""
+        (low, low_y), (high, high_y), x, y = self._around(points)
+        lower = low + y * (low_y - low)
+        return lower + x * (high + y * (high_y - high) - lower)
+
+    def slope(self, points: Floats) -> Floats:
+        """Rise (…, 2), taken over a sample's width to either side, so that it does not jump."""
+        at = points[..., :2]
+        step = self.spacing * np.eye(2)
+        across = [self.height(at + each) - self.height(at - each) for each in step]
+        return np.stack(across, axis=-1) * (0.5 / self.spacing)
+
+    def _around(
+        self, points: Floats
+    ) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats], Floats, Floats]:
+        """Heights of the four samples round each point, and how far it lies between them."""
+        nx, ny = self.heights.shape
+        x = np.clip((points[..., 0] - self.origin[0]) / self.spacing, 0.0, nx - 1.0)
+        y = np.clip((points[..., 1] - self.origin[1]) / self.spacing, 0.0, ny - 1.0)
+        column = np.minimum(x.astype(np.int64), nx - 2)
+        row = np.minimum(y.astype(np.int64), ny - 2)
+        flat, first = self.heights.ravel(), column * ny + row
+        low = flat.take(first), flat.take(first + 1)
+        high = flat.take(first + ny), flat.take(first + ny + 1)
+        return low, high, x - column, y - row
+
+
+def sampled(
+    triangles: Floats,
+    path: Floats,
+    needed: np.ndarray,
+    *,
+    reach: float,
+    spacing: float,
+    headroom: float,
+) -> HeightField:
+    """The ground that faces make along a path.
+
+    Of several surfaces one above the other, the highest counts that is not further than the
+    headroom above the path: what a creature walks on, not the roof above it.
+
+    Args:
+        triangles: (faces, 3, 3) corners, world.
+        path: (n, 3) points along the route and beyond its ends, near each other.
+        needed: (n,) under which of them there must be ground.
+        reach: metres to all sides of the path that are sampled.
+        spacing: metres between samples.
+        headroom: metres.
+
+    Raises:
+        GroundError: there are no faces, or none under some point of the path.
+    """
+    if len(triangles) == 0:
+        raise GroundError("The ground has no faces.", "Choose a mesh that has faces.")
+    low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
+    spacing = max(spacing, float(np.sqrt(np.prod(high - low) / _MOST_SAMPLES)))
+    shape = tuple(int(each) + 2 for each in np.ceil((high - low) / spacing))
+    grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
+    coarse = _near_path(grid, path, reach)
+    heights = _rasterised(triangles, grid, coarse(path[:, 2]) + headroom)
+    inside = np.flatnonzero(needed)
+    bare = np.isnan(heights[_nearest(grid, path[inside])])
+    if np.any(bare):
+        share = float(np.flatnonzero(bare)[0]) / max(len(inside) - 1, 1)
+        raise GroundError(
+            f"The route leaves the ground after {100.0 * share:.0f} % of its length.",
+            "Move the route, or make the ground larger.",
+        )
+    return HeightField(grid.origin, spacing, _filled(heights))
+
+
+def along_path(path: Floats, *, reach: float, spacing: float, softness: float) -> Ground:
+    """The ground that a route itself describes: as high as the route where that is nearest.
+
+    Args:
+        path: (n, 3) points along the route, near each other.
+        reach: metres to all sides of the path that are needed.
+        spacing: metres between samples.
+        softness: metres over which the heights of neighbouring stretches pass into each other.
+    """
+    if np.ptp(path[:, 2]) <= 1e-6 * max(reach, 1e-9):
+        return Plane(float(path[:, 2].mean()))
+    low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
+    spacing = max(spacing, float(np.sqrt(np.prod(high - low) * len(path) / _MOST_SAMPLES / 4.0)))
+    x, y = (np.arange(np.ceil((b - a) / spacing) + 2) * spacing + a for a, b in zip(low, high))
+    heights = np.empty((len(x), len(y)))
+    for column, place in enumerate(x):
+        apart = (place - path[:, 0]) ** 2 + (y[:, None] - path[:, 1]) ** 2
+        weight = np.exp((apart.min(axis=1, keepdims=True) - apart) * (0.5 / softness**2))
+        heights[column] = weight @ path[:, 2] / weight.sum(axis=1)
+    return HeightField((float(low[0]), float(low[1])), spacing, heights)
+
+
+def passes_over_itself(path: Floats, apart: float, above: float) -> bool:
+    """Whether some point of a path (n, 3) lies nearly over another, and well above it."""
+    step = max(1, len(path) // 400)
+    some = path[::step]
+    level = np.linalg.norm(some[:, None, :2] - some[None, :, :2], axis=-1)
+    rise = np.abs(some[:, None, 2] - some[None, :, 2])
+    return bool(np.any((level < apart) & (rise > above)))
+
+
+def _near_path(grid: HeightField, path: Floats, reach: float) -> Callable[[Floats], Floats]:
+    """A function that spreads a value of each point of the path over the samples near it."""
+    factor = max(1, int(0.25 * reach / grid.spacing))
+    nx, ny = (-(-each // factor) for each in grid.heights.shape)
+    width = factor * grid.spacing
+    x = grid.origin[0] + width * (np.arange(nx) + 0.5)
+    y = grid.origin[1] + width * (np.arange(ny) + 0.5)
+    nearest = np.empty((nx, ny), dtype=np.int64)
+    far = np.empty((nx, ny), dtype=bool)
+    for column, place in enumerate(x):
+        apart = (place - path[:, 0]) ** 2 + (y[:, None] - path[:, 1]) ** 2
+        nearest[column] = apart.argmin(axis=1)
+        far[column] = apart.min(axis=1) > (reach + width) ** 2
+
+    def spread(values: Floats) -> Floats:
+        coarse = np.where(far, np.nan, values[nearest])
+        fine = np.repeat(np.repeat(coarse, factor, axis=0), factor, axis=1)
+        return fine[: grid.heights.shape[0], : grid.heights.shape[1]]
+
+    return spread
+
+
+def _nearest(grid: HeightField, points: Floats) -> tuple[np.ndarray, np.ndarray]:
+    place = np.rint((points[:, :2] - grid.origin) / grid.spacing).astype(np.int64)
+    return place[:, 0], place[:, 1]
+
+
+def _rasterised(triangles: Floats, grid: HeightField, ceiling: Floats) -> Floats:
+    """Heights (nx, ny) of the faces at the samples; NaN where there is none, or no ceiling.
+
+    The highest below the ceiling; where there is none, the lowest above it.
+    """
+    shape = grid.heights.shape
+    below = np.full(shape[0] * shape[1], -np.inf)
+    above = np.full(shape[0] * shape[1], np.inf)
+    limit = ceiling.ravel()
+    corners = triangles[..., :2] - np.array(grid.origin)
+    corners = corners / grid.spacing
+    first = np.maximum(np.ceil(corners.min(axis=1) - _EDGE), 0.0).astype(np.int64)
+    last = np.minimum(np.floor(corners.max(axis=1) + _EDGE), np.array(shape) - 1).astype(np.int64)
+    sizes = np.maximum(last - first + 1, 0)
+    edges = corners[:, 1:] - corners[:, :1]
+    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    counts = np.where(np.abs(area) > 1e-12, sizes[:, 0] * sizes[:, 1], 0)
+    kept = np.flatnonzero(counts)
+    # Faces in blocks of about so many samples; one huge face is a block of its own.
+    block = np.cumsum(counts[kept]) // _AT_ONCE
+    for number in np.unique(block):
+        chosen = kept[block == number]
+        many = counts[chosen]
+        face = np.repeat(chosen, many)
+        within = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
+        column = first[face, 0] + within // sizes[face, 1]
+        row = first[face, 1] + within % sizes[face, 1]
+        x, y = column - corners[face, 0, 0], row - corners[face, 0, 1]
+        second = (x * edges[face, 1, 1] - y * edges[face, 1, 0]) / area[face]
+        third = (y * edges[face, 0, 0] - x * edges[face, 0, 1]) / area[face]
+        hit = (second >= -_EDGE) & (third >= -_EDGE) & (second + third <= 1.0 + _EDGE)
+        face, second, third = face[hit], second[hit], third[hit]
+        place = column[hit] * shape[1] + row[hit]
+        corner = triangles[face, :, 2]
+        z = corner[:, 0]
+        z = z + second * (corner[:, 1] - z) + third * (corner[:, 2] - z)
+        low = z <= limit[place]
+        np.maximum.at(below, place[low], z[low])
+        high = z > limit[place]
+        np.minimum.at(above, place[high], z[high])
+    heights = np.where(np.isfinite(below), below, above)
+    return np.where(np.isfinite(heights), heights, np.nan).reshape(shape)
+
+
+def _filled(heights: Floats) -> Floats:
+    """Heights whose gaps go on level from their borders."""
+    filled = heights.copy()
+    while np.any(missing := np.isnan(filled)):
+        padded = np.pad(filled, 1, constant_values=np.nan)
+        around = np.stack(
+            [padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]]
+        )
+        known = ~np.isnan(around)
+        count = known.sum(axis=0)
+        spread = np.where(known, around, 0.0).sum(axis=0) / np.maximum(count, 1)
+        grown = missing & (count > 0)
+        if not np.any(grown):
+            break
+        filled[grown] = spread[grown]
+    return filled

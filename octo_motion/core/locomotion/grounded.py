@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A walk on the ground: the gait's arms, brought to their footholds while the body passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..rotations import Floats, conjugate, from_matrix, multiply, rotate
+from ..skeleton import Skeleton
+from .body_line import BodyLine
+from .chains import BodyFrame
+from .columns import turned
+from .footholds import Footholds, Limbs, StanceSettings, Wish, cycles_at, lay
+from .generator import Build, Generator, twist
+from .ground import Ground, normals
+from .poses import Facing, bone_rotations, sucker_sides
+from .stance import Bodies, hold, stand
+
+_ASKEW: Final = np.radians(35.0)
+"""How far from straight outward a foothold may lie, and an arm from there."""
+_TURN: Final = 6.0
+"""Radians that the suckers of an arm are turned at most from root to tip."""
+_MOST_TURN: Final = 0.6
+"""The same from one bone to the next."""
+_FIRST_TURN: Final = 0.3
+"""Share of it at the root, which the body's skin surrounds."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundedPoses:
+    """Arms on the ground at some frames; joints of arms of different builds are apart."""
+
+    rotations: Floats
+    """(frames, bones, 4) unit quaternions in each bone's rest frame."""
+    strains: Floats
+    """(frames, bones) by how much each bone is longer than at rest, as a share."""
+    misses: Floats
+    """(frames, arms) distance of an arm that holds on from its foothold, in arm lengths."""
+    joints: tuple[Floats, ...]
+    """For each build (frames, arms, segments + 1, 3), world."""
+    lying: tuple[np.ndarray, ...]
+    """For each build (frames, arms, segments + 1): which joints rest on the ground."""
+    cycles: np.ndarray
+    """(frames, arms) number of the cycle that each arm is in."""
+
+
+@dataclass(frozen=True, eq=False)
+class Foothold:
+    """One foothold, as it is shown to the artist."""
+
+    arm: int
+    cycle: int
+    position: Floats
+    """(3,) the joint that touches first, world."""
+    heading: float
+    """Radians about world Z from +X."""
+    on: float
+    """Phase of the body, radians, at which the arm touches …"""
+    off: float
+    """… and at which it lets go."""
+    short: float
+    """Arm lengths by which it is out of reach."""
+
+
+class GroundedWalk:
+    """A body that walks over a ground.
+
+    Args:
+        skeleton: the rig.
+        generator: its gait.
+        body: where the body lies in armature space.
+        line: its way.
+        ground: what it walks on.
+        settings: how arms hold on.
+        scale: metres of the armature's unit.
+        radii: for each arm (bones + 1,) armature units from each joint to the skin below it.
+        may_stretch: for each arm, whether its bones may get longer.
+        phases: the first and the last of the body's phases, radians.
+        wishes: the artist's footholds.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        generator: Generator,
+        body: BodyFrame,
+        line: BodyLine,
+        ground: Ground,
+        settings: StanceSettings,
+        *,
+        scale: float,
+        radii: Sequence[Floats],
+        may_stretch: Sequence[bool],
+        phases: tuple[float, float],
+        wishes: Sequence[Wish] = (),
+    ) -> None:
+        self._generator, self._line, self._ground = generator, line, ground
+        self._settings, self._scale = settings, scale
+        self._middle = generator.settings.gait.power_phase
+        self._body_turn = from_matrix(body.rotation)
+        first, _ = cycles_at(phases[0] + generator.offsets, self._middle)
+        last, _ = cycles_at(phases[1] + generator.offsets, self._middle)
+        self._cycles = int(first.min()), int(last.max())
+        self._last = first, last
+        down = -body.rotation[:, 2]
+        self._sides = [sucker_sides(skeleton, arm.bones, down) for arm in generator.arms]
+        self._limbs: list[tuple[Build, Limbs, Footholds]] = []
+        for build in generator.builds:
+            for stretch in sorted({may_stretch[arm] for arm in build.arms}):
+                arms = tuple(arm for arm in build.arms if may_stretch[arm] == stretch)
+                part = Build(arms, build.chain, build.widths)
+                limbs = self._limbs_of(part, radii, stretch=stretch)
+                footholds = lay(
+                    limbs,
+                    line,
+                    ground,
+                    settings,
+                    middle=self._middle,
+                    cycles=self._cycles,
+                    wishes=wishes,
+                    seed=generator.settings.seed,
+                )
+                self._limbs.append((part, limbs, footholds))
+
+    def _limbs_of(self, build: Build, radii: Sequence[Floats], *, stretch: bool) -> Limbs:
+        generator, columns = self._generator, list(build.arms)
+        lengths = self._scale * build.chain.lengths[:, None] * generator.lengths[columns]
+        limbs = Limbs(
+            arms=build.arms,
+            roots=self._scale * generator.roots[columns],
+            outward=generator.outward[columns],
+            offsets=generator.offsets[columns],
+            lengths=lengths,
+            radii=self._scale * np.stack([radii[arm] for arm in columns], axis=1),
+            aims=np.zeros((len(columns), 2)),
+            may_stretch=stretch,
+        )
+        # Half way through the hold, as the gait alone has it.
+        phase = np.array([self._middle])
+        joint = limbs.touching(self._settings.planted)
+        aims = np.empty((len(columns), 2))
+        for place, arm in enumerate(columns):
+            angles, steering = generator.asked(phase - generator.offsets[arm], np.zeros((1, 2)))
+            shape, _ = generator.shapes(build, angles[:, columns], 0.0 * steering[:, columns])
+            steps = build.chain.lengths[:, None] * shape[:, :, 0, place]
+            aims[place, 0] = np.arctan2(*steps[:joint, 1::-1].sum(axis=0))
+            aims[place, 1] = np.arctan2(*steps[joint:, 1::-1].sum(axis=0))
+        return Limbs(**{**limbs.__dict__, "aims": _ASKEW * np.tanh(aims / _ASKEW)})
+
+    def pose(
+        self, phase: Floats, turn: Floats, centres: Floats, orientations: Floats
+    ) -> GroundedPoses:
+        """The arms at some frames.
+
+        Args:
+            phase: (frames,) of the body's gait, radians.
+            turn: (frames, 2) turn that lies ahead, in the body's XY plane.
+            centres: (frames, 3) of the body, world.
+            orientations: (frames, 4) of the canonical body, world.
+        """
+        generator = self._generator
+        frames, count = len(phase), len(generator.arms)
+        angles, steering = generator.asked(phase, turn)
+        cycles, since = cycles_at(generator.arm_phases(phase), self._middle)
+        ends = np.cumsum([0] + [len(arm.bones) for arm in generator.arms])
+        rotations = np.empty((frames, ends[-1], 4))
+        strains = np.zeros((frames, ends[-1]))
+        misses = np.zeros((frames, count))
+        joints, lying = [], []
+        to_armature = multiply(self._body_turn, conjugate(orientations))
+        for build, limbs, footholds in self._limbs:
+            columns = list(build.arms)
+            many, batch = len(columns), frames * len(columns)
+            own = angles[:, columns]
+            shapes, _ = generator.shapes(build, own, steering[:, columns])
+            segments = len(shapes)
+            facing = multiply(orientations[:, None], generator.outward[columns]).reshape(batch, 4).T
+            shapes = turned(facing, shapes.reshape(segments, 3, batch))
+            roots = centres[:, None] + rotate(orientations[:, None], limbs.roots)
+            bodies = Bodies(
+                np.ascontiguousarray(roots.reshape(batch, 3).T),
+                turned(facing, np.array([1.0, 0.0, 0.0])[:, None]),
+                turned(facing, np.array([0.0, 0.0, 1.0])[:, None]),
+            )
+            arms = np.tile(np.arange(many), frames)
+            held = hold(
+                footholds,
+                limbs,
+                cycles[:, columns].reshape(batch),
+                since[:, columns].reshape(batch),
+                arms,
+                bodies.roots,
+            )
+            stood = stand(limbs, arms, shapes, bodies, held, self._ground, self._settings)
+            back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
+            in_armature = turned(back, stood.directions)
+            down = -normals(self._ground, held.joints[0].T).T
+            towards = turned(back, down).reshape(3, frames, many)
+            most = min(_MOST_TURN, _TURN / segments)
+            along = np.minimum(_FIRST_TURN + np.arange(segments) / 3.0, 1.0)
+            turns = most * along[:, None, None] * held.weight.reshape(frames, many)
+            posed = bone_rotations(
+                [generator.rests[arm] for arm in columns],
+                in_armature.reshape(segments, 3, frames, many),
+                twist(build, own),
+                Facing([self._sides[arm] for arm in columns], towards, turns),
+            )
+            longer = stood.strains.reshape(segments, frames, many)
+            for place, arm in enumerate(columns):
+                rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
+                strains[:, ends[arm] : ends[arm + 1]] = longer[:, :, place].T
+            whole = limbs.reach[-1][arms]
+            misses[:, columns] = (stood.misses / whole).reshape(frames, many)
+            joints.append(np.moveaxis(stood.joints.reshape(segments + 1, 3, frames, many), 1, -1))
+            lying.append(stood.lying.reshape(segments + 1, frames, many))
+        return GroundedPoses(
+            rotations,
+            strains,
+            misses,
+            tuple(np.moveaxis(each, 0, 2) for each in joints),
+            tuple(np.moveaxis(each, 0, 2) for each in lying),
+            cycles,
+        )
+
+    @property
+    def builds(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the arms of each build, in the order of ``GroundedPoses.joints``."""
+        return tuple(build.arms for build, _, _ in self._limbs)
+
+    def footholds(self) -> list[Foothold]:
+        """All footholds that are there, arm by arm."""
+        found: list[Foothold] = []
+        offsets = self._generator.offsets
+        first, last = self._last
+        for build, limbs, laid in self._limbs:
+            for place, arm in enumerate(build.arms):
+                for cycle in range(int(first[arm]), int(last[arm]) + 1):
+                    at = place, cycle - laid.first
+                    if not laid.present[at]:
+                        continue
+                    middle = 2.0 * np.pi * cycle + self._middle - offsets[arm]
+                    found.append(
+                        Foothold(
+                            arm,
+                            cycle,
+                            laid.joints[place, cycle - laid.first, 0],
+                            float(laid.headings[at]),
+                            middle + 2.0 * np.pi * float(laid.on[at]),
+                            middle + 2.0 * np.pi * float(laid.off[at]),
+                            float(laid.short[at] / limbs.reach[-1, place]),
+                        )
+                    )
+        return sorted(found, key=lambda each: (each.arm, each.cycle))
