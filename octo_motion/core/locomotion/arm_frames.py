@@ -89,6 +89,22 @@ class ArmFrames:
         carried[..., follows, :] = multiply(before, self.rest.carried[follows])
         return multiply(conjugate(carried), orientations)
 
+    def shape(self, frames: Floats) -> Floats:
+        """Turns (…, bones, 4) of each frame against the one before, of the first against rest."""
+        result = frames.copy()
+        result[..., 0, :] = multiply(conjugate(self.at_rest[0]), frames[..., 0, :])
+        result[..., 1:, :] = multiply(conjugate(frames[..., :-1, :]), frames[..., 1:, :])
+        return result
+
+    def shaped(self, shape: Floats) -> Floats:
+        """Inverse of :meth:`shape`: frames (…, bones, 4) in armature space."""
+        result = shape.copy()
+        before = self.at_rest[0]
+        for bone in range(len(self.bones)):
+            before = multiply(before, shape[..., bone, :])
+            result[..., bone, :] = before
+        return result
+
     def joints(self, frames: Floats) -> Floats:
         """Joints P₀ … Pₙ (…, bones + 1, 3) in armature space of an arm with these frames."""
         steps = self.lengths[:, None] * rotate(frames, _ALONG)
@@ -134,25 +150,16 @@ def frame_of(along: Floats, facing: Floats) -> Floats:
     return from_matrix(np.stack(np.broadcast_arrays(x, y, cross(x, y)), axis=-1))
 
 
-def relative(frames: Floats) -> Floats:
-    """Frames (…, segments, 4), each against the one before; the first as it is."""
-    result = frames.copy()
-    result[..., 1:, :] = multiply(conjugate(frames[..., :-1, :]), frames[..., 1:, :])
-    return result
-
-
-def composed(turns: Floats) -> Floats:
-    """Inverse of :func:`relative`."""
-    result = turns.copy()
-    for segment in range(1, turns.shape[-2]):
-        result[..., segment, :] = multiply(result[..., segment - 1, :], turns[..., segment, :])
-    return result
-
-
 def blended(start: Floats, end: Floats, share: Floats) -> Floats:
-    """Rotations (…, 4) on the shortest way from one to another, by a share (…) of it."""
-    way = to_rotation_vector(multiply(conjugate(start), end))
-    return multiply(start, from_rotation_vector(share[..., None] * way))
+    """Between turns (…, 4) of joints, by a share (…), by way of their rotation vectors.
+
+    The shortest way from one to the other changes sides where they are half a turn apart; an arm
+    that bends one way and then the other goes through being straight instead.
+    """
+    part = share[..., None]
+    return from_rotation_vector(
+        (1.0 - part) * to_rotation_vector(start) + part * to_rotation_vector(end)
+    )
 
 
 def bends(angles: Floats) -> Floats:

@@ -201,6 +201,16 @@ class Winding:
     """+1 anticlockwise seen from the axis' end, −1 clockwise."""
 
 
+@dataclass(frozen=True)
+class Start:
+    """Where a coil begins."""
+
+    joint: int
+    """Number of the arm's joint."""
+    root: Floats
+    """(3,) the arm's root, in the object's frame: where the arm comes from."""
+
+
 @dataclass(frozen=True, eq=False)
 class Skins:
     """An object grown by the skin of an arm, as thick as it is at each of its joints."""
@@ -238,8 +248,8 @@ class Skins:
         return float(np.min(outline[seen] / facing[seen]))
 
 
-def wind(skins: Skins, lengths: Floats, *, first: int, start: Floats, winding: Winding) -> Coil:
-    """Wind the segments from joint ``first`` on about an object.
+def wind(skins: Skins, lengths: Floats, start: Start, winding: Winding) -> Coil:
+    """Wind the segments from a joint on about an object.
 
     Where the arm comes from decides where it touches: on the line that only just passes the
     object. Bones are straight, so joints lie as far out as it takes for the middle of each bone to
@@ -249,8 +259,7 @@ def wind(skins: Skins, lengths: Floats, *, first: int, start: Floats, winding: W
     Args:
         skins: the object, and the arm's skin.
         lengths: (segments,) of the arm, in the profile's unit.
-        first: joint at which the coil begins.
-        start: (3,) the arm's root, in the object's frame.
+        start: where the coil begins.
         winding: which way.
 
     Raises:
@@ -258,12 +267,12 @@ def wind(skins: Skins, lengths: Floats, *, first: int, start: Floats, winding: W
     """
     lift = np.zeros(len(lengths) + 1)
     for _ in range(_LIFTINGS):
-        coil = _wound(skins, lengths, first, skins.profile.to_profile(start), winding, lift)
+        coil = _wound(skins, lengths, start, winding, lift)
         lacking = _lacking(skins, coil)
         if not np.any(lacking > 0.0):
             break
         # Round a corner a bone would cut in: its two joints move out.
-        joints = slice(first, first + len(coil.joints))
+        joints = slice(start.joint, start.joint + len(coil.joints))
         lift[joints] += np.maximum(np.append(lacking, 0.0), np.append(0.0, lacking))
     return coil
 
@@ -279,9 +288,8 @@ def _lacking(skins: Skins, coil: Coil) -> Floats:
     return np.max(missing, axis=0) - 1e-3 * skin[0]
 
 
-def _wound(
-    skins: Skins, lengths: Floats, first: int, root: Floats, winding: Winding, lift: Floats
-) -> Coil:
+def _wound(skins: Skins, lengths: Floats, start: Start, winding: Winding, lift: Floats) -> Coil:
+    first, root = start.joint, skins.profile.to_profile(start.root)
     segments = np.arange(first, len(lengths))
     profile, radii = skins.profile, skins.radii
     # Of the longer of the two bones that meet at a joint.

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .arm_frames import ArmFrames, blended, composed, relative
+from .arm_frames import ArmFrames, blended
 from .reach import Timeline, eased, folded
 
 _FREE: Final = 0.3
@@ -36,11 +36,11 @@ def curled(arm: ArmFrames, timeline: Timeline, times: Floats, otherwise: Floats)
     up = eased((up - _WAVE * (1.0 - along)) / (1.0 - _WAVE))
     down = eased((down - _WAVE * along) / (1.0 - _WAVE))
     share = up * (1.0 - down) * eased(along / _FREE)
-    usual = relative(arm.from_bones(otherwise))
+    usual = arm.shape(arm.from_bones(otherwise))
     # A front before the arm's root: all of it is behind.
     spiral = folded(arm.lengths, np.full(len(times), -arm.length), bend=0.0, curl=_TIGHT)
     spiral[:, 0] = usual[:, 0]
-    shape = composed(blended(usual, spiral, share))
+    shape = arm.shaped(blended(usual, spiral, share))
     result = otherwise.copy()
     moves = np.any(share > 0.0, axis=-1)
     result[moves] = arm.to_bones(shape)[moves]

@@ -30,13 +30,11 @@ from ..rotations import (
 from .arm_frames import (
     ArmFrames,
     blended,
-    composed,
     frame_of,
-    relative,
     transported,
 )
 from .ccd import closed
-from .coil import Coil, Profile, Skins, Winding, wind
+from .coil import Coil, Profile, Skins, Start, Winding, wind
 from .reach import Timeline, eased, first_place, folded, front_width, passed
 
 Mode = Literal["TOUCH", "COIL"]
@@ -225,7 +223,7 @@ class Grasp:
         ends = arm.length + width if self.wraps else touches
         front_at = first_place(lengths)
         front = timeline.front(times[moves], front_at, touches, ends)
-        holding = relative(self.holding(places[moves]))
+        holding = arm.shape(self.holding(places[moves]))
         reached = passed(lengths, front)
         last = self.coil.first + len(self.coil.facing)
         # Beyond the last turn the arm is left to curl off.
@@ -235,10 +233,10 @@ class Grasp:
         reaching = blended(fold, holding, reached)
         # What holds is out of the way already.
         loose = 1.0 - eased((front - touches + width) / width)
-        cleared = self._cleared(composed(reaching), places[moves], loose)
-        reaching = relative(cleared)
-        usual = relative(arm.from_bones(otherwise[moves]))
-        shape = composed(blended(usual, reaching, weight[moves]))
+        cleared = self._cleared(arm.shaped(reaching), places[moves], loose)
+        reaching = arm.shape(cleared)
+        usual = arm.shape(arm.from_bones(otherwise[moves]))
+        shape = arm.shaped(blended(usual, reaching, weight[moves]))
         result[moves] = arm.to_bones(shape)
         return result
 
@@ -308,7 +306,7 @@ def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coi
     last = len(arm.bones) - 1
 
     def wound(first: int) -> Coil:
-        return wind(skins, arm.lengths, first=first, start=root, winding=winding)
+        return wind(skins, arm.lengths, Start(first, root), winding)
 
     def far(coil: Coil) -> float:
         return float(np.max(np.linalg.norm(places.seen(coil.joints[0]) - arm.root, axis=-1)))

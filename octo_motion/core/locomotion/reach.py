@@ -33,7 +33,7 @@ _BLUNT: Final = 0.2
 """Arm lengths that the spiral thinks are left at the tip, so that it is not wound up endlessly."""
 _MOST_BENT: Final = np.radians(75.0)
 """Of one joint."""
-_FRONT: Final = 0.22
+_FRONT: Final = 0.26
 """Width of the front in arm lengths."""
 _FRONT_SEGMENTS: Final = 2.0
 """Least width of the front in segments."""
@@ -47,7 +47,7 @@ _STAGGER: Final = 0.8
 """How much later the root joins in than the tip, in times that each of them takes."""
 _UNWOUND: Final = 0.5
 """Share of the return by which the arm has let go."""
-_BACK_FROM, _BACK_TO = 0.3, 0.8
+_BACK_FROM, _BACK_TO = 0.25, 0.9
 """Shares of the return between which the bend runs back to the root."""
 _LEAVES: Final = 0.45
 """Share of the return after which the arm begins to go back to what it does otherwise."""

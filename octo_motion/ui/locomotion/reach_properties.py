@@ -94,7 +94,7 @@ class ReachItem(bpy.types.PropertyGroup):
     back_frames: IntProperty(
         name="Back",
         description="Frames from letting go until the arm does what its gait says",
-        default=30,
+        default=40,
         min=1,
         soft_max=100,
         override=OVERRIDE,
