@@ -6,6 +6,8 @@ where Blender bakes rotations only, and the octopus with its skin, where it bake
 by default. Ours is timed from the operator's call to the action on the armature, travel included;
 Blender's is the bake alone, without constraints and targets. Each measurement has a process of
 its own.
+
+"splicing" as the first word measures the quality of splices instead; its own --help tells more.
 """
 
 from __future__ import annotations
@@ -28,6 +30,11 @@ _ARMS = 8
 
 def main() -> None:
     """Measure what the command line asks for, print tables, and write JSON if wanted."""
+    if sys.argv[1:2] == ["splicing"]:
+        from tests.bench import splicing
+
+        splicing.main(sys.argv[2:])
+        return
     arguments = _arguments()
     report: dict[str, Any] = {"machine": _machine(), "gait": arguments.gait}
     blender, processors = report["machine"]["blender"], report["machine"]["processors"]

@@ -10,20 +10,29 @@ from hypothesis import strategies as st
 
 from octo_motion.core.rotations import Floats, from_rotation_vector, multiply, rotate
 from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.parts import HEAD, LEGS, PARTS, RIGHT_ARM, TRUNK
+from octo_motion.core.splicing.parts import HEAD, LEGS, PARTS, RIGHT_ARM, TRUNK, Part
 from octo_motion.core.splicing.quality import (
     Seam,
     feet_at_rest,
     foot_slip,
     limb_length,
     log_dimensionless_jerk,
+    out_of_reach,
     path_error,
     seams,
     turn_error,
 )
 from octo_motion.core.splicing.splice import Splice, spliced
 from octo_motion.core.splicing.timing import Timing
-from tests.core.splice_bodies import LANDMARKS, humanoid, motion, moved, turned_about
+from tests.bench.plain_copy import plain_copy
+from tests.core.splice_bodies import (
+    LANDMARKS,
+    humanoid,
+    in_another_file,
+    motion,
+    moved,
+    turned_about,
+)
 
 SMOOTHEST = -np.log(720.0 / 1.875**2)
 """Of the way from rest to rest with the least jerk: 720 is its jerk's integral, 1.875 its highest
@@ -93,9 +102,9 @@ def test_a_jump_is_less_smooth_and_rest_says_nothing() -> None:
 
 
 @pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.name)
-def test_a_clip_misses_itself_by_nothing(part: object) -> None:
+def test_a_clip_misses_itself_by_nothing(part: Part) -> None:
     clip = body()
-    splice = Splice(part, clip, Timing(1.0, 1.0), LANDMARKS)  # type: ignore[arg-type]
+    splice = Splice(part, clip, Timing(1.0, 1.0), LANDMARKS)
     errors = (
         path_error(clip, LANDMARKS, splice),
         turn_error(clip, LANDMARKS, splice),
@@ -125,6 +134,26 @@ def test_an_arm_that_hangs_instead_of_pointing_aside_misses_by_the_root_of_two()
     assert path_error(straight, LANDMARKS, splice) == pytest.approx(np.sqrt(2.0))
 
 
+def test_a_hand_is_out_of_reach_by_what_the_arm_is_too_short() -> None:
+    clip = body()
+    skeleton = clip.skeleton
+    splice = Splice(RIGHT_ARM, clip, Timing(1.0, 1.0), LANDMARKS)
+    assert out_of_reach(clip, LANDMARKS, splice).max() == 0.0
+    # The other body is built alike, but its chest and shoulders are twice as wide: seen from the
+    # chest its hands are farther away.
+    matrices = skeleton.rest_matrices.copy()
+    for name in ("upper_arm", "forearm", "hand", "finger"):
+        matrices[skeleton.index[f"{name}.R"], 0, 3] -= 0.9
+    wide = replace(clip, skeleton=replace(skeleton, rest_matrices=matrices))
+    splice = replace(splice, clip=wide)
+    beyond = out_of_reach(clip, LANDMARKS, splice)
+    assert beyond.max() > 0.1
+    for reach in ("direction", "exact"):
+        result = spliced(clip, LANDMARKS, replace(splice, reach=reach))
+        left = out_of_reach(result, LANDMARKS, splice)
+        assert (path_error(result, LANDMARKS, splice) >= left - 1e-9).all()
+
+
 def test_only_frames_in_which_the_splice_is_fully_in_count() -> None:
     clip = body()
     timing = Timing(11.0, 1.0, length=20.0, ease_in=5.0, ease_out=5.0)
@@ -136,10 +165,10 @@ def test_only_frames_in_which_the_splice_is_fully_in_count() -> None:
 
 
 @pytest.mark.parametrize(("part", "bone"), [(HEAD, "head"), (TRUNK, "chest")])
-def test_a_head_or_chest_that_is_turned_is_off_by_that_angle(part: object, bone: str) -> None:
+def test_a_head_or_chest_that_is_turned_is_off_by_that_angle(part: Part, bone: str) -> None:
     clip = body()
     other = turned(clip, bone, turned_about((0.0, 0.6, 0.8), 0.3))
-    splice = Splice(part, other, Timing(1.0, 1.0), LANDMARKS)  # type: ignore[arg-type]
+    splice = Splice(part, other, Timing(1.0, 1.0), LANDMARKS)
     assert turn_error(clip, LANDMARKS, splice) == pytest.approx(0.3)
 
 
@@ -152,6 +181,25 @@ def test_where_the_body_stands_and_faces_does_not_matter() -> None:
         for measure in (path_error, turn_error):
             here, there = (measure(each, LANDMARKS, splice) for each in (clip, away))
             assert there == pytest.approx(here, abs=1e-6)
+
+
+@pytest.mark.parametrize("part", PARTS.values(), ids=lambda part: part.name)
+def test_on_one_skeleton_a_bone_by_bone_copy_is_as_good_on_another_it_is_not(part: Part) -> None:
+    base = body()
+    other = another(base)
+    splice = Splice(part, other, Timing(1.0, 1.0), LANDMARKS)
+    copied = plain_copy(base, LANDMARKS, splice)
+    assert path_error(copied, LANDMARKS, splice).max(initial=0.0) < 1e-6
+    assert turn_error(copied, LANDMARKS, splice).max(initial=0.0) < 1e-6
+    # The same motion in a file whose rest pose is posed.
+    posed = in_another_file(np.random.default_rng(7), other, posed_rest=True)
+    splice = replace(splice, clip=posed)
+    copied, ours = (
+        path_error(make(base, LANDMARKS, splice), LANDMARKS, splice)
+        for make in (plain_copy, spliced)
+    )
+    assert ours.max(initial=0.0) < 1e-6
+    assert copied.size == 0 or copied.max() > 0.05
 
 
 # --- Seams ---------------------------------------------------------------------------------------

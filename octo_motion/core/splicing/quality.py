@@ -77,23 +77,73 @@ def path_error(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
         (frames, limbs) in lengths of the result's limb, over the frames in which the splice is
         fully in; no limbs for trunk and head.
     """
-    span, whole = _whole(result, splice)
+    return _by_limb(
+        [
+            np.linalg.norm(found.end - found.wanted, axis=-1) / found.length
+            for found in _limbs(result, landmarks, splice)
+        ],
+        result,
+        splice,
+    )
+
+
+def out_of_reach(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
+    """How much farther from the joint the points are, to which hands (feet) should go, than limbs
+    are long: so much no way to splice can help missing.
+
+    Args:
+        result: to be measured.
+        landmarks: of its skeleton.
+        splice: what was to be spliced.
+
+    Returns:
+        (frames, limbs) in lengths of the result's limb, 0 within reach; as :func:`path_error`.
+    """
+    return _by_limb(
+        [
+            np.maximum(np.linalg.norm(found.wanted - found.joint, axis=-1) / found.length - 1.0, 0)
+            for found in _limbs(result, landmarks, splice)
+        ],
+        result,
+        splice,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _SeenLimb:
+    """A limb of the result, seen from its body; (window, 3) each."""
+
+    joint: Floats
+    end: Floats
+    wanted: Floats
+    """Where the end should be."""
+    length: float
+
+
+def _limbs(result: Clip, landmarks: Landmarks, splice: Splice) -> list[_SeenLimb]:
+    span = window(splice.timing, result, splice.clip)
     theirs = _landmarks(splice)
     base = _posture(result, span.frames)
     other = sampled(splice.clip, span.splice_frames)
-    misses = []
+    found: list[_SeenLimb] = []
     for piece in splice.part.pieces:
         if piece not in LIMBS:
             continue
-        frames = _seen_from(piece, (result.skeleton, landmarks), (splice.clip.skeleton, theirs))
-        ours = _end(base, frames[0], landmarks, piece)
-        wanted = _end(other, frames[1], theirs, piece)
+        ours, seen = _seen_from(piece, (result.skeleton, landmarks), (splice.clip.skeleton, theirs))
         length = limb_length(result.skeleton, landmarks, piece)
         ratio = length / limb_length(splice.clip.skeleton, theirs, piece)
-        misses.append(np.linalg.norm(ours - ratio * wanted, axis=-1)[whole] / length)
-    if not misses:
+        joint, end = (_joint(base, ours, landmarks, LIMBS[piece][place]) for place in (0, -1))
+        wanted = ratio * _joint(other, seen, theirs, LIMBS[piece][-1])
+        found.append(_SeenLimb(joint, end, wanted, length))
+    return found
+
+
+def _by_limb(values: Sequence[Floats], result: Clip, splice: Splice) -> Floats:
+    """(frames, limbs) over the frames in which a splice is fully in."""
+    _, whole = _whole(result, splice)
+    if not values:
         return np.zeros((int(whole.sum()), 0))
-    return np.stack(misses, axis=-1)
+    return np.stack(values, axis=-1)[whole]
 
 
 def turn_error(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
@@ -270,10 +320,15 @@ def _seen_from(
     return base, laid_over(frame(*theirs), base)
 
 
+def _joint(posture: Posture, frame: BodyFrame, landmarks: Landmarks, landmark: str) -> Floats:
+    """A landmark's joint in a body's frame, (frames, 3)."""
+    bone = landmark_bone(posture.skeleton, landmarks, landmark)
+    return rotate(conjugate(frame.orientation(posture)), posture.head(bone) - frame.place(posture))
+
+
 def _end(posture: Posture, frame: BodyFrame, landmarks: Landmarks, piece: str) -> Floats:
     """Hand or foot in a body's frame, (frames, 3)."""
-    bone = landmark_bone(posture.skeleton, landmarks, LIMBS[piece][-1])
-    return rotate(conjugate(frame.orientation(posture)), posture.head(bone) - frame.place(posture))
+    return _joint(posture, frame, landmarks, LIMBS[piece][-1])
 
 
 def _chest_turn(skeleton: Skeleton, landmarks: Landmarks, posture: Posture) -> Floats:

@@ -1,0 +1,330 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How good splices are: ours, both ways to reach, against copying the part's curves bone by bone.
+
+Every clip is spliced onto every base, part by part. Without a folder, on the clips of the
+examples; with folders, on all BVH files in them. The table has a row for each part, over pairs of
+clips on the same skeleton and on different ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import bpy
+import numpy as np
+
+from octo_motion.blender.clips import read_clip
+from octo_motion.blender.imports import import_clip
+from octo_motion.core.errors import OctoMotionError
+from octo_motion.core.rotations import Floats
+from octo_motion.core.splicing.bvh_check import check_bvh
+from octo_motion.core.splicing.clip import Clip
+from octo_motion.core.splicing.landmarks import Landmarks
+from octo_motion.core.splicing.mapping import map_skeleton
+from octo_motion.core.splicing.parts import LEGS, PARTS, part_bones
+from octo_motion.core.splicing.quality import (
+    feet_at_rest,
+    foot_slip,
+    limb_length,
+    out_of_reach,
+    path_error,
+    seams,
+    turn_error,
+)
+from octo_motion.core.splicing.splice import Splice, spliced
+from octo_motion.core.splicing.timing import Timing, window
+from octo_motion.ui.batch.entry import frame_rate
+from tests.bench.plain_copy import plain_copy
+
+EXAMPLES: Final = Path(__file__).resolve().parents[2] / "docs" / "examples" / "clips"
+PARTS_TOLD: Final = ("right_arm", "left_arm", "legs", "trunk", "head")
+METHODS: Final = ("copied", "direction", "exact")
+
+_EASE: Final = 0.25
+"""Seconds that a splice takes to come and to go."""
+_LEG: Final = 0.82
+"""Length of the legs of a body of 1.7 m; slip is told as on such a body."""
+_SHORTEST: Final = 1.0
+"""Seconds below which a clip is left out: seams would be most of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A clip that was read."""
+
+    name: str
+    clip: Clip
+    landmarks: Landmarks
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One part of one clip on one base, by one way."""
+
+    base: str
+    splice: str
+    part: str
+    method: str
+    same_skeleton: bool
+    path: list[float]
+    """Distances of hands or feet from where they were seen, in limb lengths, frame by frame."""
+    beyond: list[float]
+    """How much of that no limb of its length can reach, likewise."""
+    turn: list[float]
+    """Of trunk or head: degrees."""
+    roughness: list[float]
+    """Log dimensionless jerk of the rougher source less the result's, for each seam."""
+    slip: list[float]
+    """Millimetres for each frame of a foot that should stand, on a body of 1.7 m."""
+
+
+def main(words: Sequence[str]) -> None:
+    """Measure what the command line asks for, and print a table."""
+    arguments = _arguments(words)
+    folders: list[Path] = arguments.folders or [EXAMPLES]
+    files = sorted({path for folder in folders for path in _files(folder, arguments.clips)})
+    # Blender tells of everything that it imports.
+    told = os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    takes, left_out = _takes(files)
+    pairs = _pairs(takes, arguments.base)
+    print(
+        f"Blender {bpy.app.version_string}: {len(takes)} clips, {len(pairs)} pairs, "
+        f"{len(pairs) * len(PARTS_TOLD)} splices by each way\n",
+        file=told,
+    )
+    results = [each for base, other in pairs for each in measure(base, other)]
+    if arguments.each:
+        _print_each(results, told)
+    _print_table(results, told)
+    for reason in left_out:
+        print(f"Left out: {reason}", file=told)
+    told.flush()
+    if arguments.json:
+        arguments.json.parent.mkdir(parents=True, exist_ok=True)
+        content = [asdict(each) for each in results]
+        arguments.json.write_text(json.dumps(content) + "\n", encoding="utf-8")
+
+
+def _arguments(words: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.bench splicing", description=__doc__)
+    parser.add_argument("folders", type=Path, nargs="*", help="where BVH files are")
+    parser.add_argument(
+        "--base", nargs="+", default=["walk"], help="words in the names of bases; default: walk"
+    )
+    parser.add_argument(
+        "--clips", nargs="+", default=[], help="words in the names of clips; default: all files"
+    )
+    parser.add_argument("--each", action="store_true", help="a row for every splice as well")
+    parser.add_argument("--json", type=Path, help="file to write all numbers to")
+    return parser.parse_args(words)
+
+
+def _files(folder: Path, words: Sequence[str]) -> list[Path]:
+    found = [folder] if folder.is_file() else folder.rglob("*.bvh")
+    return [path for path in found if not words or _named(path.stem, words)]
+
+
+def _named(name: str, words: Sequence[str]) -> bool:
+    return any(word.lower() in name.lower() for word in words)
+
+
+def _takes(files: Sequence[Path]) -> tuple[list[Take], list[str]]:
+    takes: list[Take] = []
+    left_out: list[str] = []
+    for path in files:
+        try:
+            take = _read(path)
+        except OctoMotionError as error:
+            left_out.append(f"{path.name}: {error.problem}")
+            continue
+        if (len(take.clip) - 1) / take.clip.rate < _SHORTEST and "walk" not in take.name:
+            left_out.append(f"{path.name}: It is shorter than {_SHORTEST:g} s.")
+            continue
+        takes.append(take)
+    return takes, left_out
+
+
+def _read(path: Path) -> Take:
+    """A file at its own frame rate."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    assert scene is not None
+    rate = check_bvh(path.read_bytes()).rate
+    scene.render.fps, scene.render.fps_base = frame_rate(float(np.clip(rate, 1.0, 32767.0)))
+    imported = import_clip(path, bpy.context)
+    clip = read_clip(bpy.data.objects[imported.armatures[0]])
+    found = map_skeleton(clip.skeleton)
+    if found.problem:
+        raise OctoMotionError(found.problem)
+    for part in PARTS_TOLD:
+        part_bones(PARTS[part], clip.skeleton, found.landmarks)
+    return Take(path.stem, clip, found.landmarks)
+
+
+def _pairs(takes: Sequence[Take], words: Sequence[str]) -> list[tuple[Take, Take]]:
+    bases = [take for take in takes if _named(take.name, words)]
+    return [(base, other) for base in bases for other in takes if other is not base]
+
+
+# --- Measuring -----------------------------------------------------------------------------------
+
+
+def measure(base: Take, other: Take) -> list[Measured]:
+    """All parts of a clip on a base, by all ways."""
+    seconds = (len(other.clip) - 1) / other.clip.rate
+    whole = _lengthened(base.clip, seconds + 4.0 * _EASE)
+    rate = whole.rate
+    # Between the ends of the base, so that there are two seams.
+    lasting = min(seconds * rate, whole.frames[-1] - whole.frames[0] - 4.0 * _EASE * rate)
+    timing = Timing(
+        base_start=float(whole.frames[0]) + 2.0 * _EASE * rate,
+        splice_start=float(other.clip.frames[0]),
+        length=lasting,
+        ease_in=_EASE * rate,
+        ease_out=_EASE * rate,
+    )
+    ways: dict[str, Callable[[Splice], Clip]] = {
+        "copied": lambda splice: plain_copy(whole, base.landmarks, splice),
+        "direction": lambda splice: spliced(whole, base.landmarks, splice),
+        "exact": lambda splice: spliced(whole, base.landmarks, replace(splice, reach="exact")),
+    }
+    same = base.clip.skeleton.names == other.clip.skeleton.names and np.allclose(
+        base.clip.skeleton.heads, other.clip.skeleton.heads, atol=1e-5
+    )
+    found: list[Measured] = []
+    for name in PARTS_TOLD:
+        part = PARTS[name]
+        splice = Splice(part, other.clip, timing, other.landmarks, travel=part == LEGS)
+        for method, make in ways.items():
+            result = make(splice)
+            turns = np.degrees(turn_error(result, base.landmarks, splice))
+            jerks = seams(result, whole, base.landmarks, splice)
+            found.append(
+                Measured(
+                    *(base.name, other.name, name, method, bool(same)),
+                    path=path_error(result, base.landmarks, splice).ravel().tolist(),
+                    beyond=out_of_reach(result, base.landmarks, splice).ravel().tolist(),
+                    turn=turns.ravel().tolist(),
+                    roughness=[seam.roughness for seam in jerks],
+                    slip=_slip(result, whole, base.landmarks, splice).tolist(),
+                )
+            )
+    return found
+
+
+def _slip(result: Clip, base: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
+    """Millimetres per stance frame of the feet, on a body of 1.7 m."""
+    leg = result.scale * limb_length(result.skeleton, landmarks, "leg.L")
+    if splice.part == LEGS:
+        assert splice.landmarks is not None
+        span = window(splice.timing, base, splice.clip)
+        whole = span.weights >= 1.0
+        still = feet_at_rest(splice.clip, splice.landmarks, span.splice_frames[whole])
+        chosen = np.arange(len(base))[span.frames][whole]
+    else:
+        still = feet_at_rest(base, landmarks)
+        chosen = np.arange(len(base))
+    shown = replace(
+        result,
+        frames=result.frames[chosen],
+        rotations=result.rotations[chosen],
+        locations=result.locations[chosen],
+        world=result.world[chosen],
+    )
+    return 1000.0 * _LEG / leg * foot_slip(shown, landmarks, still)
+
+
+def _lengthened(clip: Clip, seconds: float) -> Clip:
+    """A walk that goes on for at least so long: cycle after cycle, each from where the last led."""
+    count = round(seconds * clip.rate) + 1
+    if count <= len(clip):
+        return clip
+    numbers = np.arange(count)
+    order, rounds = numbers % (len(clip) - 1), numbers // (len(clip) - 1)
+    travel = clip.locations[-1] - clip.locations[0]
+    # Up and down, and at bones within, cycles repeat.
+    travel = np.where(np.array(clip.skeleton.parents)[:, None] < 0, travel, 0.0)
+    return replace(
+        clip,
+        frames=clip.frames[0] + numbers,
+        rotations=clip.rotations[order],
+        locations=clip.locations[order] + rounds[:, None, None] * travel,
+        world=clip.world[order],
+    )
+
+
+# --- Telling -------------------------------------------------------------------------------------
+
+_HEAD: Final = f"{'':>25} {'pairs':>5} │" + "│".join(f"{name:^42}" for name in METHODS) + "│"
+_COLUMNS: Final = f"{'miss: mean':>11}{'most':>7}{'seam':>7}{'slip mm':>9}{'99 %':>6}  "
+
+
+def _print_table(results: Sequence[Measured], told: Any) -> None:
+    print(_HEAD, file=told)
+    print(f"{'':>25} {'':>5} │" + "│".join([_COLUMNS] * len(METHODS)) + "│", file=told)
+    for same, title in ((True, "same skeleton"), (False, "other skeleton")):
+        for part in PARTS_TOLD:
+            chosen = [each for each in results if (each.part, each.same_skeleton) == (part, same)]
+            if chosen:
+                _print_row(f"{title}, {part}", chosen, told)
+    print(
+        "\nmiss: arms and legs: distance of hand or foot from where the clip has it, as seen from "
+        "chest or pelvis,\n  in per cent of the limb's length; trunk and head: degrees"
+        "\nseam: by how much a hand or foot is less smooth where the splice comes and goes than in "
+        "the rougher clip\n  (natural logarithm of the dimensionless jerk; median of all seams, "
+        "0 or less is as smooth)"
+        "\nslip: millimetres per frame that feet slide which stand in their own clip, on a body of "
+        "1.7 m: median,\n  and what 99 of 100 frames stay below",
+        file=told,
+    )
+    exact = [each for each in results if each.method == "exact"]
+    pairs = [pair for each in exact for pair in zip(each.path, each.beyond, strict=True)]
+    within = [miss for miss, beyond in pairs if beyond == 0.0]
+    if within:
+        print(
+            f"\n{100.0 * (1.0 - len(within) / len(pairs)):.1f} % of the points for hands and feet "
+            "are out of reach for the base's limbs. Of those within reach\n99 of 100 are missed by "
+            f"less than {100.0 * np.percentile(within, 99):.1f} % in exact, the mean is "
+            f"{100.0 * np.mean(within):.2f} %.",
+            file=told,
+        )
+
+
+def _print_each(results: Sequence[Measured], told: Any) -> None:
+    groups: dict[tuple[str, str], list[Measured]] = {}
+    for each in results:
+        groups.setdefault((each.base, each.splice), []).append(each)
+    for (base, splice), chosen in groups.items():
+        print(f"{splice} on {base}", file=told)
+        for part in PARTS_TOLD:
+            _print_row(part, [each for each in chosen if each.part == part], told)
+    print(file=told)
+
+
+def _print_row(title: str, results: Sequence[Measured], told: Any) -> None:
+    cells = []
+    for method in METHODS:
+        chosen = [each for each in results if each.method == method]
+        misses = [100.0 * value for each in chosen for value in each.path]
+        misses += [value for each in chosen for value in each.turn]
+        jerks = [value for each in chosen for value in each.roughness]
+        slips = [value for each in chosen for value in each.slip]
+        cells.append(
+            f"{np.mean(misses):>11.2f}{np.max(misses):>7.1f}{_quantile(jerks, 50, 7, 2)}"
+            f"{_quantile(slips, 50, 9, 1)}{_quantile(slips, 99, 6, 0)}  "
+        )
+    pairs = len({(each.base, each.splice) for each in results})
+    print(f"{title:>25} {pairs:>5} │" + "│".join(cells) + "│", file=told)
+
+
+def _quantile(values: Sequence[float], share: int, width: int, digits: int) -> str:
+    if not values:
+        return f"{'–':>{width}}"
+    return f"{np.percentile(values, share):>{width}.{digits}f}"
