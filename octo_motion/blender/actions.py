@@ -193,6 +193,7 @@ def write_action(
     *,
     previous: bpy.types.Action | None,
     settings_note: str = "",
+    repeats: bool = False,
 ) -> bpy.types.Action:
     """Give an object an action with these channels: their own keys, or one linear key per frame.
 
@@ -208,6 +209,7 @@ def write_action(
         channels: values at these frames.
         previous: the action to write anew, or none.
         settings_note: kept with the action, for whoever wants to know how it was made.
+        repeats: whether curves go on before their first key and after their last, over and over.
 
     Returns:
         The action, assigned to the object together with its slot.
@@ -231,6 +233,8 @@ def write_action(
     channelbag = strip.channelbag(slot, ensure=True)
     assert channelbag is not None
     digests, handles = _write_curves(channelbag, times, channels)
+    _repeat(channelbag, repeats=repeats)
+    action.use_cyclic = repeats
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(times[0]), float(times[-1])
     data.action = action
@@ -407,6 +411,14 @@ def _write_curves(
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
     return digests, handles
+
+
+def _repeat(channelbag: bpy.types.ActionChannelbag, *, repeats: bool) -> None:
+    for curve in channelbag.fcurves:
+        for modifier in list(curve.modifiers):
+            curve.modifiers.remove(modifier)
+        if repeats:
+            curve.modifiers.new("CYCLES")
 
 
 def _write_bezier(

@@ -116,6 +116,8 @@ def variation(
     pairs: tuple[int, ...],
     limits: tuple[float, float],
     seed: int,
+    *,
+    period: int = 0,
 ) -> Floats:
     """Random additions to the angles: R(j, k) of [Octopus, §3.4].
 
@@ -130,6 +132,7 @@ def variation(
         pairs: pair of each arm.
         limits: j and k, radians.
         seed: any whole number ≥ 0.
+        period: cycles after which the numbers come again, 0 for never.
 
     Returns:
         (frames, arms, links, angles) radians.
@@ -142,9 +145,10 @@ def variation(
     first, last = int(cycles.min()), int(cycles.max())
     for pair, columns in _columns_by_curve(table, pairs).items():
         curve = table.curve(pair)
+        knots = len(curve.phases) - 1
         draws = np.stack(
             [
-                _draw_cycle(seed, cycle, len(pairs), len(curve.phases) - 1)[columns]
+                _draw_cycle(seed, cycle % period if period else cycle, len(pairs), knots)[columns]
                 for cycle in range(first, last + 2)
             ]
         )

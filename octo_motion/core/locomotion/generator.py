@@ -76,6 +76,8 @@ class GaitSettings:
     variation: tuple[float, float] = (0.0, 0.0)
     """Limits j, k of the random additions to head and pitch [Octopus, §3.4]."""
     seed: int = 0
+    period: int = 0
+    """Cycles after which the random additions come again, 0 for never."""
     turning: float = 0.5
     """Share of the turn that lies ahead which the arms take on as pitch [Octopus, §3.5]."""
     stand: bool = False
@@ -231,7 +233,12 @@ class Generator:
         settings = self._settings
         phases = self.arm_phases(np.asarray(phase, dtype=np.float64))
         angles = evaluate(settings.gait, phases, self._pairs) + variation(
-            settings.gait, phases, self._pairs, settings.variation, settings.seed
+            settings.gait,
+            phases,
+            self._pairs,
+            settings.variation,
+            settings.seed,
+            period=settings.period,
         )
         # Towards the goal: by the part of the turn that lies across the arm.
         across = rotate(self._outward, np.array([0.0, 1.0, 0.0]))[:, :2]

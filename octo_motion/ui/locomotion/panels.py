@@ -185,6 +185,10 @@ class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
         layout.prop(settings, "turning")
         if table.manner == "SWIM":
             layout.prop(settings, "burst")
+        column = layout.column(align=True)
+        column.prop(settings, "breathing")
+        if settings.breathing > 0.0:
+            column.prop(settings, "breath_time", text="Breath Time")
 
 
 class OCTO_MOTION_PT_table(_Panel, bpy.types.Panel):
@@ -370,6 +374,9 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             column.prop(settings, "frame_end")
         layout.prop(settings, "extend_scene_range")
         layout.row().prop(settings, "travel_on", expand=True)
+        if settings.travel_on == "NONE":
+            layout.prop(settings, "cycles")
+            layout.prop(settings, "repeat")
         layout.row().prop(settings, "keys", expand=True)
         if settings.keys == "REDUCED":
             column = layout.column(align=True)

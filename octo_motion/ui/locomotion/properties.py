@@ -37,6 +37,7 @@ from .gait_properties import (
     read_table,
     used,
 )
+from .in_place import TRAVEL_IN_PLACE, InPlace
 from .reach_properties import Reaches
 
 AXES: Final = (
@@ -74,7 +75,7 @@ def _make_weight_curve(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.
         )
 
 
-class OCTO_MOTION_PG_locomotion(Reaches, bpy.types.PropertyGroup):
+class OCTO_MOTION_PG_locomotion(Reaches, InPlace, bpy.types.PropertyGroup):
     """How an armature walks or swims along a route."""
 
     # --- The rig -------------------------------------------------------------------------------
@@ -448,6 +449,7 @@ class OCTO_MOTION_PG_locomotion(Reaches, bpy.types.PropertyGroup):
         items=(
             ("OBJECT", "Object", "The armature object moves", 0),
             ("BONE", "Root Bone", "The object stays; its root bone moves, as game engines like", 1),
+            TRAVEL_IN_PLACE,
         ),
         override=OVERRIDE,
     )

@@ -57,7 +57,7 @@ class Motion:
     """All channels of one shot, by what an animator moves as one."""
 
     travel: Sequence[actions.Channel]
-    """A location and a rotation, of the object or of a bone."""
+    """A location and a rotation, of the object or of a bone; none in place."""
     arms: Sequence[actions.Channel]
     """Rotations of the arms' bones, one arm after the other."""
     mantle: Sequence[actions.Channel]
@@ -81,8 +81,11 @@ def reduced(
     Raises:
         SettingsError: without tolerance, no key can be left out.
     """
-    parts: list[Sequence[actions.Channel]] = [motion.travel]
-    limbs = [_travel(body, motion, tolerances)]
+    parts: list[Sequence[actions.Channel]] = []
+    limbs: list[Limb] = []
+    if motion.travel:
+        parts.append(motion.travel)
+        limbs.append(_travel(body, motion, tolerances))
     rest = iter(motion.arms)
     for arm in body.arms:
         part = [replace(next(rest), group=arm.name) for _ in arm.bones]

@@ -42,6 +42,8 @@ APART: Final = frozenset(
             "seed",
             "active_arm",
             "active_reach",
+            "cycles",
+            "repeat",
             "body_front",
             "body_up",
             "root_bone",

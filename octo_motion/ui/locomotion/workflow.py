@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
@@ -30,14 +30,16 @@ from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.detection import Detection, detect_arms
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
+from ...core.locomotion.loops import route_in_place, travel_in_place, whole_frames
 from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import TravelSettings, duration, plan_travel, strides
-from ...core.rotations import Floats, rotate
+from ...core.rotations import Floats, from_matrix, rotate
 from ...core.skeleton import Skeleton
 from ..plain import plain
 from .arm_items import bones_of, write_arms, write_body
+from .in_place import breathing_channels
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
 from .reach_motion import Reaching, Travelling, read_reaches
 from .reduced import Body, Motion, Tolerances, reduced
@@ -127,6 +129,12 @@ class Shot:
     """(bones, 4) how, the same at every frame."""
     tolerances: Tolerances | None
     """How far few keys may be off, none for a key on every frame."""
+    in_place: bool
+    """Whether nothing travels: the motion is a loop."""
+    repeats: bool
+    """Whether curves go on before the motion and after it."""
+    breath: Sequence[actions.Channel]
+    """Of the mantle."""
     extend_scene_range: bool
     reaching: Reaching | None
     """What arms reach for."""
@@ -160,7 +168,7 @@ class Shot:
             if part.stop < count:
                 yield part.stop / count
         if self.reaching is not None:
-            travelling = Travelling(locations, orientations, self.scale)
+            travelling = self._travelling(locations, orientations)
             self.reached = self.reaching.apply(self.frames, rotations, travelling)
         self.rotations, self.misses = rotations, misses
         self.locations, self.orientations = locations, orientations
@@ -192,6 +200,7 @@ class Shot:
                 channels,
                 previous=previous,
                 settings_note=self.note,
+                repeats=self.repeats,
             )
         except WriteError:
             settings.result = previous
@@ -225,7 +234,9 @@ class Shot:
         assert self.locations is not None
         assert self.orientations is not None
         held = np.tile(self.mantle_rotations, (len(self.frames), 1, 1))
-        if self.root_bone:
+        if self.in_place:
+            travel = []
+        elif self.root_bone:
             locations, rotations = root_bone_transforms(
                 self.skeleton, self.root_bone, self.world, self.locations, self.orientations
             )
@@ -241,9 +252,17 @@ class Shot:
             mantle=actions.rotation_channels(armature, self.mantle, held),
         )
         if self.tolerances is None:
-            return motion.all()
+            return [*motion.all(), *self.breath]
         body = Body(*(armature, self.scale, self.skeleton, self.arms, self.mantle, self.root_bone))
-        return reduced(self.frames, body, motion, self.tolerances)
+        return [*reduced(self.frames, body, motion, self.tolerances), *self.breath]
+
+    def _travelling(self, locations: Floats, orientations: Floats) -> Travelling:
+        """Where the armature is: as it travels, or where it stands."""
+        if self.in_place:
+            locations = np.tile(self.world[:3, 3], (len(self.frames), 1))
+            standing = from_matrix(self.world[:3, :3] / self.scale)
+            orientations = np.tile(standing, (len(self.frames), 1))
+        return Travelling(locations, orientations, self.scale)
 
     def _missed(self) -> list[str]:
         assert self.misses is not None
@@ -292,7 +311,8 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     """
     settings = locomotion_settings(armature)
     actions.writable_armature(armature)
-    if settings.route is None:
+    in_place = settings.travel_on == "NONE"
+    if settings.route is None and not in_place:
         raise RouteError(
             f"'{armature.name}' has no route.", "Choose a curve as its route, or add one."
         )
@@ -306,14 +326,20 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     arms, body, detection = _arms(settings, armature, skeleton)
     gait = read_gait(settings)
     generator = Generator(skeleton, arms, body, _gait_settings(settings, gait))
-    route = read_route(settings.route, depsgraph, settings.spline)
+    stride = gait.stride * generator.arm_length * scale
+    if settings.route is None or in_place:
+        route = route_in_place(stride, settings.cycles)
+    else:
+        route = read_route(settings.route, depsgraph, settings.spline)
     mantle: tuple[str, ...] = ()
+    # Arms that are switched off are no mantle either.
+    listed = [tuple(bone.name for bone in item.bones) for item in settings.arms if item.bones]
+    head = find_mantle(skeleton, listed or [arm.bones for arm in arms], body)
     if gait.manner == "SWIM" and settings.streamline > 0.0:
-        # Arms that are switched off are no mantle either.
-        listed = [tuple(bone.name for bone in item.bones) for item in settings.arms if item.bones]
-        mantle = find_mantle(skeleton, listed or [arm.bones for arm in arms], body)
-    travel = _travel_settings(settings, gait, gait.stride * generator.arm_length * scale)
+        mantle = head
+    travel = _travel_settings(settings, gait, stride)
     seconds, frames, times = _timing(settings, route, travel, scene.render)
+    breath = breathing_channels(armature, settings, (*head, "")[-1 - bool(head)], times * seconds)
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -335,6 +361,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         mantle=mantle,
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
         tolerances=_tolerances(settings, generator.arm_length),
+        in_place=in_place,
+        repeats=in_place and settings.repeat,
+        breath=breath,
         extend_scene_range=settings.extend_scene_range,
         reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
         note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
@@ -541,6 +570,7 @@ def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> Gait
         phase_spread=settings.phase_spread,
         variation=(settings.variation_min, settings.variation_max),
         seed=settings.seed,
+        period=settings.cycles if settings.travel_on == "NONE" else 0,
         turning=settings.turning,
         stand=settings.stand,
     )
@@ -549,7 +579,7 @@ def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> Gait
 def _travel_settings(
     settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, stride: float
 ) -> TravelSettings:
-    return TravelSettings(
+    travel = TravelSettings(
         manner=gait.manner,
         speed=settings.speed_mode,
         ease_in=settings.ease_in,
@@ -564,6 +594,7 @@ def _travel_settings(
         keep_upright=settings.keep_upright,
         corner=settings.corner,
     )
+    return travel_in_place(travel) if settings.travel_on == "NONE" else travel
 
 
 def _tolerances(settings: OCTO_MOTION_PG_locomotion, arm_length: float) -> Tolerances | None:
@@ -603,6 +634,8 @@ def _timing(
         cycles = strides(route, travel)
         cruising = route.length / (cycles * settings.cycle_time)
         exact = duration(route, travel, cruising) * rate
+    if settings.travel_on == "NONE":
+        exact = whole_frames(exact)
     if exact > MOST_FRAMES:
         raise SettingsError(
             f"The motion would take {exact:,.0f} frames, more than {MOST_FRAMES:,}.",
