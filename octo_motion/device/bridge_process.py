@@ -24,6 +24,7 @@ from .channel import Channel, ChannelClosedError, Listener
 from .haptics.schedule import Schedule
 from .messages import (
     Button,
+    Buzz,
     DeviceMessage,
     FigureMessage,
     Goodbye,
@@ -40,7 +41,6 @@ from .messages import (
     PointerMessage,
     PoseMessage,
     Settings,
-    Test,
     Times,
     Workspace,
     WorldMessage,
@@ -151,7 +151,7 @@ class Bridge:
                     raise MessageError("a workspace without size")
                 self._workspaces[message.pointer] = message
                 self._pass_on(message, message.pointer)
-            case Grab() | Test():
+            case Grab() | Buzz():
                 self._say_to_hands(message)
             case Goodbye():
                 raise ChannelClosedError("goodbye")

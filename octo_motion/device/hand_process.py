@@ -23,6 +23,7 @@ from .haptics.schedule import Schedule, make_real_time
 from .hid.space_mouse import SpaceMouse
 from .messages import (
     Button,
+    Buzz,
     DeviceMessage,
     Goodbye,
     Grab,
@@ -33,7 +34,6 @@ from .messages import (
     MessageError,
     Notice,
     Settings,
-    Test,
     Workspace,
 )
 from .process import Parent, end_after
@@ -106,7 +106,7 @@ class HandLoop:
                 pointer = self._pointers.get(message.pointer)
                 if pointer is not None:
                     pointer.want(grab=message.grab)
-            case Test():
+            case Buzz():
                 pointer = self._pointers.get(message.pointer)
                 if pointer is not None:
                     pointer.test(now)

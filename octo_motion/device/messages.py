@@ -301,7 +301,7 @@ class Goodbye(Message):
 
 
 @dataclass(frozen=True)
-class Test(Message):
+class Buzz(Message):
     """Blender to bridge: let a device push gently, a moment each way."""
 
     KIND = 15

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -302,7 +303,7 @@ def test_answer_of_the_simulation_is_not_felt_as_a_click() -> None:
     model.correct(held((0.005, 0.0, 0.0)), 0.0)
     assert model.felt()[0] == pytest.approx(before)
     places = [before, *still(model, 30)]
-    steps = [length(subtract(b, a)) for a, b in zip(places, places[1:], strict=False)]
+    steps = [length(subtract(b, a)) for a, b in itertools.pairwise(places)]
     assert max(steps) < 0.3 * 0.005
     assert places[-1] == pytest.approx((0.005, 0.0, 0.0), abs=1e-5)
 

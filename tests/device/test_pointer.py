@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -101,7 +102,7 @@ def test_grab_begins_without_a_jump() -> None:
     table.ticks(1, ROCK)
     table.ticks(30, ROCK)
     sizes = [length(force) for force, _ in table.driver.sent]
-    changes = [b - a for a, b in zip(sizes, sizes[1:], strict=False)]
+    changes = [b - a for a, b in itertools.pairwise(sizes)]
     assert max(changes) < 0.03  # of 3.2 N within 0.2 s
 
 
@@ -129,8 +130,8 @@ def test_silent_simulation_takes_the_force_away_in_twenty_milliseconds() -> None
     sizes = [length(force) for force, _ in table.driver.sent[-22:]]
     assert before > 3.0
     assert sizes[-1] == 0.0
-    assert all(b <= a + 1e-9 for a, b in zip(sizes, sizes[1:], strict=False))
-    assert max(a - b for a, b in zip(sizes, sizes[1:], strict=False)) <= 0.11 * 8.0
+    assert all(b <= a + 1e-9 for a, b in itertools.pairwise(sizes))
+    assert max(a - b for a, b in itertools.pairwise(sizes)) <= 0.11 * 8.0
 
 
 def test_silent_device_takes_the_force_away_in_twenty_milliseconds() -> None:

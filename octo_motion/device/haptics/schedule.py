@@ -58,15 +58,17 @@ class Schedule:
         """Wait for the next deadline; the time at which the tick begins."""
         self._deadline += self.period
         now = self._clock()
-        if now > self._deadline:
-            left_out = int((now - self._deadline) / self.period)
+        late = now - self._deadline
+        if late > 0.5 * self.period:
+            # Not at once: where ticks take too long, others would never get the processor.
+            left_out = int(late / self.period) + 1
             self.missed += left_out
             self._deadline += left_out * self.period
-        else:
-            if self._deadline - now > _AWAKE:
-                self._sleep(self._deadline - now - _AWAKE)
-            while now < self._deadline:
-                now = self._clock()
+        if self._deadline - now > _AWAKE:
+            self._sleep(self._deadline - now - _AWAKE)
+            now = self._clock()
+        while now < self._deadline:
+            now = self._clock()
         self.late.add(abs(now - self._begun - self.period))
         self._begun = now
         return now
@@ -91,7 +93,9 @@ def make_real_time() -> str:
     gc.collect()
     gc.freeze()
     gc.disable()
-    if sys.platform == "linux" and (os.cpu_count() or 1) > 1:
+    if (os.cpu_count() or 1) < 2:
+        return "normal"  # the simulation needs the only processor as well
+    if sys.platform == "linux":
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
             return "real-time"

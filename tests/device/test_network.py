@@ -1,0 +1,350 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Other programs as devices: over UDP, TCP, and Haply's service."""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from octo_motion.core.errors import DeviceError
+from octo_motion.device import haply, network
+from octo_motion.device.driver import DeviceLostError, Dynamics, Kind, Sample
+from octo_motion.device.haply import Haply
+from octo_motion.device.network import Features, Force, PacketError, Port, State, parse
+from octo_motion.device.websocket import FrameReader, WebSocket, WebSocketError, frame, masked
+from tests.device.parts import HaplyService
+
+KEY = bytes(range(16))
+FEATURES = Features("My arm", 3, Dynamics(5.0, 0.2, 0.4))
+STATE = State(
+    *(9, 2),
+    held=True,
+    position=(0.1, 0.2, 0.3),
+    orientation=(1.0, 0.0, 0.0, 0.0),
+    velocity=(1.0, 2.0, 3.0),
+    angular_velocity=(4.0, 5.0, 6.0),
+)
+FORCE = Force(1, 9, 20, (1.0, 0.0, 0.0), (0.0, 0.1, 0.0))
+
+
+def wait_for(what: Callable[[], object]) -> object:
+    end = time.monotonic() + 10.0
+    while True:
+        found = what()
+        if found:
+            return found
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
+# --- Packets -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("packet", [FEATURES, STATE, FORCE])
+def test_packet_arrives_as_it_was_sent(packet: network.Packet) -> None:
+    data = network.pack(packet, KEY)
+    assert parse(data, KEY) == packet
+    assert len(data) == {Features: 168, State: 144, Force: 88}[type(packet)]
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        (network.pack(STATE, b"wrong key, sorry"), "key is wrong"),
+        (network.pack(STATE, KEY)[:-1], "another length"),
+        (b"GET / HTTP/1.1\r\n\r\n0123456789", "not one of our packets"),
+        (b"OMDF\x02\0" + network.pack(STATE, KEY)[6:], "version 2"),
+        (b"", "cut off"),
+    ],
+)
+def test_packet_that_is_none_is_refused(data: bytes, said: str) -> None:
+    with pytest.raises(PacketError, match=said):
+        parse(data, KEY)
+
+
+@given(st.sampled_from([FEATURES, STATE]), st.lists(st.tuples(st.integers(0), st.integers(0, 255))))
+@settings(max_examples=300)
+def test_packet_with_bytes_changed_is_read_or_refused(
+    packet: network.Packet, changes: list[tuple[int, int]]
+) -> None:
+    data = bytearray(network.pack(packet, KEY))
+    for at, value in changes:
+        data[at % len(data)] = value
+    try:
+        got = parse(bytes(data), KEY)
+    except PacketError:
+        return
+    if isinstance(got, State):
+        assert all(map(math.isfinite, (*got.position, *got.velocity)))
+        assert math.isclose(sum(each**2 for each in got.orientation), 1.0, rel_tol=1e-9)
+
+
+@pytest.fixture(params=["udp", "tcp"])
+def port(request: pytest.FixtureRequest) -> Iterator[tuple[Port, socket.socket]]:
+    """A port, and a program's socket that talks to it."""
+    port = Port(request.param, 0, KEY)
+    kind = socket.SOCK_DGRAM if request.param == "udp" else socket.SOCK_STREAM
+    program = socket.socket(socket.AF_INET, kind)
+    program.connect(("127.0.0.1", port.number))
+    program.settimeout(5.0)
+    yield port, program
+    program.close()
+    port.close()
+
+
+def test_program_is_a_device_once_it_says_what_it_can(port: tuple[Port, socket.socket]) -> None:
+    here, program = port
+    assert here.device() is None
+    program.sendall(network.pack(FEATURES, KEY))
+    device = wait_for(here.device)
+    assert isinstance(device, network.NetworkDevice)
+    assert device.description.name == "My arm"
+    assert device.description.dynamics == FEATURES.dynamics
+    program.sendall(network.pack(STATE, KEY))
+    sample = wait_for(device.read)
+    assert isinstance(sample, Sample)
+    assert sample.position == STATE.position
+    assert sample.buttons == 2
+    device.send((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
+    got = parse(program.recv(2048), KEY)
+    assert got == Force(1, 9, 20, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
+
+
+def test_program_without_the_key_is_no_device(port: tuple[Port, socket.socket]) -> None:
+    here, program = port
+    program.sendall(network.pack(FEATURES, b"another key 16b!"))
+    end = time.monotonic() + 0.2
+    while time.monotonic() < end:
+        assert here.device() is None
+        time.sleep(0.005)
+
+
+def test_program_that_falls_silent_is_lost(
+    port: tuple[Port, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, program = port
+    program.sendall(network.pack(FEATURES, KEY))
+    device = wait_for(here.device)
+    assert isinstance(device, network.NetworkDevice)
+    assert device.read() is None
+    later = time.perf_counter() + 2.0
+    monkeypatch.setattr(network.time, "perf_counter", lambda: later)
+    with pytest.raises(DeviceLostError):
+        device.read()
+    device.close()
+    device.close()
+
+
+def test_key_of_another_length_opens_no_port() -> None:
+    with pytest.raises(ValueError, match="16"):
+        Port("udp", 0, b"short")
+
+
+# --- WebSocket -----------------------------------------------------------------------------------
+
+
+@given(st.binary(max_size=300), st.binary(min_size=4, max_size=4))
+def test_mask_taken_twice_is_none(payload: bytes, mask: bytes) -> None:
+    assert masked(masked(payload, mask), mask) == payload
+
+
+@pytest.mark.parametrize("size", [0, 1, 125, 126, 65535, 65536, 200_000])
+def test_frame_of_any_size_is_read_in_any_pieces(size: int) -> None:
+    payload = bytes(index & 0xFF for index in range(size))
+    data = frame(0x1, payload)
+    reader = FrameReader()
+    got: list[tuple[int, bytes]] = []
+    for at in range(0, len(data), 1000):
+        got += reader.feed(data[at : at + 1000])
+    assert got == [(0x1, payload)]
+
+
+@given(st.lists(st.binary(max_size=40), max_size=6))
+@settings(max_examples=300)
+def test_any_bytes_are_frames_or_are_refused(pieces: list[bytes]) -> None:
+    reader = FrameReader()
+    try:
+        for piece in pieces:
+            reader.feed(piece)
+    except WebSocketError:
+        pass
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"\x81\x81mask.", b"\xf1\x00", b"\x80\x00", b"\x09\x00", b"\x81\x7f" + b"\xff" * 8],
+    ids=["masked", "reserved bits", "no beginning", "ping in pieces", "endless"],
+)
+def test_frame_against_the_rules_is_refused(data: bytes) -> None:
+    with pytest.raises(WebSocketError):
+        FrameReader().feed(data)
+
+
+def test_server_that_is_no_websocket_is_refused() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            client, _ = server.accept()
+            client.recv(1000)
+            client.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n")
+            client.close()
+
+        threading.Thread(target=answer, daemon=True).start()
+        with pytest.raises(WebSocketError, match="no WebSocket server"):
+            WebSocket.connect("127.0.0.1", server.getsockname()[1])
+    with pytest.raises(WebSocketError, match="nobody"):
+        WebSocket.connect("127.0.0.1", 1)
+
+
+# --- Haply ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def service() -> Iterator[HaplyService]:
+    service = HaplyService()
+    yield service
+    service.close()
+
+
+def open_haply(service: HaplyService) -> Haply:
+    device = Haply.open(service.port)
+    assert device
+    return device
+
+
+def test_haply_tells_pose_buttons_and_gets_force(service: HaplyService) -> None:
+    service.buttons["a"] = True
+    device = open_haply(service)
+    assert device.description.kind is Kind.POSE
+    sample = wait_for(device.read)
+    assert isinstance(sample, Sample)
+    assert sample.position == (0.01, 0.02, 0.03)
+    assert sample.velocity == (0.1, 0.0, -0.1)
+    assert sample.orientation == (0.0, 0.0, 0.0, 1.0)
+    assert sample.buttons == 1
+    device.send((1.0, -2.0, 3.0), (0.0, 0.0, 0.0))
+    wait_for(lambda: service.received)
+    first = service.received[0]
+    assert first["session"]["configure"]["profile"]["name"] == "octo-motion:posing"
+    assert first["session"]["configure"]["basis"] == {"permutation": "XYZ"}
+    assert first["inverse3"] == [
+        {
+            "device_id": "049D",
+            "commands": {"set_cursor_force": {"values": {"x": 1.0, "y": -2.0, "z": 3.0}}},
+        }
+    ]
+    wait_for(device.read)
+    device.send((0.5, 0.0, 0.0), (0.0, 0.0, 0.0))
+    wait_for(lambda: len(service.received) == 2)
+    assert "session" not in service.received[1], "a session is configured once"
+    device.close()
+    device.close()
+
+
+def test_haply_is_sent_one_message_for_each_state(service: HaplyService) -> None:
+    device = open_haply(service)
+    wait_for(device.read)
+    device.send((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    device.send((2.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # not before the service has answered
+    wait_for(device.read)
+    device.send((3.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    wait_for(lambda: len(service.received) == 2)
+    forces = [
+        each["inverse3"][0]["commands"]["set_cursor_force"]["values"]["x"]
+        for each in service.received
+    ]
+    assert forces == [1.0, 3.0]
+    device.close()
+
+
+def test_older_haply_service_is_not_asked_for_what_it_does_not_know() -> None:
+    service = HaplyService("3.1.1")
+    device = open_haply(service)
+    sample = wait_for(device.read)
+    assert isinstance(sample, Sample)
+    assert sample.position == pytest.approx((0.01, 0.16, -0.12))  # counted from the middle
+    device.send((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    wait_for(lambda: service.received)
+    assert "session" not in service.received[0]
+    device.close()
+    service.close()
+
+
+@pytest.mark.parametrize("version", ["3.0.8", "4.0.0", "2.9"])
+def test_haply_service_of_another_version_is_named(version: str) -> None:
+    service = HaplyService(version)
+    with pytest.raises(DeviceError, match=r"version \d\.\d"):
+        Haply.open(service.port)
+    service.close()
+
+
+def test_without_haply_service_there_is_no_device() -> None:
+    assert Haply.open(1) is None
+
+
+def test_haply_service_that_ends_is_a_lost_device(service: HaplyService) -> None:
+    device = open_haply(service)
+    wait_for(device.read)
+    service.close()
+    with pytest.raises(DeviceLostError):
+        wait_for(lambda: device.read() and None)
+    device.close()
+
+
+def test_haply_service_that_falls_silent_is_a_lost_device(
+    service: HaplyService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    device = open_haply(service)
+    wait_for(device.read)
+    later = time.perf_counter() + 1.0
+    monkeypatch.setattr(haply.time, "perf_counter", lambda: later)
+    with pytest.raises(DeviceLostError):
+        device.read()
+    device.close()
+
+
+def test_device_plugged_in_after_the_service_was_opened_is_found(service: HaplyService) -> None:
+    service.with_device = False
+    device = open_haply(service)
+    end = time.monotonic() + 0.1
+    while time.monotonic() < end:
+        assert device.read() is None
+    service.with_device = True
+    assert wait_for(device.read)
+    device.close()
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["inverse3", "state", "device_id", "cursor_position", "x", "y", "z"]),
+            inner,
+            max_size=4,
+        )
+    ),
+    max_leaves=12,
+)
+
+
+@given(json_values)
+@settings(max_examples=200)
+def test_any_json_is_a_state_or_none(value: object) -> None:
+    got = haply.parse(json.dumps({"inverse3": value}))
+    assert got is None or all(map(math.isfinite, got[1].position))
+    haply.parse(json.dumps(value))
+
+
+@given(st.text(max_size=100))
+def test_any_text_is_a_state_or_none(text: str) -> None:
+    haply.parse(text)
+    haply.parse("[" * 100_000)
