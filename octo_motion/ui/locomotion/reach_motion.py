@@ -73,13 +73,21 @@ class Reaching:
     up: Floats
     reaches: tuple[Reach, ...]
 
-    def apply(self, times: Floats, rotations: Floats, travelling: Travelling) -> tuple[str, ...]:
+    def apply(
+        self,
+        times: Floats,
+        rotations: Floats,
+        travelling: Travelling,
+        strains: Floats | None = None,
+    ) -> tuple[str, ...]:
         """Let arms reach, in place, and say what they do.
 
         Args:
             times: (frames,) of the motion.
             rotations: (frames, bones, 4) of all arms, one after the other.
             travelling: where the armature is.
+            strains: (frames, bones) by how much bones are longer than at rest; an arm that
+                reaches is as long as at rest, and what it has here is taken back in place.
 
         Raises:
             OctoMotionError: an object is out of reach at a frame, which is named; two reaches of
@@ -95,6 +103,9 @@ class Reaching:
             busy.append((number, reach))
             columns = slice(int(ends[number]), int(ends[number + 1]))
             own, arm = rotations[:, columns], self.frames[number]
+            if strains is not None:
+                weight = reach.timeline.weight(times, arm.reach[:-1] / arm.length)
+                strains[:, columns] *= 1.0 - weight
             if reach.profile is None:
                 rotations[:, columns] = curled(arm, reach.timeline, times, own)
                 continue

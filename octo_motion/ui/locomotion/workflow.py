@@ -339,7 +339,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         mantle = head
     travel = _travel_settings(settings, gait, stride)
     seconds, frames, times = _timing(settings, route, travel, scene.render)
-    breath = breathing_channels(armature, settings, (*head, "")[-1 - bool(head)], times * seconds)
+    breath = breathing_channels(armature, settings, head[-1] if head else "", times * seconds)
     return Shot(
         armature=armature.name,
         scene=scene.name,
