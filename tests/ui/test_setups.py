@@ -30,7 +30,7 @@ def settings() -> Any:
 
 
 def state(settings: Any) -> dict[str, Any]:
-    values = {name: getattr(settings, name) for name in setups.governed()}
+    values = {path: settings.path_resolve(path) for path in setups.governed()}
     return {**values, "gait": gait.to_json(read_gait(settings))}
 
 

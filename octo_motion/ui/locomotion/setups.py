@@ -37,6 +37,7 @@ ORDER: Final = ("walk", "hurry", "prowl", "tiptoe", "crawl", "settle", "swim", "
 
 APART: Final = frozenset(
     {
+        "table",
         *(
             "name",
             "seed",
@@ -55,19 +56,26 @@ APART: Final = frozenset(
         *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance"),
     }
 )
-"""Settings of the rig, the shot and the keys: no set-up of a motion changes them. The gait is in
-the table."""
+"""Settings of the rig, the shot and the keys: no set-up of a motion changes them. The table of the
+gait goes as a whole."""
 
 _SINGLE: Final = frozenset({"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"})
 
 
 def governed() -> tuple[str, ...]:
-    """Names of the settings that a set-up holds."""
-    return tuple(
-        each.identifier
-        for each in OCTO_MOTION_PG_locomotion.bl_rna.properties
-        if each.type in _SINGLE and not each.is_readonly and each.identifier not in APART
-    )
+    """The settings that a set-up holds, as paths from the settings of locomotion."""
+    return tuple(_paths(OCTO_MOTION_PG_locomotion.bl_rna, ""))
+
+
+def _paths(kind: Any, prefix: str) -> Iterator[str]:
+    for each in kind.properties:
+        path = f"{prefix}{each.identifier}"
+        if path in APART or each.identifier in {"rna_type", "name"}:
+            continue
+        if each.type in _SINGLE and not each.is_readonly:
+            yield path
+        elif each.type == "POINTER" and each.fixed_type.base == bpy.types.PropertyGroup.bl_rna:
+            yield from _paths(each.fixed_type, f"{path}.")
 
 
 def setup_paths() -> dict[str, Path]:
@@ -84,10 +92,12 @@ def setup_paths() -> dict[str, Path]:
 
 def reset(settings: Any) -> None:
     """Give all settings that a set-up holds their defaults."""
-    for name in governed():
-        definition = settings.bl_rna.properties[name]
-        value = definition.default_array[:] if getattr(definition, "is_array", False) else None
-        assign(settings, name, definition.default if value is None else value)
+    for path in governed():
+        owner, _, name = path.rpartition(".")
+        group = settings.path_resolve(owner) if owner else settings
+        definition = group.bl_rna.properties[name]
+        is_array = getattr(definition, "is_array", False)
+        assign(group, name, definition.default_array[:] if is_array else definition.default)
     set_gait(settings, load_gait(DEFAULT_GAIT))
 
 
@@ -168,7 +178,7 @@ class OCTO_MOTION_OT_setup_add(  # pyright: ignore[reportIncompatibleMethodOverr
         # The text first: the name of the gait, when it is set, is then that of the table.
         return [
             *("settings.table.as_text", "settings.gait"),
-            *(f"settings.{name}" for name in governed()),
+            *(f"settings.{path}" for path in governed()),
         ]
 
     @classmethod
