@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fast solver: Newton's method in the velocities that keep every joint closed.
 
-All laws of a step (elements, stops, contacts, holds) are piecewise smooth. With each replaced by
-its tangent, p = c − W w, the step is one linear system of the tree, for a row at a body adds
-Xᵀ W X to that body's inertia and nothing else. Pieces on which the laws are linear (sticking,
-resting, apart, below yield) are met exactly by one such solution, begun with the pieces of the
-step before; a few more are needed where something starts to touch, to slip or to flow.
+All laws of a step (elements, stops, contacts, holds) give an impulse that falls as its velocity
+grows, the slope of a convex function ℓ. The velocities at the step's end are the lowest point of
+
+    ½ (u − u*)ᵀ SᵀMS (u − u*) + Σ ℓ(w),      Sᵀ M (v + h f) = SᵀMS u*
+
+With impulses replaced by their tangents, p ≈ p_k − W (w − w_k), that is one linear system of the
+tree, for a row at a body adds Xᵀ W X to that body's inertia and nothing else. Where the laws are
+linear (sticking, resting, apart, below yield) a single solution is exact, begun with the velocities
+of the step before; a few more are needed where something starts to touch, to slip or to flow. No
+step goes beyond the lowest point on its way, so that it always arrives.
 
 Contacts between two bodies of the figure would tie branches together; they are brought in after
 the solution, by the Woodbury identity.
@@ -19,7 +24,7 @@ import numpy as np
 
 from ..rotations import Floats
 from .problem import Problem, Stops
-from .rows import Tangent
+from .rows import Answer
 from .tree import Tree
 
 
@@ -40,25 +45,32 @@ class Solution:
     impulses: Floats
     """(rows, 3)"""
     iterations: int
-    """Linear systems solved to find it."""
+    """Linear systems solved."""
     miss: float
     """Largest difference of an impulse from its law, against the largest impulse of its kind."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Joints:
-    """What elements and stops do at some velocities."""
+class _Point:
+    """Velocities, and what all laws do there."""
 
     speeds: Floats
+    """(slots, 3) u."""
+    velocities: Floats
+    """(bodies, 6)"""
+    joint_speeds: Floats
     """(bodies, 3) relative angular velocities, world axes."""
-    impulses: Floats
-    """(bodies, 3) world axes."""
-    slopes: Floats
+    joint_impulses: Floats
+    """(bodies, 3) of elements and stops, world axes."""
+    joint_slopes: Floats
     """(bodies, 3, 3)"""
     loads: Floats
     flow: Floats | None
     linear: bool
-    """Whether no element flows and no stop is near: then the tangent is the law."""
+    """Whether no element flows and no stop is near: then the joints' tangent is their law."""
+    row_speeds: Floats
+    """(rows, 3)"""
+    rows: Answer | None
 
 
 class Newton:
@@ -77,7 +89,6 @@ class Newton:
         problem: Problem,
         inertias: Floats,
         start: Floats,
-        impulses: Floats | None = None,
         corrections: Floats | None = None,
     ) -> Solution:
         """Velocities at the end of the step.
@@ -86,60 +97,43 @@ class Newton:
             problem: the step.
             inertias: (bodies, 6, 6) spatial, about the problem's origin.
             start: (slots, 3) velocities to begin with.
-            impulses: (rows, 3) to begin with, NaN where none are known.
             corrections: (rows, 3) velocities for positions alone, or None.
         """
         tree = self._tree
-        rows = problem.rows
         tree.place(problem.joints)
         slots = len(tree.layout.bodies)
         composite = (tree.beyond @ inertias.reshape(-1, 36)).reshape(slots, 6, 6)
-        speeds = start
-        velocities = tree.velocities(speeds)
-        joints = self._joints(problem, speeds)
-        tangent: Tangent | None = None
-        row_speeds = _NO_ROWS
-        if len(rows):
-            row_speeds = rows.speeds(velocities)
-            tangent = rows.tangent(rows.pieces(impulses, row_speeds), row_speeds)
-        mean: tuple[Floats, Floats] | None = None
-        best: Solution | None = None
-        for count in range(1, self._iterations + 1):
-            solved = self._linear(problem, composite, joints, tangent, corrections)
-            speeds = np.ascontiguousarray(solved[..., 0])
-            velocities = tree.velocities(speeds)
-            now = self._joints(problem, speeds)
-            miss = 0.0
-            if not (now.linear and joints.linear):
-                change = (now.speeds - joints.speeds)[:, :, None]
-                expected = joints.impulses - (joints.slopes @ change)[:, :, 0]
-                miss = _relative(float(np.abs(expected - now.impulses).max()), now.impulses)
-            joints = now
-            pushes, pieces = _NO_ROWS, None
-            if tangent is not None:
-                row_speeds = rows.speeds(velocities)
-                pushes = tangent.impulses(row_speeds)
-                pieces = rows.pieces(pushes, row_speeds)
-                miss = max(miss, _relative(pieces.miss, pushes))
-            if best is None or miss < best.miss:
-                moving = speeds if corrections is None else solved[..., 1]
-                best = Solution(
-                    speeds, velocities, moving, now.loads, now.flow, pushes, count, miss
-                )
-            if miss <= self._tolerance:
-                break
-            if pieces is None:
-                continue
-            if count > 1:
-                # Contacts that change their minds by turns settle on what they think on average.
-                mean = (pushes, row_speeds) if mean is None else _mixed(mean, pushes, row_speeds)
-                pieces, row_speeds = rows.pieces(*mean), mean[1]
-            tangent = rows.tangent(pieces, row_speeds)
-        assert best is not None
-        return best
+        point = self._at(problem, start)
+        moving = start
+        miss = np.inf
+        count = 0
+        while miss > self._tolerance and count < self._iterations:
+            count += 1
+            slopes = None if point.rows is None else problem.rows.slopes(point.rows)
+            solved = self._linear(problem, composite, point, slopes, corrections)
+            moving = solved[..., -1]
+            end = self._at(problem, np.ascontiguousarray(solved[..., 0]))
+            joints, rows = _predicted(point, end, slopes)
+            miss = _miss(end, joints, rows)
+            if miss > self._tolerance:
+                end = self._lowest(problem, inertias, point, end, joints, rows)
+            point = end
+        return Solution(
+            point.speeds,
+            point.velocities,
+            point.speeds if corrections is None else moving,
+            point.loads,
+            point.flow,
+            _NO_ROWS if point.rows is None else point.rows.impulses,
+            count,
+            miss,
+        )
 
-    def _joints(self, problem: Problem, speeds: Floats) -> _Joints:
-        joint_speeds = speeds[self._tree.joint_slot]
+    def _at(self, problem: Problem, speeds: Floats) -> _Point:
+        """All laws at u (slots, 3)."""
+        tree = self._tree
+        velocities = tree.velocities(speeds)
+        joint_speeds = speeds[tree.joint_slot]
         frames = problem.frames
         if frames is None:
             response = problem.law.respond(problem.springs, joint_speeds)
@@ -152,41 +146,54 @@ class Newton:
             slopes = problem.step * (frames @ response.slope @ frames.transpose(0, 2, 1))
         for stops in problem.stops:
             _add_stops(stops, problem.step, joint_speeds, impulses, slopes)
-        linear = response.flow is None and not problem.stops
-        return _Joints(joint_speeds, impulses, slopes, response.load, response.flow, linear)
+        rows = problem.rows
+        row_speeds, answer = _NO_ROWS, None
+        if len(rows):
+            row_speeds = rows.speeds(velocities)
+            answer = rows.answer(row_speeds)
+        return _Point(
+            speeds,
+            velocities,
+            joint_speeds,
+            impulses,
+            slopes,
+            response.load,
+            response.flow,
+            response.flow is None and not problem.stops,
+            row_speeds,
+            answer,
+        )
 
     def _linear(
         self,
         problem: Problem,
         composite: Floats,
-        joints: _Joints,
-        tangent: Tangent | None,
+        point: _Point,
+        slopes: Floats | None,
         corrections: Floats | None,
     ) -> Floats:
         """(slots, 3, columns) solution with all laws replaced by their tangents."""
         tree = self._tree
         rows = problem.rows
+        paired = rows.paired
         columns = 1 if corrections is None else 2
         momenta = np.empty((len(problem.momenta), 6, columns))
         momenta[:] = problem.momenta[:, :, None]
         right = tree.along(momenta)
-        paired = rows.paired
-        symmetric = True
-        if tangent is not None:
-            slopes = tangent.slopes
-            symmetric = tangent.symmetric
+        if slopes is not None:
+            assert point.rows is not None
+            # p_k + W w_k − W w, with w the velocity less the target.
+            at = point.row_speeds if rows.still else point.row_speeds + rows.targets
             pulls = np.empty((len(rows), 3, columns))
-            # w is the velocity less the target: c − W w = (c + W target) − W X V.
-            pulls[:, :, 0] = tangent.offsets
-            if not rows.still:
-                pulls[:, :, 0] += (slopes @ rows.targets[:, :, None])[:, :, 0]
+            pulls[:, :, 0] = point.rows.impulses + (slopes @ at[:, :, None])[:, :, 0]
             if corrections is not None:
                 pulls[:, :, 1] = pulls[:, :, 0] + (slopes @ corrections[:, :, None])[:, :, 0]
+            alone = slopes
             if len(paired):
-                slopes = slopes.copy()
-                slopes[paired] = 0.0
+                alone = slopes.copy()
+                alone[paired] = 0.0
             turned = rows.reach.transpose(0, 2, 1)
-            blocks = turned @ slopes @ rows.reach
+            blocks = turned @ alone @ rows.reach
             chain = tree.beyond[:, rows.bodies]
             composite = composite + (chain @ blocks.reshape(-1, 36)).reshape(-1, 6, 6)
             pushes = turned @ pulls
@@ -195,18 +202,18 @@ class Newton:
                 chain = tree.beyond[:, rows.others[paired]]
                 against = chain @ pushes[paired].reshape(len(paired), -1)
                 right -= tree.motion @ against.reshape(-1, 6, columns)
-        slopes = joints.slopes
-        self._joint_blocks[tree.joint_slot] = slopes
+        stiff = point.joint_slopes
+        self._joint_blocks[tree.joint_slot] = stiff
         self._joint_right[tree.joint_slot] = (
-            joints.impulses + (slopes @ joints.speeds[:, :, None])[:, :, 0]
+            point.joint_impulses + (stiff @ point.joint_speeds[:, :, None])[:, :, 0]
         )
         right += self._joint_right[:, :, None]
-        tree.assemble(composite, self._joint_blocks, symmetric=symmetric)
-        if tangent is not None and len(paired):
-            return self._with_pairs(problem, tangent, right)
+        tree.assemble(composite, self._joint_blocks)
+        if slopes is not None and len(paired):
+            return self._with_pairs(problem, slopes, right)
         return tree.solve(right)
 
-    def _with_pairs(self, problem: Problem, tangent: Tangent, right: Floats) -> Floats:
+    def _with_pairs(self, problem: Problem, slopes: Floats, right: Floats) -> Floats:
         """The solution with contacts between bodies of the figure.
 
         (H + JᵀWJ)⁻¹ r = y − Z (1 + W J Z)⁻¹ W J y with y = H⁻¹ r and Z = H⁻¹ Jᵀ.
@@ -214,7 +221,7 @@ class Newton:
         tree = self._tree
         rows = problem.rows
         paired = rows.paired
-        slopes = tangent.slopes[paired]
+        slopes = slopes[paired]
         loaded = slopes.any(axis=(1, 2))
         paired, slopes = paired[loaded], slopes[loaded]
         if not len(paired):
@@ -235,6 +242,75 @@ class Newton:
         result = both[:, :, 3 * count :] - both[:, :, : 3 * count] @ pull
         return result.reshape(-1, 3, columns)
 
+    def _lowest(
+        self,
+        problem: Problem,
+        inertias: Floats,
+        start: _Point,
+        end: _Point,
+        joints: Floats,
+        rows: Floats | None,
+    ) -> _Point:
+        """The lowest point of the convex function between two, or a little before the end.
+
+        Along the way d its slope is d·SᵀMS(u − u*) − Σ p·dw. At the end the first part is what
+        the tangents' impulses do along the way, and it is linear before.
+        """
+        joint_way = end.joint_speeds - start.joint_speeds
+        row_way = end.row_speeds - start.row_speeds
+        body_way = end.velocities - start.velocities
+        mass = float((body_way * (inertias @ body_way[:, :, None])[:, :, 0]).sum())
+        pull = float((joints * joint_way).sum())
+        if rows is not None:
+            pull += float((rows * row_way).sum())
+
+        def slope(at: _Point, share: float) -> float:
+            value = pull - (1.0 - share) * mass - float((at.joint_impulses * joint_way).sum())
+            if at.rows is not None:
+                value -= float((at.rows.impulses * row_way).sum())
+            return value
+
+        low, high = 0.0, 1.0
+        at_low, at_high = slope(start, low), slope(end, high)
+        if at_high <= _ENOUGH * abs(at_low) or at_low >= 0.0:
+            return end
+        best = end
+        for _ in range(_SEARCHES):
+            # False position, kept away from the ends: the slope may jump.
+            share = low + (high - low) * min(max(at_low / (at_low - at_high), 0.1), 0.9)
+            best = self._at(problem, start.speeds + share * (end.speeds - start.speeds))
+            value = slope(best, share)
+            if abs(value) <= _ENOUGH * abs(at_low):
+                break
+            if value > 0.0:
+                high, at_high = share, value
+            else:
+                low, at_low = share, value
+        return best
+
+
+def _predicted(start: _Point, end: _Point, slopes: Floats | None) -> tuple[Floats, Floats | None]:
+    """Impulses at the end by the tangents at the start: joints (bodies, 3), rows (rows, 3)."""
+    change = (end.joint_speeds - start.joint_speeds)[:, :, None]
+    joints = start.joint_impulses - (start.joint_slopes @ change)[:, :, 0]
+    if slopes is None:
+        return joints, None
+    assert start.rows is not None
+    change = (end.row_speeds - start.row_speeds)[:, :, None]
+    return joints, start.rows.impulses - (slopes @ change)[:, :, 0]
+
+
+def _miss(end: _Point, joints: Floats, rows: Floats | None) -> float:
+    miss = 0.0
+    if not end.linear:
+        right = end.joint_impulses
+        miss = float(np.abs(joints - right).max()) / (float(np.abs(right).max()) + _LEAST)
+    if rows is not None:
+        assert end.rows is not None
+        right = end.rows.impulses
+        miss = max(miss, float(np.abs(rows - right).max()) / (float(np.abs(rows).max()) + _LEAST))
+    return miss
+
 
 def _add_stops(stops: Stops, step: float, speeds: Floats, impulses: Floats, slopes: Floats) -> None:
     """Add a set of stops to the impulses and slopes of the joints."""
@@ -246,19 +322,8 @@ def _add_stops(stops: Stops, step: float, speeds: Floats, impulses: Floats, slop
     slopes[stops.joints] += stiff[:, None, None] * (stops.axes[:, :, None] * stops.axes[:, None, :])
 
 
-def _relative(miss: float, impulses: Floats) -> float:
-    return miss / (float(np.abs(impulses).max()) + _LEAST)
-
-
-def _mixed(mean: tuple[Floats, Floats], impulses: Floats, speeds: Floats) -> tuple[Floats, Floats]:
-    old_impulses, old_speeds = mean
-    return (
-        old_impulses + _NEWS * (impulses - old_impulses),
-        old_speeds + _NEWS * (speeds - old_speeds),
-    )
-
-
 _LEAST = 1e-12
-_NEWS = 0.6
-"""Share of the newest impulses and velocities in their running mean."""
+_ENOUGH = 0.1
+"""Of the slope at the start: where the lowest point is near enough."""
+_SEARCHES = 6
 _NO_ROWS = np.zeros((0, 3))

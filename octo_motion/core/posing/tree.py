@@ -142,27 +142,20 @@ class Tree:
         summed = self.beyond @ momenta.reshape(len(momenta), 6 * count)
         return self.motion @ summed.reshape(-1, 6, count)
 
-    def assemble(self, composite: Floats, joints: Floats, *, symmetric: bool) -> None:
+    def assemble(self, composite: Floats, joints: Floats) -> None:
         """Fill the matrix of (1).
 
         Args:
             composite: (slots, 6, 6) inertia of all that moves with each slot, rows included.
             joints: (slots, 3, 3) K, which stands on each slot's own block.
-            symmetric: whether ``composite`` is; slipping contacts make it otherwise.
         """
         trunk, branches, width = self.layout.trunk, self.layout.branches, self.layout.width
         motion = self.motion
-        pushed = motion if symmetric else motion @ composite
-        # (I S)ᵀ, wanted where a row's slot lies above the column's; Sᵀ I where it lies below.
-        carried = motion @ (composite if symmetric else composite.transpose(0, 2, 1))
+        carried = motion @ composite
         rows = motion[:trunk].reshape(3 * trunk, 6)
         products = rows @ carried[:trunk].reshape(3 * trunk, 6).T
         np.multiply(products, self._trunk_upper, out=self.trunk_matrix)
-        if symmetric:
-            np.multiply(products.T, self._trunk_lower, out=self._trunk_mirror)
-        else:
-            products = pushed[:trunk].reshape(3 * trunk, 6) @ rows.T
-            np.multiply(products, self._trunk_lower, out=self._trunk_mirror)
+        np.multiply(products.T, self._trunk_lower, out=self._trunk_mirror)
         self.trunk_matrix += self._trunk_mirror
         self._trunk_diagonal += joints[:trunk]
         if not branches:
@@ -171,11 +164,7 @@ class Tree:
         inner = motion[trunk:].reshape(branches, 3 * width, 6)
         products = inner @ of_branches.transpose(0, 2, 1)
         np.multiply(products, self._branch_upper, out=self.branch_matrix)
-        if symmetric:
-            np.multiply(products.transpose(0, 2, 1), self._branch_lower, out=self._branch_mirror)
-        else:
-            products = pushed[trunk:].reshape(branches, 3 * width, 6) @ inner.transpose(0, 2, 1)
-            np.multiply(products, self._branch_lower, out=self._branch_mirror)
+        np.multiply(products.transpose(0, 2, 1), self._branch_lower, out=self._branch_mirror)
         self.branch_matrix += self._branch_mirror
         self._branch_diagonal += joints[trunk:].reshape(branches, width, 3, 3)
         if self._has_empty:
@@ -183,11 +172,6 @@ class Tree:
         between = rows @ of_branches.reshape(-1, 6).T
         between *= self._cross_upper
         self._between = between.reshape(3 * trunk, branches, 3 * width).transpose(1, 0, 2)
-        self._back = self._between.transpose(0, 2, 1)
-        if not symmetric:
-            back = pushed[trunk:].reshape(-1, 6) @ rows.T
-            back *= self._cross_upper.T
-            self._back = back.reshape(branches, 3 * width, 3 * trunk)
 
     def solve(self, right: Floats) -> Floats:
         """u (slots, 3, columns) of (1) for right-hand sides (slots, 3, columns)."""
@@ -197,7 +181,7 @@ class Tree:
         if not branches:
             return np.linalg.solve(self.trunk_matrix, top).reshape(trunk, 3, count)
         below = right[trunk:].reshape(branches, 3 * width, count)
-        both = np.concatenate([self._back, below], axis=2)
+        both = np.concatenate([self._between.transpose(0, 2, 1), below], axis=2)
         eliminated = np.linalg.solve(self.branch_matrix, both)
         folded = (self._between @ eliminated).sum(axis=0)
         cut = 3 * trunk

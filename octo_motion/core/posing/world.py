@@ -45,9 +45,8 @@ from .tree import Tree
 
 Integers = NDArray[np.int64]
 
-_CONTACT_GAIN = 1e4
-"""Of contacts, in masses of the figure: at rest on one point it sinks by h·g/10⁴ a second."""
 _PIN_GAIN = 1e5
+"""Of pins, in masses of the figure: they give way by h·g/10⁵ a second before they are put right."""
 _STOP_GAIN = 1e3
 
 
@@ -93,8 +92,8 @@ class WorldState:
     """(bodies, 3) angular momentum about the centre of mass, world axes."""
     speeds: Floats
     """(slots, 3) where the solver begins."""
-    impulses: Floats
-    """(rows, 3) of the last step, where it begins as well."""
+    grips: Floats
+    """(contacts, 3) friction of the last step, N·s."""
     labels: NDArray[np.int64]
     """(contacts,) to know them by."""
 
@@ -183,7 +182,7 @@ class World:
         self._angular = np.zeros((count, 3))
         self._spin = np.zeros((count, 3))
         self._speeds = np.zeros((len(self._tree.layout.bodies), 3))
-        self._impulses = np.zeros((0, 3))
+        self._grips = np.zeros((0, 3))
         self._labels = np.zeros(0, np.int64)
         self._loads = np.zeros((count, 3))
         self._place(pose)
@@ -246,6 +245,7 @@ class World:
             self._plastic_rest = self._turns()
         for array in (self._linear, self._angular, self._spin, self._speeds, self._loads):
             array[:] = 0.0
+        self._labels = _NOBODY
 
     def set_elements(self, elements: Elements) -> None:
         """Take other coefficients; what is bent stays bent."""
@@ -380,7 +380,7 @@ class World:
             self._angular.copy(),
             self._spin.copy(),
             self._speeds.copy(),
-            self._impulses.copy(),
+            self._grips.copy(),
             self._labels.copy(),
         )
 
@@ -394,7 +394,7 @@ class World:
         self._angular = state.angular.copy()
         self._spin = state.spin.copy()
         self._speeds = state.speeds.copy()
-        self._impulses = state.impulses.copy()
+        self._grips = state.grips.copy()
         self._labels = state.labels.copy()
         self._refresh()
 
@@ -406,15 +406,12 @@ class World:
         h = self.settings.step
         corrections = None
         if len(problem.rows):
-            corrections = problem.rows.corrections(h, 1e-3 * self._size, 0.5 * self._size)
-        solution = self._newton.solve(
-            problem, inertias, self._speeds, self._known(problem.rows), corrections
-        )
+            corrections = problem.rows.corrections(h, self._size)
+        solution = self._newton.solve(problem, inertias, self._speeds, corrections)
         self.last = solution
         self.contacts = problem.rows.contacts
         self._take_velocities(problem, solution, body_inertias)
-        self._impulses = solution.impulses
-        self._labels = problem.rows.contacts.labels
+        self._take_grips(problem, solution)
         self._take_wrenches(problem, solution)
         self._move(problem, solution)
         self.time += h
@@ -452,7 +449,15 @@ class World:
         speed = np.sqrt((self._linear * self._linear).sum(axis=1).max())
         margin = 2e-3 * self._size + 2.0 * h * float(speed)
         contacts = self._detector.find(self._positions, frames, self.obstacles, margin)
-        rows = Rows(contacts, self._holds(), origin, figure.masses, _CONTACT_GAIN * self._mass, h)
+        rows = Rows(
+            contacts,
+            self._holds(),
+            origin,
+            figure.masses,
+            h,
+            1e-4 * self._size,
+            self._grips_before(contacts),
+        )
         problem = Problem(
             h,
             joints,
@@ -561,6 +566,29 @@ class World:
             loads = (problem.frames @ loads[:, :, None])[:, :, 0]
         self._loads = loads
 
+    def _grips_before(self, contacts: Contacts) -> Floats | None:
+        """(contacts, 3) friction in the step before, zero for those that are new."""
+        labels = self._labels
+        if not (len(labels) and len(contacts)):
+            return None
+        if np.array_equal(labels, contacts.labels):
+            return self._grips
+        order = np.argsort(labels)
+        sorted_labels = labels[order]
+        place = np.searchsorted(sorted_labels, contacts.labels)
+        place = np.minimum(place, len(labels) - 1)
+        same = sorted_labels[place] == contacts.labels
+        return np.where(same[:, None], self._grips[order[place]], 0.0)
+
+    def _take_grips(self, problem: Problem, solution: Solution) -> None:
+        contacts = problem.rows.contacts
+        self._labels = contacts.labels
+        count = len(contacts)
+        if count:
+            impulses = solution.impulses[:count]
+            loads = (impulses * contacts.normals).sum(axis=1)
+            self._grips = impulses - loads[:, None] * contacts.normals
+
     def _take_wrenches(self, problem: Problem, solution: Solution) -> None:
         if not self._grabs:
             return
@@ -607,23 +635,6 @@ class World:
         if problem.frames is None:
             springs = (springs[:, None, :] @ parents)[:, 0]
         return springs
-
-    def _known(self, rows: Rows) -> Floats | None:
-        """(rows, 3) impulses of the step before, NaN for contacts that are new."""
-        before, impulses = self._labels, self._impulses
-        now = rows.contacts
-        if not (len(before) and len(now)):
-            return None
-        if len(rows) == len(impulses) and np.array_equal(before, now.labels):
-            return impulses
-        known = np.full((len(rows), 3), np.nan)
-        order = np.argsort(before)
-        labels = before[order]
-        place = np.minimum(np.searchsorted(labels, now.labels), len(labels) - 1)
-        same = np.flatnonzero(labels[place] == now.labels)
-        known[same] = impulses[order[place[same]]]
-        known[len(now) :] = 0.0
-        return known
 
     # Geometry
 
