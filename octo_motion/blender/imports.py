@@ -29,6 +29,9 @@ NOTE: Final = "octo_motion_clip"
 COLLECTION: Final = "Clips"
 _COLLECTION_MARK: Final = "octo_motion_clips"
 
+_IMPORTED: Final = 0.8
+"""Of the work on a file: Blender's own importer, about."""
+
 _ANOTHER: Final = f"Choose a file that ends with {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}."
 
 
@@ -43,6 +46,8 @@ class ImportedClip:
     """Frames per second in the file; of glTF, which has none, as its keys tell."""
     notes: tuple[str, ...]
     """What was repaired: sentences."""
+    blocks: frozenset[int] = frozenset()
+    """Session identities of all data-blocks that were made."""
 
 
 def clips_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
@@ -56,11 +61,29 @@ def clips_collection(scene: bpy.types.Scene) -> bpy.types.Collection:
     return made
 
 
-def import_clip(path: Path, context: bpy.types.Context, frame_start: int = 1) -> ImportedClip:
+def remove_clips(clips: Iterable[ImportedClip]) -> None:
+    """Take back what was imported, all of it."""
+    blocks = {identity for clip in clips for identity in clip.blocks}
+    bpy.data.batch_remove([each for each in _all_blocks() if each.session_uid in blocks])
+
+
+def import_clip(
+    path: Path,
+    context: bpy.types.Context,
+    frame_start: int = 1,
+    *,
+    progress: Callable[[float], None] = lambda _: None,
+) -> ImportedClip:
     """One file as armatures with their actions, in the scene's collection for clips.
 
     Keys lie where the scene's frame rate puts their seconds, so the clip plays at its own speed,
     mostly between whole frames; the first one is on ``frame_start``. No key is made up or lost.
+
+    Args:
+        path: the file.
+        context: with a scene and a view layer.
+        frame_start: frame of the first key.
+        progress: is told which share of the work is done, from time to time.
 
     Raises:
         ClipError: the file cannot be read or has no motion; nothing has changed.
@@ -80,14 +103,16 @@ def import_clip(path: Path, context: bpy.types.Context, frame_start: int = 1) ->
     try:
         with _unchanged(context, scene):
             result = importer(path, scene)
+            progress(_IMPORTED)
             made = _made_since(before)
             _remove_strays(made)
             armatures, actions = _motion(made)
             for each in made:
                 _take_off_tracks(each)
             own_rate = result.rate or _rate_of_keys(actions, result.placed_by)
-            for action in actions:
+            for number, action in enumerate(actions, 1):
                 _place_keys(action, rate / result.placed_by, frame_start)
+                progress(_IMPORTED + (1.0 - _IMPORTED) * number / len(actions))
                 action.use_fake_user = True
                 action[NOTE] = {"file": path.name, "rate": own_rate}
             _name(path.stem, armatures, actions)
@@ -98,6 +123,7 @@ def import_clip(path: Path, context: bpy.types.Context, frame_start: int = 1) ->
                 actions=tuple(each.name for each in actions),
                 rate=own_rate,
                 notes=result.notes,
+                blocks=frozenset(each.session_uid for each in _made_since(before)),
             )
     except BaseException:
         bpy.data.batch_remove(list(_made_since(before)))
@@ -188,14 +214,17 @@ def _kinds() -> Iterator[Any]:
             yield getattr(bpy.data, definition.identifier)
 
 
+def _all_blocks() -> list[bpy.types.ID]:
+    # By what identifies them: some are in more than one of the file's lists.
+    return list({each.session_uid: each for kind in _kinds() for each in kind}.values())
+
+
 def _data_blocks() -> set[int]:
-    return {each.session_uid for kind in _kinds() for each in kind}
+    return {each.session_uid for each in _all_blocks()}
 
 
 def _made_since(before: set[int]) -> list[bpy.types.ID]:
-    # By what identifies them: some are in more than one of the file's lists.
-    made = {each.session_uid: each for kind in _kinds() for each in kind}
-    return [each for identity, each in made.items() if identity not in before]
+    return [each for each in _all_blocks() if each.session_uid not in before]
 
 
 @contextmanager

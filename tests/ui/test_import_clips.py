@@ -4,6 +4,7 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -12,7 +13,10 @@ import pytest
 
 from octo_motion.blender.imports import NOTE, import_clip
 from octo_motion.core.errors import ClipError
+from octo_motion.ui.splicing import import_session
+from octo_motion.ui.splicing.import_clips import OCTO_MOTION_OT_import_clips
 from tests.ui.rig import click, joints_in_world, keys
+from tests.ui.test_generate import Press, Window
 
 Data = Callable[[str], Path]
 
@@ -265,3 +269,117 @@ def test_first_frame_and_collection_are_as_asked(shared_data: Data) -> None:
     np.testing.assert_allclose(times(second) + 100.0, times(first), atol=1e-4)
     assert len(bpy.data.collections["Clips"].objects) == 2
     assert {each.name for each in bpy.context.selected_objects} == {"avatar_walk.001"}
+
+
+# --- File by file, in a window --------------------------------------------------------------------
+
+
+class Operator:
+    """The operator's methods on a plain object: Blender makes real ones only with a window."""
+
+    _session = _job = _timer = None
+    _browsing = False
+    frame_start = 1
+    filepath = ""
+
+    def __init__(self, folder: Path, names: list[str]) -> None:
+        self.directory = str(folder)
+        self.files = [SimpleNamespace(name=name) for name in names]
+        self.reports: list[str] = []
+
+    def report(self, _kind: set[str], text: str) -> None:
+        self.reports.append(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(OCTO_MOTION_OT_import_clips, name).__get__(self)
+
+
+CLEAN = ["timer off", "progress off", "text off"]
+THREE = ["avatar_walk.bvh", "avatar_run.bvh", "avatar_jump.bvh"]
+
+
+def begun(shared_data: Data, names: list[str]) -> tuple[Any, Any]:
+    folder = shared_data(f"secondlife/{THREE[0]}").parent
+    operator, window = Operator(folder, names), Window()
+    assert operator.invoke(window, Press("LEFTMOUSE")) == {"RUNNING_MODAL"}
+    assert window.calls == ["timer on", "progress on", "modal", "text on"]
+    return operator, window
+
+
+def test_several_files_come_one_after_the_other(shared_data: Data) -> None:
+    operator, window = begun(shared_data, THREE)
+    counts = []
+    while operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}:
+        counts.append(len(bpy.data.actions))
+        assert operator.modal(window, Press("LEFTMOUSE")) == {"RUNNING_MODAL"}
+    assert counts == [1, 2, 3]
+    assert window.calls[-3:] == CLEAN
+    assert operator.reports == ["3 clips imported."]
+    layer: Any = bpy.context.view_layer
+    assert layer.objects.active.name == "avatar_walk"
+    assert all(each.select_get() for each in bpy.data.objects)
+
+
+def test_esc_between_files_leaves_nothing_behind(shared_data: Data) -> None:
+    bpy.ops.object.armature_add()
+    bpy.ops.mesh.primitive_cube_add()
+    before = everything()
+    operator, window = begun(shared_data, THREE)
+    operator.modal(window, Press("TIMER"))
+    operator.modal(window, Press("TIMER"))
+    assert len(bpy.data.actions) == 2
+    assert operator.modal(window, Press("ESC")) == {"CANCELLED"}
+    assert everything() == before
+    assert window.calls[-3:] == CLEAN
+    assert operator.reports == ["Cancelled: nothing was imported."]
+    # Blender may call it as well, when it quits.
+    operator.cancel(window)
+    assert window.calls.count("timer off") == 1
+
+
+def test_esc_keeps_what_was_imported_before(shared_data: Data) -> None:
+    import_files(shared_data("derived_fbx_gltf/sl_walk.glb"))
+    before = everything()
+    operator, window = begun(shared_data, THREE)
+    operator.modal(window, Press("TIMER"))
+    operator.modal(window, Press("ESC"))
+    assert everything() == before
+    assert list(bpy.data.collections.keys()) == ["Clips"]
+
+
+def test_a_fault_in_the_middle_leaves_nothing_behind(
+    shared_data: Data, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = everything()
+    operator, window = begun(shared_data, THREE)
+    operator.modal(window, Press("TIMER"))
+
+    def fail(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(import_session, "import_clip", fail)
+    with pytest.raises(ZeroDivisionError):
+        operator.modal(window, Press("TIMER"))
+    assert everything() == before
+    assert window.calls[-3:] == CLEAN
+
+
+def test_files_that_are_all_refused_are_told_at_the_end(shared_data: Data) -> None:
+    before = everything()
+    operator, window = begun(shared_data, ["absent.bvh", "none.fbx"])
+    result = {"RUNNING_MODAL"}
+    while result == {"RUNNING_MODAL"}:
+        result = operator.modal(window, Press("TIMER"))
+    assert result == {"CANCELLED"}
+    assert operator.reports[0].startswith("'absent.bvh' was not imported. There is no such file.")
+    assert everything() == before
+
+
+def test_progress_goes_on_within_a_file(shared_data: Data) -> None:
+    told: list[float] = []
+    path = shared_data("rigs_with_actions/KayKit_Knight.glb")
+    session = import_session.ImportSession([path, path.with_name("absent.bvh")], 1, bpy.context)
+    assert list(session.steps(told.append)) == [0.5, 1.0]
+    assert told == sorted(told)
+    # Of its 76 actions each counts.
+    assert len([share for share in told if 0.0 < share < 0.5]) > 70

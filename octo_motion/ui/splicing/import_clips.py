@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import bpy
 from bpy.props import CollectionProperty, IntProperty, StringProperty
 
-from ...blender.imports import SUFFIXES, ImportedClip, import_clip
-from ...core.errors import ClipError
+from ...blender.imports import SUFFIXES
+from ...core.errors import OctoMotionError
+from ..job import Job
 from ..operator_base import OctoOperator
+from .import_session import ImportSession
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -50,6 +53,11 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
         default=";".join(f"*{suffix}" for suffix in SUFFIXES), options={"HIDDEN"}
     )
 
+    _session: ImportSession | None = None
+    _job: Job | None = None
+    _timer: bpy.types.Timer | None = None
+    _browsing = False
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         if context.mode != "OBJECT":
@@ -64,67 +72,133 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
     ) -> set[OperatorReturnItems]:
         """Open the file browser; files that were dropped need none."""
         if self.files:
-            return self.execute(context)
+            return self._begin(context)
+        self._browsing = True
         assert context.window_manager is not None
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    def execute(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
+        """All at once, as scripts want it; what the file browser gives file by file."""
+        if self._browsing and len(self.files) > 1:
+            # The file browser ends an operator that it has called: another one goes on.
+            self._browsing = False
+            with suppress(RuntimeError):  # which is reported already
+                bpy.ops.octo_motion.import_clips(  # type: ignore[attr-defined]
+                    "INVOKE_DEFAULT",
+                    directory=self.directory,
+                    files=[{"name": each.name} for each in self.files],
+                    frame_start=self.frame_start,
+                )
+            return {"CANCELLED"}
+        return super().execute(context)
+
     def run(self, context: bpy.types.Context) -> None:
-        paths = self._paths()
-        clips: list[ImportedClip] = []
-        refused: list[tuple[Path, ClipError]] = []
+        session = self._new_session(context)
         window_manager = context.window_manager
         assert window_manager is not None
-        window_manager.progress_begin(0.0, len(paths))
+        window_manager.progress_begin(0.0, 1.0)
         try:
-            for number, path in enumerate(paths):
-                window_manager.progress_update(number)
-                try:
-                    clips.append(import_clip(path, context, self.frame_start))
-                except ClipError as error:
-                    refused.append((path, error))
+            for _ in session.steps(window_manager.progress_update):
+                pass
         finally:
             window_manager.progress_end()
-        if not clips:
-            path, error = refused[0]
-            more = f" {len(refused) - 1} more were refused." if len(refused) > 1 else ""
-            raise ClipError(f"'{path.name}' was not imported. {error.problem}", error.remedy + more)
-        self._tell(clips, refused)
-        _select(context, clips)
+        self._tell(session.end())
 
-    def _paths(self) -> list[Path]:
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
+        """The next file. Everything but Esc has to wait."""
+        session, job = self._session, self._job
+        assert session is not None
+        assert job is not None
+        if event.type == "ESC":
+            session.undo()
+            self._tear_down(context)
+            self.report({"INFO"}, "Cancelled: nothing was imported.")
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        try:
+            if job.work(0.0):
+                return self._finish(context)
+        except OctoMotionError as error:
+            session.undo()
+            self._tear_down(context)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except BaseException:
+            session.undo()
+            self._tear_down(context)
+            raise
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender's own end of it: another file is opened, or Blender quits."""
+        self._tear_down(context)
+
+    def _new_session(self, context: bpy.types.Context) -> ImportSession:
         folder = Path(bpy.path.abspath(self.directory))
         named = [folder / each.name for each in self.files if each.name]
         if not named and self.filepath:
             named = [Path(bpy.path.abspath(self.filepath))]
-        if not named:
-            raise ClipError("No file is given.", "Choose one or more.")
-        return list(dict.fromkeys(named))
+        return ImportSession(named, self.frame_start, context)
 
-    def _tell(self, clips: list[ImportedClip], refused: list[tuple[Path, ClipError]]) -> None:
-        for clip in clips:
+    def _begin(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
+        window_manager = context.window_manager
+        assert window_manager is not None
+        try:
+            self._session = self._new_session(context)
+        except OctoMotionError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self._job = Job(self._session.steps(window_manager.progress_update))
+        self._timer = window_manager.event_timer_add(0.01, window=context.window)
+        window_manager.progress_begin(0.0, 1.0)
+        window_manager.modal_handler_add(self)
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def _finish(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
+        session = self._session
+        assert session is not None
+        self._tear_down(context)
+        try:
+            self._tell(session.end())
+        except OctoMotionError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def _show(self, context: bpy.types.Context) -> None:
+        assert self._session is not None
+        if context.workspace is not None:
+            context.workspace.status_text_set(
+                f"Importing {self._session.told}    Esc: none of them"
+            )
+
+    def _tear_down(self, context: bpy.types.Context) -> None:
+        """Leave nothing on the screen; safe to call twice."""
+        self._session = self._job = None
+        if self._timer is None:
+            return
+        assert context.window_manager is not None
+        context.window_manager.event_timer_remove(self._timer)
+        self._timer = None
+        context.window_manager.progress_end()
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
+
+    def _tell(self, session: ImportSession) -> None:
+        for clip in session.clips:
             for note in clip.notes:
                 self.report({"WARNING"}, f"'{clip.file}': {note}")
-        for path, error in refused:
+        for path, error in session.refused:
             self.report({"WARNING"}, f"'{path.name}' was not imported. {error}")
-        told = f"{len(clips)} {'clip' if len(clips) == 1 else 'clips'} imported"
-        if refused:
-            told += f", {len(refused)} refused"
+        count = len(session.clips)
+        told = f"{count} {'clip' if count == 1 else 'clips'} imported"
+        if session.refused:
+            told += f", {len(session.refused)} refused"
         self.report({"INFO"}, f"{told}.")
-
-
-def _select(context: bpy.types.Context, clips: list[ImportedClip]) -> None:
-    """Leave the new armatures selected, the first one active, as importers do."""
-    layer = context.view_layer
-    assert layer is not None
-    for each in layer.objects:
-        each.select_set(state=False, view_layer=layer)
-    for name in reversed([name for clip in clips for name in clip.armatures]):
-        armature = layer.objects.get(name)
-        # A collection that is switched off in this view layer hides them.
-        if armature is not None:
-            armature.select_set(state=True, view_layer=layer)
-            layer.objects.active = armature
 
 
 def draw_in_import_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> None:  # noqa: ARG001
