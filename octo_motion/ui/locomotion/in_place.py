@@ -13,13 +13,12 @@ from ...core.locomotion.loops import breaths
 from ...core.rotations import Floats
 from .gait_properties import OVERRIDE
 
-TRAVEL_IN_PLACE: Final = (
-    "NONE",
-    "In Place",
+_IN_PLACE: Final = (
     "Nothing travels: whole cycles on the spot, whose last frame meets the first, for games and "
-    "for a creature that stays. No route is needed",
-    2,
+    "for a creature that stays. No route is needed; a root bone lifts the body to its height over "
+    "the armature's origin"
 )
+TRAVEL_IN_PLACE: Final = ("NONE", "In Place", _IN_PLACE, 2)
 
 
 class InPlace:

@@ -168,7 +168,7 @@ class Shot:
             if part.stop < count:
                 yield part.stop / count
         if self.reaching is not None:
-            travelling = self._travelling(locations, orientations)
+            travelling = Travelling(locations, orientations, self.scale)
             self.reached = self.reaching.apply(self.frames, rotations, travelling)
         self.rotations, self.misses = rotations, misses
         self.locations, self.orientations = locations, orientations
@@ -234,7 +234,7 @@ class Shot:
         assert self.locations is not None
         assert self.orientations is not None
         held = np.tile(self.mantle_rotations, (len(self.frames), 1, 1))
-        if self.in_place:
+        if self.in_place and not self.root_bone:
             travel = []
         elif self.root_bone:
             locations, rotations = root_bone_transforms(
@@ -256,13 +256,18 @@ class Shot:
         body = Body(*(armature, self.scale, self.skeleton, self.arms, self.mantle, self.root_bone))
         return [*reduced(self.frames, body, motion, self.tolerances), *self.breath]
 
-    def _travelling(self, locations: Floats, orientations: Floats) -> Travelling:
-        """Where the armature is: as it travels, or where it stands."""
-        if self.in_place:
-            locations = np.tile(self.world[:3, 3], (len(self.frames), 1))
-            standing = from_matrix(self.world[:3, :3] / self.scale)
-            orientations = np.tile(standing, (len(self.frames), 1))
-        return Travelling(locations, orientations, self.scale)
+    def _in_place(self) -> tuple[Floats, Floats]:
+        """Locations (frames, 3) and orientations (frames, 4) of an armature that stays.
+
+        Its origin is taken to be on the ground; a root bone lifts a walking body to its height.
+        """
+        up = self.body.rotation[:, 2]
+        lift = self.height / self.scale - float(self.body.center @ up)
+        raised = lift * up if self.root_bone and self.gait.manner == "WALK" else 0.0 * up
+        location = self.world[:3, 3] + self.world[:3, :3] @ raised
+        orientation = from_matrix(self.world[:3, :3] / self.scale)
+        count = len(self.frames)
+        return np.tile(location, (count, 1)), np.tile(orientation, (count, 1))
 
     def _missed(self) -> list[str]:
         assert self.misses is not None
@@ -466,9 +471,11 @@ def _arms(
 def _root_bone(
     settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, detection: Detection | None
 ) -> str:
-    if settings.travel_on != "BONE":
+    if settings.travel_on == "OBJECT":
         return ""
     name = settings.root_bone or (detection.root_bone if detection else "")
+    if not name and settings.travel_on == "NONE":
+        return ""
     if not name:
         raise RigError(
             f"'{armature.name}' has no root bone.",
