@@ -156,6 +156,8 @@ class Shot:
         locations, orientations = object_transforms(
             self.body, self.scale, travel.positions + self.height * up, travel.rotations
         )
+        if self.in_place:
+            locations, orientations = self._in_place()
         count, bones = len(self.frames), len(self.generator.bones)
         rotations = np.empty((count, bones, 4))
         misses = np.zeros(len(self.arms))
