@@ -169,7 +169,7 @@ FLAT = [0.0] * 5
         ("walk", "The gait file is not JSON (line 1: Expecting value). Choose a gait file."),
         ("[]", "The gait file is not a gait of Octo Motion. Choose a gait file."),
         (damaged(version=7), "format version 7, not 1. Update Octo Motion"),
-        (damaged(manner="fly"), "has the manner 'FLY'. It must be walk or swim."),
+        (damaged(manner="fly"), "has the manner 'FLY'. It must be walk, crawl or swim."),
         (damaged(pairs={}), "has no curve for all arms"),
         (damaged(pairs=3), "is damaged"),
         (damaged(stride=0.0), "has a stride of 0. It must be above zero."),

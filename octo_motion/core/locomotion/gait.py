@@ -26,7 +26,8 @@ CYCLE: Final = 2.0 * np.pi
 FORMAT: Final = "octo_motion.gait"
 FORMAT_VERSION: Final = 1
 
-Manner = Literal["WALK", "SWIM"]
+Manner = Literal["WALK", "CRAWL", "SWIM"]
+MANNERS: Final[tuple[Manner, ...]] = ("WALK", "CRAWL", "SWIM")
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class GaitCurve:
     """(knots,) radians, ascending from 0 to 2π."""
     angles: Floats
     """(knots, links, angles) radians, in the order of ``ANGLES``; the last equals the first."""
+    free: bool = False
+    """Whether the arm never holds on to the ground, and all its cycle is a swing."""
 
     def evaluate(self, phase: Floats) -> Floats:
         """Angles (…, links, angles) at phases (…) in radians, of any cycle."""
@@ -58,7 +61,8 @@ class GaitTable:
 
     name: str
     manner: Manner
-    """Whether the body walks (upright, front ahead) or swims (mantle ahead)."""
+    """Whether the body walks (upright, all arms in step), crawls (upright, each arm in its own
+    time) or swims (mantle ahead)."""
     curves: dict[int, GaitCurve]
     """By arm pair, 1 in front; 0 serves every pair that has none of its own."""
     spread_pairs: float = 0.0
@@ -73,6 +77,11 @@ class GaitTable:
     """Phase at the middle of the power stroke, radians."""
     description: str = ""
     notes: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the body goes over the ground, upright."""
+        return self.manner != "SWIM"
 
     def curve(self, pair: int) -> GaitCurve:
         """The curve for one pair of arms."""
@@ -243,6 +252,7 @@ def to_json(table: GaitTable) -> str:
                 for number, name in enumerate(ANGLES)
                 if np.any(degrees[:, :, number])
             },
+            **({"free": True} if curve.free else {}),
         }
     content = {
         "format": FORMAT,
@@ -294,15 +304,18 @@ def from_json(text: str, source: str = "The gait file") -> GaitTable:
     try:
         manner = str(content["manner"]).upper()
         curves = {
-            0 if key == "all" else int(key): curve_from_degrees(
-                each["phase"], **{name: each[name] for name in ANGLES if name in each}
+            0 if key == "all" else int(key): replace(
+                curve_from_degrees(
+                    each["phase"], **{name: each[name] for name in ANGLES if name in each}
+                ),
+                free=bool(each.get("free", False)),
             )
             for key, each in content["pairs"].items()
         }
         spread = content.get("spread", {})
         table = GaitTable(
             name=str(content["name"]),
-            manner="SWIM" if manner == "SWIM" else "WALK",
+            manner=next((each for each in MANNERS if each == manner), "WALK"),
             curves=curves,
             spread_pairs=float(spread.get("pairs", 0.0)),
             spread_sides=float(spread.get("sides", 0.0)),
@@ -319,8 +332,8 @@ def from_json(text: str, source: str = "The gait file") -> GaitTable:
         raise GaitError(
             f"{source} is damaged ({type(error).__name__}: {error}).", "Save the gait anew."
         ) from error
-    if manner not in {"WALK", "SWIM"}:
-        raise GaitError(f"{source} has the manner {manner!r}.", "It must be walk or swim.")
+    if manner not in MANNERS:
+        raise GaitError(f"{source} has the manner {manner!r}.", "It must be walk, crawl or swim.")
     return check(table)
 
 

@@ -165,7 +165,7 @@ class Generator:
         self._sway = settings.sway * sway
         self._builds = self._group(segments)
         self._floor = -np.inf
-        if settings.stand and gait.manner == "WALK":
+        if settings.stand and gait.on_ground:
             floor = float(np.quantile(self._cycle_depths(), _STANDING))
             if floor < -_LEAST_DEPTH * self.arm_length:
                 self._floor = floor

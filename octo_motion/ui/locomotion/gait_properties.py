@@ -132,6 +132,11 @@ class OCTO_MOTION_PG_gait_curve(bpy.types.PropertyGroup):
         type=OCTO_MOTION_PG_gait_knot,
         override=OVERRIDE_LIST,
     )
+    free: BoolProperty(
+        name="Off the Ground",
+        description="These arms never hold on to the ground: they move as the table says",
+        override=OVERRIDE,
+    )
     active_knot: IntProperty(name="Active Knot", options={"HIDDEN"}, override=OVERRIDE)
     unused: _unused()
 
@@ -177,6 +182,13 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         items=(
             ("WALK", "Walk", "Over the ground: the body stays upright, its front ahead", 0),
             ("SWIM", "Swim", "Through the water: the mantle goes ahead and the arms trail", 1),
+            (
+                "CRAWL",
+                "Crawl",
+                "Over the ground without a rhythm: the arms that point away from the goal push "
+                "as they can, the others search. The front faces any way",
+                2,
+            ),
         ),
         default=_DEFAULT.manner,
         override=OVERRIDE,
@@ -303,6 +315,7 @@ def fill_offsets(
 def fill_curve(curve: OCTO_MOTION_PG_gait_curve, values: GaitCurve) -> None:
     """Make one curve's properties say what the curve says."""
     assign(curve, "active_knot", 0)
+    assign(curve, "free", values.free)
     open_knots = zip(values.phases[:-1], values.angles[:-1], strict=True)
     for knot, (phase, angles) in matched(curve, "knots", open_knots):
         assign(knot, "phase", phase)
@@ -354,7 +367,8 @@ def read_curve(curve: OCTO_MOTION_PG_gait_curve) -> GaitCurve:
     """One curve, its knots sorted and closed; not yet checked."""
     knots = used(curve.knots)
     if not knots:
-        return GaitCurve(np.array([0.0, CYCLE]), np.zeros((2, LINKS, len(ANGLES))))
+        angles = np.zeros((2, LINKS, len(ANGLES)))
+        return GaitCurve(np.array([0.0, CYCLE]), angles, free=curve.free)
     phases = np.array([_angle(knot.phase) for knot in knots])
     angles = np.stack(
         [np.stack([_angles(getattr(knot, name)) for name in ANGLES], axis=1) for knot in knots]
@@ -369,7 +383,8 @@ def read_curve(curve: OCTO_MOTION_PG_gait_curve) -> GaitCurve:
         share = -before / (phases[0] - before)
         start = (1.0 - share) * angles[-1] + share * angles[0]
         phases, angles = np.append(0.0, phases), np.concatenate([start[None], angles])
-    return GaitCurve(np.append(phases, CYCLE), np.concatenate([angles, start[None]]))
+    angles = np.concatenate([angles, start[None]])
+    return GaitCurve(np.append(phases, CYCLE), angles, free=curve.free)
 
 
 def matched(group: Any, name: str, values: Iterable[Any]) -> Iterable[tuple[Any, Any]]:

@@ -294,6 +294,7 @@ class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
             gait.GaitCurve(
                 np.insert(shape.phases, gap + 1, middle),
                 np.insert(shape.angles, gap + 1, angles, axis=0),
+                free=shape.free,
             ),
         )
         curve.active_knot = gap + 1
@@ -326,7 +327,9 @@ class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
             raise GaitError(f"There is no row {knot}.", "Choose a knot of the table.")
         if knot == 0:
             raise GaitError("A cycle cannot do without its first knot.", "Change its angles.")
-        shape = gait.GaitCurve(np.delete(shape.phases, knot), np.delete(shape.angles, knot, axis=0))
+        shape = gait.GaitCurve(
+            np.delete(shape.phases, knot), np.delete(shape.angles, knot, axis=0), free=shape.free
+        )
         group = _editable(settings)
         fill_curve(used(group.curves)[sorted(table.curves).index(pair)], shape)
 

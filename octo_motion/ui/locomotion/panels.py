@@ -144,7 +144,7 @@ class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
         layout: Any,
         settings: OCTO_MOTION_PG_locomotion,
     ) -> None:
-        if settings.table.manner == "WALK":
+        if settings.table.manner != "SWIM":
             layout.row().prop(settings, "heading", expand=True)
             layout.prop(settings, "heading_angle")
             layout.prop(settings, "keep_upright")
@@ -261,6 +261,8 @@ def _draw_knots(
         )
         remove.knot = number
     layout.operator(OCTO_MOTION_OT_gait_knot_add.bl_idname, icon="ADD")
+    if table.manner != "SWIM":
+        layout.prop(curve, "free")
 
 
 class OCTO_MOTION_UL_gait_curves(bpy.types.UIList):
