@@ -61,7 +61,7 @@ def test_every_setting_explains_itself() -> None:
 def test_every_setting_can_be_overridden_except_names_of_list_items() -> None:
     for group in groups():
         for definition in properties(group):
-            items = {"ArmItem", "ArmBoneItem", "SpliceItem"}
+            items = {"ArmItem", "ArmBoneItem", "SpliceItem", "ReachItem"}
             if group.__name__ in items and definition.identifier == "name":
                 continue
             assert definition.is_overridable, (group, definition.identifier)
