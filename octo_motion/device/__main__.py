@@ -43,6 +43,9 @@ def _parser() -> argparse.ArgumentParser:
         each.add_argument("--simulate", action="store_true", help="add a hand made of numbers")
         each.add_argument("--udp", type=int, help="port at which a program may be a device")
         each.add_argument("--tcp", type=int, help="the same over TCP")
+        each.add_argument(
+            "--rate", type=float, default=1000.0, help="Hz of the loop; less on a slow machine"
+        )
         each.add_argument("--key", default="", help="32 hexadecimal digits, for --udp and --tcp")
     return parser
 
@@ -58,12 +61,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "descriptor":
         return _descriptor(table=options.table)
     sources = _sources(parser, options)
+    if not 50.0 <= options.rate <= 4000.0:
+        parser.error("--rate must be from 50 to 4000")
     if options.command == "watch":
         return _watch(sources, options.seconds)
     if options.command == "hands":
         from . import hand_process  # noqa: PLC0415
 
-        return hand_process.run(sources)
+        return hand_process.run(sources, options.rate)
     from . import bridge_process  # noqa: PLC0415
 
     return bridge_process.run(given[1:])

@@ -56,6 +56,8 @@ class Client:
     """Of the simulation when ``pose`` was true."""
     devices: dict[int, DeviceMessage] = field(default_factory=dict[int, DeviceMessage])
     """By pointer: those that are there."""
+    lost_devices: int = 0
+    """How often a device has gone since the start; what it held was let go."""
     pointers: dict[int, PointerMessage] = field(default_factory=dict[int, PointerMessage])
     times: Times | None = None
     hello: Hello | None = None
@@ -89,6 +91,7 @@ class Client:
         self.devices.clear()
         self.pointers.clear()
         self.times = self.hello = None
+        self.lost_devices = 0
         self._child = Child.start(("bridge", *arguments), python, log_to)
         self.state = State.RUNNING
         self.heard = time.monotonic()
@@ -184,6 +187,7 @@ class Client:
         if message.present:
             self.devices[message.pointer] = message
         else:
+            self.lost_devices += 1
             self.devices.pop(message.pointer, None)
             self.pointers.pop(message.pointer, None)
 

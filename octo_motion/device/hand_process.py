@@ -40,20 +40,21 @@ from .process import Parent, end_after
 
 log = logging.getLogger(__name__)
 
-PERIOD: Final = 0.001
+RATE: Final = 1000.0
+"""Hz"""
 MOST_POINTERS: Final = 8
-_TELL_EVERY: Final = 2
-"""Ticks between two words on where the hands are."""
+_TELL_EVERY: Final = 0.002
+"""s between two words on where the hands are."""
 _TIMES_EVERY: Final = 1.0
-_LOOK_EVERY: Final = 100
-"""Ticks between two looks for devices; how costly one may be is the discovery's business."""
+_LOOK_EVERY: Final = 0.1
+"""s between two looks for devices; how costly one may be is the discovery's business."""
 
 
 class HandLoop:
     """All devices of this machine, tick by tick."""
 
     def __init__(
-        self, channel: Channel, discovery: Discovery, schedule: Schedule, period: float = PERIOD
+        self, channel: Channel, discovery: Discovery, schedule: Schedule, period: float
     ) -> None:
         self._channel = channel
         self._discovery = discovery
@@ -63,8 +64,7 @@ class HandLoop:
         self._numbers: dict[str, int] = {}
         self._workspaces: dict[int, Workspace] = {}
         self._settings = Settings()
-        self._ticks = 0
-        self._told_times = 0.0
+        self._told = self._told_times = self._looked = 0.0
 
     @property
     def pointers(self) -> Iterable[Pointer]:
@@ -85,8 +85,8 @@ class HandLoop:
             except DeviceLostError:
                 self._lose(number)
         self._tell(now)
-        self._ticks += 1
-        if self._ticks % _LOOK_EVERY == 1 and not any(each.grab for each in self.pointers):
+        if now - self._looked > _LOOK_EVERY and not any(each.grab for each in self.pointers):
+            self._looked = now
             self._look()
 
     def _hear(self, message: Message, now: float) -> None:
@@ -128,12 +128,15 @@ class HandLoop:
                 pointer.driver.response = response
 
     def _tell(self, now: float) -> None:
+        due = now - self._told > _TELL_EVERY - 0.5 * self._period
+        if due:
+            self._told = now
         for pointer in self.pointers:
             for index, pressed in pointer.presses:
                 self._channel.send(Button(pointer.number, index, pressed))
             changed = bool(pointer.presses)
             pointer.presses.clear()
-            if changed or self._ticks % _TELL_EVERY == 0:
+            if changed or due:
                 self._channel.send(pointer.message(now), droppable=not changed)
         if now - self._told_times > _TIMES_EVERY:
             self._told_times = now
@@ -194,7 +197,7 @@ class HandLoop:
         self._discovery.close()
 
 
-def run(sources: Sources) -> int:
+def run(sources: Sources, rate: float = RATE) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent()
     listener = Listener(parent.secret)
@@ -211,8 +214,8 @@ def run(sources: Sources) -> int:
     priority = make_real_time()
     end_after(1.0, lambda: parent.gone)
     channel.send(Hello(os.getpid(), platform.python_version(), priority))
-    schedule = Schedule(PERIOD)
-    loop = HandLoop(channel, discovery, schedule)
+    schedule = Schedule(1.0 / rate)
+    loop = HandLoop(channel, discovery, schedule, schedule.period)
     try:
         while not parent.gone:
             now = schedule.begin()

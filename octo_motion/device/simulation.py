@@ -35,7 +35,7 @@ _STILL: Final = 2e-3
 _REST_SECONDS: Final = 0.3
 _PROBE: Final = 1e-3
 """Of the puppet's weight: the push with which a held body's mobility is measured."""
-_STALE: Final = 0.1
+_STALE: Final = 0.25
 """s without a word from a hand: it has let go."""
 
 
@@ -255,6 +255,7 @@ class Simulation:
                 continue
             told = hand.told
             if now - told.time > _STALE:
+                hand.refused = hand.grab  # let go is let go, until it grabs anew
                 self._release(hand)
                 continue
             self.world.pull(

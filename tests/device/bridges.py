@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A bridge with a puppet and a simulated hand, and processes that are killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from octo_motion.core.posing.figure import Figure, Pose
+from octo_motion.device import messages as say
+from octo_motion.device.client import Client, State
+from tests.core.puppets import chain, posed, soft
+
+OPTIONS = ("--simulate", "--no-haply", "--no-hid")
+FIGURE: Figure = chain(3, elements=soft(3, 40.0, 2.0, 100.0, 1.0))
+POSE: Pose = posed(FIGURE)
+PATIENCE = 20.0
+"""s: a wait for another process is over at once, unless it is in vain."""
+
+
+def wait_for(client: Client, what: Callable[[], object], why: str) -> None:
+    """Poll until something is true."""
+    end = time.monotonic() + PATIENCE
+    while not what():
+        client.poll()
+        assert time.monotonic() < end, f"waited in vain: {why}; {client.state}, {client.notices}"
+        time.sleep(0.002)
+
+
+def holding(client: Client) -> None:
+    """Start a bridge whose simulated hand holds the tip of a puppet."""
+    client.start(OPTIONS)
+    client.send_figure(FIGURE, POSE)
+    client.send_pins(FIGURE, frozenset({0}))
+    wait_for(client, lambda: client.devices, "the hand is there")
+    x, y, z = map(float, POSE.positions[2] + [0.0, 0.15, 0.0])
+    client.send(say.Workspace(0, (x, y, z)))
+    client.send(say.Grab(0, grab=True))
+    wait_for(client, lambda: 0 in client.pointers and client.pointers[0].body == 2, "it holds")
+
+
+def children_of(process: int) -> list[int]:
+    """Processes that a process started; Linux."""
+    path = Path(f"/proc/{process}/task/{process}/children")
+    try:
+        return [int(each) for each in path.read_text().split()]
+    except OSError:
+        return []
+
+
+def alive(process: int) -> bool:
+    """Whether a process runs; one that ended and waits to be asked why does not."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def seconds_to_end(processes: list[int]) -> float:
+    """How long it takes until none of these runs."""
+    start = time.monotonic()
+    while any(map(alive, processes)):
+        assert time.monotonic() - start < PATIENCE
+        time.sleep(0.002)
+    return time.monotonic() - start
+
+
+def kill_bridge_and_start_again() -> tuple[float, float]:
+    """Kill the bridge in mid-grab.
+
+    Returns:
+        Seconds until the client said so, and until the process at the devices had ended.
+    """
+    client = Client()
+    try:
+        holding(client)
+        bridge = client.process_id
+        assert bridge
+        hands = children_of(bridge)
+        assert len(hands) == 1
+        wait_for(client, lambda: client.steps > 20, "it moves")
+        last = client.pose
+        assert last
+        start = time.monotonic()
+        os.kill(bridge, signal.SIGKILL)
+        wait_for(client, lambda: client.state is State.LOST, "the client notices")
+        noticed = time.monotonic() - start
+        ended = seconds_to_end(hands)
+        assert client.pose is not None
+        assert client.notices[-1].problem == (
+            "The program between Blender and the device has ended."
+        )
+        kept = client.pose
+        client.restart()
+        wait_for(client, lambda: client.devices and client.steps > 0, "it goes on")
+        assert abs(client.pose.orientations - kept.orientations).max() < 0.2
+    finally:
+        client.stop()
+    return noticed, ended
+
+
+BLENDER = """
+import os, sys, time
+from octo_motion.device.client import Client
+from tests.device.bridges import children_of, holding
+client = Client()
+holding(client)
+print(client.process_id, *children_of(client.process_id), flush=True)
+while True:
+    client.poll()
+    time.sleep(0.01)
+"""
+
+
+def kill_blender() -> float:
+    """Kill a process that has a bridge in mid-grab; seconds until all that it started has ended."""
+    blender = subprocess.Popen(
+        [sys.executable, "-c", BLENDER],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])},
+    )
+    assert blender.stdout
+    with blender.stdout:
+        started = [int(each) for each in blender.stdout.readline().split()]
+    assert len(started) == 2
+    assert all(map(alive, started))
+    blender.kill()
+    blender.wait()
+    return seconds_to_end(started)
+
+
+def kill_hands() -> float:
+    """Kill the process at the devices in mid-grab; seconds until the hand is there again."""
+    client = Client()
+    try:
+        holding(client)
+        assert client.process_id
+        (hands,) = children_of(client.process_id)
+        start = time.monotonic()
+        os.kill(hands, signal.SIGKILL)
+        wait_for(client, lambda: client.lost_devices, "the hand is gone")
+        wait_for(client, lambda: client.devices, "the hand is back")
+        assert client.state is State.RUNNING
+        return time.monotonic() - start
+    finally:
+        client.stop()

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bridge as a process: it poses the puppet, tells what happens, and ends when it must."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from octo_motion.core.errors import DeviceError
+from octo_motion.core.posing.obstacles import Plane
+from octo_motion.device import __main__ as program
+from octo_motion.device import messages as say
+from octo_motion.device import process
+from octo_motion.device.client import Client, State
+from tests.device.bridges import (
+    FIGURE,
+    OPTIONS,
+    POSE,
+    holding,
+    kill_blender,
+    kill_bridge_and_start_again,
+    kill_hands,
+    wait_for,
+)
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="finds processes through /proc")
+
+
+@pytest.fixture
+def client() -> Iterator[Client]:
+    client = Client()
+    yield client
+    client.stop()
+
+
+def test_hand_grabs_the_nearest_limb_and_bends_the_puppet(client: Client) -> None:
+    holding(client)
+    hello = client.hello
+    assert hello
+    assert hello.process == client.process_id
+
+    def bent() -> bool:
+        assert client.pose
+        return bool(np.abs(client.pose.orientations - POSE.orientations).max() > 0.02)
+
+    wait_for(client, bent, "the puppet bends")
+    pointer = client.pointers[0]
+    assert np.linalg.norm(np.subtract(pointer.coupled_position, pointer.position)) < 0.05
+    wait_for(client, lambda: any(client.pointers[0].force), "the hand feels it")
+    wait_for(client, lambda: client.times, "how well time is kept is told")
+    client.send(say.Grab(0, grab=False))
+    wait_for(client, lambda: client.pointers[0].body == -1, "it lets go")
+    assert client.notices == []
+
+
+def test_hand_far_from_the_puppet_grabs_nothing(client: Client) -> None:
+    client.start(OPTIONS)
+    client.send_figure(FIGURE, POSE)
+    wait_for(client, lambda: client.devices, "the hand is there")
+    client.send(say.Workspace(0, (10.0, 0.0, 0.0)))
+    client.send(say.Grab(0, grab=True))
+    wait_for(
+        client, lambda: 0 in client.pointers and client.pointers[0].position[0] > 9.0, "it moves"
+    )
+    end = time.monotonic() + 0.2
+    while time.monotonic() < end:
+        client.poll()
+        assert client.pointers[0].body == -1
+
+
+def test_puppet_can_be_put_pinned_and_stood_on_the_ground(client: Client) -> None:
+    client.start(OPTIONS)
+    client.send(say.WorldMessage(gravity=(0.0, 0.0, -9.81), step=4e-3))
+    client.send_obstacle(0, Plane(position=np.array([0.0, 0.0, -0.5])))
+    client.send_figure(FIGURE, POSE)
+    wait_for(client, lambda: client.pose and client.pose.positions[0, 2] < -0.3, "it falls")
+    wait_for(
+        client,
+        lambda: client.pose and abs(client.pose.positions[:, 2].min() + 0.47) < 0.05,
+        "it lies on the ground",
+    )
+    client.send_pose(POSE)
+    client.send_pins(FIGURE, frozenset({0, 1, 2}))
+    wait_for(
+        client, lambda: client.pose and abs(client.pose.positions[0, 2]) < 0.05, "it is put back"
+    )
+
+
+def test_nonsense_is_answered_with_a_notice_and_nothing_breaks(client: Client) -> None:
+    client.start(OPTIONS)
+    client.send(say.Place(POSE.positions, POSE.orientations))
+    wait_for(client, lambda: client.notices, "the bridge complains")
+    assert "a pose came before a figure" in client.notices.pop().problem
+    client.send_figure(FIGURE, POSE)
+    client.send(say.Pins((True,) * 50))
+    wait_for(client, lambda: client.notices, "the bridge complains")
+    assert "does not exist" in client.notices.pop().problem
+    client.send(say.Settings(dead_zone=(2.0,) * 6))  # pyright: ignore[reportArgumentType]
+    wait_for(client, lambda: client.notices, "the bridge complains")
+    assert client.state is State.RUNNING
+
+
+def test_bridge_that_is_stopped_ends_at_once_and_is_not_lost(client: Client) -> None:
+    holding(client)
+    process_id = client.process_id
+    assert process_id
+    client.stop()
+    assert client.state is State.OFF
+    assert client.process_id is None
+    with pytest.raises(ProcessLookupError):
+        os.kill(process_id, 0)
+    client.stop()
+    assert client.poll() == []
+    client.send(say.Grab(0, grab=True))
+    assert client.notices == []
+
+
+@linux
+def test_killed_bridge_is_told_keeps_the_pose_and_can_be_started_again() -> None:
+    noticed, ended = kill_bridge_and_start_again()
+    assert noticed < 1.0
+    assert ended < 1.0
+
+
+@linux
+def test_killed_blender_leaves_no_process_behind() -> None:
+    assert kill_blender() < 1.0
+
+
+@linux
+def test_killed_process_at_the_devices_is_started_again() -> None:
+    kill_hands()
+
+
+def test_stranger_at_the_bridges_door_changes_nothing(tmp_path: Path) -> None:
+    """Whoever finds the port and does not know the secret is sent away; no file is written."""
+    with subprocess.Popen(
+        [process.python_executable(), "-I", process.LAUNCHER, "bridge", *OPTIONS],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+    ) as run:
+        assert run.stdin
+        assert run.stdout
+        assert run.stderr
+        run.stdin.write(b"00" * 32 + b"\n")
+        run.stdin.flush()
+        port = int(run.stdout.readline().decode().removeprefix("port "))
+        with (
+            socket.create_connection(("127.0.0.1", port)) as stranger,
+            contextlib.suppress(ConnectionResetError),
+        ):
+            stranger.sendall(b"let me in" * 20)
+            stranger.settimeout(10.0)
+            while stranger.recv(1000):
+                pass
+        run.kill()
+        said = run.stderr.read().decode()
+    assert "another language" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_program_that_does_not_start_says_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match="does not start"):
+        Client().start(OPTIONS, python=tmp_path / "no-python")
+    if os.name != "nt":
+        silent = tmp_path / "python3"
+        silent.write_text("#!/bin/sh\nexit 1\n")
+        silent.chmod(0o755)
+        with pytest.raises(DeviceError, match="does not answer"):
+            Client().start(OPTIONS, python=silent)
+
+
+def test_blenders_own_python_is_found_wherever_it_lies(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert process.python_executable() == Path(sys.executable)
+    name = "python.exe" if os.name == "nt" else f"python3.{sys.version_info.minor}"
+    folder = tmp_path / ("." if os.name == "nt" else "bin")
+    folder.mkdir(exist_ok=True)
+    (folder / name).touch(0o755)
+    for blender in ("/opt/blender/blender", ""):
+        monkeypatch.setattr(sys, "executable", blender)
+        monkeypatch.setattr(sys, "prefix", str(tmp_path))
+        assert process.python_executable() == folder / name
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / "nothing"))
+    monkeypatch.setattr(sys, "base_prefix", str(tmp_path / "nothing"))
+    monkeypatch.setattr(sys, "exec_prefix", str(tmp_path / "nothing"))
+    with pytest.raises(DeviceError, match="Python was not found"):
+        process.python_executable()
+
+
+def test_program_runs_from_where_blender_installs_it(tmp_path: Path) -> None:
+    """Below bl_ext the package has another name, and beside it lie folders that must stay out."""
+    installed = tmp_path / "extensions" / "user_default" / "octo_motion"
+    installed.parent.mkdir(parents=True)
+    installed.symlink_to(process.LAUNCHER.parent.parent, target_is_directory=True)
+    (installed.parent / "json").mkdir()
+    (installed.parent / "json" / "__init__.py").write_text("raise SystemExit('the wrong json')")
+    run = subprocess.run(
+        [process.python_executable(), "-I", installed / "device" / "launch.py", "descriptor"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.startswith("0x06, 0x4f, 0xff, 0x09, 0x01, 0xa1, 0x01")
+
+
+def test_libraries_that_came_with_the_extension_are_handed_over(tmp_path: Path) -> None:
+    (tmp_path / "octo_test_library.py").write_text("")
+    script = (
+        "import sys, runpy; sys.argv = ['launch.py', '--library', sys.argv[1], 'descriptor']\n"
+        f"try: runpy.run_path({str(process.LAUNCHER)!r}, run_name='__main__')\n"
+        "except SystemExit: pass\n"
+        "import octo_test_library"
+    )
+    run = subprocess.run([sys.executable, "-c", script, tmp_path], check=False)
+    assert run.returncode == 0
+    assert any((Path(each) / "numpy").is_dir() for each in process.library_folders())
+
+
+# --- The command line ----------------------------------------------------------------------------
+
+
+def test_descriptor_is_printed_for_firmware_and_for_people(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert program.main(["descriptor"]) == 0
+    printed = capsys.readouterr().out
+    from octo_motion.device.hid.force_profile import report_descriptor
+
+    values = bytes(int(each, 16) for each in printed.replace("\n", " ").split(",") if each.strip())
+    assert values == report_descriptor()
+    assert program.main(["descriptor", "--table"]) == 0
+    assert "Report 1, input, 53 bytes with its number" in capsys.readouterr().out
+
+
+def test_watching_prints_what_a_device_says(capsys: pytest.CaptureFixture[str]) -> None:
+    assert program.main(["watch", "--seconds", "0.3", *OPTIONS]) == 0
+    assert "Simulated hand:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ["watch", "--udp", "5000"],
+        ["watch", "--udp", "5000", "--key", "zz" * 16],
+        ["watch", "--udp", "1", "--tcp", "2", "--key", "00" * 16],
+        ["watch", "--tcp", "70000", "--key", "00" * 16],
+    ],
+)
+def test_command_line_that_makes_no_sense_is_refused(wrong: list[str]) -> None:
+    with pytest.raises(SystemExit):
+        program.main(wrong)
+
+
+@pytest.fixture(autouse=True)
+def quiet_log() -> Iterator[None]:
+    root = logging.getLogger()
+    handlers, level = root.handlers[:], root.level
+    yield
+    root.handlers[:], root.level = handlers, level
