@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motion in place: a loop that games can take, and a creature that breathes."""
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.blender.actions import is_edited
+from tests.ui.rig import generate, joints_in_world, keys, make_octopus
+
+
+@pytest.fixture
+def octopus() -> Any:
+    """An octopus of four arms that moves in place; it has no route."""
+    armature = make_octopus()
+    settings = armature.octo_motion.locomotion
+    settings.travel_on = "NONE"
+    settings.cycle_time = 1.0
+    bpy.context.scene.render.fps = 24
+    return armature
+
+
+def curves(action: Any) -> list[Any]:
+    return [
+        curve
+        for layer in action.layers
+        for strip in layer.strips
+        for bag in strip.channelbags
+        for curve in bag.fcurves
+    ]
+
+
+@pytest.mark.parametrize("gait", ["walk", "swim", "idle"])
+@pytest.mark.parametrize("how", ["DENSE", "REDUCED"])
+def test_the_last_frame_meets_the_first(octopus: Any, gait: str, how: str) -> None:
+    settings = octopus.octo_motion.locomotion
+    settings.gait, settings.cycles, settings.keys = gait, 2, how
+    settings.variation_min, settings.variation_max = -0.1, 0.1
+    action = generate(octopus)
+    assert tuple(action.frame_range) == (1.0, 49.0)
+    for (path, _), values in keys(action).items():
+        assert values[0, 1] == pytest.approx(values[-1, 1], abs=1e-5), path
+    # Beyond its ends it goes on.
+    np.testing.assert_allclose(
+        joints_in_world(octopus, 55.25), joints_in_world(octopus, 7.25), atol=1e-5
+    )
+    assert action.use_cyclic
+    assert not is_edited(action)
+
+
+def test_nothing_travels_and_the_root_bone_lifts_the_body(octopus: Any) -> None:
+    octopus.location = (3.0, 2.0, 1.0)
+    bpy.context.view_layer.update()
+    action = generate(octopus)
+    assert not any(path in {"location", "rotation_euler"} for path, _ in keys(action))
+    places = np.array([joints_in_world(octopus, frame)[0, 0] for frame in (1, 8, 20)])
+    np.testing.assert_allclose(places, np.tile(places[:1], (3, 1)), atol=1e-6)
+    np.testing.assert_allclose(places[0, :2], (3.0, 2.0), atol=1e-5)
+    lowest = min(joints_in_world(octopus, frame)[..., 2].min() for frame in range(1, 25))
+    # The armature's origin is on the ground.
+    assert lowest == pytest.approx(1.0, abs=0.02)
+    again = keys(generate(octopus))
+    assert all(np.allclose(again[path], values) for path, values in keys(action).items())
+
+
+def test_without_repeat_the_curves_have_no_modifiers(octopus: Any) -> None:
+    settings = octopus.octo_motion.locomotion
+    action = generate(octopus)
+    assert all(len(curve.modifiers) == 1 for curve in curves(action))
+    settings.repeat = False
+    assert generate(octopus) == action  # made anew in place
+    assert all(len(curve.modifiers) == 0 for curve in curves(action))
+    assert not action.use_cyclic
+
+
+def test_frames_and_seconds_make_whole_frames(octopus: Any) -> None:
+    settings = octopus.octo_motion.locomotion
+    settings.cycle_time = 0.99
+    assert tuple(generate(octopus).frame_range) == (1.0, 25.0)
+    settings.timing, settings.frame_start, settings.frame_end = "RANGE", 10, 40
+    assert tuple(generate(octopus).frame_range) == (10.0, 40.0)
+
+
+def test_the_mantle_breathes() -> None:
+    bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    octopus: Any = bpy.context.object
+    settings = octopus.octo_motion.locomotion
+    settings.travel_on, settings.gait, settings.cycle_time = "NONE", "idle", 4.0
+    assert not any("scale" in path for path, _ in keys(generate(octopus)))
+    settings.breathing, settings.breath_time = 0.1, 1.8
+    found = keys(generate(octopus))
+    wide = found['pose.bones["mantle"].scale', 0][:, 1]
+    assert wide.max() == pytest.approx(1.1, abs=1e-3)
+    assert wide[0] == pytest.approx(wide[-1], abs=1e-6)
+    peaks = (wide[1:-1] > wide[:-2]) & (wide[1:-1] >= wide[2:])
+    assert peaks.sum() == 2
+    settings.breathing = 0.0
+    generate(octopus)
+    assert tuple(octopus.pose.bones["mantle"].scale) == pytest.approx((1.0, 1.0, 1.0))
