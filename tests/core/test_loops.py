@@ -62,7 +62,8 @@ def test_at_the_seam_the_motion_is_as_smooth_as_anywhere(name: str, cycles: int)
     steps = np.diff(poses, axis=0)
     within = np.linalg.norm(np.diff(steps, axis=0), axis=-1).max(axis=0).reshape(8, 12)
     seam = np.linalg.norm(steps[0] - steps[-1], axis=-1).reshape(8, 12)
-    assert np.all(seam <= 1.1 * within.max(axis=0))
+    # A corner that falls between two samples is seen by half in each.
+    assert np.all(seam <= 2.1 * within.max(axis=0))
 
 
 @every_preset
