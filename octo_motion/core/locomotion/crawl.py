@@ -31,17 +31,17 @@ _BEFORE: Final = 1.5
 class CrawlSettings:
     """How a crawl is made. Lengths in arm lengths, angles in radians."""
 
-    near: float = 0.35
+    near: float = 0.15
     """From an arm's root to where it takes hold to push."""
-    far: float = 0.8
+    far: float = 0.5
     """From there to where it lets go."""
     pushing: float = np.radians(70.0)
     """Largest angle between an arm's push and the way to go of an arm that pushes."""
     astray: float = np.radians(50.0)
     """Angle by which a hold may come to lie beside the arm's own direction before it lets go."""
-    pause: tuple[float, float] = (0.1, 0.45)
+    pause: tuple[float, float] = (0.12, 0.4)
     """Shortest and longest way between two holds of an arm that pushes."""
-    search: tuple[float, float] = (0.3, 1.0)
+    search: tuple[float, float] = (0.2, 0.7)
     """Shortest and longest way between two holds of an arm that does not."""
     hold: tuple[float, float] = (0.5, 1.0)
     """Shares of the longest possible hold after which an arm lets go."""
@@ -143,7 +143,7 @@ class _Crawl:
         heapify(waiting)
         while waiting and waiting[0][0] <= last:
             at, arm = heappop(waiting)
-            end = self._take_hold(arm, self._not_too_few(arm, at))
+            end = self._take_hold(arm, self._not_too_few(arm, at), waiting)
             heappush(waiting, (end + self._rest(arm, end), arm))
         return self._sorted()
 
@@ -157,16 +157,17 @@ class _Crawl:
             pushers = [other for other in range(self._arms) if other != arm and self._pushed[other]]
             alone = min(alone, max((float(self._ends[other]) for other in pushers), default=alone))
         overlap = 0.5 * self._settings.pause[0] * self._unit
-        if not np.isfinite(alone) or planned <= alone - overlap:
+        if not np.isfinite(alone):
             return planned
-        return max(float(self._ends[arm]) + 0.5 * overlap, alone - overlap)
+        shortest = self._settings.pause[0] * self._unit
+        return max(float(self._ends[arm]) + shortest, min(planned, alone - overlap))
 
     def _pushes(self, arm: int, at: float) -> bool:
         """Whether an arm's push points along the way."""
         _, outward, ahead = self._at(arm, at)
         return -float(outward @ ahead) >= np.cos(self._settings.pushing)
 
-    def _take_hold(self, arm: int, at: float) -> float:
+    def _take_hold(self, arm: int, at: float, waiting: list[tuple[float, int]]) -> float:
         settings, unit = self._settings, self._unit
         root, outward, ahead = self._at(arm, at)
         middle = 0.5 * (settings.near + settings.far) * unit
@@ -177,7 +178,13 @@ class _Crawl:
         pushes = self._pushes(arm, at)
         longest = self._lasts(arm, at, place)
         share = self._streams[arm].uniform(*settings.hold)
-        end = at + max(share * longest, 1e-3 * unit)
+        end = at + share * longest
+        # Nobody else to take over yet: hold on for as long as it goes.
+        others = np.delete(self._ends, arm) > end
+        coming = np.array([start <= end for start, other in waiting if other != arm])
+        if np.count_nonzero(others) + np.count_nonzero(coming) < settings.least:
+            end = at + longest
+        end = max(end, at + 1e-3 * unit)
         self._holds.append((arm, at, end, float(place[0]), float(place[1]), pushes))
         self._ends[arm], self._pushed[arm] = end, pushes
         return end

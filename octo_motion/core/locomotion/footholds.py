@@ -19,19 +19,24 @@ from ..errors import SettingsError
 from ..rotations import Floats, rotate
 from .body_line import BodyLine
 from .ground import Ground
+from .rhythm import Rhythm
 
 _CYCLE: Final = 2.0 * np.pi
 UNROLLING: Final = 0.3
 """Share of a hold in which the arm lies down, from where it first touches to its tip."""
-PEELING: Final = 0.35
-"""Share of a hold in which the arm is peeled off, in the same direction."""
+PEELING: Final = 0.5
+"""Share of a hold in which the arm is peeled off, in the same direction, as the body pulls."""
+_SLACK: Final = 0.82
+"""Distance from root to where it is peeled off, as a share of the arm between, that peels no more."""
+_LEFT: Final = 0.25
+"""Share of the part that lies down which is not peeled off, but let go with the tip."""
 _EASY: Final = 0.80
 """Distance from root to foothold half way through, as a share of the arm between them."""
 _TAUT: Final = 0.94
 """The same at its longest."""
 _STRETCHED: Final = 0.6
 """Share of the most stretch that footholds are laid for."""
-_NEAREST: Final = 0.10
+_NEAREST: Final = 0.20
 """Arm lengths from the root, seen from above."""
 _SHORTENED: Final = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
 """Shares of its time that a hold may be cut down to where the body moves on too far."""
@@ -47,7 +52,7 @@ class StanceSettings:
 
     duty: float = 0.55
     """Share of the cycle that an arm holds on."""
-    planted: float = 0.4
+    planted: float = 0.3
     """Share of the arm that lies down."""
     stretch: float = 0.4
     """How much longer bones may get that may stretch."""
@@ -107,6 +112,8 @@ class Limbs:
     """(arms, 2) radians about the arm's vertical: where the gait has the foothold, and which way
     the arm lies from there, from straight outward."""
     may_stretch: bool = False
+    free: np.ndarray | None = None
+    """(arms,) whether the gait keeps an arm off the ground, none if it keeps no arm off."""
 
     @property
     def reach(self) -> Floats:
@@ -140,6 +147,8 @@ class Footholds:
     """(arms, cycles, segments + 1 − c, 3) world: joints c … n as they lie on the ground."""
     headings: Floats
     """(arms, cycles) radians about world Z from +X."""
+    peeled_to: Floats
+    """(arms, cycles) metres along the arm up to which it is peeled off as the hold ends."""
     roots_on: Floats
     """(arms, cycles, 3) where the arm's root is as the hold begins, world …"""
     roots_off: Floats
@@ -171,6 +180,7 @@ def lay(
     line: BodyLine,
     ground: Ground,
     settings: StanceSettings,
+    rhythm: Rhythm,
     *,
     middle: float,
     cycles: tuple[int, int],
@@ -184,6 +194,7 @@ def lay(
         line: the body's way.
         ground: what it walks on.
         settings: how arms hold on.
+        rhythm: when they do.
         middle: phase of the gait, radians, half way through the hold.
         cycles: the first and the last that are wanted.
         wishes: the artist's; of arms by their number in the body.
@@ -193,6 +204,8 @@ def lay(
     count, arms = last - first + 1, len(limbs.arms)
     numbers = np.arange(first, last + 1)
     shift, present = np.zeros((arms, count)), np.ones((arms, count), dtype=bool)
+    if limbs.free is not None:
+        present[limbs.free] = False
     moved = np.zeros((arms, count), dtype=bool)
     turned = np.zeros((arms, count), dtype=bool)
     places, headings_wanted = np.zeros((arms, count, 3)), np.zeros((arms, count))
@@ -200,15 +213,15 @@ def lay(
         if wish.arm not in limbs.arms or not first <= wish.cycle <= last:
             continue
         at = limbs.arms.index(wish.arm), wish.cycle - first
-        present[at], shift[at] = not wish.removed, wish.shift
+        present[at], shift[at] = present[at] and not wish.removed, wish.shift
         if wish.position is not None:
             moved[at], places[at] = True, wish.position
         if wish.heading is not None:
             turned[at], headings_wanted[at] = True, wish.heading
 
     # Metres along the route at which the body is half way through each hold.
-    stride = line.settings.stride
-    centre = stride * ((middle - limbs.offsets[:, None]) / _CYCLE + numbers + shift)
+    given = np.broadcast_to(middle / _CYCLE + numbers, (arms, count))
+    centre = rhythm.distances(limbs.arms, given + shift)
     body, rotations = line.at(centre)
     roots = body + rotate(rotations, limbs.roots[:, None])
     # Which way the arm points, and lies, seen from above.
@@ -230,7 +243,10 @@ def lay(
     for share in _SHORTENED:
         width = settings.duty * share
         times = (-0.5 * width, (0.5 - PEELING) * width, 0.5 * width)
-        seen = [_roots(limbs, line, centre + stride * each) for each in times]
+        seen = [
+            _roots(limbs, line, rhythm.distances(limbs.arms, given + shift + each))
+            for each in times
+        ]
         reaches = (_TAUT * longer * free, _TAUT * longer * free, _TAUT * longer * whole)
         beyond = (0.0, 0.0, whole - free)
         nearest = _NEAREST * whole
@@ -240,6 +256,10 @@ def lay(
             z = ground.height(spot)
             easy = (_EASY * free) ** 2 - (roots[..., 2] - z) ** 2
             limit = np.sqrt(np.maximum(easy, nearest**2))
+            least = np.broadcast_to(nearest, limit.shape)
+            for root in seen[:1] + seen[-1:]:
+                onto = np.sum((root[..., :2] - roots[..., :2]) * aim, axis=-1)
+                least = np.maximum(least, nearest + onto)
             lack = np.zeros((arms, count))
             for root, far, extra in zip(seen, reaches, beyond, strict=True):
                 level = far**2 - (root[..., 2] - z) ** 2
@@ -248,9 +268,9 @@ def lay(
                 onto = np.sum(apart * aim, axis=-1)
                 inside = onto**2 - np.sum(apart**2, axis=-1) + level
                 largest = np.sqrt(np.maximum(inside, 0.0)) - onto - extra
-                lack = np.maximum(lack, np.where(inside < 0.0, nearest, nearest - largest))
+                lack = np.maximum(lack, np.where(inside < 0.0, whole, least - largest))
                 limit = np.minimum(limit, largest)
-            found = np.maximum(limit, nearest)
+            found = np.maximum(limit, least)
         better = open_ & (lack < short)
         distance = np.where(better, found, distance)
         half = np.where(better, 0.5 * width, half)
@@ -269,7 +289,9 @@ def lay(
     off = np.minimum(shift + half, _EARLIEST)
     between = 0.5 * ((on + UNROLLING * (off - on)) + (off - PEELING * (off - on)))
     # Shifted holds are told from the middle that the gait gives them.
-    given = centre - stride * shift
+    roots_on, roots_off = (
+        _roots(limbs, line, rhythm.distances(limbs.arms, given + each)) for each in (on, off)
+    )
     return Footholds(
         first=first,
         touching=joint,
@@ -279,10 +301,30 @@ def lay(
         present=present,
         joints=joints,
         headings=heading,
-        roots_on=_roots(limbs, line, given + stride * on),
-        roots_off=_roots(limbs, line, given + stride * off),
+        peeled_to=_peeled_to(limbs, joints, roots_off, joint),
+        roots_on=roots_on,
+        roots_off=roots_off,
         short=np.maximum(short, 0.0),
     )
+
+
+def _peeled_to(limbs: Limbs, joints: Floats, roots: Floats, joint: int) -> Floats:
+    """Metres along the arm (arms, cycles) up to which a body at its farthest peels it off."""
+    along = limbs.reach[joint:]
+    first, last = along[0][:, None], along[-1][:, None]
+    result = np.broadcast_to(first, roots.shape[:2]).copy()
+    share = np.linspace(0.0, 1.0 - _LEFT, 16)
+    for each in share:
+        place = each * (last - first) + first
+        number = np.clip((along[1:-1, :, None] < place).sum(axis=0), 0, len(along) - 2)
+        number = np.broadcast_to(number, result.shape)
+        arms, cycles = np.indices(result.shape)
+        low, high = along[number, arms], along[number + 1, arms]
+        within = ((place - low) / (high - low))[..., None]
+        start, end = joints[arms, cycles, number], joints[arms, cycles, number + 1]
+        apart = np.linalg.norm(start + within * (end - start) - roots, axis=-1)
+        result = np.where(apart >= _SLACK * place, np.maximum(result, place), result)
+    return result
 
 
 def _roots(limbs: Limbs, line: BodyLine, distance: Floats) -> Floats:

@@ -303,6 +303,7 @@ def from_json(text: str, source: str = "The gait file") -> GaitTable:
         )
     try:
         manner = str(content["manner"]).upper()
+        known: dict[str, Manner] = {each: each for each in MANNERS}
         curves = {
             0 if key == "all" else int(key): replace(
                 curve_from_degrees(
@@ -315,7 +316,7 @@ def from_json(text: str, source: str = "The gait file") -> GaitTable:
         spread = content.get("spread", {})
         table = GaitTable(
             name=str(content["name"]),
-            manner=next((each for each in MANNERS if each == manner), "WALK"),
+            manner=known.get(manner, "WALK"),
             curves=curves,
             spread_pairs=float(spread.get("pairs", 0.0)),
             spread_sides=float(spread.get("sides", 0.0)),

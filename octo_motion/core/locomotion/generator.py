@@ -230,8 +230,11 @@ class Generator:
             Angles (frames, arms, links, 3), turns anticlockwise for every arm, and by how much the
             arms steer (frames, arms), radians.
         """
+        return self.asked_at(self.arm_phases(np.asarray(phase, dtype=np.float64)), turn)
+
+    def asked_at(self, phases: Floats, turn: Floats) -> tuple[Floats, Floats]:
+        """The same for phases (frames, arms) of the arms themselves."""
         settings = self._settings
-        phases = self.arm_phases(np.asarray(phase, dtype=np.float64))
         angles = evaluate(settings.gait, phases, self._pairs) + variation(
             settings.gait,
             phases,

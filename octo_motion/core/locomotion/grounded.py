@@ -18,8 +18,10 @@ from .footholds import Footholds, Limbs, StanceSettings, Wish, cycles_at, lay
 from .generator import Build, Generator, twist
 from .ground import Ground, normals
 from .poses import Facing, bone_rotations, sucker_sides
+from .rhythm import Even, Rhythm
 from .stance import Bodies, hold, stand
 
+_CYCLE: Final = 2.0 * np.pi
 _ASKEW: Final = np.radians(35.0)
 """How far from straight outward a foothold may lie, and an arm from there."""
 _TURN: Final = 6.0
@@ -81,6 +83,7 @@ class GroundedWalk:
         may_stretch: for each arm, whether its bones may get longer.
         phases: the first and the last of the body's phases, radians.
         wishes: the artist's footholds.
+        rhythm: when arms hold on; none for the gait's own.
     """
 
     def __init__(
@@ -97,17 +100,22 @@ class GroundedWalk:
         may_stretch: Sequence[bool],
         phases: tuple[float, float],
         wishes: Sequence[Wish] = (),
+        rhythm: Rhythm | None = None,
     ) -> None:
         self._generator, self._line, self._ground = generator, line, ground
         self._settings, self._scale = settings, scale
         self._middle = generator.settings.gait.power_phase
         self._body_turn = from_matrix(body.rotation)
-        first, _ = cycles_at(phases[0] + generator.offsets, self._middle)
-        last, _ = cycles_at(phases[1] + generator.offsets, self._middle)
+        self._stride = line.settings.stride
+        self._rhythm = rhythm or Even(self._stride, generator.offsets)
+        ends, _ = cycles_at(self._arm_phases(np.array(phases)), self._middle)
+        first, last = ends
         self._cycles = int(first.min()), int(last.max())
         self._last = first, last
         down = -body.rotation[:, 2]
         self._sides = [sucker_sides(skeleton, arm.bones, down) for arm in generator.arms]
+        # Where nothing varies at random, the seed does not matter.
+        seed = generator.settings.seed if any(generator.settings.variation) else 0
         self._limbs: list[tuple[Build, Limbs, Footholds]] = []
         for build in generator.builds:
             for stretch in sorted({may_stretch[arm] for arm in build.arms}):
@@ -119,10 +127,11 @@ class GroundedWalk:
                     line,
                     ground,
                     settings,
+                    self._rhythm,
                     middle=self._middle,
                     cycles=self._cycles,
                     wishes=wishes,
-                    seed=generator.settings.seed,
+                    seed=seed,
                 )
                 self._limbs.append((part, limbs, footholds))
 
@@ -138,18 +147,25 @@ class GroundedWalk:
             radii=self._scale * np.stack([radii[arm] for arm in columns], axis=1),
             aims=np.zeros((len(columns), 2)),
             may_stretch=stretch,
+            free=np.array(
+                [generator.settings.gait.curve(generator.arms[arm].pair).free for arm in columns]
+            ),
         )
-        # Half way through the hold, as the gait alone has it.
-        phase = np.array([self._middle])
+        # Half way through the hold, as the gait alone has it: a frame for each arm.
+        phases = self._middle - generator.offsets[columns]
+        phases = phases[:, None] + generator.offsets
+        angles, _ = generator.asked_at(phases, np.zeros((len(columns), 2)))
+        own = angles[:, columns]
+        shapes, _ = generator.shapes(build, own, np.zeros(own.shape[:2]))
+        steps = build.chain.lengths[:, None, None] * np.einsum("scaa->sca", shapes)
         joint = limbs.touching(self._settings.planted)
-        aims = np.empty((len(columns), 2))
-        for place, arm in enumerate(columns):
-            angles, steering = generator.asked(phase - generator.offsets[arm], np.zeros((1, 2)))
-            shape, _ = generator.shapes(build, angles[:, columns], 0.0 * steering[:, columns])
-            steps = build.chain.lengths[:, None] * shape[:, :, 0, place]
-            aims[place, 0] = np.arctan2(*steps[:joint, 1::-1].sum(axis=0))
-            aims[place, 1] = np.arctan2(*steps[joint:, 1::-1].sum(axis=0))
+        near, far = steps[:joint].sum(axis=0), steps[joint:].sum(axis=0)
+        aims = np.arctan2([near[1], far[1]], [near[0], far[0]]).T
         return Limbs(**{**limbs.__dict__, "aims": _ASKEW * np.tanh(aims / _ASKEW)})
+
+    def _arm_phases(self, phase: Floats) -> Floats:
+        """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
+        return self._rhythm.phases(self._stride * np.asarray(phase) / _CYCLE)
 
     def pose(
         self, phase: Floats, turn: Floats, centres: Floats, orientations: Floats
@@ -164,8 +180,9 @@ class GroundedWalk:
         """
         generator = self._generator
         frames, count = len(phase), len(generator.arms)
-        angles, steering = generator.asked(phase, turn)
-        cycles, since = cycles_at(generator.arm_phases(phase), self._middle)
+        phases = self._arm_phases(phase)
+        angles, steering = generator.asked_at(phases, turn)
+        cycles, since = cycles_at(phases, self._middle)
         ends = np.cumsum([0] + [len(arm.bones) for arm in generator.arms])
         rotations = np.empty((frames, ends[-1], 4))
         strains = np.zeros((frames, ends[-1]))
@@ -234,7 +251,6 @@ class GroundedWalk:
     def footholds(self) -> list[Foothold]:
         """All footholds that are there, arm by arm."""
         found: list[Foothold] = []
-        offsets = self._generator.offsets
         first, last = self._last
         for build, limbs, laid in self._limbs:
             for place, arm in enumerate(build.arms):
@@ -242,15 +258,16 @@ class GroundedWalk:
                     at = place, cycle - laid.first
                     if not laid.present[at]:
                         continue
-                    middle = 2.0 * np.pi * cycle + self._middle - offsets[arm]
+                    turns = self._middle / _CYCLE + cycle + np.array([laid.on[at], laid.off[at]])
+                    ends = self._rhythm.distances([arm], turns[None])[0] * _CYCLE / self._stride
                     found.append(
                         Foothold(
                             arm,
                             cycle,
                             laid.joints[place, cycle - laid.first, 0],
                             float(laid.headings[at]),
-                            middle + 2.0 * np.pi * float(laid.on[at]),
-                            middle + 2.0 * np.pi * float(laid.off[at]),
+                            float(ends[0]),
+                            float(ends[1]),
                             float(laid.short[at] / limbs.reach[-1, place]),
                         )
                     )

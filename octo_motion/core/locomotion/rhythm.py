@@ -15,10 +15,13 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rotations import Floats
-from .crawl import Holds
+from ..rotations import Floats, multiply, normalized, rotate
+from .body_line import BodyLine
+from .crawl import CrawlSettings, Holds, Journey, plan_crawl
 
 _CYCLE: Final = 2.0 * np.pi
+_PER_REACH: Final = 32
+"""Samples of a journey to the length of an arm."""
 _FINE: Final = 8
 """Steps of the table of distances between two knots of an arm's cycle."""
 
@@ -77,6 +80,44 @@ class Free:
         return np.stack(
             [self._tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
         )
+
+
+def crawling(
+    line: BodyLine,
+    roots: Floats,
+    outward: Floats,
+    settings: CrawlSettings,
+    *,
+    reach: float,
+    middle: float,
+    duty: float,
+) -> Free:
+    """The rhythm of a body that crawls.
+
+    Args:
+        line: its way.
+        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
+        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
+        settings: how it crawls.
+        reach: metres that its arms are long.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes in the gait.
+    """
+    length = line.route.length
+    count = max(2, int(np.ceil(length / reach * _PER_REACH)) + 1)
+    distance = np.linspace(0.0, length, count)
+    centres, rotations = line.at(distance)
+    directions = rotate(multiply(rotations[:, None], outward), np.array([1.0, 0.0, 0.0]))[..., :2]
+    places = centres[:, None] + rotate(rotations[:, None], roots)
+    ahead = np.gradient(centres[:, :2], axis=0)
+    journey = Journey(
+        distance=distance,
+        roots=places[..., :2],
+        outward=normalized(directions),
+        ahead=normalized(ahead),
+        length=reach,
+    )
+    return Free(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,12 +33,21 @@ _RAISES_BETWEEN: Final = 2
 """How often the lowest joints of an arm are raised, in the air and before it is drawn down."""
 _WEAK: Final = 0.02
 """Least lever that joints are raised with, in squares of the first segment's length."""
+_ARCHED: Final = np.radians(15.0)
+_ARCHING: Final = 0.5
+"""How much more where it is slack, and over what share of its length that comes."""
+_HALVINGS: Final = 9
+"""Steps in which the length of a curve is found."""
 _CURLED: Final = np.radians(85.0)
 """How far the tip stands up before it is unrolled."""
 _BORDER: Final = 1.6
 """Segments before the ground over which an arm is less and less free to turn."""
 _EASY: Final = 0.88
 """Share of its length between body and foothold from which on an arm stretches."""
+_CROWDED: Final = 0.7
+"""The same below which it shortens …"""
+_SHORTER: Final = 0.5
+"""… by this share of the most stretch at most."""
 _NEARLY: Final = 0.97
 _REST: Final = 0.025
 """Share of its length from which on an arm no longer reaches out all the way, and what is left."""
@@ -139,7 +148,7 @@ def hold(
     carried = moved * _smooth((before + after) / _GOING)
     return Hold(
         weight=weight * footholds.present[at],
-        lies_from=touching + gone * (whole - touching),
+        lies_from=touching + gone * (footholds.peeled_to[at] - touching),
         lies_to=touching + down * (whole - touching),
         by_tip=since > footholds.middle[at],
         joints=np.ascontiguousarray(joints),
@@ -196,6 +205,35 @@ def stand(
     slack = 1e-9 * reach[-1]
     lying = (reach >= held.lies_from - slack) & (reach <= held.lies_to + slack) & (weight >= 1.0)
     return Stood(directions, strains, joints, np.sqrt(dot(missed, missed)) * (weight >= 1.0), lying)
+
+
+def _curve(
+    leaving: Floats, arriving: Floats, chord: Floats, size: Floats, middles: Floats, parts: Floats
+) -> Floats:
+    """Directions (segments, 3, batch) along a cubic that is about as long as it should be.
+
+    Args:
+        leaving: (3, batch) unit, at its start.
+        arriving: (3, batch) unit, at its end.
+        chord: (3, batch) from start to end.
+        size: (batch,) how long it should be.
+        middles: (segments, 1, batch) where on it the segments' middles are, 0…1.
+        parts: (segments, batch) how much of each segment is on it.
+    """
+    t = middles
+    start, end = 1.0 - 4.0 * t + 3.0 * t * t, 3.0 * t * t - 2.0 * t
+    straight = 6.0 * t * (1.0 - t) * chord
+    handles = size * (start * leaving + end * arriving)
+    share = parts / np.maximum(np.sum(parts, axis=0), _TINY)
+    wanted = np.sqrt(dot(chord, chord)) / size
+    low, high = np.full(size.shape, 0.2), np.full(size.shape, 4.0)
+    # The longer the handles, the more of its length the curve spends on its way round.
+    for _ in range(_HALVINGS):
+        middle = np.sqrt(low * high)
+        mean = np.sum(share[:, None] * _unit(straight + middle * handles), axis=0)
+        short = np.sqrt(dot(mean, mean)) < wanted
+        low, high = np.where(short, low, middle), np.where(short, middle, high)
+    return _unit(straight + np.sqrt(low * high) * handles)
 
 
 def _part(held: Hold, chosen: np.ndarray) -> Hold:
@@ -310,19 +348,21 @@ def _asked(
     if limbs.may_stretch and settings.stretch > 0.0:
         taut = np.maximum(ratio / _EASY - 1.0, 0.0)
         taut = taut * taut / (taut + _GENTLE)
+        slack = np.maximum(1.0 - ratio / _CROWDED, 0.0)
+        slack = slack * slack / (slack + _GENTLE)
+        shortest = _SHORTER * settings.stretch
         strain[0] = settings.stretch * np.tanh(taut / settings.stretch)
-    # A cubic from body to ground that leaves and arrives as the arm does.
-    leaving = np.cos(_RAISED) * bodies.outward + np.sin(_RAISED) * bodies.upward
+        strain[0] -= shortest * np.tanh(slack / shortest)
+    # A cubic from body to ground that leaves and arrives as the arm does, and is as long. The
+    # slacker the arm, the more it rises.
+    rising = _RAISED + _ARCHED * _smooth((_EASY - ratio) / _ARCHING)
+    leaving = np.cos(rising) * bodies.outward + np.sin(rising) * bodies.upward
     size = held.lies_from * (1.0 + strain[0])
-    points = np.empty((count + 1, 3, ratio.shape[-1]))
-    t = np.clip(reach / held.lies_from, 0.0, 1.0)[:, None]
-    start, end = size * leaving, size * arriving
-    points[:] = bodies.roots + t * (
-        start + t * (3.0 * chord - 2.0 * start - end + t * (start + end - 2.0 * chord))
-    )
-    on_ground = (reach[first:] >= held.lies_from)[:, None]
-    points[first:] = np.where(on_ground, held.joints + held.carried, points[first:])
-    directions = np.diff(points, axis=0)
+    middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
+    parts = np.clip(held.lies_from - reach[:-1], 0.0, lengths)
+    directions = _curve(leaving, arriving, chord, size, middles, parts)
+    through = np.clip((held.lies_from - reach[first:-1]) / lengths[first:], 0.0, 1.0)[:, None]
+    directions[first:] = through * directions[first:] + (1.0 - through) * lying
     # Not unrolled yet: the part beyond stands up, the more, the further out.
     span = reach[-1] - reach[first]
     beyond = np.maximum(reach[first + 1 :] - held.lies_to, 0.0) / span
