@@ -154,12 +154,14 @@ def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
     found = {
         bone.name
         for bone in armature.pose.bones
-        if bone.is_in_ik_chain
-        or any(
-            each.type not in _TOLERANT and not each.mute and each.influence > 0.0
-            for each in bone.constraints
-        )
+        if any(each.type not in _TOLERANT and _acts(each) for each in bone.constraints)
     }
+    for bone in armature.pose.bones:
+        for constraint in bone.constraints:
+            if constraint.type in {"IK", "SPLINE_IK"} and _acts(constraint):
+                count = getattr(constraint, "chain_count", 0)
+                chain = [bone, *bone.parent_recursive]
+                found.update(each.name for each in chain[: count or len(chain)])
     if armature.animation_data is not None:
         for curve in armature.animation_data.drivers:
             start, _, rest = curve.data_path.partition('pose.bones["')
@@ -167,6 +169,10 @@ def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
             if not start and channel.startswith("rotation_"):
                 found.add(bpy.utils.unescape_identifier(name))
     return frozenset(found)
+
+
+def _acts(constraint: bpy.types.Constraint) -> bool:
+    return not constraint.mute and constraint.influence > 0.0
 
 
 def bone_marks(armature: bpy.types.Object) -> dict[str, str]:

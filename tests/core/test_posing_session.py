@@ -142,7 +142,8 @@ def test_longer_steps_keep_what_is_held_and_pinned() -> None:
     assert session.held_point() == pytest.approx(before)
     assert session.pins == {0}
     session.tick(0.1)
-    assert session.held_point() == pytest.approx(before, abs=0.02)
+    # The hand goes on pulling, but nothing jumps.
+    assert session.held_point() == pytest.approx(before, abs=0.05)
 
 
 def test_material_is_changed_in_the_hand() -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -62,6 +62,8 @@ class Roles:
     bones that hang on the rig's root and on a limb only by their place."""
     follows: tuple[int, ...]
     """(bones,) for each bone the body that it belongs to or is carried by, −1 for none."""
+    driven: tuple[int, ...] = ()
+    """Bones that would be limbs, were they not moved by constraints or drivers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +102,9 @@ def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") 
     if not size > 0.0:
         raise RigError(f"'{name}' has no size.", "Repair its bones or its scale.")
     # A rig in which all bones bear names of helpers means something else by them.
-    chosen = _chosen(skeleton, facts, size) or _chosen(skeleton, facts, size, by_name=False)
+    chosen, driven = _chosen(skeleton, facts, size)
+    if not chosen:
+        chosen, driven = _chosen(skeleton, facts, size, by_name=False)
     if not chosen:
         if facts.moved:
             raise RigError(
@@ -111,7 +115,8 @@ def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") 
             f"'{name}' has no bone that could be posed by hand.",
             "Mark bones as limbs in the panel Pose.",
         )
-    return _tree(skeleton, _joined(skeleton, facts, chosen, size), size)
+    tree = _tree(skeleton, _joined(skeleton, facts, chosen, size), size)
+    return replace(tree, driven=tuple(sorted(driven)))
 
 
 def diagonal(heads: Floats, tails: Floats) -> float:
@@ -131,32 +136,40 @@ def is_helper_name(name: str) -> bool:
     )
 
 
-def _chosen(skeleton: Skeleton, facts: RigFacts, size: float, *, by_name: bool = True) -> set[int]:
+def _chosen(
+    skeleton: Skeleton, facts: RigFacts, size: float, *, by_name: bool = True
+) -> tuple[set[int], set[int]]:
+    """Limbs, and bones that would be limbs if nothing else moved them."""
     skinned = {name for name, weight in facts.weights.items() if weight > 0.0}
     deforming = [bone for bone, deform in enumerate(skeleton.deform) if deform]
     if any(skeleton.names[bone] in skinned for bone in deforming):
         deforming = [bone for bone in deforming if skeleton.names[bone] in skinned]
     reach = _reaches(skeleton, skinned)
     found: set[int] = set()
+    lost: set[int] = set()
     for bone in deforming or range(len(skeleton)):
         mark = facts.marks.get(skeleton.names[bone])
         name = skeleton.names[bone]
-        if mark is not None or name in facts.locked:
+        driven = name in facts.moved
+        # What is driven is locked in many rigs, so that nobody takes hold of it by mistake.
+        if mark is not None or (name in facts.locked and not driven):
             continue
         if reach[bone] < max(facts.smallest, 1e-6) * size:
             continue
         # What deforms in Rigify's rigs begins with DEF; the rest of the name counts.
         if by_name and is_helper_name(name.removeprefix("DEF-")):
             continue
-        if skeleton.names[bone] in facts.moved:
+        if driven:
             twin = _twin(skeleton, facts, bone, size)
-            if twin is not None:
+            if twin is None:
+                lost.add(bone)
+            else:
                 found.add(twin)
             continue
         found.add(bone)
     marked = {skeleton.index[each] for each, mark in facts.marks.items() if mark == BODY}
     left_out = {skeleton.index[each] for each, mark in facts.marks.items() if mark == FOLLOW}
-    return (found | marked) - left_out
+    return (found | marked) - left_out, lost - marked - left_out
 
 
 def _reaches(skeleton: Skeleton, skinned: set[str]) -> Floats:
@@ -182,7 +195,8 @@ def _twin(skeleton: Skeleton, facts: RigFacts, bone: int, size: float) -> int | 
     along = skeleton.rest_matrices[:, :3, 1] @ skeleton.rest_matrices[bone, :3, 1]
     best: tuple[float, int] | None = None
     for other in np.flatnonzero((apart < _TWIN * size) & (along > 0.9)).tolist():
-        if other == bone or skeleton.names[other] in facts.moved:
+        name = skeleton.names[other]
+        if other == bone or name in facts.moved | facts.locked or is_helper_name(name):
             continue
         off = abs(float(skeleton.lengths[other] - skeleton.lengths[bone]))
         if best is None or off < best[0]:
@@ -224,8 +238,8 @@ def _joined(skeleton: Skeleton, facts: RigFacts, chosen: set[int], size: float) 
             for root in roots
             if root == main or _end_nearby(skeleton, result, root, size) is None
         ]
-        hub = _common_ancestor(skeleton, loose) if len(loose) > 1 else None
-        if hub is None or skeleton.names[hub] in facts.moved:
+        hub = _common_ancestor(skeleton, facts, loose) if len(loose) > 1 else None
+        if hub is None:
             return _movable(skeleton, facts, result)
         result.add(hub)
 
@@ -248,10 +262,12 @@ def _limb_size(skeleton: Skeleton, chosen: set[int], root: int) -> float:
     return float(skeleton.lengths[beneath].sum())
 
 
-def _common_ancestor(skeleton: Skeleton, bones: Sequence[int]) -> int | None:
+def _common_ancestor(skeleton: Skeleton, facts: RigFacts, bones: Sequence[int]) -> int | None:
+    """The lowest bone that carries all of these and that nothing else moves."""
     paths = [_ancestors(skeleton, bone) for bone in bones]
     for bone in paths[0]:
-        if all(bone in path for path in paths[1:]):
+        free = skeleton.names[bone] not in facts.moved
+        if free and all(bone in path for path in paths[1:]):
             return bone
     return None
 

@@ -22,7 +22,7 @@ from ..rotations import (
     multiply,
     to_rotation_vector,
 )
-from .coupling import Grab
+from .coupling import Coupling, Grab
 from .figure import Elements, Figure, Pose
 from .figure_building import turned_bodies
 from .obstacles import Obstacle
@@ -42,6 +42,8 @@ STILL: Final = 2e-3
 REST_TIME: Final = 0.3
 """Seconds that it must be so before nothing is computed any more."""
 MOST_STEPS_BACK: Final = 64
+GENTLE: Final = 0.1
+"""Of the firmest coupling, with joints that just bear what hangs on them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +85,16 @@ class Grip:
     """Whether the hand has turned: only then does it keep the bone from turning by itself."""
 
 
+def hand_for(figure: Figure, strength: float = 1.0) -> Coupling:
+    """A hand that bends joints of a strength, and not many times more.
+
+    A mouse asks for any place at all. Pulled far beyond its reach with all the force that a hand
+    could have, a chain of light bones would be a string under a tension that long steps cannot
+    simulate; three times the figure's weight is plenty.
+    """
+    return Coupling.for_figure(figure, GENTLE * max(strength, 1.0))
+
+
 class Session:
     """A figure in a world, and a hand.
 
@@ -107,6 +119,8 @@ class Session:
         self.figure = figure
         self.world = World(figure, pose, settings, obstacles)
         self.grip: Grip | None = None
+        self.hand = hand_for(figure)
+        """How firmly the next grab holds."""
         self.time = 0.0
         """Simulated seconds."""
         self._start = self.world.pose()
@@ -140,7 +154,7 @@ class Session:
         self.release()
         self._before.append(self.world.state())
         del self._before[:-MOST_STEPS_BACK]
-        handle = self.world.grab(hit.body, hit.point, IDENTITY)
+        handle = self.world.grab(hit.body, hit.point, IDENTITY, self.hand)
         self.grip = Grip(hit.body, handle, np.array(hit.point, dtype=np.float64), IDENTITY.copy())
         self._calm = 0.0
 

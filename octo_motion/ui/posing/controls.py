@@ -260,8 +260,7 @@ class PoseControls:
         session = self.session
         parts = [f"Posing {session.puppet.name}"]
         if self.holding and session.core.grip is not None:
-            force = float(np.linalg.norm(session.core.force()))
-            parts.append(f"{session.bone(session.core.grip.body)}: {force:.1f} N")
+            parts.append(f"{session.bone(session.core.grip.body)}: pull {session.pull():.2f}")
         elif self.hover is not None:
             parts.append(session.bone(self.hover.body))
         if session.recording:

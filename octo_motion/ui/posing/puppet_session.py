@@ -25,8 +25,8 @@ from ...core.posing.figure import Figure, Pose
 from ...core.posing.figure_building import turned_bodies
 from ...core.posing.obstacles import Obstacle, Plane
 from ...core.posing.picking import Hit, capsules_in_world, pick
-from ...core.posing.presets import elements_for
-from ...core.posing.session import TOUCHED, Sample, Session, Told
+from ...core.posing.presets import elements_for, joint_loads
+from ...core.posing.session import TOUCHED, Sample, Session, Told, hand_for
 from ...core.posing.world import WorldSettings
 from ...core.rotations import IDENTITY, Floats
 from .properties import marked_obstacles, posing_settings
@@ -110,6 +110,8 @@ class PuppetSession:
             self._obstacles(),
             clock=clock,
         )
+        self.core.hand = hand_for(figure, settings.strength)
+        self._weights = joint_loads(figure)
         self._hold_root()
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
@@ -177,11 +179,16 @@ class PuppetSession:
         return None if point is None else point / self.unit
 
     def loads(self) -> Floats:
-        """(bodies,) what each joint bears, 1 where it begins to give way."""
+        """(bodies,) what each joint bears: 1 where it gives way, or bears all that hangs on it."""
         loads = np.linalg.norm(self.core.world.joint_loads(), axis=1)
         limit = self.figure.elements.yield_torque
-        bounded = np.isfinite(limit) & (limit > 0.0)
-        return np.divide(loads, limit, out=np.zeros_like(loads), where=bounded)
+        limit = np.where(np.isfinite(limit) & (limit > 0.0), limit, self._weights)
+        return loads / limit
+
+    def pull(self) -> float:
+        """How hard the hand pulls, in weights of the whole figure."""
+        weight = -GRAVITY[2] * float(self.figure.masses.sum())
+        return float(np.linalg.norm(self.core.force())) / weight
 
     def pins(self) -> list[int]:
         """Bodies that the artist has nailed to their places, or that are by the settings."""
@@ -411,6 +418,7 @@ class PuppetSession:
         before, self._shown = self._shown, shown
         if (before.material, before.strength) != (shown.material, shown.strength):
             self.core.change_elements(self._elements(self.figure))
+            self.core.hand = hand_for(self.figure, shown.strength)
         if before.ground != shown.ground:
             self.core.change_obstacles(self._obstacles())
         wanted = self._world_settings()
