@@ -64,6 +64,15 @@ def _one_colour(lines: Floats, colour: tuple[float, ...], width: float) -> Any:
     return points, np.tile(np.array(colour), (len(points), 1)), width
 
 
+_shown: list[Overlay] = []
+
+
+def take_down_all() -> None:
+    """Leave no drawing behind."""
+    for each in list(_shown):
+        each.take_down()
+
+
 class Overlay:
     """The drawing of one session, in all 3D viewports, until it is taken down.
 
@@ -76,12 +85,14 @@ class Overlay:
         self._handle: Any = bpy.types.SpaceView3D.draw_handler_add(
             self._draw, (), "WINDOW", "POST_VIEW"
         )
+        _shown.append(self)
 
     def take_down(self) -> None:
         """Draw no more; safe to call twice."""
         handle, self._handle = self._handle, None
         if handle is not None:
             bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
+            _shown.remove(self)
 
     def _draw(self) -> None:
         context: Any = bpy.context

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What must end before the classes go."""
+
+from __future__ import annotations
+
+from .overlay import take_down_all
+from .puppet_session import active_session
+
+
+def unregister() -> None:
+    """End the session that is going on, if one is, and draw no more."""
+    session = active_session()
+    if session is not None:
+        session.finish()
+    take_down_all()
