@@ -23,6 +23,10 @@ from .locomotion import (
     reach_properties,
     setups,
 )
+from .posing import marks, pose_script, pose_start
+from .posing import panels as posing_panels
+from .posing import properties as posing_properties
+from .posing import registration as posing
 from .splicing import (
     import_clips,
     landmark_table,
@@ -50,6 +54,7 @@ CLASSES: tuple[type, ...] = (
     *landmark_table.CLASSES,
     *splice_properties.CLASSES,
     *splicing_properties.CLASSES,
+    *posing_properties.CLASSES,
     *settings.CLASSES,
     add_octopus.OCTO_MOTION_OT_add_octopus,
     add_route.OCTO_MOTION_OT_add_route,
@@ -63,6 +68,10 @@ CLASSES: tuple[type, ...] = (
     *splice_build.CLASSES,
     *splice_drag.CLASSES,
     *splice_panels.CLASSES,
+    *pose_start.CLASSES,
+    *pose_script.CLASSES,
+    *marks.CLASSES,
+    *posing_panels.CLASSES,
 )
 
 
@@ -79,6 +88,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Take back what ``register`` did, in reverse order."""
+    posing.unregister()
     command_line.unregister()
     for menu, draw in reversed(MENUS):
         menu.remove(draw)

@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
 from .locomotion.properties import OCTO_MOTION_PG_locomotion, make_overridable
+from .posing.properties import OCTO_MOTION_PG_posing
 from .splicing.properties import OCTO_MOTION_PG_splicing
 
 
@@ -26,6 +27,12 @@ class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
         name="Splicing",
         description="What splicing knows of the armature",
         type=OCTO_MOTION_PG_splicing,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    posing: PointerProperty(
+        name="Posing",
+        description="How the armature is posed by hand, and what stops it",
+        type=OCTO_MOTION_PG_posing,
         override={"LIBRARY_OVERRIDABLE"},
     )
 
