@@ -46,9 +46,10 @@ def test_form_and_place_together_are_what_the_scene_shows(scale: tuple[float, ..
 
 def test_modifiers_count() -> None:
     target = rod()
-    modifier = target.modifiers.new("Thicker", "SOLIDIFY")
-    modifier.thickness, modifier.offset = 0.1, 1.0
-    assert np.hypot(*corners(target)[:, :2].T).max() > 0.18
+    modifier = target.modifiers.new("Copies", "ARRAY")
+    modifier.count, modifier.use_relative_offset, modifier.use_constant_offset = 2, False, True
+    modifier.constant_offset_displace = (0.0, 0.5, 0.0)
+    assert corners(target)[:, 1].max() == pytest.approx(0.6, abs=1e-3)
 
 
 def test_a_curve_with_a_bevel_can_be_grasped_and_an_empty_not() -> None:

@@ -78,7 +78,6 @@ def test_the_nearest_arm_winds_round_the_object_and_the_others_walk_on(octopus: 
         held = near < 0.16
         assert held.sum() >= 3
         assert near.min() > 0.04
-    assert away(arm_joints(octopus, 5), rod).min() > 0.1
     assert not is_edited(action)
 
 
