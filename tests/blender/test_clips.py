@@ -2,6 +2,7 @@
 """A clip is what Blender shows; reading changes nothing, and what is written is what was read."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from octo_motion.blender.actions import MARK
 from octo_motion.blender.clips import read_clip, write_clip
 from octo_motion.blender.unkeyed import AT_REST
 from octo_motion.core.errors import ClipError, RigError
-from octo_motion.core.rotations import angle_between
+from octo_motion.core.rotations import angle_between, from_rotation_vector, multiply
 from octo_motion.core.splicing.clip import Clip
 
 # Blender's importer leaves the file open.
@@ -410,3 +411,71 @@ def test_written_quaternions_keep_their_sign():
         [[bag.fcurves.find(path, index=i).evaluate(f) for i in range(4)] for f in clip.frames]
     )
     assert (np.sum(values[1:] * values[:-1], axis=1) > 0.0).all()
+
+
+# --- Poses without keys ---------------------------------------------------------------------------
+
+
+def rig_with_posed_hand() -> tuple[Any, Any]:
+    """A rig whose action moves its first bone alone; the third one is posed without keys."""
+    armature = make_rig()
+    bones = armature.pose.bones
+    for frame, turn in ((1, (1.0, 0.0, 0.0, 0.0)), (9, (0.6, 0.8, 0.0, 0.0))):
+        bones[0].rotation_quaternion = turn
+        bones[0].keyframe_insert("rotation_quaternion", frame=frame)
+    bones[2].rotation_euler = (0.1, 0.2, 0.3)
+    return armature, armature.animation_data.action
+
+
+def assign_action(armature: Any, action: Any) -> None:
+    armature.animation_data.action = action
+    armature.animation_data.action_slot = action.slots[0]
+    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+
+
+def moving_everything(clip: Clip) -> Clip:
+    """As if a splice had moved all bones."""
+    turns = np.linspace(0.0, 1.0, len(clip))[:, None, None] * (0.4, -0.2, 0.1)
+    return replace(clip, rotations=multiply(clip.rotations, from_rotation_vector(turns)))
+
+
+def test_a_changed_pose_without_keys_counts_from_the_next_reading_on():
+    armature, action = rig_with_posed_hand()
+    write_clip(armature, read_clip(armature))
+    assign_action(armature, action)
+    armature.pose.bones[2].rotation_euler = (0.9, 0.0, 0.0)
+    clip = read_clip(armature, action)
+    turned = angle_between(clip.rotations[:, 2], (1.0, 0.0, 0.0, 0.0))
+    assert turned == pytest.approx(0.9, abs=1e-6)
+    # Also while the next result plays.
+    write_clip(armature, moving_everything(clip))
+    bpy.context.scene.frame_set(5)
+    again = read_clip(armature, action)
+    assert np.array_equal(again.rotations, clip.rotations)
+    # And back to rest, if the artist wants that.
+    assign_action(armature, action)
+    armature.pose.bones[2].rotation_euler = (0.0, 0.0, 0.0)
+    rested = read_clip(armature, action)
+    assert angle_between(rested.rotations[:, 2], (1.0, 0.0, 0.0, 0.0)).max() == 0.0
+
+
+@pytest.mark.parametrize("frame", [1, 4, 9])
+def test_what_a_result_leaves_behind_is_no_pose_of_the_artists(frame: int):
+    armature, action = rig_with_posed_hand()
+    clip = read_clip(armature)
+    write_clip(armature, moving_everything(clip))
+    bpy.context.scene.frame_set(frame, subframe=0.5 if frame < 9 else 0.0)
+    bpy.context.view_layer.update()
+    assign_action(armature, action)
+    again = read_clip(armature, action)
+    assert np.array_equal(again.rotations, clip.rotations)
+
+
+def test_a_pose_without_keys_is_kept_in_another_rotation_mode():
+    armature, action = rig_with_posed_hand()
+    clip = read_clip(armature)
+    write_clip(armature, moving_everything(clip))
+    for mode in ("QUATERNION", "AXIS_ANGLE"):
+        armature.pose.bones[2].rotation_mode = mode
+        again = read_clip(armature, action)
+        assert angle_between(again.rotations[:, 2], clip.rotations[:, 2]).max() < ANGLE
