@@ -65,6 +65,7 @@ class HandLoop:
         self._workspaces: dict[int, Workspace] = {}
         self._settings = Settings()
         self._told = self._told_times = self._looked = 0.0
+        self._held = False
 
     @property
     def pointers(self) -> Iterable[Pointer]:
@@ -77,6 +78,7 @@ class HandLoop:
         Raises:
             ChannelClosedError: whoever started us is gone.
         """
+        held = self._held
         for message in self._channel.receive():
             self._hear(message, now)
         for number, pointer in list(self._pointers.items()):
@@ -85,7 +87,10 @@ class HandLoop:
             except DeviceLostError:
                 self._lose(number)
         self._tell(now)
-        if now - self._looked > _LOOK_EVERY and not any(each.grab for each in self.pointers):
+        self._held = any(each.grab for each in self.pointers)
+        if self._held and not held:
+            self._schedule.forget()  # what is told of the clock is told of holding something
+        if not self._held and now - self._looked > _LOOK_EVERY:
             self._looked = now
             self._look()
 

@@ -35,6 +35,8 @@ _STILL: Final = 2e-3
 _REST_SECONDS: Final = 0.3
 _PROBE: Final = 1e-3
 """Of the puppet's weight: the push with which a held body's mobility is measured."""
+_TOO_SLOW: Final = 3e-3
+"""s for a step, with which seven more at a grab would be noticed."""
 _STALE: Final = 0.25
 """s without a word from a hand: it has let go."""
 
@@ -166,7 +168,8 @@ class Simulation:
         if gap > self.reach:
             hand.refused = hand.told.grab
             return
-        mobility, angular = self._mobility(body, point)
+        # A machine too slow for the measurement goes on without: the body then keeps its velocity.
+        mobility, angular = (0.0, 0.0) if self.cost > _TOO_SLOW else self._mobility(body, point)
         coupling = self._coupling(hand)
         hand.handle = self.world.grab(body, point, turn, coupling)
         self.world.pull(hand.handle, point, turn)

@@ -59,6 +59,10 @@ class VirtualDevice:
         self._open = True
         self._thread.start()
 
+    @property
+    def plugged_in(self) -> bool:
+        return self._open
+
     def report(self, data: bytes) -> None:
         """Send an input report."""
         self._write(_INPUT2, struct.pack("<H", len(data)) + data)
