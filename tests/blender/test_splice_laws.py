@@ -15,6 +15,7 @@ from octo_motion.core.rotations import (
     Floats,
     angle_between,
     conjugate,
+    from_matrix,
     multiply,
     normalized,
     rotate,
@@ -28,6 +29,7 @@ from octo_motion.core.splicing.parts import LEFT_ARM, LEGS, PARTS, RIGHT_ARM, Pa
 from octo_motion.core.splicing.posture import posture_of, sampled
 from octo_motion.core.splicing.splice import Reach, Splice, build, spliced
 from octo_motion.core.splicing.timing import Timing, window
+from octo_motion.core.splicing.unpose import unposed
 
 # Blender's importer leaves the file open.
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
@@ -146,25 +148,49 @@ def test_bvh_fbx_and_gltf_of_a_motion_give_the_same(
     other, others = load(path, frames)
     if suffix == "glb":
         other = replace(other, frames=clip.frames, rate=clip.rate)
-    # The FBX files were exported with keys thinned out: what they lost is not ours to find.
-    order = [other.skeleton.index[bone] for bone in clip.skeleton.names]
-    inches = positions(other)[:, order] / 0.0254
-    lost = np.abs(inches - positions(clip)).max()
-    assert lost < 4e-3 * height(base, landmarks)
-    tolerance = 1e-3 * height(base, landmarks) + (lost if suffix == "fbx" else 0.0)
+    size = height(base, landmarks)
+    # Two of the FBX files were exported with keys thinned out: between those that are left the body
+    # is up to 3.5e-3 of its height off, before anything is spliced. What splicing itself adds shows
+    # against the very motion of the file on the BVH's skeleton.
+    lost = np.abs(metres_to_inches(other, clip) - positions(clip)).max()
+    assert lost < 4e-3 * size
+    thinned = suffix == "fbx" and name != "walk"
+    assert (lost > 1e-3 * size) == thinned
+    same = on_skeleton_of(clip, other)
     for part in PARTS.values():
         for reach in REACHES:
             for travel in {False, part == LEGS}:
-                results = [
-                    spliced(
-                        base,
-                        landmarks,
-                        Splice(part, each, Timing(1, each.frames[0]), mark, reach, travel),
+                ours, theirs, exactly = (
+                    positions(
+                        spliced(
+                            base,
+                            landmarks,
+                            Splice(part, each, Timing(1, each.frames[0]), mark, reach, travel),
+                        )
                     )
-                    for each, mark in ((clip, marks), (other, others))
-                ]
-                error = np.abs(positions(results[0]) - positions(results[1])).max()
-                assert error < tolerance
+                    for each, mark in ((clip, marks), (other, others), (same, marks))
+                )
+                assert np.abs(theirs - exactly).max() < 1e-5 * size
+                assert np.abs(theirs - ours).max() < (lost if thinned else 1e-3 * size)
+
+
+def metres_to_inches(other: Clip, clip: Clip) -> Floats:
+    """Places of another file's bones, in the order and the units of the BVH's."""
+    order = [other.skeleton.index[bone] for bone in clip.skeleton.names]
+    return positions(other)[:, order] / 0.0254
+
+
+def on_skeleton_of(clip: Clip, other: Clip) -> Clip:
+    """The motion of another file of the same body, on this clip's skeleton."""
+    order = [other.skeleton.index[bone] for bone in clip.skeleton.names]
+    ours, theirs = clip.posed()[0], other.posed()[0][:, order]
+    # At the first frame, which all files have a key at, both are the same.
+    axes = multiply(conjugate(ours[0]), theirs[0])
+    turn = conjugate(from_matrix(clip.world[0, :3, :3] / clip.scale))
+    orientations = multiply(turn, multiply(theirs, conjugate(axes)))
+    heads = rotate(turn, metres_to_inches(other, clip) - clip.world[0, :3, 3]) / clip.scale
+    rotations, locations = unposed(clip.skeleton, orientations, heads)
+    return replace(clip, rotations=rotations, locations=locations)
 
 
 @pytest.mark.parametrize("base_name", ["secondlife/avatar_walk.bvh", "cmu/12_01_walk.bvh"])
