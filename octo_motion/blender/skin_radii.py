@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.rotations import Floats
 
-_MOST_VERTICES: Final = 20_000
+_MOST_VERTICES: Final = 6_000
 """Of more, only every second, third … is looked at."""
 _FEW: Final = 4
 """Vertices of a bone that do not yet tell its thickness."""

@@ -105,9 +105,15 @@ class ArmFrames:
             result[..., bone, :] = before
         return result
 
-    def joints(self, frames: Floats) -> Floats:
-        """Joints P₀ … Pₙ (…, bones + 1, 3) in armature space of an arm with these frames."""
-        steps = self.lengths[:, None] * rotate(frames, _ALONG)
+    def joints(self, frames: Floats, strains: Floats | None = None) -> Floats:
+        """Joints P₀ … Pₙ (…, bones + 1, 3) in armature space of an arm with these frames.
+
+        Args:
+            frames: (…, bones, 4)
+            strains: (…, bones) by how much bones are longer than at rest, as a share.
+        """
+        lengths = self.lengths if strains is None else self.lengths * (1.0 + strains)
+        steps = lengths[..., None] * rotate(frames, _ALONG)
         start = np.broadcast_to(self.root, (*steps.shape[:-2], 1, 3))
         return np.concatenate([start, self.root + np.cumsum(steps, axis=-2)], axis=-2)
 

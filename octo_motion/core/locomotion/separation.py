@@ -18,6 +18,8 @@ import numpy as np
 from ..rotations import Floats
 
 _TINY: Final = 1e-12
+_AT_ONCE: Final = 8_000_000
+"""Distances that are looked at in one go: some tens of megabytes."""
 _BUILT_SO: Final = 0.02
 """Share of the smaller radius by which capsules may overlap at rest and still count."""
 
@@ -109,18 +111,25 @@ def _near(
     middles = (0.5 * (starts + ends)).astype(np.float32)
     half = 0.5 * np.sqrt(np.max(np.sum((ends - starts) ** 2, axis=-1), axis=0))
     size = half + np.maximum(*radii)
-    # Squared distances of all from all by one matrix product; single precision and its rounding.
+    # Around its middle a scene's rounding in single precision is least.
+    middles -= middles.mean(axis=(0, 1))
     squares = np.einsum("fsi,fsi->fs", middles, middles)
-    products = np.matmul(middles, middles.transpose(0, 2, 1))
-    products *= -2.0
-    products += squares[:, :, None]
-    products += squares[:, None, :]
     limit = np.full((len(size), len(size)), -np.inf, dtype=np.float32)
     limit[one, other] = ((size[one] + size[other]) * (1.0 + 1e-4)) ** 2 + 1e-6 * squares.max()
     place = np.full(limit.shape, -1)
     place[one, other] = np.arange(len(one))
-    frame, row, column = np.nonzero(products <= limit)
-    return frame, place[row, column]
+    step = max(1, _AT_ONCE // limit.size)
+    found: list[tuple[np.ndarray, np.ndarray]] = []
+    for begin in range(0, len(middles), step):
+        part = slice(begin, begin + step)
+        # Squared distances of all from all by one matrix product.
+        products = np.matmul(middles[part], middles[part].transpose(0, 2, 1))
+        products *= -2.0
+        products += squares[part, :, None]
+        products += squares[part, None, :]
+        frame, row, column = np.nonzero(products <= limit)
+        found.append((frame + begin, place[row, column]))
+    return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 
 def _depths(

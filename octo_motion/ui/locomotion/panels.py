@@ -384,6 +384,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             column = layout.column(align=True)
             column.prop(settings, "key_angle", text="Tolerance Angle")
             column.prop(settings, "key_distance")
+        layout.prop(settings, "tell_overlaps")
         row = layout.row()
         row.scale_y = 1.5
         row.operator(OCTO_MOTION_OT_generate_locomotion.bl_idname, icon="PLAY", text="Generate")

@@ -27,6 +27,7 @@ from ...core.errors import GaitError
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import GaitSettings
 from ...core.locomotion.travel import TravelSettings
+from .apart import KeepingApart
 from .arm_properties import ArmItem
 from .gait_properties import (
     DEFAULT_GAIT,
@@ -75,7 +76,7 @@ def _make_weight_curve(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.
         )
 
 
-class OCTO_MOTION_PG_locomotion(Reaches, InPlace, bpy.types.PropertyGroup):
+class OCTO_MOTION_PG_locomotion(Reaches, InPlace, KeepingApart, bpy.types.PropertyGroup):
     """How an armature walks or swims along a route."""
 
     # --- The rig -------------------------------------------------------------------------------

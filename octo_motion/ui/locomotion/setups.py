@@ -45,6 +45,7 @@ APART: Final = frozenset(
             "active_reach",
             "cycles",
             "repeat",
+            "tell_overlaps",
             "body_front",
             "body_up",
             "root_bone",

@@ -38,6 +38,7 @@ from ...core.locomotion.travel import TravelSettings, duration, plan_travel, str
 from ...core.rotations import Floats, from_matrix, rotate
 from ...core.skeleton import Skeleton
 from ..plain import plain
+from .apart import Apart, read_apart
 from .arm_items import bones_of, write_arms, write_body
 from .in_place import breathing_channels
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
@@ -136,6 +137,8 @@ class Shot:
     breath: Sequence[actions.Channel]
     """Of the mantle."""
     extend_scene_range: bool
+    apart: Apart | None
+    """What tells whether arms overlap."""
     reaching: Reaching | None
     """What arms reach for."""
     note: str
@@ -148,6 +151,8 @@ class Shot:
     """(arms,) largest of each arm."""
     reached: tuple[str, ...] = ()
     """What arms that reach do."""
+    overlaps: tuple[str, ...] = ()
+    """Where arms pass through each other or the body."""
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
@@ -172,6 +177,9 @@ class Shot:
         if self.reaching is not None:
             travelling = Travelling(locations, orientations, self.scale)
             self.reached = self.reaching.apply(self.frames, rotations, travelling)
+        if self.apart is not None:
+            strains = np.zeros((count, bones))
+            self.overlaps = self.apart.told(rotations, strains, self.frames)
         self.rotations, self.misses = rotations, misses
         self.locations, self.orientations = locations, orientations
         yield 1.0
@@ -227,7 +235,7 @@ class Shot:
             miss=float(self.misses.max()),
             keys=keys,
             dense_keys=dense_keys,
-            warnings=(*self.warnings, *self._missed()),
+            warnings=(*self.warnings, *self._missed(), *self.overlaps),
             notes=(*notes, *self.reached),
         )
 
@@ -372,6 +380,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         repeats=in_place and settings.repeat,
         breath=breath,
         extend_scene_range=settings.extend_scene_range,
+        apart=read_apart(armature, skeleton, arms, body) if settings.tell_overlaps else None,
         reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
         note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
         # Detection has looked for constraints itself.

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether arms keep apart: from the rig and its skin to what is said of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty
+
+from ...blender.skin_radii import skin_radii
+from ...core.locomotion.arm_frames import ArmFrames, arm_frames
+from ...core.locomotion.chains import BodyFrame
+from ...core.locomotion.generator import Arm
+from ...core.locomotion.separation import Capsules, Separation, measure
+from ...core.rotations import Floats
+from ...core.skeleton import Skeleton
+from .gait_properties import OVERRIDE
+
+DEEP: Final = 0.1
+"""Share of a radius by which arms may overlap without a word: flesh gives."""
+
+_MOST_CAPSULES: Final = 16
+"""Of an arm; those of more bones are taken together."""
+_MOST_DISTANCES: Final = 60_000_000
+"""With more, of very many arms over very many frames, only every second, third … is measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """What it takes to measure how far arms keep apart; see :func:`read_apart`."""
+
+    arms: tuple[ArmFrames, ...]
+    names: tuple[str, ...]
+    radii: tuple[Floats, ...]
+    still: tuple[Capsules, ...]
+    """Of the body, one frame."""
+
+    def measure(self, rotations: Floats, strains: Floats) -> tuple[Separation, int]:
+        """What overlaps, and at every how many frames it was looked for.
+
+        Args:
+            rotations: (frames, bones, 4) of all arms, one after the other.
+            strains: (frames, bones) by how much bones are longer than at rest.
+        """
+        capsules = sum(min(len(arm.bones), _MOST_CAPSULES) for arm in self.arms) + len(self.still)
+        every = max(1, -(-len(rotations) * capsules * capsules // _MOST_DISTANCES))
+        looked = rotations[::every]
+        ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)])
+        chains: list[Capsules] = []
+        for number, arm in enumerate(self.arms):
+            columns = slice(int(ends[number]), int(ends[number + 1]))
+            own, longer = looked[:, columns], strains[::every, columns]
+            count = len(arm.bones)
+            some = np.unique(np.linspace(0, count, min(count, _MOST_CAPSULES) + 1).astype(int))
+            joints, rest = arm.joints(arm.from_bones(own), longer), arm.joints(arm.at_rest)
+            radii = self.radii[number][some]
+            chains.append(Capsules(self.names[number], joints[:, some], radii, rest[some]))
+        still = [
+            Capsules(each.name, np.tile(each.joints, (len(looked), 1, 1)), each.radii, each.at_rest)
+            for each in self.still
+        ]
+        return measure(chains, still), every
+
+    def told(self, rotations: Floats, strains: Floats, frames: Floats) -> tuple[str, ...]:
+        """A sentence on the deepest overlap, none if arms keep apart.
+
+        Args:
+            rotations: (frames, bones, 4) of all arms, one after the other.
+            strains: (frames, bones) by how much bones are longer than at rest.
+            frames: (frames,) their numbers in the scene.
+        """
+        found, every = self.measure(rotations, strains)
+        worst = found.worst
+        if worst is None or worst.depth <= DEEP:
+            return ()
+        share = 100.0 * float(np.mean(found.depths > DEEP))
+        told = (
+            f"'{worst.first}' passes through '{worst.second}' at frame "
+            f"{frames[worst.frame * every]:.0f}, by {worst.depth:.1f} of its radius; something "
+            f"overlaps at {share:.0f} % of the frames."
+        )
+        return (told,)
+
+
+class KeepingApart:
+    """What ``Object.octo_motion.locomotion`` has of it."""
+
+    tell_overlaps: BoolProperty(
+        name="Tell Overlaps",
+        description="After generating, say at which frame an arm passes deepest through another "
+        "or through the body, if by more than a tenth of its thickness",
+        default=True,
+        override=OVERRIDE,
+    )
+
+
+def read_apart(
+    armature: bpy.types.Object, skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame
+) -> Apart:
+    """The arms and the parts of the body as thick as their skin.
+
+    Args:
+        armature: the armature object.
+        skeleton: its bones.
+        arms: those that move.
+        body: which way it faces.
+    """
+    limbs = {bone for arm in arms for bone in arm.bones}
+    parts = [
+        name
+        for number, name in enumerate(skeleton.names)
+        if skeleton.deform[number]
+        and skeleton.weighted[number]
+        and not _hangs(skeleton, name, limbs)
+    ]
+    radii = skin_radii(armature, [*(arm.bones for arm in arms), *((name,) for name in parts)])
+    still: list[Capsules] = []
+    for name, own in zip(parts, radii[len(arms) :], strict=True):
+        number = skeleton.index[name]
+        ends = np.stack([skeleton.heads[number], skeleton.tails[number]])
+        still.append(Capsules(name, ends[None], own, ends))
+    return Apart(
+        arms=tuple(arm_frames(skeleton, arm.bones, body) for arm in arms),
+        names=tuple(arm.name for arm in arms),
+        radii=tuple(radii[: len(arms)]),
+        still=tuple(still),
+    )
+
+
+def _hangs(skeleton: Skeleton, name: str, limbs: set[str]) -> bool:
+    """Whether a bone is of an arm, or hangs on one."""
+    bone = skeleton.index[name]
+    while bone >= 0:
+        if skeleton.names[bone] in limbs:
+            return True
+        bone = skeleton.parents[bone]
+    return False
