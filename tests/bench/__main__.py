@@ -8,6 +8,7 @@ Blender's is the bake alone, without constraints and targets. Each measurement h
 its own.
 
 "splicing" as the first word measures the quality of splices instead; its own --help tells more.
+"device" measures how well the loop at the devices keeps time.
 """
 
 from __future__ import annotations
@@ -34,6 +35,11 @@ def main() -> None:
         from tests.bench import splicing
 
         splicing.main(sys.argv[2:])
+        return
+    if sys.argv[1:2] == ["device"]:
+        from tests.bench import device_loop
+
+        device_loop.main(sys.argv[2:])
         return
     arguments = _arguments()
     report: dict[str, Any] = {"machine": _machine(), "gait": arguments.gait}

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How well the loop at the devices keeps time while a hand bends a puppet of twenty bodies.
 
-python -m tests.bench.device_loop [SECONDS]
+make bench ARGS="device --seconds 60"
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from octo_motion.device import messages as say
 from octo_motion.device.client import Client
@@ -84,12 +87,14 @@ def table(measured: Measured) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
+def main(arguments: Sequence[str]) -> None:
     """Run the command line."""
-    measured = measure(float(sys.argv[1]) if len(sys.argv) > 1 else 20.0)
+    parser = argparse.ArgumentParser(prog="python -m tests.bench device", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=20.0, help="how long the hand holds")
+    parser.add_argument("--json", type=Path, help="file to write all numbers to")
+    options = parser.parse_args(arguments)
+    measured = measure(options.seconds)
     print(table(measured))
-    print(json.dumps(asdict(measured)))
-
-
-if __name__ == "__main__":
-    main()
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(asdict(measured), indent=1) + "\n", encoding="utf-8")
