@@ -78,9 +78,13 @@ def measure(times: Floats, torques: Floats, angles: Floats) -> Measured:
     guesses = [_guess(t, load, angle, share) for share in np.linspace(0.02, 1.0, _SPLITS)]
     scored = sorted(((_error(t, load, angle, guess), guess) for guess in guesses), key=_first)
     error, best = min((_refined(t, load, angle, guess) for guess in scored[:_TRIED]), key=_first)
-    stiffness, damping, flow, limit = np.exp(best)
+    # What a joint that never yields explains as well needs no flow.
     peak = float(np.abs(load).max())
-    if limit >= 0.999 * peak:
+    firm = _guess(t, load, angle, 2.0)
+    firm_error, firm = _refined(t, load, angle, (_error(t, load, angle, firm), firm))
+    stiffness, damping, flow, limit = np.exp(best)
+    if firm_error <= 1.03 * error or limit >= 0.999 * peak:
+        error, (stiffness, damping) = firm_error, np.exp(firm[:2])
         flow = limit = np.inf
     return Measured(float(stiffness), float(damping), float(flow), float(limit), error)
 

@@ -82,7 +82,8 @@ class PlasticLaw:
         if not self.can_flow:
             return Response(load, self.diagonal, None)
         size = np.sqrt((load * load) @ _ONES)
-        flows = size > self.yield_torque
+        # With a threshold of 0 it flows even at rest: there its law is linear.
+        flows = size >= self.yield_torque
         if not flows.any():
             return Response(load, self.diagonal, None)
         toward = load / (size + _TINY)[..., None]

@@ -54,7 +54,7 @@ MATERIALS: Final[Mapping[str, Material]] = MappingProxyType(
         # Bends by its own weight and always comes back.
         "rubber": Material(bears=np.inf, springs=np.radians(20.0), settles=0.15, gives=0.0),
         # Bears nothing; a little resistance, so that it does not swing for ever.
-        "limp": Material(bears=np.inf, springs=np.inf, settles=0.02, gives=0.0),
+        "limp": Material(bears=np.inf, springs=np.inf, settles=0.15, gives=0.0),
     }
 )
 

@@ -108,7 +108,8 @@ class Rows:
         self.holds = holds
         count = len(contacts)
         self._slack = slack
-        self._rates = np.maximum(contacts.gaps, -slack) / step
+        self.rates = np.maximum(contacts.gaps, -slack) / step
+        """(contacts,) g/h."""
         if holds is None:
             self.bodies = contacts.bodies
             self.others = contacts.others
@@ -119,6 +120,8 @@ class Rows:
             self.others = np.concatenate([contacts.others, np.full(len(holds), -1)])
             points = np.concatenate([contacts.points, holds.points]) - origin
             self.targets = np.concatenate([contacts.speeds, np.zeros((len(holds), 3))])
+        self.places = points
+        """(rows, 3) of their points, from the origin."""
         size = len(self.bodies)
         self.reach = np.empty((size, 3, 6))
         """(rows, 3, 6) from a spatial velocity to that of the point or turn."""
@@ -167,7 +170,7 @@ class Rows:
             normals, friction = self.contacts.normals, self.contacts.friction
             w = speeds[:count] if holds is not None else speeds
             into = (w * normals) @ _ONES
-            push = self.gains * (-self._rates - into)
+            push = self.gains * (-self.rates - into)
             pull = self.gains[:, None] * (into[:, None] * normals - w)
             if self.grips is not None:
                 pull += self.grips
