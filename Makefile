@@ -6,7 +6,7 @@
 WITH_BPY = python=$$(.ci/venv bpy-5.2 bpy-4.5) && export PYTHONPATH=. &&
 WITH_LINT = python=$$(.ci/venv lint) && bin=$${python%/*} &&
 
-.PHONY: help test lint demo bench build pictures experiment clean
+.PHONY: help test lint demo bench build pictures experiment setups clean
 
 help: ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
@@ -34,6 +34,9 @@ pictures: ## render the pictures of the documentation anew
 
 experiment: ## splice a throw and a punch onto a walk at two timings and draw it; ARGS=FOLDER for clips of your own
 	@$(WITH_BPY) $$python .ci/check_rendering.py && $$python docs/studio/experiment.py $(ARGS)
+
+setups: ## show every set-up on bumpy ground in build/setups; ARGS=--film for videos too
+	@$(WITH_BPY) $$python .ci/check_rendering.py && $$python docs/studio/setups.py $(ARGS)
 
 clean: ## delete what was built; delete .venv as well to set up anew
 	rm -rf build dist .ruff_cache .import_linter_cache

@@ -34,8 +34,16 @@ def state(settings: Any) -> dict[str, Any]:
     return {**values, "gait": gait.to_json(read_gait(settings))}
 
 
-def test_there_is_a_way_to_walk_and_one_to_swim() -> None:
-    assert {"walk", "swim"} <= set(SHIPPED)
+def test_there_are_ways_to_walk_run_sneak_crawl_rest_swim_and_flee() -> None:
+    assert set(SHIPPED) == set(setups.ORDER)
+    assert list(setups.setup_paths())[: len(SHIPPED)] == list(setups.ORDER)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_button_of_a_setup_shows_a_picture_of_it(name: str) -> None:
+    header = setups.setup_paths()[name].with_suffix(".png").read_bytes()[:24]
+    assert header[:8] == b"\x89PNG\r\n\x1a\n"
+    assert int.from_bytes(header[16:20]) == int.from_bytes(header[20:24]) >= 128
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The source's walk, standing on several arms: all that the settings start with.
+# A wave of steps runs over the arms.
 import bpy
 
 active = bpy.context.object

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Show every set-up that comes with the add-on: a sheet, a video and a picture for its button.
+
+Those that go over the ground go over bumps of 0.3 arm lengths.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from pathlib import Path
+from typing import Final
+
+import bpy
+import contact_sheet
+import film
+import numpy as np
+import shots
+import stage
+from mathutils import Vector
+from stage import Pixels, Points
+
+import octo_motion
+from octo_motion.ui.locomotion import setups as ours
+
+BUMPS: Final = 0.3
+"""Height of the bumps from valley to top, in arm lengths."""
+_WAVES: Final = (1.4, 1.2)
+"""Arm lengths from one bump to the next along X and Y."""
+_FINE: Final = 0.04
+"""Arm lengths between the points of the ground."""
+_ROUTE: Final = ((-1.1, 0.35, 0.0), (-0.4, -0.45, 0.0), (0.3, 0.5, 0.0), (1.1, 0.0, 0.0))
+_RISING: Final = ((-3.6, 0.6, 0.9), (-1.2, -1.5, 0.6), (0.9, 1.8, 1.8), (3.6, 0.3, 2.0))
+_THUMBNAIL: Final = 160
+_BACKGROUND: Final = (0.06, 0.06, 0.065)
+
+
+def main() -> None:
+    """Make what is asked for."""
+    names = list(ours.ORDER)
+    parser = argparse.ArgumentParser(prog="make setups", description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(names)}; all if none is named")
+    parser.add_argument("--folder", type=Path, default=Path("build/setups"), help="where they go")
+    parser.add_argument("--film", action="store_true", help="videos as well")
+    parser.add_argument(
+        "--thumbnails", action="store_true", help="only the pictures of the buttons, in their place"
+    )
+    arguments = parser.parse_args()
+    if unknown := set(arguments.names) - set(names):
+        parser.error(f"there is no set-up '{unknown.pop()}'")
+    folder = arguments.folder.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    # Blender tells of everything that it does; here only the pictures matter.
+    told = os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    octo_motion.register()
+    try:
+        for name in arguments.names or names:
+            start = time.perf_counter()
+            performance = perform(name)
+            if arguments.thumbnails:
+                path = ours.setup_paths()[name].with_suffix(".png")
+                stage.save_pixels(_thumbnail(performance), path)
+            else:
+                path = folder / f"{name}.png"
+                stage.save_pixels(_sheet(performance), path)
+                if arguments.film:
+                    film.render_film(path.with_suffix(".mp4"), (640, 360))
+            print(f"{path}  {time.perf_counter() - start:.0f} s", file=told, flush=True)
+    finally:
+        # Blender 4.5 does not end while an operator is registered.
+        octo_motion.unregister()
+
+
+def perform(name: str) -> shots.Performance:
+    """Start from an empty file: an octopus that moves as the set-up says."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = stage.the_scene()
+    scene.render.fps = shots.RATE
+    bpy.ops.octo_motion.add_octopus()
+    octopus = bpy.context.object
+    assert octopus is not None
+    bpy.ops.octo_motion.detect_arms()
+    settings = octopus.octo_motion.locomotion
+    bpy.ops.octo_motion.setup_load(name=name)
+    swims = settings.table.manner == "SWIM"
+    route = _RISING if swims else _ROUTE
+    bpy.ops.octo_motion.add_route(**dict(zip(("b0", "b1", "b2", "b3"), route, strict=True)))
+    scene.frame_end = 1
+    if not swims:
+        settings.ground.object = add_bumps(np.array(route), _arm_length(octopus))
+    bpy.ops.octo_motion.generate_locomotion()
+    octopus.show_in_front = False
+    points = stage.skin_points(octopus, range(scene.frame_start, scene.frame_end + 1, 4))
+    stage.set_light(scene)
+    if swims:
+        stage.add_ground(points, float(points[..., 2].min()) - 0.25)
+    camera = stage.add_camera("Camera", lens=50.0)
+    stage.look(camera, np.array((-0.35, 0.9, -0.45)), np.array([0.0, 0.0, 1.0]))
+    stage.set_resolution(640, 360)
+    stage.frame_points(camera, points)
+    scene.frame_set(scene.frame_start)
+    shot = shots.Shot(settings.gait, route, (-0.35, 0.9, -0.45), None)
+    return shots.Performance(shot, octopus, settings.route, points)
+
+
+def _arm_length(octopus: bpy.types.Object) -> float:
+    assert isinstance(octopus.data, bpy.types.Armature)
+    arm = octopus.octo_motion.locomotion.arms[0]
+    return float(sum(octopus.data.bones[bone.name].length for bone in arm.bones))
+
+
+def add_bumps(points: Points, unit: float, height: float = BUMPS) -> bpy.types.Object:
+    """A tiled ground of gentle bumps under points (…, 3); lengths in arm lengths.
+
+    Args:
+        points: what it reaches beneath.
+        unit: metres that an arm is long.
+        height: of the bumps.
+    """
+    flat = points.reshape(-1, 3)[:, :2]
+    low, high = flat.min(axis=0) - 3.0 * unit, flat.max(axis=0) + 3.0 * unit
+    x, y = (np.arange(a, b, _FINE * unit) for a, b in zip(low, high, strict=True))
+    across, along = np.meshgrid(x, y, indexing="ij")
+    turns = 2.0 * np.pi / unit
+    waves = np.sin(turns * across / _WAVES[0]) * np.cos(turns * along / _WAVES[1])
+    vertices = np.stack([across, along, 0.5 * height * unit * waves], axis=-1).reshape(-1, 3)
+    corner = np.arange(len(vertices)).reshape(across.shape)
+    faces = np.stack(
+        [corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1
+    ).reshape(-1, 4)
+    mesh = bpy.data.meshes.new("Bumps")
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+    for colour in ((0.50, 0.43, 0.31), (0.44, 0.375, 0.27)):
+        mesh.materials.append(stage.new_material("Bumps", colour))
+    tiles = [np.floor(each[:-1, :-1] / (0.25 * unit)) for each in (across, along)]
+    chosen = (np.add(*tiles) % 2).astype(np.int32).ravel()
+    mesh.polygons.foreach_set("material_index", chosen)
+    mesh.shade_smooth()
+    ground = bpy.data.objects.new("Bumps", mesh)
+    stage.the_scene().collection.objects.link(ground)
+    return ground
+
+
+def _sheet(performance: shots.Performance) -> Pixels:
+    rows = [
+        contact_sheet.cycle_pixels(performance, view)
+        for view in (contact_sheet.SIDE, contact_sheet.ABOVE)
+    ]
+    return np.concatenate(rows, axis=0)
+
+
+def _thumbnail(performance: shots.Performance) -> Pixels:
+    """One telling moment, from the side and a little above, on a plain background."""
+    octopus = performance.octopus
+    for each in list(bpy.data.objects):
+        if each.name.startswith(("Bumps", "Ground", "Route")):
+            each.hide_render = True
+    assert bpy.context.scene is not None
+    assert bpy.context.scene.world is not None
+    bpy.context.scene.world.color = _BACKGROUND
+    frame = performance.cycle(8)[3]
+    (points,) = stage.skin_points(octopus, [frame])
+    (after,) = stage.skin_points(octopus, [frame + 2.0])
+    stage.go_to(frame)
+    travel = (after - points).mean(axis=0)
+    travel[2] = 0.0
+    travel /= max(float(np.linalg.norm(travel)), 1e-9)
+    side = np.array([-travel[1], travel[0], 0.0])
+    forward = 0.85 * side - 0.35 * travel - np.array([0.0, 0.0, 0.4])
+    camera = stage.add_camera("Thumbnail")
+    stage.look(camera, forward, np.array([0.0, 0.0, 1.0]))
+    axes = np.array(camera.matrix_world.to_3x3())
+    seen = points @ axes
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    assert isinstance(camera.data, bpy.types.Camera)
+    camera.data.ortho_scale = 1.1 * float((high - low)[:2].max())
+    middle = 0.5 * (low + high)
+    middle[2] = high[2] + 1.0
+    camera.location = Vector(axes @ middle)
+    bpy.context.view_layer.update()
+    return stage.render_pixels(_THUMBNAIL, _THUMBNAIL)
+
+
+if __name__ == "__main__":
+    main()

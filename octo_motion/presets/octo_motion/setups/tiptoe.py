@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# On the two rear arms, the others curled up.
+import bpy
+
+active = bpy.context.object
+armature = active if active.type == "ARMATURE" else active.find_armature()
+settings = armature.octo_motion.locomotion
+
+settings.gait = "tiptoe"
+settings.cycle_time = 1.2
+settings.ground.duty = 0.6
+settings.ground.planted = 0.3
+settings.ground.lift = 0.05
+settings.ground.lean = 0.2
