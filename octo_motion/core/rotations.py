@@ -178,11 +178,23 @@ def from_euler(angles: ArrayLike, order: str) -> Floats:
 
     As in Blender, the first letter is the axis that is turned about first.
     """
-    turns = np.asarray(angles, dtype=np.float64)
-    result = np.broadcast_to(IDENTITY, (*turns.shape[:-1], 4))
-    for letter in order:
-        axis = "XYZ".index(letter)
-        result = multiply(from_axis_angle(np.eye(3)[axis], turns[..., axis]), result)
+    half = 0.5 * np.asarray(angles, dtype=np.float64)
+    i, j, k = ("XYZ".index(letter) for letter in order)
+    # The product of three turns about the axes, written out. An odd order is an even one seen in a
+    # mirror, where all turns go backwards.
+    mirror = 1.0 if (j - i) % 3 == 1 else -1.0
+    cosine, sine = np.cos(half), np.sin(half)
+    (ci, cj, ck), (si, sj, sk) = (
+        (each[..., i], each[..., j], each[..., k]) for each in (cosine, sine)
+    )
+    sk_mirrored = mirror * sk
+    both, crossed = cj * ci, sj * si
+    one, other = cj * si, sj * ci
+    result = np.empty((*half.shape[:-1], 4))
+    result[..., 0] = ck * both + sk_mirrored * crossed
+    result[..., 1 + i] = ck * one - sk_mirrored * other
+    result[..., 1 + j] = ck * other + sk_mirrored * one
+    result[..., 1 + k] = sk * both - mirror * ck * crossed
     return result
 
 

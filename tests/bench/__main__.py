@@ -4,8 +4,8 @@
 Both animate the same rig to the same pseudo-targets over the same frames, twice: the bones alone,
 where Blender bakes rotations only, and the octopus with its skin, where it bakes all that it does
 by default. Ours is timed from the operator's call to the action on the armature, travel included;
-Blender's is the bake alone, without constraints and targets. Each measurement has a process of
-its own.
+Blender's is the bake alone, without constraints and targets. Then how fast splices are built. Each measurement
+has a process of its own.
 
 "splicing" as the first word measures the quality of splices instead; its own --help tells more.
 "device" measures how well the loop at the devices keeps time.
@@ -22,6 +22,8 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any
+
+from tests.bench import splice_speed
 
 Measured = dict[str, Any]
 
@@ -52,6 +54,8 @@ def main() -> None:
     if not arguments.short:
         report["frames"] = _by_frames(arguments)
         report["arms"] = _by_arms(arguments)
+        print()
+        report["splices"] = splice_speed.tables(arguments.repeat)
     if arguments.json:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
