@@ -4,8 +4,8 @@
 Both animate the same rig to the same pseudo-targets over the same frames, twice: the bones alone,
 where Blender bakes rotations only, and the octopus with its skin, where it bakes all that it does
 by default. Ours is timed from the operator's call to the action on the armature, travel included;
-Blender's is the bake alone, without constraints and targets. Then how fast splices are built. Each measurement
-has a process of its own.
+Blender's is the bake alone, without constraints and targets. Then how fast splices are built. Each
+measurement has a process of its own.
 
 "splicing" as the first word measures the quality of splices instead; its own --help tells more.
 "device" measures how well the loop at the devices keeps time.
