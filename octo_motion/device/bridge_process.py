@@ -128,10 +128,10 @@ class Bridge:
                 self._place(message)
             case Pins():
                 if simulation is not None:
-                    pinned = frozenset(i for i, pin in enumerate(message.pinned) if pin)
-                    if pinned and max(pinned) >= len(simulation.world.figure):
+                    pins = {body: pin > 1 for body, pin in enumerate(message.pinned) if pin}
+                    if pins and max(pins) >= len(simulation.world.figure):
                         raise MessageError("a pin on a body that does not exist")
-                    simulation.pin(pinned)
+                    simulation.pin(pins)
             case WorldMessage():
                 self._world = message.settings()
                 if simulation is not None:

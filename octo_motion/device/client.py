@@ -69,6 +69,7 @@ class Client:
     _arguments: tuple[str, ...] = ()
     _python: Path | None = None
     _figure: tuple[Figure, Pose] | None = None
+    _pins: dict[int, bool] = field(default_factory=dict[int, bool])
 
     def start(
         self,
@@ -106,6 +107,7 @@ class Client:
         if self._figure is not None:
             figure, pose = self._figure
             self.send_figure(figure, self.pose or pose)
+            self.send_pins(self._pins)
 
     def stop(self) -> None:
         """End the bridge, if there is one; hands let go at once."""
@@ -139,9 +141,15 @@ class Client:
         self.pose = pose
         self.send(Place(pose.positions, pose.orientations))
 
-    def send_pins(self, figure: Figure, pinned: frozenset[int]) -> None:
-        """Pin these bodies where they are, and no others."""
-        self.send(Pins(tuple(body in pinned for body in range(len(figure)))))
+    def send_pins(self, pins: dict[int, bool]) -> None:
+        """Pin these bodies where they are, and no others.
+
+        Args:
+            pins: By body, whether its orientation is held as well.
+        """
+        self._pins = dict(pins)
+        count = len(self._figure[0]) if self._figure else 0
+        self.send(Pins(tuple(1 + pins[body] if body in pins else 0 for body in range(count))))
 
     def send_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
         """Add or move something solid; None takes it away."""

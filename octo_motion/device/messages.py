@@ -154,7 +154,8 @@ class Pins(Message):
     """Blender to bridge: which bodies stay where they are."""
 
     KIND = 5
-    pinned: Annotated[tuple[bool, ...], Many(FLAG, 4096)]
+    pinned: Annotated[tuple[int, ...], Many(U8, 4096)]
+    """For each body 0: free, 1: its joint stays in its place, 2: and it does not turn."""
 
 
 @dataclass(frozen=True)

@@ -175,7 +175,15 @@ class Parent:
     """Whoever started this process; when it is gone, so are we."""
 
     def __init__(self) -> None:
-        self.secret = bytes.fromhex(sys.stdin.buffer.readline().decode("ascii").strip())
+        # Not through sys.stdin: Python cannot end while a thread waits within its buffer.
+        self._input = sys.stdin.fileno()
+        line = b""
+        while not line.endswith(b"\n") and len(line) < 100:
+            byte = os.read(self._input, 1)
+            if not byte:
+                break
+            line += byte
+        self.secret = bytes.fromhex(line.decode("ascii", "replace").strip())
         if len(self.secret) != 32:
             raise ValueError("a secret has 32 bytes")
         self.gone = False
@@ -183,8 +191,8 @@ class Parent:
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
-        with contextlib.suppress(OSError, ValueError):
-            while sys.stdin.buffer.read(4096):
+        with contextlib.suppress(OSError):
+            while os.read(self._input, 4096):
                 pass
         self.gone = True
 

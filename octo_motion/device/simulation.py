@@ -81,6 +81,7 @@ class Simulation:
         self._clock = clock
         self._calm = 0.0
         self._obstacles: dict[int, Obstacle] = {}
+        self._pins: dict[int, bool] = {}
 
     @property
     def resting(self) -> bool:
@@ -99,20 +100,26 @@ class Simulation:
         for hand in self.hands.values():
             self._release(hand)
         self.world.set_pose(pose)
-        self._pin_again(self.world.pinned)
+        self._pin_again()
         self._wake()
 
-    def pin(self, pinned: frozenset[int]) -> None:
-        """Pin these bodies where they are, and no others."""
-        for body in self.world.pinned - pinned:
+    def pin(self, pins: dict[int, bool]) -> None:
+        """Pin these bodies where they are, and no others.
+
+        Args:
+            pins: By body, whether its orientation is held as well.
+        """
+        for body in self.world.pinned - pins.keys():
             self.world.unpin(body)
-        for body in sorted(pinned - self.world.pinned):
-            self.world.pin(body)
+        for body, firm in sorted(pins.items()):
+            if body not in self.world.pinned or self._pins.get(body) != firm:
+                self.world.pin(body, firm=firm)
+        self._pins = dict(pins)
         self._wake()
 
-    def _pin_again(self, pinned: frozenset[int]) -> None:
-        for body in sorted(pinned):
-            self.world.pin(body)
+    def _pin_again(self) -> None:
+        for body, firm in sorted(self._pins.items()):
+            self.world.pin(body, firm=firm)
 
     def put_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
         """Add, move or take away something solid."""
@@ -295,7 +302,7 @@ class Simulation:
             *(old.figure, old.pose(), replace(settings, pinned=frozenset()), old.obstacles)
         )
         self.world.restore(old.state())
-        self._pin_again(old.pinned)
+        self._pin_again()
         for hand in self.hands.values():
             if hand.handle is not None:
                 held = hand.handle

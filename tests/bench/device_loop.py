@@ -41,7 +41,7 @@ def measure(seconds: float) -> Measured:
     client.start(("--simulate", "--no-haply", "--no-hid"))
     try:
         client.send_figure(figure, pose)
-        client.send_pins(figure, frozenset({0}))
+        client.send_pins({0: False})
         while not client.devices:
             client.poll()
             time.sleep(0.01)

@@ -36,7 +36,7 @@ def holding(client: Client) -> None:
     """Start a bridge whose simulated hand holds the tip of a puppet."""
     client.start(OPTIONS)
     client.send_figure(FIGURE, POSE)
-    client.send_pins(FIGURE, frozenset({0}))
+    client.send_pins({0: False})
     wait_for(client, lambda: client.devices, "the hand is there")
     x, y, z = map(float, POSE.positions[2] + [0.0, 0.15, 0.0])
     client.send(say.Workspace(0, (x, y, z)))

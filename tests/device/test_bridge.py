@@ -90,7 +90,7 @@ def test_puppet_can_be_put_pinned_and_stood_on_the_ground(client: Client) -> Non
         "it lies on the ground",
     )
     client.send_pose(POSE)
-    client.send_pins(FIGURE, frozenset({0, 1, 2}))
+    client.send_pins({0: True, 1: True, 2: True})
     wait_for(
         client, lambda: client.pose and abs(client.pose.positions[0, 2]) < 0.05, "it is put back"
     )
@@ -102,7 +102,7 @@ def test_nonsense_is_answered_with_a_notice_and_nothing_breaks(client: Client) -
     wait_for(client, lambda: client.notices, "the bridge complains")
     assert "a pose came before a figure" in client.notices.pop().problem
     client.send_figure(FIGURE, POSE)
-    client.send(say.Pins((True,) * 50))
+    client.send(say.Pins((1,) * 50))
     wait_for(client, lambda: client.notices, "the bridge complains")
     assert "does not exist" in client.notices.pop().problem
     client.send(say.Settings(dead_zone=(2.0,) * 6))  # pyright: ignore[reportArgumentType]

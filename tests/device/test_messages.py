@@ -30,7 +30,7 @@ EXAMPLES: list[say.Message] = [
     say.FigureMessage.of(FIGURE),
     say.Place(POSE.positions, POSE.orientations),
     say.PoseMessage(7, 0.014, POSE.positions, POSE.orientations),
-    say.Pins((True, False, True)),
+    say.Pins((1, 0, 2)),
     say.Grab(1, grab=True),
     say.Settings(force=0.5, toggle=True),
     say.Workspace(1, V, Q, 2.0),

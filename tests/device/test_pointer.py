@@ -257,7 +257,7 @@ class Bench:
             settings=WorldSettings(step=every * PERIOD),
             clock=lambda: 0.0,
         )
-        self.simulation.pin(frozenset({0}))
+        self.simulation.pin({0: False})
         self.now = 0.0
         self.hand = Hand(tremor=0.0)
         self.driver = SimulatedHand(self.hand, clock=lambda: self.now)

@@ -6,6 +6,7 @@ The kernel makes them (/dev/uhid) and hidapi finds them as it would find any oth
 
 from __future__ import annotations
 
+import os
 import struct
 import threading
 import time
@@ -33,10 +34,10 @@ pytestmark = pytest.mark.skipif(not uhid.available(), reason=uhid.WHY_NOT)
 
 SECRET = bytes(32)
 HID_ALONE = Sources(haply=False)
-OPTIONS = ("--no-haply", "--rate", "100")
+OPTIONS = ("--no-haply", "--rate", "50")
 """An emulated machine with one processor is no place for 1 kHz."""
 DYNAMICS = Dynamics(8.0, 0.4, 0.5, 0.0012)
-PATIENCE = 60.0
+PATIENCE = 100.0
 """s: of a machine that is emulated; on a real one each wait is over at once."""
 
 
@@ -72,11 +73,16 @@ def force_device(plug: Callable[..., uhid.VirtualDevice]) -> uhid.VirtualDevice:
     return plug("Octo hand", 0x1209, 0x0001, profile.report_descriptor(), features=features)
 
 
-def wait_for(what: Callable[[], object], why: str, seconds: float = PATIENCE) -> None:
-    end = time.monotonic() + seconds
+def wait_for(what: Callable[[], object], why: str, pause: float = 0.002) -> None:
+    end = time.monotonic() + PATIENCE
     while not what():
         assert time.monotonic() < end, f"waited in vain: {why}"
-        time.sleep(0.005)
+        time.sleep(pause)
+
+
+def wait_beside(what: Callable[[], object], why: str) -> None:
+    """Wait, and leave an only processor to the processes that are waited for."""
+    wait_for(what, why, 0.005 if (os.cpu_count() or 1) > 1 else 0.03)
 
 
 def found_by(discovery: Discovery) -> Driver:
@@ -224,10 +230,16 @@ class Loop:
         self.there = connect(listener.port, SECRET)
         thread.join()
         assert got[0]
+        self._here = got[0]
         schedule = Schedule(0.001)
-        self.loop = HandLoop(got[0], Discovery(HID_ALONE), schedule, 0.001)
+        self.loop = HandLoop(self._here, Discovery(HID_ALONE), schedule, 0.001)
         self.devices: list[say.DeviceMessage] = []
         self.hand: say.HandMessage | None = None
+
+    def close(self) -> None:
+        self.loop.close()
+        self._here.close()
+        self.there.close()
 
     def tick(self) -> None:
         now = time.perf_counter()
@@ -290,8 +302,7 @@ def test_force_is_reported_in_mid_grab_ends_with_the_plug_and_begins_anew(
     wait_for(ticking(lambda: loop.hand and loop.hand.grab), "it grabs again")
     hand.position = (0.004, 0.0, 0.0)
     wait_for(ticking(feels), "the hand feels it again")
-    loop.loop.close()
-    loop.there.close()
+    loop.close()
     assert not hand.last_command().enabled
 
 
@@ -304,7 +315,7 @@ def test_force_device_bends_a_puppet_until_it_is_unplugged_in_mid_grab(
     client.start(OPTIONS)
     client.send(say.WorldMessage(step=4e-3))
     client.send_figure(figure, pose)
-    client.send_pins(figure, frozenset({0}))
+    client.send_pins({0: False})
 
     def polled(what: Callable[[], object]) -> Callable[[], object]:
         def look() -> object:
@@ -329,18 +340,18 @@ def test_force_device_bends_a_puppet_until_it_is_unplugged_in_mid_grab(
             hand.position = (0.04, 0.0, 0.04)
         return bent(client, pose.orientations) > 0.02
 
-    wait_for(polled(lambda: client.devices), "the device is found")
+    wait_beside(polled(lambda: client.devices), "the device is found")
     tip = pose.positions[2] + [0.0, 0.15, 0.0]
     x, y, z = map(float, tip)
     client.send(say.Workspace(0, (x, y, z)))
-    wait_for(
+    wait_beside(
         polled(lambda: 0 in client.pointers and client.pointers[0].position == (x, y, z)),
         "the pointer is at the tip",
     )
-    wait_for(polled(bends), "the puppet bends")
+    wait_beside(polled(bends), "the puppet bends")
     assert client.times
     if client.times.step < 0.008:
-        wait_for(
+        wait_beside(
             polled(lambda: any(np.linalg.norm(each.force) > 0.2 for each in hand.forces())),
             "the hand feels it",
         )
@@ -359,9 +370,9 @@ def test_force_device_bends_a_puppet_until_it_is_unplugged_in_mid_grab(
     assert kept > 0.01, "the pose stays"
 
     hand = Hand(force_device(plug))
-    wait_for(polled(lambda: client.devices), "the device is found again")
+    wait_beside(polled(lambda: client.devices), "the device is found again")
     assert set(client.devices) == {0}, "it is the same pointer as before"
-    wait_for(polled(lambda: 0 in client.pointers), "the pointer is back")
+    wait_beside(polled(lambda: 0 in client.pointers), "the pointer is back")
     assert client.pointers[0].body == -1, "nothing is held until it is grabbed again"
     assert not any(each.enabled for each in hand.forces())
 
@@ -375,7 +386,7 @@ def test_space_mouse_bends_a_puppet(
     client.start(OPTIONS)
     client.send(say.WorldMessage(step=4e-3))
     client.send_figure(figure, pose)
-    client.send_pins(figure, frozenset({0}))
+    client.send_pins({0: False})
     push = struct.pack("<B3h", 1, 0, 0, 0)
 
     def polled(what: Callable[[], object]) -> Callable[[], object]:
@@ -386,11 +397,11 @@ def test_space_mouse_bends_a_puppet(
 
         return look
 
-    wait_for(polled(lambda: client.devices), "the device is found")
+    wait_beside(polled(lambda: client.devices), "the device is found")
     x, y, z = map(float, pose.positions[2] + [0.0, 0.15, 0.0])
     client.send(say.Workspace(0, (x, y, z)))
     device.report(b"\x03\x01\0\0\0")
-    wait_for(
+    wait_beside(
         polled(lambda: 0 in client.pointers and client.pointers[0].body == 2), "the tip is held"
     )
     push = struct.pack("<B3h", 1, 100, 0, -100)
@@ -404,6 +415,6 @@ def test_space_mouse_bends_a_puppet(
         return bent(client, pose.orientations) > 0.02
 
     pressed = 1
-    wait_for(polled(bends), "the puppet bends")
+    wait_beside(polled(bends), "the puppet bends")
     device.report(b"\x03\0\0\0\0")
-    wait_for(polled(lambda: client.pointers[0].body == -1), "the tip is let go")
+    wait_beside(polled(lambda: client.pointers[0].body == -1), "the tip is let go")
