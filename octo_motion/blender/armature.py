@@ -16,7 +16,8 @@ SUCKER_PROPERTY = "octo_motion_sucker"
 
 
 def active_armature(context: bpy.types.Context) -> bpy.types.Object:
-    """The armature that the user works on: the active object, or the one that deforms it.
+    """The armature that the user works on: the active object, the one that deforms it, or the one
+    whose contact the active object marks.
 
     Raises:
         RigError: there is no such object.
@@ -26,10 +27,17 @@ def active_armature(context: bpy.types.Context) -> bpy.types.Object:
         raise RigError("No object is active.", "Select an armature.")
     if active.type == "ARMATURE":
         return active
-    armature = active.find_armature()
+    armature = active.find_armature() or _marked_armature(active)
     if armature is None:
         raise RigError(f"'{active.name}' is not an armature.", "Select an armature.")
     return armature
+
+
+def _marked_armature(active: bpy.types.Object) -> bpy.types.Object | None:
+    """The armature that a marker of a contact belongs to."""
+    name = active.octo_motion.contact.armature  # type: ignore[attr-defined]
+    found = bpy.data.objects.get(name) if name else None
+    return found if found is not None and found.type == "ARMATURE" else None
 
 
 def armature_data(armature: bpy.types.Object) -> bpy.types.Armature:

@@ -23,6 +23,7 @@ from ..core.locomotion.octopus_rig import (
 from ..core.locomotion.octopus_shape import OctopusShape
 from ..core.locomotion.octopus_surface import Material, OctopusMesh
 from .armature import SUCKER_PROPERTY
+from .stretching import ALIGNED
 
 _NAME: Final = "Octopus"
 _Colour = tuple[float, float, float]
@@ -117,6 +118,8 @@ def _write_bones(data: bpy.types.Armature, bones: OctopusBones) -> None:
     data.edit_bones.foreach_set("use_deform", bones.deform)
     for bone in made[FIRST_ARM_BONE:]:
         bone[SUCKER_PROPERTY] = SUCKER_AXIS
+        # So that bones can stretch one by one, and yet grow with a body that is scaled.
+        bone.inherit_scale = ALIGNED
     names = dict.fromkeys(bones.collections)
     collections = {name: data.collections.new(name) for name in names}
     for bone, name, pair in zip(made, bones.collections, bones.pairs, strict=True):

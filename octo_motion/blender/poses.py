@@ -9,12 +9,16 @@ from typing import Final
 import bpy
 import numpy as np
 
+SCALE: Final = ("scale",)
+"""Channels of a bone that stretches."""
 _STILL: Final = 0.01
 """Bone lengths, radians and factors by which a bone may be off its rest pose unnoticed."""
 
 
-def animated_bones(action: bpy.types.Action) -> set[str]:
-    """Names of the bones whose location or rotation the action keys."""
+def animated_bones(
+    action: bpy.types.Action, channels: tuple[str, ...] = ("location", "rotation_")
+) -> set[str]:
+    """Names of the bones whose channels of these kinds the action keys."""
     names: set[str] = set()
     for layer in action.layers:
         for strip in layer.strips:
@@ -24,7 +28,7 @@ def animated_bones(action: bpy.types.Action) -> set[str]:
                 for curve in channelbag.fcurves:
                     start, _, rest = curve.data_path.partition('pose.bones["')
                     name, _, channel = rest.partition('"].')
-                    if not start and channel.startswith(("location", "rotation_")):
+                    if not start and channel.startswith(channels):
                         names.add(bpy.utils.unescape_identifier(name))
     return names
 
@@ -44,6 +48,14 @@ def rest_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
             bone.rotation_axis_angle = (0.0, 0.0, 1.0, 0.0)
         else:
             bone.rotation_euler = (0.0, 0.0, 0.0)
+
+
+def unscale_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
+    """Put bones back to their rest scale; names that are no bone's are passed."""
+    bones = armature.pose.bones if armature.pose is not None else {}
+    for name in names:
+        if name in bones:
+            bones[name].scale = (1.0, 1.0, 1.0)
 
 
 def displaced_bones(

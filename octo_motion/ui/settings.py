@@ -9,6 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
+from .locomotion.ground_properties import OCTO_MOTION_PG_contact
 from .locomotion.properties import OCTO_MOTION_PG_locomotion, make_overridable
 from .posing.properties import OCTO_MOTION_PG_posing
 from .splicing.properties import OCTO_MOTION_PG_splicing
@@ -21,6 +22,12 @@ class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
         name="Locomotion",
         description="How the armature walks or swims",
         type=OCTO_MOTION_PG_locomotion,
+        override={"LIBRARY_OVERRIDABLE"},
+    )
+    contact: PointerProperty(
+        name="Contact",
+        description="What a marker of a contact with the ground stands for",
+        type=OCTO_MOTION_PG_contact,
         override={"LIBRARY_OVERRIDABLE"},
     )
     splicing: PointerProperty(

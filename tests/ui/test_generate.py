@@ -77,6 +77,7 @@ def test_arms_that_are_found_while_generating_are_listed(octopus: Any) -> None:
 
 
 def test_the_body_follows_the_route_at_the_height_of_its_arms(octopus: Any) -> None:
+    settings_of(octopus).ground.use = False
     settings_of(octopus).ease_in = settings_of(octopus).ease_out = 0.0
     generate(octopus)
     route = read_route(settings_of(octopus).route)
@@ -97,6 +98,7 @@ def test_the_body_follows_the_route_at_the_height_of_its_arms(octopus: Any) -> N
 
 
 def test_height_can_be_given(octopus: Any) -> None:
+    settings_of(octopus).ground.use = False
     settings = settings_of(octopus)
     settings.height_mode, settings.height = "MANUAL", 1.5
     generate(octopus)
@@ -184,6 +186,7 @@ def test_fractional_fps_gives_the_same_motion_between_its_keys(octopus: Any) -> 
 
 
 def test_speed_is_metres_per_second(octopus: Any) -> None:
+    settings_of(octopus).ground.use = False
     settings = settings_of(octopus)
     settings.timing, settings.speed = "SPEED", 2.0
     settings.ease_in = settings.ease_out = 0.0
@@ -345,6 +348,7 @@ def test_two_octopuses_in_one_scene_do_not_touch_each_other(octopus: Any) -> Non
 
 
 def test_after_a_control_point_moved_its_own_action_is_made_anew_in_place(octopus: Any) -> None:
+    settings_of(octopus).ground.use = False
     action = generate(octopus)
     before = body(octopus, 60)
     point = settings_of(octopus).route.data.splines[0].bezier_points[1]
@@ -356,6 +360,7 @@ def test_after_a_control_point_moved_its_own_action_is_made_anew_in_place(octopu
 
 
 def test_the_view_shows_the_new_motion_without_a_change_of_frame(octopus: Any) -> None:
+    settings_of(octopus).ground.use = False
     generate(octopus)
     bpy.context.scene.frame_set(60)
     settings_of(octopus).route.location.z += 3.0
@@ -856,7 +861,7 @@ def test_a_failure_in_the_middle_cleans_up(
     def fail(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr("octo_motion.core.locomotion.generator.Generator.pose", fail)
+    monkeypatch.setattr("octo_motion.core.locomotion.generator.Generator.shapes", fail)
     with pytest.raises(ZeroDivisionError):
         operator.modal(window, Press("TIMER"))
     assert window.calls[-3:] == CLEAN

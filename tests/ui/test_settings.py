@@ -22,7 +22,7 @@ NAMES = {
     *("arms", "active_arm", "body_front", "body_up", "root_bone"),
     *("route", "spline", "speed_mode", "ease_in", "ease_out"),
     *("heading", "heading_angle", "keep_upright", "look_ahead", "corner"),
-    *("height_mode", "height", "stand"),
+    *("height_mode", "height", "stand", "ground"),
     *("gait", "table", "contraction", "softness", "sway", "phase_spread", "turning"),
     *("burst", "streamline", "bank_in_turns"),
     *("variation_min", "variation_max", "seed"),

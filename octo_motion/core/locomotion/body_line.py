@@ -50,11 +50,14 @@ class BodyLine:
     """(n, 3) unit vectors: which way up the body is."""
 
     def ride(self, positions: Floats, distance: Floats) -> tuple[Floats, Floats]:
-        """The body's centre (…, 3) above points (…, 3) of its way, and its upright (…, 3)."""
+        """The body's centre (…, 3) above points (…, 3) of its way, and its upright (…, 3).
+
+        Seen from above the body stays on its route; a slope is as far below as level ground is.
+        """
         upright = normalized(self._at(self.uprights, distance))
         centre = positions.copy()
-        centre[..., 2] = self._at(self.heights, distance)
-        return centre + self.clearance * upright, upright
+        centre[..., 2] = self._at(self.heights, distance) + self.clearance / upright[..., 2]
+        return centre, upright
 
     def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
         """World positions (…, 3) and orientations (…, 4) of the body at distances (…,)."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import SettingsError
 from ..rotations import Floats, rotate
-from .body_line import BodyLine
+from .course import Line
 from .ground import Ground
 from .rhythm import Rhythm
 
@@ -177,7 +177,7 @@ def cycles_at(phases: Floats, middle: float) -> tuple[np.ndarray, Floats]:
 
 def lay(
     limbs: Limbs,
-    line: BodyLine,
+    line: Line,
     ground: Ground,
     settings: StanceSettings,
     rhythm: Rhythm,
@@ -327,7 +327,7 @@ def _peeled_to(limbs: Limbs, joints: Floats, roots: Floats, joint: int) -> Float
     return result
 
 
-def _roots(limbs: Limbs, line: BodyLine, distance: Floats) -> Floats:
+def _roots(limbs: Limbs, line: Line, distance: Floats) -> Floats:
     centre, rotations = line.at(distance)
     return centre + rotate(rotations, limbs.roots[:, None])
 

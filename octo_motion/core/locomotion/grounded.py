@@ -11,9 +11,9 @@ import numpy as np
 
 from ..rotations import Floats, conjugate, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
-from .body_line import BodyLine
 from .chains import BodyFrame
 from .columns import turned
+from .course import Line
 from .footholds import Footholds, Limbs, StanceSettings, Wish, cycles_at, lay
 from .generator import Build, Generator, twist
 from .ground import Ground, normals
@@ -91,7 +91,7 @@ class GroundedWalk:
         skeleton: Skeleton,
         generator: Generator,
         body: BodyFrame,
-        line: BodyLine,
+        line: Line,
         ground: Ground,
         settings: StanceSettings,
         *,

@@ -14,6 +14,7 @@ from ...core.errors import RigError
 from .add_octopus import OCTO_MOTION_OT_add_octopus
 from .add_route import OCTO_MOTION_OT_add_route
 from .arm_list import draw_arms
+from .contacts import draw_ground
 from .gait_properties import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table, used
 from .gait_table import (
     OCTO_MOTION_MT_gait,
@@ -126,10 +127,33 @@ class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
         splines = getattr(settings.route.data, "splines", ())
         if len(splines) > 1 or settings.spline >= 0:
             layout.prop(settings, "spline")
+        if settings.table.manner != "SWIM" and settings.ground.use:
+            layout.prop(settings.ground, "object", text="Ground")
         layout.row().prop(settings, "speed_mode", expand=True)
         column = layout.column(align=True)
         column.prop(settings, "ease_in")
         column.prop(settings, "ease_out", text="Out")
+
+
+class OCTO_MOTION_PT_ground(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_ground"
+    bl_label = "Hold the Ground"
+    bl_parent_id = OCTO_MOTION_PT_route.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        armature = _armature(context)
+        layout = cast("Any", self).layout
+        if armature is not None and layout is not None:
+            layout.prop(locomotion_settings(armature).ground, "use", text="")
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        draw_ground(layout, settings)
 
 
 class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
@@ -147,7 +171,9 @@ class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
         if settings.table.manner != "SWIM":
             layout.row().prop(settings, "heading", expand=True)
             layout.prop(settings, "heading_angle")
-            layout.prop(settings, "keep_upright")
+            row = layout.row()
+            row.active = not settings.ground.use
+            row.prop(settings, "keep_upright")
             layout.prop(settings, "stand")
         else:
             layout.prop(settings, "streamline")
@@ -413,6 +439,7 @@ CLASSES: Final = (
     OCTO_MOTION_PT_rig,
     OCTO_MOTION_PT_arms,
     OCTO_MOTION_PT_route,
+    OCTO_MOTION_PT_ground,
     OCTO_MOTION_PT_heading,
     OCTO_MOTION_PT_gait,
     OCTO_MOTION_PT_table,

@@ -40,6 +40,7 @@ from .gait_properties import (
 )
 from .in_place import TRAVEL_IN_PLACE, InPlace
 from .reach_properties import Reaches
+from .ground_properties import OCTO_MOTION_PG_ground
 
 AXES: Final = (
     ("X", "X", "The armature's own +X", 0),
@@ -232,6 +233,13 @@ class OCTO_MOTION_PG_locomotion(Reaches, InPlace, KeepingApart, bpy.types.Proper
         "that several stand on the ground together. Off, the gait's angles alone count, and the "
         "creature hangs on the tip of its deepest arm",
         default=True,  # other than in core, where the source's walk is the default
+        override=OVERRIDE,
+    )
+
+    ground: PointerProperty(
+        name="Ground",
+        description="What a walking creature stands on, and how",
+        type=OCTO_MOTION_PG_ground,
         override=OVERRIDE,
     )
 

@@ -21,6 +21,9 @@ MANTLE_GROUP: Final = "Mantle"
 _TRAVEL_SHARE: Final = 0.25
 """Of the distance that a tip may be off, what travel may take; the rest is the arm's own."""
 
+_STRETCH_SHARE: Final = 0.25
+"""Of the same distance, what the length of stretching bones may take."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tolerances:
@@ -61,10 +64,12 @@ class Motion:
     arms: Sequence[actions.Channel]
     """Rotations of the arms' bones, one arm after the other."""
     mantle: Sequence[actions.Channel]
+    stretch: Sequence[actions.Channel] = ()
+    """Scales of the arms' bones that stretch."""
 
     def all(self) -> list[actions.Channel]:
         """Every channel, as one key per frame."""
-        return [*self.travel, *self.arms, *self.mantle]
+        return [*self.travel, *self.arms, *self.mantle, *self.stretch]
 
 
 def reduced(
@@ -94,7 +99,8 @@ def reduced(
             Limb(
                 tracks=_tracks(part, body.modes(arm.bones)),
                 angle=tolerances.angle,
-                distance=(1.0 - _TRAVEL_SHARE) * tolerances.distance,
+                distance=(1.0 - _TRAVEL_SHARE - _STRETCH_SHARE * bool(motion.stretch))
+                * tolerances.distance,
                 chain=chain_to_tip(body.skeleton, arm.bones),
             )
         )
@@ -103,12 +109,32 @@ def reduced(
         parts.append(part)
         tracks = _tracks(part, body.modes(body.mantle))
         limbs.append(Limb(tracks, tolerances.angle, tolerances.distance))
+    for arm, part in _by_arm(body.arms, motion.stretch):
+        # A share of a bone's length: of all of them together, that share of the arm's.
+        bound = _STRETCH_SHARE * tolerances.distance / _length(body.skeleton, arm)
+        parts.append([replace(each, group=arm.name) for each in part])
+        limbs.append(Limb([Track(each.values, LOCATION) for each in part], np.pi, bound))
     found = reduce_keys(frames, limbs)
     return [
         replace(channel, keys=keys)
         for part, each in zip(parts, found, strict=True)
         for channel, keys in zip(part, each, strict=True)
     ]
+
+
+def _by_arm(
+    arms: Sequence[Arm], channels: Sequence[actions.Channel]
+) -> list[tuple[Arm, list[actions.Channel]]]:
+    """Channels of bones, by the arm that the bones belong to."""
+    owners = {bone: arm.name for arm in arms for bone in arm.bones}
+    found: dict[str, list[actions.Channel]] = {arm.name: [] for arm in arms}
+    for channel in channels:
+        found[owners[channel.group]].append(channel)
+    return [(arm, found[arm.name]) for arm in arms if found[arm.name]]
+
+
+def _length(skeleton: Skeleton, arm: Arm) -> float:
+    return float(np.linalg.norm(chain_to_tip(skeleton, arm.bones).steps, axis=1).sum())
 
 
 def _tracks(channels: Sequence[actions.Channel], kinds: Sequence[str]) -> list[Track]:
@@ -137,5 +163,4 @@ def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> Limb:
 def _reach(skeleton: Skeleton, arm: Arm, pivot: Floats) -> float:
     """How far from a point an arm can reach."""
     root = skeleton.heads[skeleton.index[arm.bones[0]]]
-    length = np.linalg.norm(chain_to_tip(skeleton, arm.bones).steps, axis=1).sum()
-    return float(np.linalg.norm(root - pivot) + length)
+    return float(np.linalg.norm(root - pivot)) + _length(skeleton, arm)

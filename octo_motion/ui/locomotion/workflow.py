@@ -21,8 +21,16 @@ import numpy as np
 from ...blender import actions
 from ...blender.armature import armature_data, read_skeleton, world_matrix
 from ...blender.arms import world_directions
+from ...blender.contacts import Contact, write_markers
 from ...blender.curves import read_route
-from ...blender.poses import animated_bones, displaced_bones, rest_bones
+from ...blender.poses import (
+    SCALE,
+    animated_bones,
+    displaced_bones,
+    rest_bones,
+    unscale_bones,
+)
+from ...blender.stretching import stretch_channels
 from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
 from ...core.keys import check_bounds
@@ -44,6 +52,8 @@ from .in_place import breathing_channels
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
 from .reach_motion import Reaching, Travelling, read_reaches
 from .reduced import Body, Motion, Tolerances, reduced
+from .standing import Standing, read_standing
+from .wishes import Place, Wanted, as_wishes, gathered, note_shown, store
 
 MOST_FRAMES: Final = 100_000
 """A journey of more is a slip of the hand: over an hour at 24 frames a second."""
@@ -137,6 +147,10 @@ class Shot:
     breath: Sequence[actions.Channel]
     """Of the mantle."""
     extend_scene_range: bool
+    standing: Standing | None
+    """What holds the ground, none for a swim."""
+    wanted: dict[Place, Wanted]
+    """What the artist wants of single contacts."""
     apart: Apart | None
     """What tells whether arms overlap."""
     reaching: Reaching | None
@@ -149,6 +163,10 @@ class Shot:
     orientations: Floats | None = None
     misses: Floats | None = None
     """(arms,) largest of each arm."""
+    strains: Floats | None = None
+    """(frames, bones) by how much each bone is longer than at rest, as a share."""
+    out_of_reach: Floats | None = None
+    """(frames, arms) arm lengths from an arm to the foothold that it cannot reach."""
     reached: tuple[str, ...] = ()
     """What arms that reach do."""
     overlaps: tuple[str, ...] = ()
@@ -156,31 +174,41 @@ class Shot:
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
-        travel = plan_travel(self.route, self.travel, self.times)
-        up = rotate(travel.rotations, _UP) if self.gait.manner == "WALK" else _UP
-        locations, orientations = object_transforms(
-            self.body, self.scale, travel.positions + self.height * up, travel.rotations
-        )
+        standing = self.standing
+        table = standing.bearings if standing is not None else None
+        travel = plan_travel(self.route, self.travel, self.times, table)
+        if standing is not None:
+            places = standing.place(travel)
+        else:
+            up = rotate(travel.rotations, _UP) if self.gait.on_ground else _UP
+            places = travel.positions + self.height * up, travel.rotations
+        locations, orientations = object_transforms(self.body, self.scale, *places)
         if self.in_place:
             locations, orientations = self._in_place()
         count, bones = len(self.frames), len(self.generator.bones)
         rotations = np.empty((count, bones, 4))
+        strains, late = np.zeros((count, bones)), np.zeros((count, len(self.arms)))
         misses = np.zeros(len(self.arms))
         step = max(1, _BONES_AT_ONCE // max(bones, 1))
         for start in range(0, count, step):
             part = slice(start, min(start + step, count))
-            poses = self.generator.pose(travel.phase[part], travel.turn[part])
-            rotations[part] = poses.rotations
-            misses = np.maximum(misses, poses.misses.max(axis=(0, 2)))
+            if standing is not None:
+                stood = standing.pose(travel, part, places)
+                rotations[part], strains[part] = stood.rotations, stood.strains
+                late[part] = stood.misses
+            else:
+                poses = self.generator.pose(travel.phase[part], travel.turn[part])
+                rotations[part] = poses.rotations
+                misses = np.maximum(misses, poses.misses.max(axis=(0, 2)))
             if part.stop < count:
                 yield part.stop / count
         if self.reaching is not None:
             travelling = Travelling(locations, orientations, self.scale)
-            self.reached = self.reaching.apply(self.frames, rotations, travelling)
+            self.reached = self.reaching.apply(self.frames, rotations, travelling, strains)
         if self.apart is not None:
-            strains = np.zeros((count, bones))
             self.overlaps = self.apart.told(rotations, strains, self.frames)
         self.rotations, self.misses = rotations, misses
+        self.strains, self.out_of_reach = strains, late
         self.locations, self.orientations = locations, orientations
         yield 1.0
 
@@ -196,6 +224,7 @@ class Shot:
         channels = self._channels(armature)
         previous = _previous_action(armature, settings)
         left_behind = animated_bones(previous) if previous is not None else set[str]()
+        scaled = animated_bones(previous, SCALE) if previous is not None else set[str]()
         # An arm that was switched off is left to the artist, in the pose that it has.
         for item in settings.arms:
             left_behind.difference_update(() if item.enabled else bones_of(item))
@@ -221,6 +250,11 @@ class Shot:
             write_arms(settings, self.detection.arms)
             write_body(settings, self.detection)
         rest_bones(armature, left_behind - animated_bones(action))
+        unscale_bones(armature, scaled - animated_bones(action, SCALE))
+        if self.standing is not None:
+            store(settings.ground, self.wanted)
+            if settings.ground.shown:
+                show_contacts(armature, self)
         notes = self._extend_range()
         keys, dense_keys = actions.key_counts(action)
         assert self.misses is not None
@@ -260,6 +294,7 @@ class Shot:
             travel=travel,
             arms=actions.rotation_channels(armature, self.generator.bones, self.rotations),
             mantle=actions.rotation_channels(armature, self.mantle, held),
+            stretch=self._stretch(armature),
         )
         if self.tolerances is None:
             return [*motion.all(), *self.breath]
@@ -279,8 +314,23 @@ class Shot:
         count = len(self.frames)
         return np.tile(location, (count, 1)), np.tile(orientation, (count, 1))
 
+    def _stretch(self, armature: bpy.types.Object) -> list[actions.Channel]:
+        if self.standing is None or not self.standing.stretching:
+            return []
+        assert self.strains is not None
+        return stretch_channels(armature, [arm.bones for arm in self.arms], self.strains)
+
     def _missed(self) -> list[str]:
         assert self.misses is not None
+        assert self.out_of_reach is not None
+        if self.out_of_reach.max() > MISS:
+            frame, arm = np.unravel_index(self.out_of_reach.argmax(), self.out_of_reach.shape)
+            told = (
+                f"'{self.arms[arm].name}' slides at frame {self.frames[frame]:.0f}: its contact is "
+                f"{self.out_of_reach[frame, arm]:.2g} arm lengths out of reach. Lower Hold, raise "
+                "Stretch or shorten the stride."
+            )
+            return [told]
         worst = int(self.misses.argmax())
         if self.misses[worst] <= MISS:
             return []
@@ -300,6 +350,39 @@ class Shot:
             scene.frame_end = last
             return (f"The scene now ends at frame {last}.",)
         return (f"It lasts to frame {last}, the scene ends at {scene.frame_end}.",)
+
+
+def show_contacts(armature: bpy.types.Object, shot: Shot) -> int:
+    """Put markers where a shot's contacts are; how many."""
+    assert shot.standing is not None
+    settings = locomotion_settings(armature).ground
+    store(settings, shot.wanted)
+    travel = plan_travel(shot.route, shot.travel, shot.times, shot.standing.bearings)
+    # The first of equal phases, where the body stands still, is as good as any.
+    phases, first = np.unique(travel.phase, return_index=True)
+    frames = shot.frames[first]
+    contacts = []
+    for each in shot.standing.walk.footholds():
+        name = shot.arms[each.arm].name
+        wish = shot.wanted.get((name, each.cycle), Wanted())
+        on, off = np.interp([each.on, each.off], phases, frames)
+        share = (each.off - each.on) / (2.0 * np.pi)
+        contacts.append(
+            Contact(
+                name,
+                each.cycle,
+                each.position,
+                each.heading,
+                locked=wish.position is not None,
+                shift=wish.shift,
+                frame_on=float(on),
+                frame_off=float(off),
+                cycle_frames=float(off - on) / share,
+            )
+        )
+    write_markers(armature, contacts, shot.generator.arm_length * shot.scale)
+    note_shown(settings, contacts)
+    return len(contacts)
 
 
 def generate(armature: bpy.types.Object, context: bpy.types.Context) -> Summary:
@@ -355,6 +438,23 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     travel = _travel_settings(settings, gait, stride)
     seconds, frames, times = _timing(settings, route, travel, scene.render)
     breath = breathing_channels(armature, settings, head[-1] if head else "", times * seconds)
+    wanted = gathered(settings.ground, armature)
+    standing = None
+    if gait.on_ground and settings.ground.use and not in_place:
+        standing = read_standing(
+            settings.ground,
+            armature,
+            depsgraph,
+            skeleton=skeleton,
+            arms=arms,
+            generator=generator,
+            body=body,
+            route=route,
+            travel=travel,
+            scale=scale,
+            height=settings.height if settings.height_mode == "MANUAL" else None,
+            wishes=as_wishes(wanted, arms),
+        )
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -380,14 +480,17 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         repeats=in_place and settings.repeat,
         breath=breath,
         extend_scene_range=settings.extend_scene_range,
+        standing=standing,
+        wanted=wanted,
         apart=read_apart(armature, skeleton, arms, body) if settings.tell_overlaps else None,
         reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
-        note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
+        note=json.dumps(plain(settings, without=frozenset({"result", "shown"})), sort_keys=True),
         # Detection has looked for constraints itself.
         warnings=[
             *(detection.notes if detection else _held(skeleton, arms)),
             *_warnings(settings, armature, skeleton),
             *_displaced(settings, armature, skeleton, arms),
+            *(standing.warnings if standing else ()),
         ],
     )
 
@@ -559,6 +662,8 @@ def _displaced(
     if (previous := _previous_action(armature, settings)) is not None:
         # These go back to rest if they are not keyed again.
         own -= animated_bones(previous)
+        stretched_by_it = animated_bones(previous, SCALE)
+        turned = [bone for bone in turned if bone not in stretched_by_it]
     found = displaced_bones(armature, turned, sorted(own))
     if not found:
         return []
@@ -598,7 +703,7 @@ def _travel_settings(
     settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, stride: float
 ) -> TravelSettings:
     travel = TravelSettings(
-        manner=gait.manner,
+        manner="WALK" if gait.on_ground else "SWIM",
         speed=settings.speed_mode,
         ease_in=settings.ease_in,
         ease_out=settings.ease_out,
@@ -625,7 +730,7 @@ def _tolerances(settings: OCTO_MOTION_PG_locomotion, arm_length: float) -> Toler
 def _height(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, clearance: float) -> float:
     if settings.height_mode == "MANUAL":
         return settings.height
-    return clearance if gait.manner == "WALK" else 0.0
+    return clearance if gait.on_ground else 0.0
 
 
 def _timing(

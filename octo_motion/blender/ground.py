@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mesh objects to what a creature walks on, and meshes to how thick its arms are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ..core.errors import GroundError
+from ..core.locomotion.chains import joint_positions
+from ..core.rotations import Floats
+from ..core.skeleton import Skeleton
+
+_MOST_POINTS: Final = 1500
+"""Points of a skin that are looked at; an arm's thickness needs no more."""
+_THICKEST: Final = 0.2
+"""Arm lengths from an arm's middle line: what is further away is not its skin."""
+_SHARE: Final = 0.5
+"""Of the points round a joint, the share that lies nearer to it than its radius."""
+
+
+def read_triangles(ground: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+    """The faces of a mesh object as it is seen, modifiers and all, (faces, 3, 3) world.
+
+    Raises:
+        GroundError: the object is no mesh, or has no faces.
+    """
+    if ground.type != "MESH":
+        raise GroundError(f"'{ground.name}' is not a mesh.", "Choose a mesh as the ground.")
+    if ground.mode == "EDIT":
+        ground.update_from_editmode()
+    evaluated = ground.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        count = len(mesh.loop_triangles) if mesh is not None else 0
+        if mesh is None or count == 0:
+            raise GroundError(f"The ground '{ground.name}' has no faces.", "Choose another mesh.")
+        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        corners = np.empty((count, 3), dtype=np.int32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        mesh.loop_triangles.foreach_get("vertices", corners.ravel())
+    finally:
+        evaluated.to_mesh_clear()
+    world = np.array(evaluated.matrix_world, dtype=np.float64)
+    moved = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+    return moved[corners]
+
+
+def arm_radii(
+    armature: bpy.types.Object, skeleton: Skeleton, arms: Sequence[Sequence[str]]
+) -> list[Floats]:
+    """For each arm (bones + 1,) how far the skin is from each joint at rest, armature units.
+
+    Zero where no mesh hangs on the armature.
+    """
+    points = _skin(armature)
+    joints = [joint_positions(skeleton, bones) for bones in arms]
+    if len(points) == 0:
+        return [np.zeros(len(each)) for each in joints]
+    lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
+    found = [_distances(points, each) for each in joints]
+    nearest = np.stack([distance for distance, _ in found]).argmin(axis=0)
+    radii = []
+    for arm, (distance, along) in enumerate(found):
+        own = (nearest == arm) & (distance < _THICKEST * lengths[arm])
+        radii.append(_radii(distance[own], along[own], len(joints[arm])))
+    return radii
+
+
+def _skin(armature: bpy.types.Object) -> Floats:
+    """Some points (n, 3) of the meshes that the armature moves, at rest, armature space."""
+    inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
+    parts: list[Floats] = []
+    for item in armature.children_recursive:
+        mesh = item.data
+        if not isinstance(mesh, bpy.types.Mesh) or item.find_armature() != armature:
+            continue
+        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        place = inverse @ np.array(item.matrix_world, dtype=np.float64)
+        parts.append(points.astype(np.float64) @ place[:3, :3].T + place[:3, 3])
+    whole = np.concatenate(parts) if parts else np.empty((0, 3))
+    return whole[:: max(1, len(whole) // _MOST_POINTS)]
+
+
+def _distances(points: Floats, joints: Floats) -> tuple[Floats, Floats]:
+    """Distances (n,) of points from a chain, and where along it they are nearest, in joints."""
+    starts, steps = joints[:-1], np.diff(joints, axis=0)
+    seen = points[:, None] - starts
+    share = np.einsum("nsc,sc->ns", seen, steps) / np.maximum(np.sum(steps**2, axis=1), 1e-12)
+    share = np.clip(share, 0.0, 1.0)
+    apart = np.linalg.norm(seen - share[..., None] * steps, axis=-1)
+    segment = apart.argmin(axis=1)
+    rows = np.arange(len(points))
+    return apart[rows, segment], segment + share[rows, segment]
+
+
+def _radii(distance: Floats, along: Floats, joints: int) -> Floats:
+    """The radius at each joint (joints,), where there are points round it, else its neighbours'."""
+    places = np.arange(joints)
+    radii = np.full(joints, np.nan)
+    for joint in places:
+        near = distance[np.abs(along - joint) <= 0.5]
+        if len(near):
+            radii[joint] = np.quantile(near, _SHARE)
+    known = np.isfinite(radii)
+    if not np.any(known):
+        return np.zeros(joints)
+    return np.interp(places, places[known], radii[known])

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contacts with the ground: shown, shifted and cleared, and their part of the panel."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+from bpy.props import FloatProperty
+
+from ...blender.armature import active_armature
+from ...blender.contacts import remove_markers
+from ...core.errors import SettingsError
+from ..operator_base import OctoOperator
+from .armature_operator import ArmatureOperator
+from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .wishes import gathered, store
+from .workflow import prepare, show_contacts
+
+
+class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_show"
+    bl_label = "Show Contacts"
+    bl_description = (
+        "Put a marker wherever an arm takes hold of the ground. Drag or turn a marker and the arm "
+        "holds on there; delete it and the arm does not; then generate again"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        shot = prepare(armature, context)
+        if shot.standing is None:
+            raise SettingsError(
+                "This motion does not hold the ground.", "Choose a walk, and Hold the Ground."
+            )
+        count = show_contacts(armature, shot)
+        self.report({"INFO"}, f"{count} contacts.")
+
+
+class OCTO_MOTION_OT_contacts_hide(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_hide"
+    bl_label = "Hide Contacts"
+    bl_description = "Take the markers away. What was changed on them is kept"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        settings = locomotion_settings(armature).ground
+        store(settings, gathered(settings, armature))
+        settings.shown = ""
+        remove_markers(armature)
+        _activate(context, armature)
+
+
+class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_clear"
+    bl_label = "Free Contacts"
+    bl_description = (
+        "Forget what was moved, locked, shifted or deleted: all contacts are again where the gait "
+        "has them"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        settings = locomotion_settings(armature).ground
+        shown = bool(settings.shown)
+        settings.contacts.clear()
+        settings.shown = ""
+        remove_markers(armature)
+        _activate(context, armature)
+        if shown:
+            shot = prepare(armature, context)
+            if shot.standing is not None:
+                show_contacts(armature, shot)
+
+
+class OCTO_MOTION_OT_contacts_shift(OctoOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_shift"
+    bl_label = "Shift Contacts in Time"
+    bl_description = (
+        "Let the arms of the selected markers take hold so many frames later, or earlier if it is "
+        "negative; then generate again"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    frames: FloatProperty(
+        name="Frames",
+        description="How much later the contact is",
+        default=2.0,
+        soft_min=-24.0,
+        soft_max=24.0,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if _selected(context):
+            return True
+        cls.poll_message_set("Select markers of contacts.")
+        return False
+
+    def run(self, context: bpy.types.Context) -> None:
+        for item in _selected(context):
+            own: Any = item.octo_motion.contact  # type: ignore[attr-defined]
+            own.shift += self.frames / max(own.cycle_frames, 1e-6)
+
+
+def _selected(context: bpy.types.Context) -> list[bpy.types.Object]:
+    chosen = context.selected_objects
+    return [item for item in chosen if item.octo_motion.contact.armature]  # type: ignore[attr-defined]
+
+
+def _activate(context: bpy.types.Context, armature: bpy.types.Object) -> None:
+    """Make the armature active if what was active is gone."""
+    layer = context.view_layer
+    if layer is not None and layer.objects.active is None and armature in layer.objects.values():
+        layer.objects.active = armature
+
+
+def draw_ground(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+    """How arms hold the ground, and where."""
+    ground = settings.ground
+    layout.active = ground.use and settings.table.manner != "SWIM"
+    column = layout.column(align=True)
+    column.prop(ground, "duty")
+    column.prop(ground, "planted")
+    column = layout.column(align=True)
+    column.prop(ground, "stretch")
+    column.prop(ground, "lift")
+    column = layout.column(align=True)
+    column.prop(ground, "lean")
+    column.prop(ground, "smoothing")
+    row = layout.row(align=True)
+    if ground.shown:
+        row.operator(OCTO_MOTION_OT_contacts_hide.bl_idname, icon="HIDE_ON")
+    else:
+        row.operator(OCTO_MOTION_OT_contacts_show.bl_idname, icon="EMPTY_SINGLE_ARROW")
+    row.operator(OCTO_MOTION_OT_contacts_clear.bl_idname, text="", icon="LOOP_BACK")
+    if len(ground.contacts):
+        count = len(ground.contacts)
+        layout.label(text=f"{count} contact{'s' * (count > 1)} changed by hand", icon="PINNED")
+
+
+class OCTO_MOTION_PT_contact(bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_contact"
+    bl_label = "Contact"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Octo Motion"
+    bl_order = 0
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        item = context.object
+        return item is not None and bool(item.octo_motion.contact.armature)  # type: ignore[attr-defined]
+
+    def draw(self, context: bpy.types.Context) -> None:
+        item, layout = context.object, self.layout
+        assert item is not None
+        assert layout is not None
+        own: Any = item.octo_motion.contact  # type: ignore[attr-defined]
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.label(text=f"{own.arm}, cycle {own.cycle}", icon="PINNED")
+        layout.label(text=f"Frames {own.frame_on:.0f} to {own.frame_off:.0f}", icon="TIME")
+        layout.prop(own, "locked")
+        layout.prop(own, "shift")
+        layout.operator(OCTO_MOTION_OT_contacts_shift.bl_idname)
+
+
+CLASSES: Final = (
+    OCTO_MOTION_OT_contacts_show,
+    OCTO_MOTION_OT_contacts_hide,
+    OCTO_MOTION_OT_contacts_clear,
+    OCTO_MOTION_OT_contacts_shift,
+    OCTO_MOTION_PT_contact,
+)

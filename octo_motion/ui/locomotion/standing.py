@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A walk's ground, from the settings to what core works with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ...blender.ground import arm_radii, read_triangles
+from ...blender.stretching import may_stretch
+from ...core.locomotion.bearings import Bearings
+from ...core.locomotion.body_line import BodyLine, body_line, leaning
+from ...core.locomotion.chains import BodyFrame
+from ...core.locomotion.crawl import CrawlSettings
+from ...core.locomotion.footholds import Wish
+from ...core.locomotion.generator import Arm, Generator
+from ...core.locomotion.ground import Ground, along_path, passes_over_itself, sampled
+from ...core.locomotion.grounded import GroundedPoses, GroundedWalk
+from ...core.locomotion.rhythm import crawling
+from ...core.locomotion.route import Route
+from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, strides, walked_at
+from ...core.rotations import Floats
+from ...core.skeleton import Skeleton
+from .ground_properties import OCTO_MOTION_PG_ground, stance_settings
+
+_FINE: Final = 0.03
+"""Arm lengths between the samples of a ground …"""
+_COARSE: Final = 0.1
+"""… and of one that only follows the route."""
+_AROUND: Final = 1.8
+"""Arm lengths to all sides of the route that the ground is sampled."""
+_HEADROOM: Final = 2.0
+"""Arm lengths above the route up to which a surface is ground and not a roof."""
+_LOWEST: Final = 0.12
+"""Arm lengths that a body is above its ground at least."""
+_PATH_STEP: Final = 0.1
+"""Arm lengths between the points of the route that the ground is looked for under."""
+
+_OVER_ITSELF: Final = (
+    "The route passes over itself: the ground between its levels is half way up. Choose a mesh as "
+    "the ground, or switch Hold the Ground off."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """A walk that holds the ground, ready to be computed."""
+
+    walk: GroundedWalk
+    line: BodyLine
+    bearings: Bearings
+    stretching: bool
+    """Whether any bones may stretch."""
+    warnings: tuple[str, ...] = ()
+
+    def place(self, travel: Travel) -> tuple[Floats, Floats]:
+        """World positions (frames, 3) and orientations (frames, 4) of the canonical body."""
+        centres, upright = self.line.ride(travel.positions, travel.distance)
+        return centres, leaning(upright, travel.rotations)
+
+    def pose(self, travel: Travel, part: slice, places: tuple[Floats, Floats]) -> GroundedPoses:
+        """The arms at some of the frames, whose places :meth:`place` has found."""
+        centres, orientations = places
+        return self.walk.pose(
+            travel.phase[part], travel.turn[part], centres[part], orientations[part]
+        )
+
+
+def read_standing(
+    settings: OCTO_MOTION_PG_ground,
+    armature: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    *,
+    skeleton: Skeleton,
+    arms: Sequence[Arm],
+    generator: Generator,
+    body: BodyFrame,
+    route: Route,
+    travel: TravelSettings,
+    scale: float,
+    height: float | None,
+    wishes: Sequence[Wish],
+) -> Standing:
+    """Read the ground under a walk, and lay its footholds.
+
+    Args:
+        settings: how it stands.
+        armature: the armature object.
+        depsgraph: the evaluated scene.
+        skeleton: the rig.
+        arms: its arms.
+        generator: its gait.
+        body: where the body lies in armature space.
+        route: where to.
+        travel: how it travels.
+        scale: metres of the armature's unit.
+        height: metres from the ground to the body's centre, none for as high as the gait is.
+        wishes: the artist's, for single contacts.
+
+    Raises:
+        GroundError: the ground is no mesh, has no faces, or the route leaves it.
+    """
+    stance = stance_settings(settings)
+    reach = generator.arm_length * scale
+    bearings = bearings_of(route, travel)
+    ground, warnings = _ground(settings, depsgraph, route, travel, bearings, reach)
+    radii = arm_radii(armature, skeleton, [arm.bones for arm in arms])
+    if height is None:
+        thickness = float(np.mean([each[len(each) // 2] for each in radii]))
+        height = max(generator.clearance + thickness, _LOWEST * generator.arm_length) * scale
+    line = body_line(
+        route,
+        travel,
+        bearings,
+        ground,
+        clearance=height,
+        reach=reach,
+        lean=stance.lean,
+        smoothing=stance.smoothing,
+    )
+    rhythm = None
+    gait = generator.settings.gait
+    if gait.manner == "CRAWL":
+        rhythm = crawling(
+            line,
+            generator.roots * scale,
+            generator.outward,
+            CrawlSettings(seed=generator.settings.seed),
+            reach=reach,
+            middle=gait.power_phase,
+            duty=stance.duty,
+        )
+    stretch = [may_stretch(armature, arm.bones) for arm in arms]
+    walk = GroundedWalk(
+        skeleton,
+        generator,
+        body,
+        line,
+        ground,
+        stance,
+        scale=scale,
+        radii=radii,
+        may_stretch=stretch,
+        phases=(0.0, 2.0 * np.pi * strides(route, travel)),
+        wishes=wishes,
+        rhythm=rhythm,
+    )
+    return Standing(walk, line, bearings, any(stretch), warnings)
+
+
+def _ground(
+    settings: OCTO_MOTION_PG_ground,
+    depsgraph: bpy.types.Depsgraph,
+    route: Route,
+    travel: TravelSettings,
+    bearings: Bearings,
+    reach: float,
+) -> tuple[Ground, tuple[str, ...]]:
+    beyond = 0.0 if route.cyclic else travel.stride + reach
+    count = int(np.ceil((route.length + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
+    distance = np.linspace(-beyond, route.length + beyond, count)
+    path, _ = walked_at(route, travel, bearings, distance)
+    if settings.object is None:
+        warnings = ()
+        if passes_over_itself(path, 0.5 * reach, 0.5 * reach):
+            warnings = (_OVER_ITSELF,)
+        around = _AROUND * reach
+        spacing = _COARSE * reach
+        ground = along_path(path, reach=around, spacing=spacing, softness=0.3 * reach)
+        return ground, warnings
+    inside = (distance >= 0.0) & (distance <= route.length)
+    triangles = read_triangles(settings.object, depsgraph)
+    return (
+        sampled(
+            triangles,
+            path,
+            inside,
+            reach=_AROUND * reach,
+            spacing=_FINE * reach,
+            headroom=_HEADROOM * reach,
+        ),
+        (),
+    )

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist wants of single contacts: kept in the settings, changed on markers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ...blender.contacts import Contact, read_markers
+from ...core.locomotion.footholds import Wish
+from ...core.locomotion.generator import Arm
+from ...core.rotations import Floats
+from .ground_properties import OCTO_MOTION_PG_ground
+
+Place = tuple[str, int]
+"""Name of an arm, and number of its cycle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What is wanted of one contact."""
+
+    removed: bool = False
+    shift: float = 0.0
+    position: Floats | None = None
+    """(3,) where it is locked, world."""
+    heading: float = 0.0
+
+    @property
+    def matters(self) -> bool:
+        """Whether it differs from what would be there anyway."""
+        return self.removed or self.shift != 0.0 or self.position is not None
+
+
+def gathered(settings: OCTO_MOTION_PG_ground, armature: bpy.types.Object) -> dict[Place, Wanted]:
+    """All wishes: those in the settings, and what was done to the markers since."""
+    wanted = {
+        (item.arm, item.cycle): Wanted(
+            item.removed,
+            item.shift,
+            np.array(item.position, dtype=np.float64) if item.locked else None,
+            item.heading,
+        )
+        for item in settings.contacts
+    }
+    if not settings.shown:
+        return wanted
+    found = read_markers(armature)
+    for arm, cycle in json.loads(settings.shown):
+        place = arm, cycle
+        if place not in found:
+            wanted[place] = replace(wanted.get(place, Wanted()), removed=True)
+    for place, contact in found.items():
+        position = contact.position if contact.locked else None
+        wanted[place] = Wanted(shift=contact.shift, position=position, heading=contact.heading)
+    return {place: each for place, each in wanted.items() if each.matters}
+
+
+def as_wishes(wanted: dict[Place, Wanted], arms: Sequence[Arm]) -> list[Wish]:
+    """Wishes as core has them, of those arms that there are."""
+    numbers = {arm.name: number for number, arm in enumerate(arms)}
+    return [
+        Wish(
+            numbers[arm],
+            cycle,
+            removed=each.removed,
+            shift=each.shift,
+            position=each.position,
+            heading=each.heading if each.position is not None else None,
+        )
+        for (arm, cycle), each in wanted.items()
+        if arm in numbers
+    ]
+
+
+def store(settings: OCTO_MOTION_PG_ground, wanted: dict[Place, Wanted]) -> None:
+    """Keep wishes in the settings."""
+    settings.contacts.clear()
+    for (arm, cycle), each in sorted(wanted.items()):
+        item = settings.contacts.add()
+        item.name = f"{arm} {cycle}"
+        item.arm, item.cycle, item.removed = arm, cycle, each.removed
+        item.shift, item.locked = each.shift, each.position is not None
+        if each.position is not None:
+            item.position, item.heading = each.position, each.heading
+
+
+def note_shown(settings: OCTO_MOTION_PG_ground, contacts: Sequence[Contact]) -> None:
+    """Remember which markers were put, so that one that is gone is known to be removed."""
+    settings.shown = json.dumps([(each.arm, each.cycle) for each in contacts])
