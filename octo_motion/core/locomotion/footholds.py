@@ -220,7 +220,7 @@ def lay(
             turned[at], headings_wanted[at] = True, wish.heading
 
     # Metres along the route at which the body is half way through each hold.
-    given = np.broadcast_to(middle / _CYCLE + numbers, (arms, count))
+    given: Floats = np.broadcast_to(middle / _CYCLE + numbers.astype(np.float64), (arms, count))
     centre = rhythm.distances(limbs.arms, given + shift)
     body, rotations = line.at(centre)
     roots = body + rotate(rotations, limbs.roots[:, None])

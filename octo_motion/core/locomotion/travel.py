@@ -146,13 +146,24 @@ def plan_travel(
     at = np.clip(np.asarray(times, dtype=np.float64), 0.0, 1.0)
     distance, phase = _progress(route, settings, at)
     table = bearings_of(route, settings) if table is None else table
+    return replace(travel_at(route, settings, table, distance, phase), times=at)
+
+
+def travel_at(
+    route: Route, settings: TravelSettings, table: Bearings, distance: Floats, phase: Floats
+) -> Travel:
+    """The motion at distances (frames,) along the route, with phases (frames,) of the gait.
+
+    Its times count as if all distances took equally long.
+    """
+    distance = np.clip(distance, 0.0, route.length)
     ahead = distance + min(settings.look_ahead * settings.stride, route.length)
     turning = _swum if settings.manner == "SWIM" else _walked
     rotations, turn = turning(table, settings, distance, ahead)
     size = np.sqrt(turn[:, 0] * turn[:, 0] + turn[:, 1] * turn[:, 1])
     turn = turn * np.minimum(1.0, np.pi / np.maximum(size, np.pi))[:, None]
     positions = route.position(route.parameter_at(distance))
-    return Travel(at, distance, phase, positions, rotations, turn)
+    return Travel(distance / route.length, distance, phase, positions, rotations, turn)
 
 
 def walked_at(
