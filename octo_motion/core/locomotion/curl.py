@@ -13,7 +13,7 @@ from .reach import Timeline, eased, folded
 
 _FREE: Final = 0.3
 """Share of the arm, from its root, that hardly curls."""
-_TIGHT: Final = 2.5
+_TIGHT: Final = 3.1
 """How much tighter than that of a reach the spiral is."""
 _WAVE: Final = 0.5
 """How much of the time the curl needs to run along the arm."""

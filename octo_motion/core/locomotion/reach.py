@@ -25,12 +25,17 @@ from ..errors import SettingsError
 from ..rotations import Floats
 from .arm_frames import bends
 
-FOLD: Final = np.radians(110.0)
+FOLD: Final = np.radians(100.0)
 """Angle of the travelling bend."""
-_SPIRAL: Final = 1.5
+_SPIRAL: Final = 1.2
 """Radians of the spiral for each time that what is left of the arm gets e times shorter."""
 _BLUNT: Final = 0.2
 """Arm lengths that the spiral thinks are left at the tip, so that it is not wound up endlessly."""
+_SHY: Final = 0.2
+"""Share of bend and spiral while the bend is at the root: an arm that folds back there would lie
+over the head."""
+_BOLD: Final = 0.6
+"""Where along the arm, in its lengths, the bend has its full angle."""
 _MOST_BENT: Final = np.radians(75.0)
 """Of one joint."""
 _FRONT: Final = 0.26
@@ -148,6 +153,8 @@ def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1
         curl: how much of the spiral.
     """
     whole, width = float(lengths.sum()), front_width(lengths)
+    shy = _SHY + (1.0 - _SHY) * eased(front[..., None] / (_BOLD * whole))
+    shy = np.where(front[..., None] < 0.0, 1.0, shy)
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
     left = whole - ends + _BLUNT * whole
     spiral = curl * _SPIRAL * np.log(left[:-1] / left[1:])
@@ -155,6 +162,6 @@ def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1
     behind = front[..., None] - 0.5 * width
     so_far = eased((ends - 0.5 * np.append(lengths, lengths[-1]) - behind) / width)
     fold = bend * FOLD * np.diff(so_far, axis=-1)
-    angles = np.minimum(spiral + fold, _MOST_BENT)
+    angles = np.minimum(shy * (spiral + fold), _MOST_BENT)
     angles[..., 0] = 0.0
     return bends(angles)

@@ -79,7 +79,7 @@ class Apart:
         share = 100.0 * float(np.mean(found.depths > DEEP))
         told = (
             f"'{worst.first}' passes through '{worst.second}' at frame "
-            f"{frames[worst.frame * every]:.0f}, by {worst.depth:.1f} of its radius; something "
+            f"{frames[worst.frame * every]:.0f}, by {worst.depth:.1f} of the radius; something "
             f"overlaps at {share:.0f} % of the frames."
         )
         return (told,)
