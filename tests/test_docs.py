@@ -152,6 +152,8 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(after("An item of `arms`:", arms))
         case "bone":
             return rows(after("An item of its `bones`:", arms))
+        case "reach":
+            return rows(section("## Reaches"))
         case "landmarks":
             return rows(section("## Landmarks"))
         case "splicing":
@@ -167,7 +169,12 @@ def described(group: str) -> dict[str, list[str]]:
 
 
 def group_class(group: str) -> Any:
-    from octo_motion.ui.locomotion import arm_properties, gait_properties, properties
+    from octo_motion.ui.locomotion import (
+        arm_properties,
+        gait_properties,
+        properties,
+        reach_properties,
+    )
     from octo_motion.ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
     from octo_motion.ui.splicing.properties import OCTO_MOTION_PG_splicing
     from octo_motion.ui.splicing.splice_properties import SpliceItem
@@ -176,6 +183,7 @@ def group_class(group: str) -> Any:
         "locomotion": properties.OCTO_MOTION_PG_locomotion,
         "arm": arm_properties.ArmItem,
         "bone": arm_properties.ArmBoneItem,
+        "reach": reach_properties.ReachItem,
         "landmarks": OCTO_MOTION_PG_landmarks,
         "splicing": OCTO_MOTION_PG_splicing,
         "splice": SpliceItem,
@@ -237,7 +245,7 @@ def number(value: float, definition: Any) -> str:
 @pytest.mark.parametrize(
     "group",
     [
-        *("locomotion", "arm", "bone", "table", "curve", "knot", "offset", "note"),
+        *("locomotion", "arm", "bone", "reach", "table", "curve", "knot", "offset", "note"),
         *("splicing", "splice", "landmarks"),
     ],
 )

@@ -16,6 +16,7 @@ import contact_sheet
 import experiment
 import numpy as np
 import plot
+import reaching
 import shots
 import stage
 from stage import Pixels
@@ -137,6 +138,9 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "swim_route": along_route(shots.SWIM, 5),
     "rig": rig,
     "gaits": gaits,
+    "reach": reaching.reach,
+    "coil": reaching.coil,
+    "hold": reaching.hold,
     "splices": splices,
 }
 """By file name."""
