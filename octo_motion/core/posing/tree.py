@@ -66,8 +66,12 @@ class Tree:
                 self.above[body] += self.above[parent]
         self.roots = np.flatnonzero(self.parents < 0)
         self.root_of = self.roots[np.argmax(self.above[:, self.roots], axis=1)]
-        self.layout = plan(self.parents, self.above)
-        layout = self.layout
+        self.use(plan(self.parents, self.above))
+
+    def use(self, layout: Layout) -> None:
+        """Solve by this plan; any plan that covers the figure gives the same solutions."""
+        self.layout = layout
+        count = len(self.parents)
         slots = len(layout.bodies)
         filled = layout.bodies >= 0
         self.joint_slot = np.zeros(count, dtype=np.int64)
@@ -174,7 +178,7 @@ class Tree:
         self._between = between.reshape(3 * trunk, branches, 3 * width).transpose(1, 0, 2)
 
     def solve(self, right: Floats) -> Floats:
-        """u (slots, 3, columns) of (1) for right-hand sides (slots, 3, columns)."""
+        """Solution of (1), u (slots, 3, columns), for right-hand sides (slots, 3, columns)."""
         trunk, branches, width = self.layout.trunk, self.layout.branches, self.layout.width
         count = right.shape[-1]
         top = right[:trunk].reshape(3 * trunk, count)
