@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.actions import is_edited
+from octo_motion.core.locomotion.gait import presets
 from tests.ui.rig import generate, joints_in_world, keys, make_octopus
 
 
@@ -32,7 +33,7 @@ def curves(action: Any) -> list[Any]:
     ]
 
 
-@pytest.mark.parametrize("gait", ["walk", "swim", "idle"])
+@pytest.mark.parametrize("gait", sorted(presets()))
 @pytest.mark.parametrize("how", ["DENSE", "REDUCED"])
 def test_the_last_frame_meets_the_first(octopus: Any, gait: str, how: str) -> None:
     settings = octopus.octo_motion.locomotion

@@ -308,7 +308,7 @@ class Shot:
         """
         up = self.body.rotation[:, 2]
         lift = self.height / self.scale - float(self.body.center @ up)
-        raised = lift * up if self.root_bone and self.gait.manner == "WALK" else 0.0 * up
+        raised = lift * up if self.root_bone and self.gait.on_ground else 0.0 * up
         location = self.world[:3, 3] + self.world[:3, :3] @ raised
         orientation = from_matrix(self.world[:3, :3] / self.scale)
         count = len(self.frames)
