@@ -13,13 +13,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import bpy
 import numpy as np
 
 from ..core.errors import ClipError, WriteError
+from ..core.rotations import normalized
 from ..core.splicing.bvh_check import check_bvh
+from ..core.splicing.mapping import map_skeleton
+from .armature import read_skeleton
+from .clips import read_clip
 
 SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
 
@@ -28,6 +32,14 @@ NOTE: Final = "octo_motion_clip"
 
 COLLECTION: Final = "Clips"
 _COLLECTION_MARK: Final = "octo_motion_clips"
+
+Up = Literal["AUTO", "Y", "Z"]
+
+_LOOKS: Final = 7
+"""Frames at which is looked at how a body lies."""
+
+_LYING: Final = 0.8
+"""Cosine between a body's length and the axis along which it lies."""
 
 _IMPORTED: Final = 0.8
 """Of the work on a file: Blender's own importer, about."""
@@ -72,6 +84,7 @@ def import_clip(
     context: bpy.types.Context,
     frame_start: int = 1,
     *,
+    up: Up = "AUTO",
     progress: Callable[[float], None] = lambda _: None,
 ) -> ImportedClip:
     """One file as armatures with their actions, in the scene's collection for clips.
@@ -83,6 +96,8 @@ def import_clip(
         path: the file.
         context: with a scene and a view layer.
         frame_start: frame of the first key.
+        up: which axis of a BVH file points up, usually Y; "AUTO" looks at how the body lies. Other
+            formats say it themselves.
         progress: is told which share of the work is done, from time to time.
 
     Raises:
@@ -102,7 +117,7 @@ def import_clip(
     rate = scene.render.fps / scene.render.fps_base
     try:
         with _unchanged(context, scene):
-            result = importer(path, scene)
+            result = importer(path, scene, up)
             progress(_IMPORTED)
             made = _made_since(before)
             _remove_strays(made)
@@ -140,26 +155,63 @@ class _Result:
     notes: tuple[str, ...] = ()
 
 
-def _import_bvh(path: Path, scene: bpy.types.Scene) -> _Result:  # noqa: ARG001 - as all importers
+def _import_bvh(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa: ARG001 - as all
     checked = check_bvh(_content(path))
     # Always the plain copy: what is tested is what is used. Windows cannot delete it as long as
     # the importer's open file waits for the garbage collector.
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         copy = Path(folder) / f"{path.stem}.bvh"
         copy.write_text(checked.text, encoding="utf-8", newline="\n")
-        _call(bpy.ops.import_anim.bvh, filepath=str(copy), update_scene_fps=False)
+        options = {"filepath": str(copy), "update_scene_fps": False}
+        before, notes = _data_blocks(), checked.notes
+        _call(bpy.ops.import_anim.bvh, **options, **_AXES["Z" if up == "Z" else "Y"])
+        if up == "AUTO" and _lies_as_if_z_were_up(_made_since(before)):
+            bpy.data.batch_remove(_made_since(before))
+            _call(bpy.ops.import_anim.bvh, **options, **_AXES["Z"])
+            notes = (*notes, "Its Z axis points up, unlike in most BVH files: it was stood up.")
         gc.collect()
-    return _Result(checked.rate, checked.rate, checked.notes)
+    return _Result(checked.rate, checked.rate, notes)
 
 
-def _import_fbx(path: Path, scene: bpy.types.Scene) -> _Result:
+_AXES: Final[Mapping[str, Mapping[str, str]]] = {
+    "Y": {"axis_forward": "-Z", "axis_up": "Y"},
+    "Z": {"axis_forward": "Y", "axis_up": "Z"},
+}
+
+
+def _lies_as_if_z_were_up(made: Iterable[bpy.types.ID]) -> bool:
+    """Whether a body, read as if Y pointed up, lies on its back, at rest and as it moves."""
+    for each in made:
+        data = each.animation_data if isinstance(each, bpy.types.Object) else None
+        if not isinstance(each, bpy.types.Object) or data is None or data.action is None:
+            continue
+        skeleton = read_skeleton(each)
+        marks = map_skeleton(skeleton).landmarks
+        names = [marks.get(mark) for mark in ("head", "foot.L", "foot.R")]
+        if None in names:
+            return False
+        chosen = [skeleton.index[name] for name in names if name is not None]
+        first, last = data.action.frame_range
+        frames = np.unique(np.linspace(first, last, _LOOKS))
+        try:
+            heads = read_clip(each, frames=frames).posed()[1][:, chosen]
+        except ClipError:
+            return False
+        heads = np.concatenate([skeleton.heads[None, chosen], heads])
+        upright = normalized(heads[:, 0] - heads[:, 1:].mean(axis=1))
+        lying = upright @ (0.0, -1.0, 0.0) > _LYING
+        return bool(lying[0] and np.mean(lying[1:]) > 0.5)
+    return False
+
+
+def _import_fbx(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa: ARG001 - as all
     _content(path)
     _call(bpy.ops.import_scene.fbx, filepath=str(path))
     # The importer sets the scene's rate to the file's, and counts in whole frames a second.
     return _Result(float(scene.render.fps), scene.render.fps / scene.render.fps_base)
 
 
-def _import_gltf(path: Path, scene: bpy.types.Scene) -> _Result:
+def _import_gltf(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa: ARG001 - as all
     _content(path)
     # The importer multiplies by the base of the rate where it should divide.
     scene.render.fps_base = 1.0
@@ -167,7 +219,7 @@ def _import_gltf(path: Path, scene: bpy.types.Scene) -> _Result:
     return _Result(float(scene.render.fps), None)
 
 
-_IMPORTERS: Final[Mapping[str, Callable[[Path, bpy.types.Scene], _Result]]] = {
+_IMPORTERS: Final[Mapping[str, Callable[[Path, bpy.types.Scene, Up], _Result]]] = {
     ".bvh": _import_bvh,
     ".fbx": _import_fbx,
     ".glb": _import_gltf,

@@ -11,8 +11,10 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.blender.armature import read_skeleton
 from octo_motion.blender.imports import NOTE, import_clip
 from octo_motion.core.errors import ClipError
+from octo_motion.core.splicing.mapping import map_skeleton
 from octo_motion.ui.splicing import import_session
 from octo_motion.ui.splicing.import_clips import OCTO_MOTION_OT_import_clips
 from tests.ui.rig import click, joints_in_world, keys
@@ -182,6 +184,60 @@ def test_a_clip_stands_as_blenders_own_importer_shows_it(shared_data: Data) -> N
         np.testing.assert_allclose(found, joints, atol=1e-3)  # of 80 units, single precision
 
 
+def upright(name: str) -> Any:
+    """From feet to head of an armature, world, at rest and at the middle of its action."""
+    armature: Any = bpy.data.objects[name]
+    marks = map_skeleton(read_skeleton(armature)).landmarks
+    names = [marks["head"], marks["foot.L"], marks["foot.R"]]
+    first, last = armature.animation_data.action.frame_range
+    bpy.context.scene.frame_set(int(0.5 * (first + last)))
+    heads = [
+        np.array([armature.matrix_world @ bones[each].head for each in names])
+        for bones in (armature.pose.bones,)
+    ]
+    heads.append(
+        np.array([armature.matrix_world @ armature.data.bones[n].head_local for n in names])
+    )
+    along = [each[0] - each[1:].mean(axis=0) for each in heads]
+    return [each / np.linalg.norm(each) for each in along]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("makehuman/walk1", "makehuman/tpose", "animated_drawings/fair1_dab"),
+        *("animated_drawings/fair1_jumping", "pybvh/bvh_example", "pybvh/standard_skeleton"),
+    ],
+)
+def test_bodies_of_files_whose_z_axis_points_up_stand(name: str, shared_data: Data) -> None:
+    clip = import_clip(shared_data(f"{name}.bvh"), bpy.context)
+    assert any("Z axis points up" in note for note in clip.notes)
+    assert all(each[2] > 0.9 for each in upright(Path(name).name))
+    assert len(bpy.data.armatures) == len(bpy.data.actions) == 1
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("secondlife/avatar_sit_ground", "secondlife/avatar_backflip", "cmu/12_01_walk"),
+        *("animated_drawings/rokoko_jesse_dance", "odd_real/cossack dance 2"),
+    ],
+)
+def test_files_whose_y_axis_points_up_are_left_as_they_are(name: str, shared_data: Data) -> None:
+    clip = import_clip(shared_data(f"{name}.bvh"), bpy.context)
+    assert not any("axis" in note for note in clip.notes)
+
+
+def test_which_axis_points_up_can_be_said(shared_data: Data) -> None:
+    path = shared_data("makehuman/walk1.bvh")
+    assert not import_clip(path, bpy.context, up="Y").notes
+    assert upright("walk1")[0][1] < -0.9
+    assert not import_clip(path, bpy.context, up="Z").notes
+    assert upright("walk1.001")[0][2] > 0.9
+    click("import_clips", filepath=str(path), up="Y")
+    assert upright("walk1.002")[0][1] < -0.9
+
+
 def test_a_rig_with_many_actions_shows_the_first_and_keeps_all(shared_data: Data) -> None:
     import_files(shared_data("rigs_with_actions/KayKit_Knight.glb"))
 
@@ -281,6 +337,7 @@ class Operator:
     _browsing = False
     frame_start = 1
     filepath = ""
+    up = "AUTO"
 
     def __init__(self, folder: Path, names: list[str]) -> None:
         self.directory = str(folder)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import bpy
-from bpy.props import CollectionProperty, IntProperty, StringProperty
+from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringProperty
 
 from ...blender.imports import SUFFIXES
 from ...core.errors import OctoMotionError
@@ -47,6 +47,16 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
         name="First Frame",
         description="Where the first key of each clip goes",
         default=1,
+        options={"SKIP_SAVE"},
+    )
+    up: EnumProperty(
+        name="Up",
+        description="Which axis of BVH files points up. Other formats say it themselves",
+        items=(
+            ("AUTO", "Automatic", "Y; Z if the body would lie on its back", 0),
+            ("Y", "Y", "As most programs write it", 1),
+            ("Z", "Z", "As Blender and MakeHuman may write it", 2),
+        ),
         options={"SKIP_SAVE"},
     )
     filter_glob: StringProperty(
@@ -89,6 +99,7 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
                     directory=self.directory,
                     files=[{"name": each.name} for each in self.files],
                     frame_start=self.frame_start,
+                    up=self.up,
                 )
             return {"CANCELLED"}
         return super().execute(context)
@@ -141,7 +152,7 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
         named = [folder / each.name for each in self.files if each.name]
         if not named and self.filepath:
             named = [Path(bpy.path.abspath(self.filepath))]
-        return ImportSession(named, self.frame_start, context)
+        return ImportSession(named, self.frame_start, context, up=self.up)
 
     def _begin(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
         window_manager = context.window_manager

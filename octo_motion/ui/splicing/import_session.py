@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ...blender.imports import ImportedClip, import_clip, remove_clips
+from ...blender.imports import ImportedClip, Up, import_clip, remove_clips
 from ...core.errors import ClipError
 
 
@@ -19,18 +19,27 @@ class ImportSession:
         paths: the files; one that is named twice is imported once.
         frame_start: frame of the first key of each.
         context: of the import; not kept.
+        up: which axis of BVH files points up.
 
     Raises:
         ClipError: there are no files.
     """
 
-    def __init__(self, paths: Sequence[Path], frame_start: int, context: bpy.types.Context) -> None:
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        frame_start: int,
+        context: bpy.types.Context,
+        *,
+        up: Up = "AUTO",
+    ) -> None:
         self._paths = list(dict.fromkeys(paths))
         if not self._paths:
             raise ClipError("No file is given.", "Choose one or more.")
         self.clips: list[ImportedClip] = []
         self.refused: list[tuple[Path, ClipError]] = []
         self._frame_start = frame_start
+        self._up: Up = up
         layer = context.view_layer
         assert layer is not None
         self._selected = [
@@ -57,7 +66,7 @@ class ImportSession:
                 progress((number + share) / len(self._paths))
 
             try:
-                clip = import_clip(path, bpy.context, self._frame_start, progress=told)
+                clip = import_clip(path, bpy.context, self._frame_start, up=self._up, progress=told)
                 self.clips.append(clip)
             except ClipError as error:
                 self.refused.append((path, error))
