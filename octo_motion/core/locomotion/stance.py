@@ -22,7 +22,7 @@ from .columns import dot, product, smallest_arc, turned
 from .footholds import PEELING, UNROLLING, Footholds, Limbs, StanceSettings
 from .ground import Ground
 
-_STEPS: Final = (4, 3, 5)
+_STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised."""
 _KEPT: Final = 0.3
 """Share of the gait's own shape in an arm that holds on."""
@@ -55,9 +55,9 @@ _GENTLE: Final = 0.05
 """Strain over which stretching begins."""
 _BOLD: Final = 0.6
 """Radians that a segment turns at a step of Newton's at most."""
-_GOING: Final = 0.08
+_GOING: Final = 0.12
 """Cycles within which an arm in the air comes to go along with its body."""
-_AT_ONCE: Final = 8.0
+_AT_ONCE: Final = 20.0
 """How much faster than its hold an arm loses its stiffness against the ground."""
 _FIRM: Final = 1e-4
 """What keeps the steps finite where an arm is straight, as a share of its own stiffness."""
@@ -136,8 +136,8 @@ def hold(
     touching, whole = reach[footholds.touching][arms], reach[-1][arms]
     down = _smooth((since - on) / (UNROLLING * (off - on)))
     gone = _smooth((since - footholds.peeled()[at]) / (PEELING * (off - on)))
-    landing = _smooth((since + 0.5) / (on + 0.5))
-    leaving = _smooth((0.5 - since) / (0.5 - off))
+    landing = _gentle((since + 0.5) / (on + 0.5))
+    leaving = _gentle((0.5 - since) / (0.5 - off))
     weight = np.where(since < on, landing, np.where(since > off, leaving, 1.0))
     joints = np.moveaxis(footholds.joints[at], 0, -1)
     # An arm in the air goes along with the body, and does so gently at first.
@@ -145,7 +145,7 @@ def hold(
     moved = np.where(
         since < on, roots - footholds.roots_on[at].T, roots - footholds.roots_off[at].T
     )
-    carried = moved * _smooth((before + after) / _GOING)
+    carried = moved * _gentle((before + after) / _GOING)
     return Hold(
         weight=weight * footholds.present[at],
         lies_from=touching + gone * (footholds.peeled_to[at] - touching),
@@ -188,14 +188,13 @@ def stand(
         own = _part(held, swinging)
         let_go = _smooth(_AT_ONCE * away)
         free = _freedom(limbs.lengths[:, arms[swinging]], reach[:, swinging], own)
-        loose = _loose(reach[:, swinging], own)
         directions[..., swinging] = _raised(
             directions[..., swinging],
             lengths[:, swinging],
             free + (1.0 - free) * let_go,
             bodies.roots[:, swinging],
             radii[:, swinging] + settings.lift * reach[-1, swinging] * away**2,
-            loose + (_out(reach[:, swinging]) - loose) * let_go,
+            let_go * _out(reach[:, swinging]),
             ground,
             _RAISES,
         )
@@ -533,3 +532,9 @@ def _smooth(share: Floats) -> Floats:
     """From 0 to 1 and from 1 on, level at both ends."""
     inside = np.clip(share, 0.0, 1.0)
     return inside * inside * (3.0 - 2.0 * inside)
+
+
+def _gentle(share: Floats) -> Floats:
+    """The same with no acceleration at its ends either: next to a hold nothing moves at first."""
+    inside = np.clip(share, 0.0, 1.0)
+    return inside * inside * inside * (10.0 + inside * (6.0 * inside - 15.0))
