@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Final
 
 import bpy
 import numpy as np
+from mathutils import Matrix
+
+from ..core.rotations import Floats
 
 SCALE: Final = ("scale",)
 """Channels of a bone that stretches."""
@@ -56,6 +59,31 @@ def unscale_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
     for name in names:
         if name in bones:
             bones[name].scale = (1.0, 1.0, 1.0)
+
+
+def standing_of(
+    armature: bpy.types.Object, bone: str, *, left_out: Collection[str] = ()
+) -> tuple[Floats, Floats]:
+    """Where the poses of a bone's ancestors have brought what it hangs on.
+
+    Args:
+        armature: the armature object.
+        bone: name of a bone.
+        left_out: ancestors whose pose does not count.
+
+    Returns:
+        A shift (3,) and a turn (4,) of armature space; scale is left out.
+    """
+    assert armature.pose is not None
+    ancestors = list(reversed(armature.pose.bones[bone].parent_recursive))
+    moved = Matrix.Identity(4)
+    for each in ancestors:
+        rest = each.bone.matrix_local
+        if each.name not in left_out:
+            # What it does to its own rest, in armature space, carried by those above it.
+            moved = moved @ rest @ each.matrix_basis @ rest.inverted_safe()
+    shift, turn, _ = moved.decompose()
+    return np.array(shift, dtype=np.float64), np.array(turn, dtype=np.float64)
 
 
 def displaced_bones(

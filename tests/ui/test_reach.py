@@ -159,6 +159,22 @@ def test_it_works_in_place_and_swimming_and_on_a_root_bone(octopus: Any) -> None
         assert min(away(each, rod).min() for each in points) < 0.16, gait
 
 
+def test_a_pose_of_the_body_counts(octopus: Any) -> None:
+    settings = settings_of(octopus)
+    settings.travel_on, settings.root_bone = "OBJECT", "Root"
+    click("detect_arms")
+    settings.root_bone = ""
+    rod = thing()
+    reach(octopus, rod)
+    root = octopus.pose.bones["Root"]
+    root.rotation_mode = "XYZ"
+    root.location, root.rotation_euler = (0.05, 0.02, -0.05), (0.1, 0.2, -0.15)
+    generate(octopus)
+    near = away(arm_joints(octopus, 52), rod)
+    assert near.min() > 0.04
+    assert (near < 0.16).sum() >= 3
+
+
 def test_few_keys_hold_as_well(octopus: Any) -> None:
     settings = settings_of(octopus)
     settings.keys = "REDUCED"

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...blender.grasp_target import hangs_on, read_form, read_places
+from ...blender.poses import standing_of
 from ...blender.skin_radii import skin_radii
 from ...core.errors import RigError, SettingsError
 from ...core.locomotion.arm_frames import ArmFrames, arm_frames
@@ -70,6 +71,9 @@ class Reaching:
     arms: tuple[Arm, ...]
     frames: tuple[ArmFrames, ...]
     radii: tuple[Floats, ...]
+    standings: tuple[tuple[Floats, Floats], ...]
+    """Where a pose that stays has brought what each arm hangs on: a shift (3,) and a turn (4,) of
+    armature space."""
     up: Floats
     reaches: tuple[Reach, ...]
 
@@ -97,8 +101,13 @@ class Reaching:
         busy: list[tuple[int, Reach]] = []
         notes: list[str] = []
         for reach in sorted(self.reaches, key=lambda each: each.timeline.start):
-            places = travelling.seen(reach.positions, reach.rotations)
-            number = self._arm(reach, times, places)
+            seen = travelling.seen(reach.positions, reach.rotations)
+            number = self._arm(reach, times, seen)
+            shift, turn = self.standings[number]
+            places = Places(
+                rotate(conjugate(turn), seen.positions - shift),
+                multiply(conjugate(turn), seen.rotations),
+            )
             _check_free(busy, number, reach, self.arms[number].name)
             busy.append((number, reach))
             columns = slice(int(ends[number]), int(ends[number + 1]))
@@ -182,6 +191,9 @@ def read_reaches(
         arms=arms,
         frames=tuple(arm_frames(skeleton, arm.bones, body) for arm in arms),
         radii=tuple(radii),
+        standings=tuple(
+            standing_of(armature, arm.bones[0], left_out={settings.root_bone}) for arm in arms
+        ),
         up=body.rotation[:, 2],
         reaches=tuple(_reach(item, armature, frames) for item in items),
     )
