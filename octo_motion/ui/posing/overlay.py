@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 import bpy
@@ -69,7 +70,7 @@ _shown: list[Overlay] = []
 
 def take_down_all() -> None:
     """Leave no drawing behind."""
-    for each in list(_shown):
+    for each in _shown:
         each.take_down()
 
 
@@ -77,11 +78,13 @@ class Overlay:
     """The drawing of one session, in all 3D viewports, until it is taken down.
 
     Args:
-        controls: of the session.
+        controls: of the session; a device's have the same attributes.
+        lines: what is drawn, by ``overlay_lines`` if nothing else is given.
     """
 
-    def __init__(self, controls: PoseControls) -> None:
+    def __init__(self, controls: Any, lines: Callable[..., Lines] = overlay_lines) -> None:
         self._controls = controls
+        self._lines = lines
         self._handle: Any = bpy.types.SpaceView3D.draw_handler_add(
             self._draw, (), "WINDOW", "POST_VIEW"
         )
@@ -106,7 +109,7 @@ class Overlay:
         gpu.state.blend_set("ALPHA")
         gpu.state.depth_test_set("NONE")
         try:
-            for points, colours, width in overlay_lines(
+            for points, colours, width in self._lines(
                 self._controls, eye, loads=settings.show_loads
             ):
                 if not len(points):

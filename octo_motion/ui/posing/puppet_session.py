@@ -194,6 +194,11 @@ class PuppetSession:
         """Bodies that the artist has nailed to their places, or that are by the settings."""
         return sorted(self.core.pins)
 
+    @property
+    def root_is_held(self) -> bool:
+        """Whether the root neither moves nor turns."""
+        return self._shown.root == "HELD"
+
     # --- The hand -------------------------------------------------------------------------------
 
     def pick(self, origin: Floats, direction: Floats, *, margin: float = 0.0) -> Hit | None:

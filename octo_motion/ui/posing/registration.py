@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
+from .device_pose import active_hands
 from .overlay import take_down_all
 from .puppet_session import active_session
 
 
 def unregister() -> None:
     """End the session that is going on, if one is, and draw no more."""
+    hands = active_hands()
+    if hands is not None:
+        hands.stop()
     session = active_session()
     if session is not None:
         session.finish()
