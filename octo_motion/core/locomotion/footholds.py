@@ -28,6 +28,8 @@ PEELING: Final = 0.5
 """Share of a hold in which the arm is peeled off, in the same direction, as the body pulls."""
 _SLACK: Final = 0.82
 """Distance from root to where it is peeled off, as a share of the arm between, that peels no more."""
+_FEW: Final = 2
+"""Joints that lie down of an arm that is too stiff to be peeled off."""
 _LEFT: Final = 0.25
 """Share of the part that lies down which is not peeled off, but let go with the tip."""
 _EASY: Final = 0.80
@@ -38,6 +40,8 @@ _STRETCHED: Final = 0.6
 """Share of the most stretch that footholds are laid for."""
 _NEAREST: Final = 0.20
 """Arm lengths from the root, seen from above."""
+_CLOSEST: Final = 0.05
+"""The same where there is no other way."""
 _SHORTENED: Final = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
 """Shares of its time that a hold may be cut down to where the body moves on too far."""
 _CURL: Final = np.radians(50.0)
@@ -240,6 +244,9 @@ def lay(
     half = np.zeros((arms, count))
     short = np.full((arms, count), np.inf)
     open_ = np.ones((arms, count), dtype=bool)
+    # How much of the part that lies down is peeled off at the farthest.
+    stiff = len(along) - joint <= _FEW
+    peeled = 0.0 if stiff else (1.0 - _LEFT) * (whole - free)
     for share in _SHORTENED:
         width = settings.duty * share
         times = (-0.5 * width, (0.5 - PEELING) * width, 0.5 * width)
@@ -247,8 +254,8 @@ def lay(
             _roots(limbs, line, rhythm.distances(limbs.arms, given + shift + each))
             for each in times
         ]
-        reaches = (_TAUT * longer * free, _TAUT * longer * free, _TAUT * longer * whole)
-        beyond = (0.0, 0.0, whole - free)
+        reaches = (_TAUT * longer * free, _TAUT * longer * free, _TAUT * longer * (free + peeled))
+        beyond = (0.0, 0.0, peeled)
         nearest = _NEAREST * whole
         found = np.full((arms, count), 0.5) * free
         for _ in range(3):
@@ -260,7 +267,7 @@ def lay(
             for root in seen[:1] + seen[-1:]:
                 onto = np.sum((root[..., :2] - roots[..., :2]) * aim, axis=-1)
                 least = np.maximum(least, nearest + onto)
-            lack = np.zeros((arms, count))
+            lack, farthest = np.zeros((arms, count)), np.full((arms, count), np.inf)
             for root, far, extra in zip(seen, reaches, beyond, strict=True):
                 level = far**2 - (root[..., 2] - z) ** 2
                 apart = roots[..., :2] - root[..., :2]
@@ -269,8 +276,9 @@ def lay(
                 inside = onto**2 - np.sum(apart**2, axis=-1) + level
                 largest = np.sqrt(np.maximum(inside, 0.0)) - onto - extra
                 lack = np.maximum(lack, np.where(inside < 0.0, whole, least - largest))
-                limit = np.minimum(limit, largest)
-            found = np.maximum(limit, least)
+                farthest = np.minimum(farthest, largest)
+            # What is too near looks bad, but what is too far slides.
+            found = np.minimum(np.maximum(limit, least), np.maximum(farthest, _CLOSEST * whole))
         better = open_ & (lack < short)
         distance = np.where(better, found, distance)
         half = np.where(better, 0.5 * width, half)
@@ -313,6 +321,8 @@ def _peeled_to(limbs: Limbs, joints: Floats, roots: Floats, joint: int) -> Float
     along = limbs.reach[joint:]
     first, last = along[0][:, None], along[-1][:, None]
     result = np.broadcast_to(first, roots.shape[:2]).copy()
+    if len(along) <= _FEW:
+        return result
     share = np.linspace(0.0, 1.0 - _LEFT, 16)
     for each in share:
         place = each * (last - first) + first
