@@ -24,6 +24,7 @@ import stage
 from stage import Colour, Pixels
 
 import octo_motion
+from octo_motion.blender.cycles import lasting
 
 CLIPS: Final = Path(__file__).resolve().parent.parent / "examples" / "clips"
 VARIABLE: Final = "OCTO_MOTION_CLIPS"
@@ -89,8 +90,8 @@ def sheet(clips: Clips, cell: tuple[int, int] = _CELL, columns: int = _COLUMNS) 
     scene = stage.the_scene()
     scene.render.fps = 30
     walker, thrower, puncher = (_imported(path) for path in (clips.walk, clips.right, clips.left))
-    lasting = [_span(each)[1] - _span(each)[0] for each in (thrower, puncher)]
-    _lengthen(walker, 0.9 * lasting[0] + lasting[1] + 20.0)
+    long = [_span(each)[1] - _span(each)[0] for each in (thrower, puncher)]
+    _lengthen(walker, round(0.9 * long[0] + long[1]) + 21)
     figures.dress(walker, {"arm.R": _RIGHT, "arm.L": _LEFT}, _PLAIN)
     figures.dress(thrower, {"arm.R": _RIGHT}, _PLAIN)
     figures.dress(puncher, {"arm.L": _LEFT}, _PLAIN)
@@ -98,8 +99,8 @@ def sheet(clips: Clips, cell: tuple[int, int] = _CELL, columns: int = _COLUMNS) 
     base: Any = walker.animation_data
     action = base.action
     timings = (
-        (first + 6.0, first + 6.0 + 0.9 * lasting[0]),
-        (first + 6.0 + 0.6 * lasting[1], first + 6.0),
+        (first + 6.0, first + 6.0 + 0.9 * long[0]),
+        (first + 6.0 + 0.6 * long[1], first + 6.0),
     )
     for part, source in (("RIGHT_ARM", thrower), ("LEFT_ARM", puncher)):
         _select(walker)
@@ -144,29 +145,9 @@ def _span(armature: Any) -> tuple[float, float]:
     return float(start), float(end)
 
 
-def _lengthen(armature: Any, frames: float) -> None:
-    """Let a walk go on for so many frames, as the guide tells: cycles, and a frame range."""
-    action = armature.animation_data.action
-    start, end = _span(armature)
-    if end - start >= frames:
-        action.frame_end = start + frames
-        return
-    for curve in _curves(action):
-        cycles = curve.modifiers.new("CYCLES")
-        travels = curve.data_path.endswith("location")
-        cycles.mode_after = "REPEAT_OFFSET" if travels else "REPEAT"
-    action.use_frame_range = True
-    action.frame_start, action.frame_end = start, start + frames
-
-
-def _curves(action: Any) -> list[Any]:
-    return [
-        curve
-        for layer in action.layers
-        for strip in layer.strips
-        for bag in strip.channelbags
-        for curve in bag.fcurves
-    ]
+def _lengthen(armature: Any, frames: int) -> None:
+    """Let a walk last so many frames: longer ones are cut, a single cycle is repeated."""
+    _assign(armature, lasting(armature.animation_data.action, frames))
 
 
 def _select(armature: Any) -> None:

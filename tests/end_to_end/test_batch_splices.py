@@ -217,6 +217,26 @@ def test_armatures_and_actions_of_a_scene_are_spliced_by_name(scene: Path, folde
 ARM = ("--splice", "right_arm")
 
 
+def test_a_short_base_is_repeated_and_a_long_one_cut(folder: Path) -> None:
+    rounds = (*("splice", "dance.bvh", *ARM, "throw.bvh", "base_start=100"), "--frames", "300")
+    assert run_here(folder, *rounds, "-o", "long.blend") == 0
+    dancer = opened(folder / "long.blend")
+    assert tuple(dancer.animation_data.action.frame_range) == (1, 300)
+    assert bpy.context.scene.frame_end == 300
+    before = read_clip(dancer, bpy.data.actions["dance"])
+    assert len(before) == 91
+    again = read_clip(dancer, dancer.octo_motion.splicing.base)
+    assert angle_between(again.rotations[90:180], before.rotations[:90]).max() < ROUNDING
+
+    job = write(
+        folder / "job.toml",
+        '[[shots]]\nname = "a"\nkind = "splice"\nfile = "walk.bvh"\noutput = "a.blend"\n'
+        'frames = 50\nsplices = [{ part = "head", clip = "dance.bvh" }]\n',
+    )
+    assert run_here(folder, "bake", "job.toml") == 0
+    assert report(job)["a"]["frames"] == 50
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -52,7 +53,7 @@ def test_results_differ_from_the_walk_and_from_each_other(tmp_path: Path) -> Non
     assert run.returncode == 0, run.stderr
     assert str(path) in run.stdout
     assert "timing 1: Right Arm: throw from frame 7, Left Arm: punch from frame 77" in run.stderr
-    image = bpy.data.images.load(str(path))
+    image: Any = bpy.data.images.load(str(path))
     width, height = image.size
     assert (width, height) == (3 * CELL[0] + 2 * APART, 5 * CELL[1] + 4 * APART)
     pixels = np.array(image.pixels[:]).reshape(height, width, -1)[::-1, :, :3]

@@ -141,7 +141,7 @@ def test_output_must_not_be_a_clip_that_is_read(tmp_path: Path) -> None:
 
 
 def test_splices_survive_their_way_to_another_process(tmp_path: Path) -> None:
-    asked = WALK + ARM + 'base = "Stroll"\nsettings = { visual = true }\n'
+    asked = WALK + ARM + 'frames = 50\nbase = "Stroll"\nsettings = { visual = true }\n'
     listed = WALK.replace("walk", "b").replace(".bvh", ".blend").replace("out.", "b2.")
     for shot in read(tmp_path, asked + listed).shots:
         text = json.dumps(shot.entry.to_plain())

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from .entry import EXPORT_SUFFIXES, HIGHEST_FPS
+from .entry import EXPORT_SUFFIXES, HIGHEST_FPS, MOST_FRAMES
 
 _STATUS: Final = "Exit status: 0 all went well, 1 something failed, 2 wrong arguments or job."
 
@@ -154,6 +154,12 @@ def _add_splice(
     command.add_argument(
         "--base", metavar="ACTION", default="", help="default: the list's, or the armature's own"
     )
+    command.add_argument(
+        "--frames",
+        metavar="N",
+        type=_frame_count,
+        help="how long the base lasts: a walk of one cycle is repeated, a longer one is cut",
+    )
     _add_settings(command, "a setting of the base, such as visual=true or landmarks.chest=Spine2")
 
 
@@ -246,6 +252,13 @@ def _positive(text: str) -> int:
     number = int(text) if text.isdecimal() else 0
     if number < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
+    return number
+
+
+def _frame_count(text: str) -> int:
+    number = int(text) if text.isdecimal() else 0
+    if not 2 <= number <= MOST_FRAMES:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 2 to {MOST_FRAMES}")
     return number
 
 

@@ -127,7 +127,7 @@ def _splice_entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
         fps=options.fps,
         output=output,
         exports=exports,
-        splicing=SpliceWork(options.base, splices),
+        splicing=SpliceWork(options.base, options.frames, splices),
     )
 
 

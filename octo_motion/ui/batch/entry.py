@@ -15,6 +15,9 @@ EXPORT_SUFFIXES: Final = (".glb", ".fbx", ".abc")
 HIGHEST_FPS: Final = 32767
 """Blender's own limit."""
 
+MOST_FRAMES: Final = 1_000_000
+"""A little below Blender's last frame."""
+
 Points = tuple[tuple[float, float, float], ...]
 
 
@@ -56,6 +59,8 @@ class SpliceWork:
 
     base: str = ""
     """Name of the action to splice onto; the armature's own, or the list's, if empty."""
+    frames: int | None = None
+    """Frames that the base is to last, repeated or cut; as long as it is if not given."""
     splices: tuple[NewSplice, ...] | None = None
     """In order, or none for the list that the file has."""
 
@@ -129,7 +134,8 @@ class ShotEntry:
 
 def _splice_work(plain: dict[str, Any]) -> SpliceWork:
     given = plain["splices"]
-    return SpliceWork(plain["base"], None if given is None else tuple(map(_new_splice, given)))
+    splices = None if given is None else tuple(map(_new_splice, given))
+    return SpliceWork(plain["base"], plain["frames"], splices)
 
 
 def _new_splice(plain: dict[str, Any]) -> NewSplice:

@@ -23,6 +23,7 @@ from ...core.locomotion.octopus_shape import OctopusShape
 from .entry import (
     EXPORT_SUFFIXES,
     HIGHEST_FPS,
+    MOST_FRAMES,
     NewOctopus,
     NewRoute,
     Points,
@@ -39,7 +40,7 @@ KINDS: Final = {
         *("output", "export"),
     ),
     "splice": (
-        *("name", "kind", "file", "armature", "base", "splices", "settings", "fps"),
+        *("name", "kind", "file", "armature", "base", "frames", "splices", "settings", "fps"),
         *("output", "export"),
     ),
 }
@@ -282,7 +283,7 @@ class _Reader:
             fps=self._fps(),
             output=output,
             exports=exports,
-            splicing=SpliceWork(self._text("base"), splices),
+            splicing=SpliceWork(self._text("base"), self._frames(), splices),
         )
         return JobShot(entry, self._table)
 
@@ -433,6 +434,19 @@ class _Reader:
             self._fault(f"fps must be a number from 1 to {HIGHEST_FPS}, not {fps!r}.")
             return None
         return float(fps)
+
+    def _frames(self) -> int | None:
+        frames = self._table.get("frames")
+        if frames is None:
+            return None
+        if (
+            isinstance(frames, bool)
+            or not isinstance(frames, int)
+            or not 2 <= frames <= MOST_FRAMES
+        ):
+            self._fault(f"frames must be a whole number from 2 to {MOST_FRAMES}, not {frames!r}.")
+            return None
+        return frames
 
     def _exports(self) -> tuple[Path, ...]:
         given = self._table.get("export", [])

@@ -11,6 +11,7 @@ from typing import Any, Final
 import bpy
 
 from ...blender import actions
+from ...blender.cycles import lasting
 from ...blender.imports import NOTE, ImportedClip, import_clip
 from ...core.errors import ClipError, OctoMotionError
 from ..splicing.properties import splicing_settings
@@ -163,9 +164,12 @@ def splice(
         stack.base = _base(work.base, clips, base_file)
         stack.base_slot = ""
     _set(stack, settings)
+    if work.frames is not None or work.splices is not None:
+        _choose_base(armature, stack)
+    if work.frames is not None and stack.base is not None:
+        stack.base = lasting(stack.base, work.frames)
     if work.splices is not None:
         _clear(stack)
-        _choose_base(armature, stack)
         for number, each in enumerate(work.splices, 1):
             try:
                 _add(armature, each, clips, base_file)
