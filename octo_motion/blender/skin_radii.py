@@ -67,7 +67,8 @@ def _of_chain(
         beyond = joints > places[-1]
         result[beyond] = radii[-1] + slope * (joints[beyond] - places[-1])
         result = np.maximum(result, 0.3 * radii[-1])
-    return result
+    # Thicker further out are webs, fins and what few vertices do not tell.
+    return np.minimum.accumulate(result)
 
 
 def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:

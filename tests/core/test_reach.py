@@ -13,7 +13,7 @@ from octo_motion.core.locomotion.coil import profile_of
 from octo_motion.core.locomotion.curl import curled
 from octo_motion.core.locomotion.generator import GaitSettings, Generator
 from octo_motion.core.locomotion.grasp import Grasp, Mode, Places, Target, plan_grasp
-from octo_motion.core.locomotion.reach import Timeline, eased
+from octo_motion.core.locomotion.reach import Timeline, eased, first_place, front_width
 from octo_motion.core.rotations import (
     IDENTITY,
     Floats,
@@ -114,22 +114,19 @@ def test_suckers_face_the_ground_where_the_rig_does_not_say() -> None:
 # --- The reach ------------------------------------------------------------------------------------
 
 
-def bend(reaching: Case, times: Floats) -> tuple[Floats, Floats]:
-    """Place of the bend (frames, 3), and its frames that lie between setting out and touching."""
-    places = still(times)
-    along = reaching.joints(times, places)
+def bend(reaching: Case, times: Floats) -> Floats:
+    """Place of the bend (frames, 3)."""
+    along = reaching.joints(times, still(times))
     arm, first = reaching.arm, reaching.grasp.coil.first
-    from octo_motion.core.locomotion.reach import first_place, front_width
-
     width = front_width(arm.lengths)
-    front = TIMELINE.front(
-        times, first_place(arm.lengths), arm.reach[first] + width, arm.length + width
+    touches = arm.reach[first] + width
+    front = TIMELINE.front(times, first_place(arm.lengths), touches, arm.length + width)
+    return np.stack(
+        [
+            _at(joints, arm.reach, place)
+            for joints, place in zip(along, front - 0.5 * width, strict=True)
+        ]
     )
-    point = np.stack(
-        [np.interp(0.0, [0.0], [0.0]) + _at(along[n], arm.reach, front[n] - 0.5 * width)
-         for n in range(len(times))]
-    )  # fmt: skip
-    return point, times
 
 
 def _at(joints: Floats, reach: Floats, place: float) -> Floats:
@@ -139,7 +136,7 @@ def _at(joints: Floats, reach: Floats, place: float) -> Floats:
 def test_the_bend_speeds_up_once_and_slows_down_once() -> None:
     times = frames(0.25)
     moving = (times >= 25.0) & (times <= TIMELINE.contact)
-    point, _ = bend(case(60), times[moving])
+    point = bend(case(60), times[moving])
     speed = np.linalg.norm(np.diff(point, axis=0), axis=1)
     speed = np.convolve(speed, np.ones(5) / 5.0, "valid")  # joints are 1.5 % of the arm apart
     peak = int(np.argmax(speed))
@@ -152,7 +149,7 @@ def test_the_bend_speeds_up_once_and_slows_down_once() -> None:
 def test_the_bend_stays_near_a_plane() -> None:
     times = frames(0.25)
     moving = (times >= 25.0) & (times <= TIMELINE.contact)
-    point, _ = bend(case(60), times[moving])
+    point = bend(case(60), times[moving])
     centred = point - point.mean(axis=0)
     spread = np.linalg.svd(centred, compute_uv=False)
     assert spread[2] < 0.08 * spread[0]
@@ -196,7 +193,7 @@ def test_a_frame_does_not_depend_on_others() -> None:
 @pytest.mark.parametrize("name", ["rod", "bottle", "ball", "box"])
 def test_the_arm_does_not_pass_through_what_it_holds(joints: int, name: str) -> None:
     form = getattr(objects, name)()
-    where = WHERE + (0.0, 0.0, 0.2 if name in {"ball", "box"} else 0.0)
+    where = WHERE + (0.2 if name in {"ball", "box"} else 0.0) * UP
     times = frames(0.5)
     reaching = case(joints, form, still(frames(), where))
     held = (times >= TIMELINE.contact) & (times <= TIMELINE.release)

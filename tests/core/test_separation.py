@@ -13,12 +13,14 @@ from octo_motion.core.locomotion.separation import Capsules, measure
 from octo_motion.core.rotations import Floats
 from tests.core.rigs import body_with_arms
 
+ALONG = np.array([1.0, 0.0, 0.0])
+HIGH = np.array([0.0, 0.0, 1.4])
 FAR = np.array([[10.0, 0.0, 0.0], [11.0, 0.0, 0.0]])
 
 
 def capsule(name: str, start: Floats, end: Floats, radius: float, *, rest: float = 0.0) -> Capsules:
     joints = np.stack([np.atleast_2d(start), np.atleast_2d(end)], axis=1)
-    return Capsules(name, joints, np.full(2, radius), FAR + [0.0, rest, 0.0])
+    return Capsules(name, joints, np.full(2, radius), FAR + np.array([0.0, rest, 0.0]))
 
 
 def nearest(a: Floats, b: Floats, c: Floats, d: Floats) -> float:
@@ -45,10 +47,10 @@ def test_depth_is_what_is_missing_to_the_sum_of_radii(seed: int) -> None:
 
 def test_the_worst_frame_and_the_pair_are_named() -> None:
     start = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0]])
-    moving = capsule("moving", start, start + [1.0, 0.0, 0.0], 0.3, rest=9.0)
+    moving = capsule("moving", start, start + ALONG, 0.3, rest=9.0)
     zero = np.zeros((3, 3))
-    lying = capsule("lying", zero, zero + [1.0, 0.0, 0.0], 0.3)
-    body = capsule("body", zero + [0.0, 0.0, 1.4], zero + [1.0, 0.0, 1.4], 0.3, rest=20.0)
+    lying = capsule("lying", zero, zero + ALONG, 0.3)
+    body = capsule("body", zero + HIGH, zero + ALONG + HIGH, 0.3, rest=20.0)
     found = measure([moving, lying], [body])
     np.testing.assert_allclose(found.depths, [0.0, 1.0 / 3.0, 2.0 / 3.0], atol=1e-9)
     assert [(each.first, each.second, each.frame) for each in found.overlaps] == [
@@ -60,8 +62,8 @@ def test_the_worst_frame_and_the_pair_are_named() -> None:
 
 def test_what_overlaps_at_rest_is_built_so() -> None:
     zero = np.zeros((2, 3))
-    one = capsule("one", zero, zero + [1.0, 0.0, 0.0], 0.3)
-    two = capsule("two", zero, zero + [1.0, 0.0, 0.0], 0.3)
+    one = capsule("one", zero, zero + ALONG, 0.3)
+    two = capsule("two", zero, zero + ALONG, 0.3)
     found = measure([one, two])
     assert found.worst is None
     assert not found.depths.any()

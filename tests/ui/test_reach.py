@@ -66,7 +66,7 @@ def away(points: np.ndarray, target: Any) -> np.ndarray:
 
 
 def test_the_nearest_arm_winds_round_the_object_and_the_others_walk_on(octopus: Any) -> None:
-    walk = {path: values for path, values in keys(generate(octopus)).items()}
+    walk = keys(generate(octopus))
     rod = thing()
     reach(octopus, rod)
     action = generate(octopus)
