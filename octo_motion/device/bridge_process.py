@@ -102,7 +102,7 @@ class Bridge:
                 space = self._workspaces.get(message.pointer)
                 simulation.hear(message, device, space.scale if space else 1.0)
             simulation.step(now)
-            for held in simulation.held(now):
+            for held in list(simulation.held(now)):  # saying may lose the devices
                 self._say_to_hands(held)
         if now - self._told >= _TELL_EVERY:
             self._told = now

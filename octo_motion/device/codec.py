@@ -163,6 +163,8 @@ class Table:
     row: tuple[int, ...] = ()
     most: int = MOST_BODIES
     """Rows."""
+    endless: bool = False
+    """Whether a number may be infinite: a joint that never gives way."""
 
     def put(self, value: Any, out: bytearray) -> None:
         """Append the array."""
@@ -180,7 +182,7 @@ class Table:
         for each in self.row:
             width *= each
         array = np.frombuffer(reader.take(8 * count * width), dtype="<f8").astype(np.float64)
-        if not np.isfinite(array).all():
+        if np.isnan(array).any() or not (self.endless or np.isfinite(array).all()):
             raise MessageError("a number is not finite")
         return array.reshape((count, *self.row))
 

@@ -90,7 +90,7 @@ class FigureMessage(Message):
     stiffness: Annotated[Floats, Table((3,))]
     damping: Annotated[Floats, Table((3,))]
     flow: Annotated[Floats, Table((3,))]
-    yield_torque: Annotated[Floats, Table()]
+    yield_torque: Annotated[Floats, Table(endless=True)]
 
     @classmethod
     def of(cls, figure: Figure) -> FigureMessage:
@@ -120,6 +120,8 @@ class FigureMessage(Message):
             raise MessageError("a parent does not come before its child")
         if count == 0 or (self.masses <= 0.0).any() or (self.lengths <= 0.0).any():
             raise MessageError("a body without mass or length")
+        if (self.yield_torque < 0.0).any():
+            raise MessageError("a joint that yields to less than nothing")
         return Figure(
             *(self.names, self.parents, self.anchors, self.rest, self.lengths, self.masses),
             *(self.centres, self.inertias, self.capsules, self.radii),

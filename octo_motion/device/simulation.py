@@ -265,6 +265,7 @@ class Simulation:
                 continue
             told = hand.told
             if now - told.time > _STALE:
+                log.info("A hand was not heard of for %.2f s and let go", now - told.time)
                 hand.refused = hand.grab  # let go is let go, until it grabs anew
                 self._release(hand)
                 continue

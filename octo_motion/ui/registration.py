@@ -14,6 +14,8 @@ from .locomotion import (
     add_octopus,
     add_route,
     arm_list,
+    change_list,
+    change_properties,
     contacts,
     gait_properties,
     gait_table,
@@ -25,7 +27,7 @@ from .locomotion import (
     reach_properties,
     setups,
 )
-from .posing import marks, pose_script, pose_start
+from .posing import device_panel, device_pose, device_settings, marks, pose_script, pose_start
 from .posing import panels as posing_panels
 from .posing import properties as posing_properties
 from .posing import registration as posing
@@ -53,11 +55,13 @@ CLASSES: tuple[type, ...] = (
     *arm_list.CLASSES,
     *reach_properties.CLASSES,
     *ground_properties.CLASSES,
+    *change_properties.CLASSES,
     *properties.CLASSES,
     *landmark_table.CLASSES,
     *splice_properties.CLASSES,
     *splicing_properties.CLASSES,
     *posing_properties.CLASSES,
+    *device_settings.CLASSES,
     *settings.CLASSES,
     add_octopus.OCTO_MOTION_OT_add_octopus,
     add_route.OCTO_MOTION_OT_add_route,
@@ -65,6 +69,7 @@ CLASSES: tuple[type, ...] = (
     generate.OCTO_MOTION_OT_generate_locomotion,
     *contacts.CLASSES,
     *setups.CLASSES,
+    *change_list.CLASSES,
     *reach_list.CLASSES,
     *panels.CLASSES,
     *import_clips.CLASSES,
@@ -76,6 +81,8 @@ CLASSES: tuple[type, ...] = (
     *pose_script.CLASSES,
     *marks.CLASSES,
     *posing_panels.CLASSES,
+    *device_pose.CLASSES,
+    *device_panel.CLASSES,
 )
 
 
@@ -84,6 +91,7 @@ def register() -> None:
     for each in CLASSES:
         bpy.utils.register_class(each)
     settings.register()
+    device_settings.register()
     setups.register()
     for menu, draw in MENUS:
         menu.append(draw)
@@ -93,6 +101,7 @@ def register() -> None:
 def unregister() -> None:
     """Take back what ``register`` did, in reverse order."""
     posing.unregister()
+    device_settings.unregister()
     command_line.unregister()
     for menu, draw in reversed(MENUS):
         menu.remove(draw)

@@ -21,6 +21,7 @@ from tests.core.puppets import doll, posed, soft
 
 CORNERS = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]])
 FIGURE = doll(soft(20, 1.0, 2.0, 3.0, 4.0))
+FIGURE.elements.yield_torque[3] = np.inf  # a joint that never gives way
 POSE = posed(FIGURE)
 V, Q = (1.0, -2.0, 3.0), (0.5, 0.5, 0.5, 0.5)
 TIMES = (1e-6, 2e-6, 3e-6, 4e-3)
@@ -93,8 +94,9 @@ def test_figure_arrives_whole() -> None:
         {"masses": np.zeros(20)},
         {"lengths": FIGURE.lengths[:-1]},
         {"names": FIGURE.names[:-1]},
+        {"yield_torque": np.full(20, -np.inf)},
     ],
-    ids=["its own parent", "parent after child", "no mass", "short array", "missing name"],
+    ids=["own parent", "parent after child", "no mass", "short array", "no name", "no yield"],
 )
 def test_figure_that_is_none_is_refused(change: dict[str, Any]) -> None:
     message = dataclasses.replace(say.FigureMessage.of(FIGURE), **change)

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Devices on a session of posing, without a window: the bridge simulates, the armature follows.
+
+Everything that the bridge hears is in the puppet's metres; whatever is shown is in the world's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from ...core.posing.figure import Pose
+from ...core.posing.picking import Hit
+from ...core.rotations import Floats, from_matrix
+from ...device.client import Client, State
+from ...device.driver import Kind
+from ...device.messages import (
+    Button,
+    Buzz,
+    Grab,
+    Notice,
+    PointerMessage,
+    Workspace,
+    WorldMessage,
+)
+from ...device.messages import Settings as DeviceSettings
+from .puppet_session import PuppetSession
+
+_WIDTH: Final = 0.25
+"""m: the room of a desktop device, which is as wide as the view."""
+_RATE_WIDTH: Final = 1.0
+"""m: full push of a space mouse crosses the view in 2.5 s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """What the view says of where devices are in the scene."""
+
+    middle: Floats
+    """(3,) the middle of the view, world."""
+    axes: Floats
+    """(3, 3) as columns: right, up, and towards the eye."""
+    width: float
+    """Of what is seen, world."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A pointer, as it is drawn."""
+
+    number: int
+    position: Floats
+    """(3,) world."""
+    coupled: Floats
+    """(3,) world, where the held point is."""
+    body: int
+    force: float
+    """Share of what the device can give."""
+    name: str
+
+
+class DeviceHands:
+    """Hands at devices that hold a session's puppet.
+
+    Args:
+        session: of posing; it steps no more by itself.
+        client: to the bridge, started.
+        settings: how devices behave.
+    """
+
+    def __init__(self, session: PuppetSession, client: Client, settings: DeviceSettings) -> None:
+        self.session = session
+        self.client = client
+        self.hover: Hit | None = None
+        """The limb that is held, for the overlay."""
+        self.hand: Floats | None = None
+        self.said = ""
+        self._start = session.core.pose
+        self._figure: Any = None
+        self._world: Any = None
+        self._obstacles: tuple[Any, ...] = ()
+        self._pins: dict[int, bool] = {}
+        self._settings: DeviceSettings | None = None
+        self._spaces: dict[int, Workspace] = {}
+        self._ours: Pose = self._start
+        self._tell(settings)
+
+    # --- What is there --------------------------------------------------------------------------
+
+    @property
+    def lost(self) -> bool:
+        """Whether the bridge has ended by itself."""
+        return self.client.state is State.LOST
+
+    @property
+    def holding(self) -> bool:
+        """Whether any hand holds a limb."""
+        return any(each.body >= 0 for each in self.client.pointers.values())
+
+    def shown(self) -> list[Shown]:
+        """The pointers."""
+        return [self._shown(each) for each in self.client.pointers.values()]
+
+    def _shown(self, pointer: PointerMessage) -> Shown:
+        device = self.client.devices.get(pointer.pointer)
+        most = device.force if device else 0.0
+        unit = self.session.unit
+        return Shown(
+            pointer.pointer,
+            np.array(pointer.position) / unit,
+            np.array(pointer.coupled_position) / unit,
+            pointer.body,
+            float(np.linalg.norm(pointer.force)) / most if most > 0.0 else 0.0,
+            device.name if device else "",
+        )
+
+    # --- What the artist does -------------------------------------------------------------------
+
+    def grab(self) -> None:
+        """Grab with the first device what is near, or let go."""
+        number = min(self.client.pointers, default=None)
+        if number is None:
+            self.said = "No device is there"
+            return
+        held = self.client.pointers[number].body >= 0
+        self.client.send(Grab(number, grab=not held))
+
+    def pin(self) -> None:
+        """Pin what is held, or take the pin out."""
+        body = self.hover.body if self.hover else None
+        if body is None:
+            self.said = "Hold a limb to pin it"
+            return
+        pinned = self.session.toggle_pin(body)
+        self.said = f"{self.session.bone(body)} {'pinned' if pinned else 'free again'}"
+
+    def restore(self) -> None:
+        """Back to the pose at the start; hands let go."""
+        self.session.core.world.set_pose(self._start)
+        self._give(self.session.core.pose)
+
+    def test(self, number: int) -> None:
+        """Let a device push gently each way."""
+        self.client.send(Buzz(number))
+
+    def recentre(self) -> None:
+        """Bring all pointers to the middle of the view."""
+        self._spaces.clear()
+
+    # --- Time -----------------------------------------------------------------------------------
+
+    def tick(self, settings: DeviceSettings, room: Room | None = None) -> list[Button]:
+        """Take over what the bridge says, pose the armature, and tell the bridge what changed.
+
+        Args:
+            settings: how devices behave now.
+            room: where they are, if a view says so.
+
+        Returns:
+            Buttons that were pressed or let go.
+
+        Raises:
+            RigError: the armature is gone, changed or in edit mode.
+        """
+        buttons = self.client.poll()
+        core = self.session.core
+        if not _same(core.pose, self._ours):
+            # A change of frame, or a script, has posed the armature: that counts.
+            self._give(core.pose)
+        elif self.client.pose is not None and self.client.steps > 0:
+            core.world.set_pose(self.client.pose)
+            self._ours = core.pose
+        self.session.tick(0.0)
+        self._tell(settings)
+        if room is not None:
+            self._place(room)
+        self._look_at_held()
+        return buttons
+
+    def notices(self) -> list[Notice]:
+        """What the user should be told, each once."""
+        notices, self.client.notices = self.client.notices, []
+        return notices
+
+    def _look_at_held(self) -> None:
+        held = [each.body for each in self.client.pointers.values() if each.body >= 0]
+        self.hover = Hit(held[0], np.zeros(3), 0.0) if held else None
+
+    def _give(self, pose: Pose) -> None:
+        self._ours = pose
+        self.client.send_pose(pose)
+        self.client.steps = 0
+
+    def _tell(self, settings: DeviceSettings) -> None:
+        session = self.session
+        world = session.core.world
+        wanted = WorldMessage(
+            gravity=world.settings.gravity,
+            self_collision=world.settings.self_collision,
+            friction=world.settings.friction,
+            drag=world.settings.drag,
+        )
+        if wanted != self._world:
+            self._world = wanted
+            self.client.send(wanted)
+        if world.obstacles != self._obstacles:
+            self._tell_obstacles(world.obstacles)
+        if session.figure is not self._figure:
+            # Another material: the puppet is another one, in the pose that it has.
+            self._figure = session.figure
+            self.client.send_figure(session.figure, session.core.pose)
+            self._pins = {}
+        firm = self._pins_now()
+        if firm != self._pins:
+            self._pins = firm
+            self.client.send_pins(firm)
+        if settings != self._settings:
+            self._settings = settings
+            self.client.send(settings)
+
+    def _tell_obstacles(self, obstacles: tuple[Any, ...]) -> None:
+        for number, obstacle in enumerate(obstacles):
+            self.client.send_obstacle(number, obstacle)
+        for number in range(len(obstacles), len(self._obstacles)):
+            self.client.send_obstacle(number, None)
+        self._obstacles = obstacles
+
+    def _pins_now(self) -> dict[int, bool]:
+        session = self.session
+        held = session.root_is_held
+        return {
+            body: held if session.figure.parents[body] < 0 else True for body in session.core.pins
+        }
+
+    def _place(self, room: Room) -> None:
+        """Tell devices where the view is; a hand that holds something stays where it is."""
+        right, up, towards = room.axes.T
+        turn = from_matrix(np.stack([right, -towards, up], axis=1))
+        w, x, y, z = (float(each) for each in turn)
+        unit = self.session.unit
+        for number, device in self.client.devices.items():
+            pointer = self.client.pointers.get(number)
+            if pointer is not None and pointer.body >= 0:
+                continue
+            before = self._spaces.get(number)
+            rate = device.kind == Kind.RATE
+            middle = room.middle * unit
+            if rate and before is not None:
+                # A space mouse has its pointer where it was pushed to, whatever the view does.
+                middle = np.array(before.origin)
+            own = _RATE_WIDTH if rate else _WIDTH
+            scale = room.width * unit / own
+            a, b, c = (float(each) for each in middle)
+            space = Workspace(number, (a, b, c), (w, x, y, z), scale)
+            if before is None or not _near(before, space):
+                self._spaces[number] = space
+                self.client.send(space)
+
+    def stop(self) -> None:
+        """End the bridge."""
+        self.client.stop()
+
+
+def _same(first: Pose, second: Pose) -> bool:
+    return bool(
+        np.array_equal(first.orientations, second.orientations)
+        and np.array_equal(first.positions, second.positions)
+    )
+
+
+def _near(first: Workspace, second: Workspace) -> bool:
+    """Whether two rooms are so alike that nobody sees the difference."""
+    far = max(abs(a - b) for a, b in zip(first.origin, second.origin, strict=True))
+    off = max(abs(a - b) for a, b in zip(first.orientation, second.orientation, strict=True))
+    return far < 1e-4 * second.scale and off < 1e-4 and abs(first.scale / second.scale - 1.0) < 1e-3

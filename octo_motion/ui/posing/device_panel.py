@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel Device: what is plugged in, how well it goes, and how strong it is."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+
+from ...device.client import State
+from .device_hands import DeviceHands
+from .device_pose import OCTO_MOTION_OT_device_test, OCTO_MOTION_OT_pose_device, active_hands
+from .device_settings import device_settings
+from .panels import OCTO_MOTION_PT_posing, _Panel
+
+_LATE: Final = 0.002
+"""s: a loop that is off its period by more, in one of a hundred ticks, is felt."""
+
+
+class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_posing_device"
+    bl_label = "Device"
+    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+
+    def show(
+        self,
+        context: bpy.types.Context,
+        layout: Any,
+        settings: Any,  # noqa: ARG002
+    ) -> None:
+        assert context.window_manager is not None
+        own = device_settings(context.window_manager)
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(OCTO_MOTION_OT_pose_device.bl_idname, icon="ORIENTATION_GIMBAL")
+        hands = active_hands()
+        if hands is not None:
+            self._devices(layout, hands)
+        layout.prop(own, "force")
+        layout.prop(own, "toggle")
+        layout.prop(own, "speed")
+        layout.prop(own, "scale")
+        layout.prop(own, "reach")
+        row = layout.row()
+        row.active = hands is None
+        row.prop(own, "simulate")
+
+    @staticmethod
+    def _devices(layout: Any, hands: DeviceHands) -> None:
+        box = layout.box()
+        client = hands.client
+        if client.state is State.LOST:
+            box.alert = True
+            box.label(text="The program has ended", icon="ERROR")
+            box.label(text="B over the viewport starts it again")
+            return
+        if not client.devices:
+            box.label(text="No device is plugged in", icon="INFO")
+        forces = {each.number: each for each in hands.shown()}
+        for number, device in client.devices.items():
+            column = box.column(align=True)
+            row = column.row()
+            row.label(text=device.name, icon="ORIENTATION_GIMBAL")
+            shown = forces.get(number)
+            if device.force > 0.0:
+                row.operator(OCTO_MOTION_OT_device_test.bl_idname, text="Test").number = number
+                share = shown.force if shown else 0.0
+                column.progress(factor=share, text=f"{share * device.force:.1f} N")
+            else:
+                column.label(text="Leads, without force")
+        times = client.times
+        if times is not None:
+            row = box.row()
+            row.alert = times.late[1] > _LATE or times.lag > 0.0
+            row.label(text=f"{times.rate:.0f} Hz, {1e3 * times.late[1]:.2f} ms off")
+            row.label(text=f"step {1e3 * times.step:.1f} ms")
+
+
+CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PT_posing_device,)

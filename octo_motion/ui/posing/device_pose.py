@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Posing with devices in the viewport."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import bpy
+import numpy as np
+from bpy.props import IntProperty
+
+from ...blender.armature import active_armature
+from ...core.errors import OctoMotionError, SettingsError
+from ...device.client import Client, State
+from ..locomotion.armature_operator import ArmatureOperator
+from ..operator_base import OctoOperator
+from .controls import Outcome
+from .device_hands import DeviceHands, Room
+from .device_overlay import device_lines
+from .device_settings import device_settings, message
+from .overlay import Overlay
+from .puppet_session import PuppetSession, active_session
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+_RATE: Final = 1.0 / 60.0
+HELP: Final = (
+    ("First button or G", "grab"),
+    ("Second button or K", "key touched"),
+    ("Shift K", "key all"),
+    ("P", "pin"),
+    ("O", "record"),
+    ("R", "restore"),
+    ("Home", "pointer to the middle"),
+    ("B", "start the device's program again"),
+    ("Enter", "keep"),
+    ("Esc", "as it was"),
+)
+_KEYS: Final = frozenset({"ESC", "RET", "NUMPAD_ENTER", "G", "K", "P", "O", "R", "HOME", "B"})
+
+_going_on: list[DeviceHands] = []
+
+
+def active_hands() -> DeviceHands | None:
+    """The devices that pose now, if any do."""
+    return _going_on[0] if _going_on else None
+
+
+def room_of(context: bpy.types.Context, scale: float) -> Room | None:
+    """What the largest 3D viewport of the window shows."""
+    areas = (
+        [each for each in context.screen.areas if each.type == "VIEW_3D"] if context.screen else []
+    )
+    area = max(areas, key=lambda each: each.width * each.height, default=None)
+    space = area.spaces.active if area else None
+    data = space.region_3d if isinstance(space, bpy.types.SpaceView3D) else None
+    if data is None:
+        return None
+    axes = np.array(data.view_matrix.inverted(), dtype=np.float64)[:3, :3]
+    axes /= np.linalg.norm(axes, axis=0)
+    middle = np.array(data.view_location, dtype=np.float64)
+    return Room(middle, axes, scale * max(float(data.view_distance), 1e-6))
+
+
+def start_bridge(settings: Any) -> Client:
+    """A bridge that runs.
+
+    Raises:
+        DeviceError: it cannot be started.
+    """
+    client = Client()
+    client.start(["--simulate"] if settings.simulate else [])
+    return client
+
+
+class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_device"
+    bl_label = "Pose with Device"
+    bl_description = (
+        "Take hold of the figure with a space mouse or a force device: the first button grabs the "
+        "nearest limb, the second one sets keys. Enter keeps the pose, Esc leaves all as it was"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    _session: PuppetSession | None = None
+    _hands: DeviceHands | None = None
+    _overlay: Overlay | None = None
+    _timer: Any = None
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        going_on = active_session()
+        if going_on is not None:
+            cls.poll_message_set(f"{going_on.puppet.name} is being posed already")
+            return False
+        return super().poll(context)
+
+    def run(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+        """Without a window nobody sees the pointer."""
+        raise SettingsError(
+            "Posing with a device needs a 3D viewport.",
+            "Click it in the panel Device; scripts have octo_motion.pose_script.",
+        )
+
+    def invoke(
+        self,
+        context: bpy.types.Context,
+        event: bpy.types.Event,  # noqa: ARG002
+    ) -> set[OperatorReturnItems]:
+        """Start the bridge, and take the armature into its hands."""
+        window_manager, scene, window = context.window_manager, context.scene, context.window
+        if window is None or bpy.app.background:
+            return self.execute(context)
+        assert window_manager is not None
+        assert scene is not None
+        settings = device_settings(window_manager)
+        try:
+            self._session = PuppetSession(active_armature(context), scene)
+            client = start_bridge(settings)
+        except OctoMotionError as error:
+            self._end(context, keep=False)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        try:
+            self._hands = DeviceHands(self._session, client, self._told(settings))
+            _going_on.append(self._hands)
+            self._overlay = Overlay(self._hands, device_lines)
+            self._timer = window_manager.event_timer_add(_RATE, window=window)
+            window_manager.modal_handler_add(self)
+        except BaseException:
+            client.stop()
+            self._end(context, keep=False)
+            raise
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
+        """One event."""
+        hands = self._hands
+        if hands is None or self._session is None or self._session.ended:
+            self._end(context, keep=True)
+            return {"CANCELLED"}
+        try:
+            if event.type == "TIMER":
+                self._tick(context, hands)
+                return {"PASS_THROUGH"}
+            outcome = self._handle(hands, event)
+        except OctoMotionError as error:
+            self._end(context, keep=False)
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except BaseException:
+            self._end(context, keep=False)
+            raise
+        if outcome is Outcome.FINISH:
+            self._end(context, keep=True)
+            return {"FINISHED"}
+        if outcome is Outcome.CANCEL:
+            self._end(context, keep=False)
+            return {"CANCELLED"}
+        return {"RUNNING_MODAL"} if outcome is Outcome.TAKEN else {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender's own end of it: another file is opened, or Blender quits."""
+        self._end(context, keep=False)
+
+    def _told(self, settings: Any) -> Any:
+        assert self._session is not None
+        heads = self._session.figure.lengths
+        return message(settings, float(heads.sum() / max(len(heads), 1) * 5.0))
+
+    def _tick(self, context: bpy.types.Context, hands: DeviceHands) -> None:
+        settings = device_settings(context.window_manager)
+        was_holding = hands.holding
+        told = self._told(settings)
+        for button in hands.tick(told, room_of(context, settings.scale)):
+            if button.pressed and button.button == told.key_button:
+                self._key(hands, all_bones=False)
+        if was_holding and not hands.holding:
+            self._let_go(context, hands)
+        for notice in hands.notices():
+            self.report({"WARNING"}, f"{notice.problem} {notice.remedy}".strip())
+        self._tell(context, hands)
+
+    def _let_go(self, context: bpy.types.Context, hands: DeviceHands) -> None:
+        tools = context.scene.tool_settings if context.scene else None
+        if tools is not None and tools.use_keyframe_insert_auto and not hands.session.recording:
+            self._key(hands, all_bones=False)
+
+    @staticmethod
+    def _key(hands: DeviceHands, *, all_bones: bool) -> None:
+        names = hands.session.key(all_bones=all_bones)
+        frame = hands.session.scene().frame_current
+        hands.said = f"Keyed {len(names)} bones at frame {frame}" if names else "Nothing to key"
+
+    def _handle(self, hands: DeviceHands, event: Any) -> Outcome:
+        if event.type not in _KEYS:
+            return Outcome.PASSED
+        if event.value != "PRESS":
+            return Outcome.TAKEN
+        match event.type:
+            case "ESC":
+                return Outcome.CANCEL
+            case "RET" | "NUMPAD_ENTER":
+                return Outcome.FINISH
+            case "G":
+                hands.grab()
+            case "K":
+                self._key(hands, all_bones=event.shift)
+            case "P":
+                hands.pin()
+            case "O":
+                self._record(hands)
+            case "R":
+                hands.restore()
+                hands.said = "As at the start"
+            case "HOME":
+                hands.recentre()
+            case _:
+                hands.client.restart()
+                hands.recentre()
+                hands.said = "Started again"
+        return Outcome.TAKEN
+
+    @staticmethod
+    def _record(hands: DeviceHands) -> None:
+        if hands.session.recording:
+            bones, count = hands.session.stop_record()
+            hands.said = f"Recorded {bones} bones on {count} key frames"
+        else:
+            hands.session.record()
+            hands.said = "Recording while the frames go by: play, and drag"
+
+    @staticmethod
+    def _tell(context: bpy.types.Context, hands: DeviceHands) -> None:
+        text = line(hands)
+        for area in context.screen.areas if context.screen else ():
+            if area.type == "VIEW_3D":
+                area.header_text_set(text)
+                area.tag_redraw()
+        if context.workspace is not None:
+            context.workspace.status_text_set("    ".join(f"{keys}: {what}" for keys, what in HELP))
+
+    def _end(self, context: bpy.types.Context, *, keep: bool) -> None:
+        """Leave nothing on screen and no process behind; safe to call twice."""
+        session, self._session = self._session, None
+        hands, self._hands = self._hands, None
+        overlay, self._overlay = self._overlay, None
+        timer, self._timer = self._timer, None
+        try:
+            if hands is not None:
+                hands.stop()
+            if session is not None:
+                if keep:
+                    session.finish()
+                else:
+                    session.cancel()
+        finally:
+            if hands in _going_on:
+                _going_on.remove(hands)
+            if overlay is not None:
+                overlay.take_down()
+            if timer is not None and context.window_manager is not None:
+                context.window_manager.event_timer_remove(timer)
+            for area in context.screen.areas if context.screen else ():
+                if area.type == "VIEW_3D":
+                    area.header_text_set(None)
+                    area.tag_redraw()
+            if context.workspace is not None:
+                context.workspace.status_text_set(None)
+
+
+def line(hands: DeviceHands) -> str:
+    """One line about devices, for the header."""
+    parts = [f"Posing {hands.session.puppet.name}"]
+    shown = hands.shown()
+    if hands.client.state is State.LOST:
+        parts.append("The device's program has ended: B starts it again")
+    elif not shown:
+        parts.append("No device yet: plug one in")
+    for each in shown:
+        what = hands.session.bone(each.body) if each.body >= 0 else "free"
+        parts.append(f"{each.name}: {what}")
+    if hands.session.recording:
+        parts.append("● Recording")
+    if hands.said:
+        parts.append(hands.said)
+    return "    ".join(parts)
+
+
+class OCTO_MOTION_OT_device_test(OctoOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.device_test"
+    bl_label = "Test Device"
+    bl_description = "Let the device push gently to the right, then to the left"
+    bl_options = {"INTERNAL"}  # nothing in the file changes
+
+    number: IntProperty(
+        name="Device", description="Which one, counted from 0", default=0, min=0, max=7
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:  # noqa: ARG003
+        if active_hands() is None:
+            cls.poll_message_set("Start Pose with Device first")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+        hands = active_hands()
+        assert hands is not None
+        device = hands.client.devices.get(self.number)
+        if device is None or device.force <= 0.0:
+            raise SettingsError("This device has no force.", "Choose a force device.")
+        hands.test(self.number)
+
+
+CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_OT_pose_device, OCTO_MOTION_OT_device_test)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``WindowManager.octo_motion_device``: how devices behave at this computer, for this session."""
+
+from __future__ import annotations
+
+from typing import Any, Final, cast
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, PointerProperty
+
+from ...device.messages import Settings
+
+
+class OCTO_MOTION_PG_device(bpy.types.PropertyGroup):
+    """Settings of devices: they belong to the hand and the desk, not to a file."""
+
+    force: FloatProperty(
+        name="Force",
+        description="How much of its force a device may give. 0 for a device that only leads",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        options={"SKIP_SAVE"},
+    )
+    toggle: BoolProperty(
+        name="Press to Grab",
+        description="One press of the first button grabs and another lets go; else hold the button",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+    reach: FloatProperty(
+        name="Reach",
+        description="How near to a limb the pointer must be to grab it, of the figure's size",
+        subtype="FACTOR",
+        default=0.1,
+        min=0.01,
+        max=1.0,
+        options={"SKIP_SAVE"},
+    )
+    speed: FloatProperty(
+        name="Speed",
+        description="How fast a space mouse moves its pointer",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.05,
+        max=10.0,
+        soft_max=3.0,
+        options={"SKIP_SAVE"},
+    )
+    scale: FloatProperty(
+        name="Scale",
+        description="How far the pointer of a force device goes in the view for the way of the "
+        "hand. Zooming in makes it finer as well",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.05,
+        max=20.0,
+        soft_max=4.0,
+        options={"SKIP_SAVE"},
+    )
+    simulate: BoolProperty(
+        name="Simulated Hand",
+        description="Add a hand that moves by itself, to see what a force device would do",
+        default=False,
+        options={"SKIP_SAVE"},
+    )
+
+
+def device_settings(window_manager: bpy.types.WindowManager) -> Any:
+    """The settings."""
+    return cast("Any", window_manager).octo_motion_device
+
+
+def message(settings: Any, size: float) -> Settings:
+    """What the bridge is told of them.
+
+    Args:
+        settings: the property group.
+        size: of the figure, puppet metres.
+    """
+    defaults = Settings()
+    return Settings(
+        force=settings.force,
+        toggle=settings.toggle,
+        reach=settings.reach * size,
+        speed=defaults.speed * settings.speed,
+        angular_speed=defaults.angular_speed * settings.speed,
+    )
+
+
+CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PG_device,)
+
+
+def register() -> None:
+    """Give the window manager its settings."""
+    bpy.types.WindowManager.octo_motion_device = PointerProperty(  # type: ignore[attr-defined]
+        name="Octo Motion Device",
+        description="How devices behave at this computer",
+        type=OCTO_MOTION_PG_device,
+    )
+
+
+def unregister() -> None:
+    """Take them away."""
+    del bpy.types.WindowManager.octo_motion_device  # type: ignore[attr-defined]

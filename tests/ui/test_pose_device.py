@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Posing with a device in Blender: the armature follows the bridge, and keys are set by button."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.device import messages as say
+from octo_motion.device.client import Client, State
+from octo_motion.ui.posing import device_pose
+from octo_motion.ui.posing.device_hands import DeviceHands, Room
+from octo_motion.ui.posing.device_overlay import device_lines
+from octo_motion.ui.posing.device_settings import device_settings, message
+from octo_motion.ui.posing.puppet_session import PuppetSession
+
+PATIENCE = 30.0
+TOLD = say.Settings(reach=0.2)
+
+
+def arm() -> bpy.types.Object:
+    """An upright armature of three bones, each half a metre long."""
+    data = bpy.data.armatures.new("Arm")
+    armature = bpy.data.objects.new("Arm", data)
+    bpy.context.scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    parent = None
+    for index in range(3):
+        bone = data.edit_bones.new(f"bone{index}")
+        bone.head = (0.0, 0.0, 0.5 * index)
+        bone.tail = (0.0, 0.0, 0.5 * index + 0.5)
+        bone.parent, bone.use_connect = parent, parent is not None
+        parent = bone
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return armature
+
+
+@pytest.fixture
+def hands() -> Iterator[DeviceHands]:
+    """A simulated hand at the tip of an arm, in the middle of what the view shows."""
+    session = PuppetSession(arm(), bpy.context.scene)
+    client = Client()
+    client.start(("--simulate", "--no-hid", "--no-haply"))
+    hands = DeviceHands(session, client, TOLD)
+    yield hands
+    hands.stop()
+    session.cancel()
+
+
+FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""The front view: right is X, up is Z, towards the eye is −Y."""
+
+
+def room(height: float = 1.3, width: float = 1.0) -> Room:
+    return Room(np.array([0.0, 0.0, height]), FRONT, width)
+
+
+def wait(hands: DeviceHands, what: Callable[[], object], why: str) -> list[say.Button]:
+    pressed: list[say.Button] = []
+    end = time.monotonic() + PATIENCE
+    while not what():
+        pressed += hands.tick(TOLD, room())
+        assert time.monotonic() < end, f"waited in vain: {why}; {hands.notices()}"
+        time.sleep(0.005)
+    return pressed
+
+
+def grabbed(hands: DeviceHands) -> None:
+    wait(hands, hands.shown, "the hand is there")
+    wait(hands, lambda: abs(hands.shown()[0].position[2] - 1.3) < 0.3, "it is in the view")
+    hands.grab()
+    wait(hands, lambda: hands.holding, "it holds")
+
+
+def the_arm() -> Any:
+    return bpy.data.objects["Arm"]
+
+
+def turn_of(name: str) -> np.ndarray:
+    armature = the_arm()
+    return np.array(armature.pose.bones[name].matrix_basis.to_quaternion())
+
+
+def test_armature_follows_the_hand_at_the_device(hands: DeviceHands) -> None:
+    grabbed(hands)
+    assert hands.hover
+    assert hands.session.bone(hands.hover.body) == "bone2"
+    wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
+    shown = hands.shown()[0]
+    assert shown.name == "Simulated hand"
+    assert np.linalg.norm(shown.coupled - shown.position) < 0.3
+    assert device_pose.line(hands) == "Posing Arm    Simulated hand: bone2"
+    assert len(device_lines(hands, np.array([0.0, -1.0, 0.0]))) >= 4
+    hands.grab()
+    wait(hands, lambda: not hands.holding, "it lets go")
+    keyed = hands.session.key()
+    assert "bone2" in keyed
+
+
+def test_enter_keeps_pose_and_keys_and_escape_takes_them_back(hands: DeviceHands) -> None:
+    grabbed(hands)
+    wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
+    device_pose.OCTO_MOTION_OT_pose_device._key(hands, all_bones=False)
+    assert hands.said.startswith("Keyed")
+    armature = the_arm()
+    assert armature.animation_data.action
+    hands.stop()
+    hands.session.cancel()
+    assert abs(turn_of("bone2")[1:]).max() < 1e-6
+    assert armature.animation_data is None or armature.animation_data.action is None
+
+
+def test_change_of_frame_counts_and_hands_let_go(hands: DeviceHands) -> None:
+    armature = the_arm()
+    bone = armature.pose.bones["bone1"]
+    bone.rotation_quaternion = (0.924, 0.383, 0.0, 0.0)
+    bone.keyframe_insert("rotation_quaternion", frame=10)
+    bone.rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
+    bone.keyframe_insert("rotation_quaternion", frame=1)
+    grabbed(hands)
+    bpy.context.scene.frame_set(10)
+    hands.tick(TOLD, room())
+    wait(hands, lambda: not hands.holding, "it lets go")
+    wait(hands, lambda: hands.client.steps > 0, "the bridge goes on")
+    assert turn_of("bone1")[1] == pytest.approx(0.383, abs=0.02)
+
+
+def test_pins_material_and_floor_reach_the_bridge(
+    hands: DeviceHands, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait(hands, hands.shown, "the hand is there")
+    sent: list[say.Message] = []
+    send = hands.client.send
+    monkeypatch.setattr(hands.client, "send", lambda each: (sent.append(each), send(each)))
+    settings: Any = the_arm().octo_motion.posing
+    hands.session.toggle_pin(2)
+    hands.tick(TOLD)
+    assert [each.pinned for each in sent if isinstance(each, say.Pins)] == [(2, 0, 2)]
+    settings.material = "RUBBER"
+    hands.tick(TOLD)
+    assert any(isinstance(each, say.FigureMessage) for each in sent)
+    settings.floor = True
+    settings.gravity = True
+    hands.tick(TOLD)
+    assert any(isinstance(each, say.ObstacleMessage) for each in sent)
+    worlds = [each for each in sent if isinstance(each, say.WorldMessage)]
+    assert worlds[-1].gravity == pytest.approx((0.0, 0.0, -9.81))
+    assert hands.notices() == []
+
+
+def test_right_of_the_view_is_right_of_the_device(hands: DeviceHands) -> None:
+    wait(hands, hands.shown, "the hand is there")
+    space = hands._spaces[0]
+    assert space.orientation == pytest.approx((1.0, 0.0, 0.0, 0.0))  # the front view is home
+    side = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    hands.tick(TOLD, Room(np.zeros(3), side, 1.0))
+    half = 0.5**0.5
+    assert hands._spaces[0].orientation == pytest.approx((half, 0.0, 0.0, half))
+    # Twice as much in the view: twice the way for the same way of the hand.
+    before = hands._spaces[0].scale
+    hands.tick(TOLD, Room(np.zeros(3), side, 2.0))
+    assert hands._spaces[0].scale == pytest.approx(2.0 * before)
+
+
+def test_killed_bridge_leaves_pose_and_keys_and_can_be_started_again(hands: DeviceHands) -> None:
+    grabbed(hands)
+    wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
+    hands.session.key()
+    before = turn_of("bone2")
+    assert hands.client._child
+    hands.client._child._process.kill()
+    wait(hands, lambda: hands.lost, "it is noticed")
+    assert [each.problem for each in hands.notices()] == [
+        "The program between Blender and the device has ended."
+    ]
+    assert np.abs(turn_of("bone2") - before).max() < 0.2
+    assert the_arm().animation_data.action
+    assert "B starts it again" in device_pose.line(hands)
+    hands.client.restart()
+    hands.recentre()
+    wait(hands, hands.shown, "the hand is back")
+    assert hands.client.state is State.RUNNING
+
+
+def test_settings_of_the_panel_are_told_in_the_bridges_units() -> None:
+    settings = device_settings(bpy.context.window_manager)
+    settings.force, settings.toggle, settings.speed, settings.reach = 0.5, True, 2.0, 0.1
+    told = message(settings, 3.0)
+    assert told.force == 0.5
+    assert told.toggle
+    assert told.speed == pytest.approx(0.8)
+    assert told.reach == pytest.approx(0.3)
+    settings.force, settings.toggle, settings.speed = 1.0, False, 1.0
+
+
+def test_without_a_window_scripts_are_told_what_else_there_is() -> None:
+    arm()
+    with pytest.raises(RuntimeError, match="needs a 3D viewport"):
+        bpy.ops.octo_motion.pose_device()
+    with pytest.raises(RuntimeError, match="Start Pose with Device first"):
+        bpy.ops.octo_motion.device_test()
