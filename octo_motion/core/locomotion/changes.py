@@ -18,10 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SettingsError
-from ..rotations import Floats, conjugate, from_rotation_vector, multiply, to_rotation_vector
+from ..rotations import (
+    Floats,
+    conjugate,
+    continuous,
+    from_rotation_vector,
+    multiply,
+    to_rotation_vector,
+)
 
-_LEAST: Final = 0.25
-"""Share of a change that an arm has at least to go over in."""
+_HELD: Final = 0.4
+"""Share of a change, from either end, in which arms may still hold on, or hold on again: in between
+the body turns too far for an arm to follow."""
 
 
 @dataclass(frozen=True)
@@ -131,18 +139,17 @@ def windows(
         before: for each arm, where its holds (holds,) of the way before begin and end, ascending.
         after: the same of the way after.
     """
-    least = _LEAST * (change.end - change.start)
+    held = _HELD * (change.end - change.start)
     starts, ends = np.empty(len(before)), np.empty(len(before))
     first_drops, last_drops = [], []
     for arm, ((on, off), (next_on, next_off)) in enumerate(zip(before, after, strict=True)):
-        # A hold that begins before the middle is held to its end, if that leaves time to go over.
-        dropped = (0.5 * (on + off) > change.middle) | (off > change.end - least)
+        dropped = (0.5 * (on + off) > change.middle) | (off > change.start + held)
         kept = off[~dropped]
         start = max(change.start, float(kept.max()) if len(kept) else change.start)
-        late = (0.5 * (next_on + next_off) < change.middle) | (next_on < start + least)
+        late = (0.5 * (next_on + next_off) < change.middle) | (next_on < change.end - held)
         coming = next_on[~late]
         end = min(change.end, float(coming.min()) if len(coming) else change.end)
-        starts[arm], ends[arm] = start, max(end, start + least)
+        starts[arm], ends[arm] = start, end
         first_drops.append(dropped)
         last_drops.append(late)
     return Windows(starts, ends, tuple(first_drops), tuple(last_drops))
@@ -170,3 +177,20 @@ def between(first: Floats, second: Floats, share: Floats, sense: Floats | None =
 def sense_of(first: Floats, second: Floats) -> Floats:
     """The shortest turn (…, 3) from one rotation (…, 4) to the other, as a rotation vector."""
     return to_rotation_vector(multiply(conjugate(first), second))
+
+
+def blended(first: Floats, second: Floats, share: Floats) -> Floats:
+    """Motions (frames, …, 4) a share (frames, …) of the way from one to the other.
+
+    Half way each bone turns the shortest way, and before and after the same way round, however
+    far apart the two motions come: no bone turns now this way and now that.
+    """
+    turn = continuous(multiply(conjugate(first), second))
+    nearest = np.argmin(np.abs(share - 0.5), axis=0)
+    middle = np.take_along_axis(turn[..., 0], nearest[None], axis=0)
+    turn = np.where((middle < 0.0)[..., None], -turn, turn)
+    sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, turn[..., :1])
+    # Beyond half a turn the cosine is negative: the angle goes on to a whole one.
+    axis = turn[..., 1:] / np.maximum(sine, 1e-12)
+    return multiply(first, from_rotation_vector(share[..., None] * angle * axis))

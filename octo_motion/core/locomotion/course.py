@@ -21,7 +21,7 @@ from .bearings import Bearings
 from .changes import Change, between, eased, sense_of
 from .route import Route
 from .stroke import stroke_distance
-from .travel import Travel, TravelSettings, travel_at
+from .travel import Travel, TravelSettings, travel_at, walked_at
 
 _CYCLE = 2.0 * np.pi
 
@@ -76,6 +76,25 @@ class SwumLine:
         travel = self.travel(wanted.reshape(-1))
         positions = travel.positions + np.array([0.0, 0.0, self.height])
         return positions.reshape(*wanted.shape, 3), travel.rotations.reshape(*wanted.shape, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class WalkedLine:
+    """A walking body that holds no ground."""
+
+    route: Route
+    settings: TravelSettings
+    bearings: Bearings
+    height: float
+    """Metres above the route."""
+
+    def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
+        """World positions (…, 3) and orientations (…, 4)."""
+        wanted = np.asarray(distance, dtype=np.float64)
+        flat = wanted.reshape(-1)
+        positions, rotations = walked_at(self.route, self.settings, self.bearings, flat)
+        positions = positions + np.array([0.0, 0.0, self.height])
+        return positions.reshape(*wanted.shape, 3), rotations.reshape(*wanted.shape, 4)
 
 
 @dataclass(frozen=True, eq=False)

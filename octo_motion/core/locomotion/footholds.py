@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import SettingsError
 from ..rotations import Floats, rotate
 from .course import Line
-from .ground import Ground
+from .ground import Ground, normals
 from .rhythm import Rhythm
 
 _CYCLE: Final = 2.0 * np.pi
@@ -149,6 +149,8 @@ class Footholds:
     """(arms, cycles) whether there is one at all."""
     joints: Floats
     """(arms, cycles, segments + 1 − c, 3) world: joints c … n as they lie on the ground."""
+    normals: Floats
+    """(arms, cycles, segments + 1 − c, 3) which way up the ground is there."""
     headings: Floats
     """(arms, cycles) radians about world Z from +X."""
     peeled_to: Floats
@@ -308,6 +310,7 @@ def lay(
         middle=between,
         present=present,
         joints=joints,
+        normals=normals(ground, joints),
         headings=heading,
         peeled_to=_peeled_to(limbs, joints, roots_off, joint),
         roots_on=roots_on,

@@ -16,7 +16,7 @@ from .columns import turned
 from .course import Line
 from .footholds import Footholds, Limbs, StanceSettings, Wish, cycles_at, lay
 from .generator import Build, Generator, twist
-from .ground import Ground, normals
+from .ground import Ground
 from .poses import Facing, bone_rotations, sucker_sides
 from .rhythm import Even, Rhythm
 from .stance import Bodies, hold, stand
@@ -215,8 +215,7 @@ class GroundedWalk:
             stood = stand(limbs, arms, shapes, bodies, held, self._ground, self._settings)
             back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
             in_armature = turned(back, stood.directions)
-            down = -normals(self._ground, held.joints[0].T).T
-            towards = turned(back, down).reshape(3, frames, many)
+            towards = turned(back, -held.upwards(segments)).reshape(segments, 3, frames, many)
             most = min(_MOST_TURN, _TURN / segments)
             along = np.minimum(_FIRST_TURN + np.arange(segments) / 3.0, 1.0)
             turns = most * along[:, None, None] * held.weight.reshape(frames, many)

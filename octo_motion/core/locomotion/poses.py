@@ -67,7 +67,7 @@ class Facing:
     sides: Sequence[Floats]
     """For each arm (bones, 3): unit vectors across the segments, in the bones' rest frames."""
     towards: Floats
-    """(3, frames, arms) unit vectors, armature space."""
+    """(bones, 3, frames, arms) unit vectors, armature space."""
     hold: Floats
     """(bones, frames, arms) radians that a bone is turned at most against the one before."""
 
@@ -133,7 +133,7 @@ def bone_rotations(
             side = turned(product(carried, turn), side)
             # Bank is meant to be seen: it is what the side is turned away by.
             banked = banked + 2.0 * half[bone]
-            towards = facing.towards.reshape(3, batch)
+            towards = facing.towards[bone].reshape(3, batch)
             sine = dot(cross(side, towards), wanted[bone])
             cosine = dot(side, towards) - dot(side, wanted[bone]) * dot(towards, wanted[bone])
             askew = np.sin(banked) * cosine + np.cos(banked) * sine

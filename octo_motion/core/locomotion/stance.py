@@ -92,8 +92,16 @@ class Hold:
     """(segments + 1 − c, 3, batch) the joints as they lie, world."""
     carried: Floats
     """(3, batch) metres by which they have gone along with the body since, or still will."""
+    normals: Floats
+    """(segments + 1 − c, 3, batch) which way up the ground is there."""
     touching: int
     """c"""
+
+    def upwards(self, segments: int) -> Floats:
+        """Which way is up for each segment (segments, 3, batch): what lies, lies on its ground."""
+        lying = _unit(self.normals[1:] + self.normals[:-1])
+        free = np.broadcast_to(self.normals[:1], (self.touching, *self.normals.shape[1:]))
+        return np.concatenate([free, lying])[:segments]
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +161,7 @@ def hold(
         by_tip=since > footholds.middle[at],
         joints=np.ascontiguousarray(joints),
         carried=carried,
+        normals=np.ascontiguousarray(np.moveaxis(footholds.normals[at], 0, -1)),
         touching=footholds.touching,
     )
 
@@ -244,6 +253,7 @@ def _part(held: Hold, chosen: np.ndarray) -> Hold:
         held.by_tip[chosen],
         held.joints[..., chosen],
         held.carried[:, chosen],
+        held.normals[..., chosen],
         held.touching,
     )
 

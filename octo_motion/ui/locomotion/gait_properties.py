@@ -185,8 +185,7 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
             (
                 "CRAWL",
                 "Crawl",
-                "Over the ground without a rhythm: the arms that point away from the goal push "
-                "as they can, the others search. The front faces any way",
+                "Over the ground without a rhythm, each arm in its own time, facing any way",
                 2,
             ),
         ),

@@ -14,6 +14,7 @@ from ...core.errors import RigError
 from .add_octopus import OCTO_MOTION_OT_add_octopus
 from .add_route import OCTO_MOTION_OT_add_route
 from .arm_list import draw_arms
+from .change_list import draw_changes
 from .contacts import draw_ground
 from .gait_properties import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table, used
 from .gait_table import (
@@ -317,6 +318,21 @@ class OCTO_MOTION_UL_gait_curves(bpy.types.UIList):
             row.prop(item, "pair", text="", emboss=False)
 
 
+class OCTO_MOTION_PT_change(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_change"
+    bl_label = "Change of Gait"
+    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        draw_changes(layout, settings)
+
+
 class OCTO_MOTION_PT_variation(_Panel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_variation"
     bl_label = "Variation"
@@ -443,6 +459,7 @@ CLASSES: Final = (
     OCTO_MOTION_PT_heading,
     OCTO_MOTION_PT_gait,
     OCTO_MOTION_PT_table,
+    OCTO_MOTION_PT_change,
     OCTO_MOTION_PT_variation,
     OCTO_MOTION_PT_weights,
     OCTO_MOTION_PT_reaches,

@@ -29,6 +29,7 @@ from ...core.locomotion.generator import GaitSettings
 from ...core.locomotion.travel import TravelSettings
 from .apart import KeepingApart
 from .arm_properties import ArmItem
+from .change_properties import OCTO_MOTION_PG_change
 from .gait_properties import (
     DEFAULT_GAIT,
     OVERRIDE,
@@ -38,9 +39,9 @@ from .gait_properties import (
     read_table,
     used,
 )
+from .ground_properties import OCTO_MOTION_PG_ground
 from .in_place import TRAVEL_IN_PLACE, InPlace
 from .reach_properties import Reaches
-from .ground_properties import OCTO_MOTION_PG_ground
 
 AXES: Final = (
     ("X", "X", "The armature's own +X", 0),
@@ -240,6 +241,12 @@ class OCTO_MOTION_PG_locomotion(Reaches, InPlace, KeepingApart, bpy.types.Proper
         name="Ground",
         description="What a walking creature stands on, and how",
         type=OCTO_MOTION_PG_ground,
+        override=OVERRIDE,
+    )
+    change: PointerProperty(
+        name="Change of Gait",
+        description="Where along the route the gait changes",
+        type=OCTO_MOTION_PG_change,
         override=OVERRIDE,
     )
 

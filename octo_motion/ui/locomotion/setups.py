@@ -38,6 +38,7 @@ ORDER: Final = ("walk", "hurry", "prowl", "tiptoe", "crawl", "settle", "swim", "
 APART: Final = frozenset(
     {
         "table",
+        "change",
         *(
             "name",
             "seed",

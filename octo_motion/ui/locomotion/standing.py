@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,10 +15,11 @@ from ...blender.stretching import may_stretch
 from ...core.locomotion.bearings import Bearings
 from ...core.locomotion.body_line import BodyLine, body_line, leaning
 from ...core.locomotion.chains import BodyFrame
+from ...core.locomotion.course import Line
 from ...core.locomotion.crawl import CrawlSettings
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.generator import Arm, Generator
-from ...core.locomotion.ground import Ground, along_path, passes_over_itself, sampled
+from ...core.locomotion.ground import Ground, Plane, along_path, passes_over_itself, sampled
 from ...core.locomotion.grounded import GroundedPoses, GroundedWalk
 from ...core.locomotion.rhythm import crawling
 from ...core.locomotion.route import Route
@@ -55,6 +56,9 @@ class Standing:
     bearings: Bearings
     stretching: bool
     """Whether any bones may stretch."""
+    build: Callable[[Line, Sequence[Wish]], GroundedWalk]
+    """The same walk along another line, with other wishes."""
+    ground: Ground
     warnings: tuple[str, ...] = ()
 
     def place(self, travel: Travel) -> tuple[Floats, Floats]:
@@ -84,6 +88,7 @@ def read_standing(
     scale: float,
     height: float | None,
     wishes: Sequence[Wish],
+    plane: float | None = None,
 ) -> Standing:
     """Read the ground under a walk, and lay its footholds.
 
@@ -100,6 +105,7 @@ def read_standing(
         scale: metres of the armature's unit.
         height: metres from the ground to the body's centre, none for as high as the gait is.
         wishes: the artist's, for single contacts.
+        plane: world Z of the level ground where no mesh is set, none to follow the route.
 
     Raises:
         GroundError: the ground is no mesh, has no faces, or the route leaves it.
@@ -107,7 +113,10 @@ def read_standing(
     stance = stance_settings(settings)
     reach = generator.arm_length * scale
     bearings = bearings_of(route, travel)
-    ground, warnings = _ground(settings, depsgraph, route, travel, bearings, reach)
+    if settings.object is None and plane is not None:
+        ground, warnings = Plane(plane), ()
+    else:
+        ground, warnings = _ground(settings, depsgraph, route, travel, bearings, reach)
     radii = arm_radii(armature, skeleton, [arm.bones for arm in arms])
     if height is None:
         thickness = float(np.mean([each[len(each) // 2] for each in radii]))
@@ -135,21 +144,25 @@ def read_standing(
             duty=stance.duty,
         )
     stretch = [may_stretch(armature, arm.bones) for arm in arms]
-    walk = GroundedWalk(
-        skeleton,
-        generator,
-        body,
-        line,
-        ground,
-        stance,
-        scale=scale,
-        radii=radii,
-        may_stretch=stretch,
-        phases=(0.0, 2.0 * np.pi * strides(route, travel)),
-        wishes=wishes,
-        rhythm=rhythm,
-    )
-    return Standing(walk, line, bearings, any(stretch), warnings)
+
+    def build(along: Line, wished: Sequence[Wish]) -> GroundedWalk:
+        return GroundedWalk(
+            skeleton,
+            generator,
+            body,
+            along,
+            ground,
+            stance,
+            scale=scale,
+            radii=radii,
+            may_stretch=stretch,
+            phases=(0.0, 2.0 * np.pi * strides(route, travel)),
+            wishes=wished,
+            rhythm=rhythm,
+        )
+
+    walk = build(line, wishes)
+    return Standing(walk, line, bearings, any(stretch), build, ground, warnings)
 
 
 def _ground(

@@ -12,13 +12,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, cast
 
 import bpy
 import numpy as np
 
-from ...blender import actions
+from ...blender import actions, presets
 from ...blender.armature import armature_data, read_skeleton, world_matrix
 from ...blender.arms import world_directions
 from ...blender.contacts import Contact, write_markers
@@ -35,7 +35,9 @@ from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
 from ...core.keys import check_bounds
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
+from ...core.locomotion.changes import between
 from ...core.locomotion.detection import Detection, detect_arms
+from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
 from ...core.locomotion.loops import route_in_place, travel_in_place, whole_frames
@@ -43,11 +45,13 @@ from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import TravelSettings, duration, plan_travel, strides
-from ...core.rotations import Floats, from_matrix, rotate
+from ...core.rotations import IDENTITY, Floats, from_matrix, rotate
 from ...core.skeleton import Skeleton
 from ..plain import plain
 from .apart import Apart, read_apart
 from .arm_items import bones_of, write_arms, write_body
+from .changing import Changing, Moved, Way, gaits_of, read_changes
+from .changing import plan as plan_changes
 from .in_place import breathing_channels
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
 from .reach_motion import Reaching, Travelling, read_reaches
@@ -65,6 +69,7 @@ MISS: Final = 1e-3
 """Arm lengths by which a target may be missed without a word."""
 
 _WEIGHT_SAMPLES: Final = 33
+_ROUTE_SAMPLES: Final = 257
 _UNEQUAL: Final = 1e-3
 _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
@@ -149,6 +154,8 @@ class Shot:
     extend_scene_range: bool
     standing: Standing | None
     """What holds the ground, none for a swim."""
+    changing: Changing | None
+    """Where the gait changes, none for one gait all the way."""
     wanted: dict[Place, Wanted]
     """What the artist wants of single contacts."""
     apart: Apart | None
@@ -169,6 +176,8 @@ class Shot:
     """(frames, arms) arm lengths from an arm to the foothold that it cannot reach."""
     reached: tuple[str, ...] = ()
     """What arms that reach do."""
+    swimming: Floats | None = None
+    """(frames,) how far the body swims, 0…1, where the gait changes."""
     overlaps: tuple[str, ...] = ()
     """Where arms pass through each other or the body."""
 
@@ -177,7 +186,9 @@ class Shot:
         standing = self.standing
         table = standing.bearings if standing is not None else None
         travel = plan_travel(self.route, self.travel, self.times, table)
-        if standing is not None:
+        if self.changing is not None:
+            places = self.changing.course.at(travel.distance)
+        elif standing is not None:
             places = standing.place(travel)
         else:
             up = rotate(travel.rotations, _UP) if self.gait.on_ground else _UP
@@ -190,7 +201,16 @@ class Shot:
         strains, late = np.zeros((count, bones)), np.zeros((count, len(self.arms)))
         misses = np.zeros(len(self.arms))
         step = max(1, _BONES_AT_ONCE // max(bones, 1))
-        for start in range(0, count, step):
+        if self.changing is not None:
+            for done in self.changing.compute(travel.distance, places, step):
+                if isinstance(done, Moved):
+                    rotations, strains, late, misses = (
+                        *(done.rotations, done.strains, done.late, done.misses),
+                    )
+                else:
+                    yield done
+            self.swimming = self.changing.swimming(travel.distance)
+        for start in range(0, 0 if self.changing else count, step):
             part = slice(start, min(start + step, count))
             if standing is not None:
                 stood = standing.pose(travel, part, places)
@@ -251,7 +271,7 @@ class Shot:
             write_body(settings, self.detection)
         rest_bones(armature, left_behind - animated_bones(action))
         unscale_bones(armature, scaled - animated_bones(action, SCALE))
-        if self.standing is not None:
+        if self.standing is not None and self.changing is None:
             store(settings.ground, self.wanted)
             if settings.ground.shown:
                 show_contacts(armature, self)
@@ -278,6 +298,9 @@ class Shot:
         assert self.locations is not None
         assert self.orientations is not None
         held = np.tile(self.mantle_rotations, (len(self.frames), 1, 1))
+        if self.swimming is not None:
+            rest = np.broadcast_to(IDENTITY, held.shape)
+            held = between(rest, held, np.repeat(self.swimming[:, None], held.shape[1], axis=1))
         if self.in_place and not self.root_bone:
             travel = []
         elif self.root_bone:
@@ -439,22 +462,53 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     seconds, frames, times = _timing(settings, route, travel, scene.render)
     breath = breathing_channels(armature, settings, head[-1] if head else "", times * seconds)
     wanted = gathered(settings.ground, armature)
-    standing = None
-    if gait.on_ground and settings.ground.use and not in_place:
-        standing = read_standing(
-            settings.ground,
-            armature,
-            depsgraph,
-            skeleton=skeleton,
-            arms=arms,
-            generator=generator,
-            body=body,
-            route=route,
-            travel=travel,
-            scale=scale,
-            height=settings.height if settings.height_mode == "MANUAL" else None,
-            wishes=as_wishes(wanted, arms),
-        )
+    wishes = as_wishes(wanted, arms)
+    reach = generator.arm_length * scale
+    plane = None
+    if settings.change.by == "HEIGHT":
+        plane = float(route.position(np.linspace(0.0, 1.0, _ROUTE_SAMPLES))[:, 2].min())
+
+    def read_way(table: GaitTable, own: Generator, wished: Sequence[Wish]) -> Way:
+        """One way of moving along this route."""
+        going = _travel_settings(settings, table, table.stride * own.arm_length * scale)
+        holding = None
+        if table.on_ground and settings.ground.use and not in_place:
+            holding = read_standing(
+                settings.ground,
+                armature,
+                depsgraph,
+                skeleton=skeleton,
+                arms=arms,
+                generator=own,
+                body=body,
+                route=route,
+                travel=going,
+                scale=scale,
+                height=settings.height if settings.height_mode == "MANUAL" else None,
+                wishes=wished,
+                plane=plane,
+            )
+        return Way(table, own, going, holding, _height(settings, table, own.clearance * scale))
+
+    def read_gait_of(name: str) -> Way:
+        """One of the ways that the gait changes to."""
+        table = presets.load_gait(name)
+        own = Generator(skeleton, arms, body, _gait_settings(settings, table))
+        return read_way(table, own, ())
+
+    first = read_way(gait, generator, wishes)
+    standing = first.standing
+    changing = None
+    if settings.change.by != "NONE" and not in_place:
+        # The pace is the same for all gaits: a stroke's burst is the swimming way's own.
+        travel = replace(travel, burst=0.0)
+        names = [name for name in dict.fromkeys(gaits_of(settings.change)) if name != gait.name]
+        ways = [first, *(read_gait_of(name) for name in names)]
+        numbers = {gait.name: 0, **{name: number + 1 for number, name in enumerate(names)}}
+        changes = read_changes(settings.change, numbers, route, reach, first)
+        changing = plan_changes(ways, changes, route, wishes, [len(arm.bones) for arm in arms])
+        if any(not way.gait.on_ground for way in changing.ways) and settings.streamline > 0.0:
+            mantle = head
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -481,6 +535,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         breath=breath,
         extend_scene_range=settings.extend_scene_range,
         standing=standing,
+        changing=changing,
         wanted=wanted,
         apart=read_apart(armature, skeleton, arms, body) if settings.tell_overlaps else None,
         reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
