@@ -36,7 +36,10 @@ def looped(name: str, cycles: int, shares: Floats) -> Floats:
     generator = Generator(skeleton, odd, body, settings)
     travel = travel_in_place(
         TravelSettings(
-            manner=table.manner, stride=table.stride, stroke_phase=table.power_phase, burst=0.6
+            manner="SWIM" if table.manner == "SWIM" else "WALK",
+            stride=table.stride,
+            stroke_phase=table.power_phase,
+            burst=0.6,
         )
     )
     plan = plan_travel(route_in_place(table.stride, cycles), travel, shares)

@@ -266,14 +266,15 @@ def wind(skins: Skins, lengths: Floats, start: Start, winding: Winding) -> Coil:
         RigError: the arm starts within the object.
     """
     lift = np.zeros(len(lengths) + 1)
+    coil = _wound(skins, lengths, start, winding, lift)
     for _ in range(_LIFTINGS):
-        coil = _wound(skins, lengths, start, winding, lift)
         lacking = _lacking(skins, coil)
         if not np.any(lacking > 0.0):
             break
         # Round a corner a bone would cut in: its two joints move out.
         joints = slice(start.joint, start.joint + len(coil.joints))
         lift[joints] += np.maximum(np.append(lacking, 0.0), np.append(0.0, lacking))
+        coil = _wound(skins, lengths, start, winding, lift)
     return coil
 
 
