@@ -47,6 +47,9 @@ _LEAST_SCALING: Final = 1e-6
 _ROUNDING: Final = 1e-4
 """Factors by which importers' scale keys are off one, or unequal, without meaning it."""
 
+_APART: Final = frozenset({"ALIGNED", "AVERAGE", "NONE"})
+"""Ways of a bone to inherit its parent's scale that leave its own axes straight."""
+
 _STILL: Final = 1e-7
 """Of the skeleton's size: a location that is smaller is none."""
 
@@ -69,7 +72,9 @@ def read_clip(
     as far as nothing else moves it (glTF files pose bones that no action of theirs moves). But
     what another action on the armature has left there is no part of this clip: such a bone is
     at rest. Parents of the object are taken as they stand at the current frame. Scaled bones
-    move and turn those they carry; the clip keeps where they are, not how large.
+    move and turn those they carry; the clip keeps where they are, not how large. But bones that
+    stretch, and whose children do not inherit their scale in full, keep it, and their children are
+    where they are without it.
 
     Args:
         armature: the armature object.
@@ -114,10 +119,10 @@ def read_clip(
         with assigned(armature, action, slot):
             return _shown_clip(armature, skeleton, action.name, times, per_second)
     unkeyed = unkeyed_pose(armature)
-    rotations, locations = _bone_motion(armature, skeleton, curves, unkeyed, times)
+    rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
     world = _object_motion(armature, curves, times)
     _check_scale(armature, world)
-    return Clip(action.name, skeleton, times, per_second, rotations, locations, world)
+    return Clip(action.name, skeleton, times, per_second, rotations, locations, world, scales)
 
 
 def write_clip(
@@ -152,10 +157,12 @@ def write_clip(
     channels = rotation_channels(armature, skeleton.names, clip.rotations)
     channels += _location_channels(armature, clip)
     assert armature.pose is not None
+    scales = np.ones(clip.locations.shape) if clip.scales is None else clip.scales
     channels += [
-        Channel(bone.path_from_id("scale"), np.ones((len(clip), 3)), bone.name)
+        Channel(bone.path_from_id("scale"), scales[:, number], bone.name)
         for bone in armature.pose.bones
-        if bone.name in skeleton.index and bone.scale[:] != (1.0, 1.0, 1.0)
+        if (number := skeleton.index.get(bone.name)) is not None
+        and (bone.scale[:] != (1.0, 1.0, 1.0) or (scales[:, number] != 1.0).any())
     ]
     own = world_matrix(armature)
     if np.abs(clip.world - own).max() > _STILL * max(1.0, np.abs(own).max()):
@@ -336,8 +343,8 @@ def _bone_motion(
     curves: _Curves,
     unkeyed: UnkeyedPose,
     times: Floats,
-) -> tuple[Floats, Floats]:
-    """Rotations (frames, bones, 4) and locations (frames, bones, 3)."""
+) -> tuple[Floats, Floats, Floats | None]:
+    """Rotations (frames, bones, 4), locations and, if there are any, scales (frames, bones, 3)."""
     shape = (len(times), len(skeleton))
     rotations = np.broadcast_to(IDENTITY, (*shape, 4)).copy()
     locations = np.zeros((*shape, 3))
@@ -368,10 +375,30 @@ def _bone_motion(
             turned = np.stack([values(name, channel) for name in chosen], axis=1)
             rotations[:, numbers] = _as_quaternions(turned, mode)
     off = np.abs(scales - 1.0).max(axis=(0, 2))
+    stretching = (off > _ROUNDING) & _stretches_apart(armature, skeleton)
+    kept = None
+    if stretching.any():
+        kept = np.where(stretching[:, None], scales, 1.0)
+        off = np.where(stretching, 0.0, off)
     _check_inheritance(armature, skeleton, off > _ROUNDING)
     if (off > _LEAST_SCALING).any():
-        return without_scale(skeleton, rotations, locations, scales)
-    return rotations, locations
+        scales = np.where(stretching[:, None], 1.0, scales)
+        return *without_scale(skeleton, rotations, locations, scales), kept
+    return rotations, locations, kept
+
+
+def _stretches_apart(armature: bpy.types.Object, skeleton: Skeleton) -> np.ndarray:
+    """Whether each bone's children all keep their own axes when it is scaled; at the end of a
+    chain, whether the bone itself does.
+    """
+    bones = armature_data(armature).bones
+    apart = [bones[name].inherit_scale in _APART for name in skeleton.names]
+    return np.array(
+        [
+            all(apart[child] for child in children or (number,))
+            for number, children in enumerate(skeleton.children)
+        ]
+    )
 
 
 def _location_axes(skeleton: Skeleton, bone: int) -> Floats:

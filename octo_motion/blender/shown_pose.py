@@ -36,7 +36,11 @@ def restore_pose(armature: bpy.types.Object, values: PoseValues) -> None:
 
 
 def show_pose(
-    armature: bpy.types.Object, names: Sequence[str], rotations: Floats, locations: Floats
+    armature: bpy.types.Object,
+    names: Sequence[str],
+    rotations: Floats,
+    locations: Floats,
+    scales: Floats | None = None,
 ) -> None:
     """Pose bones, without keys: the next change of frame brings back what the action says.
 
@@ -45,17 +49,21 @@ def show_pose(
         names: bones; those that are gone are passed.
         rotations: (bones, 4), from rest.
         locations: (bones, 3), in each bone's rest frame.
+        scales: (bones, 3), if any bone has one.
     """
     if armature.pose is None:
         return
     bones = armature.pose.bones
-    for name, rotation, location in zip(names, rotations.tolist(), locations.tolist(), strict=True):
+    sizes = [None] * len(names) if scales is None else scales.tolist()
+    for name, rotation, location, size in zip(
+        names, rotations.tolist(), locations.tolist(), sizes, strict=True
+    ):
         bone = bones.get(name)
         if bone is not None:
             place = Vector(location)
             if not bone.bone.use_local_location:
                 place = _carrying_axes(bone.bone) @ place
-            bone.matrix_basis = Matrix.LocRotScale(place[:], Quaternion(rotation), None)
+            bone.matrix_basis = Matrix.LocRotScale(place[:], Quaternion(rotation), size)
 
 
 def _carrying_axes(bone: bpy.types.Bone) -> Matrix:

@@ -231,6 +231,27 @@ def test_scale_that_is_not_inherited_is_refused_unless_read_as_shown():
     assert_shown(armature, read_clip(armature, visual=True), 20.0, y_only=True)
 
 
+@pytest.mark.parametrize("inherited", ["ALIGNED", "AVERAGE", "NONE"])
+def test_a_bone_that_stretches_alone_is_written_as_it_was_read(inherited: Any):
+    armature = make_rig()
+    animate(armature)
+    bones = armature.pose.bones
+    for child in bones[1].children:
+        child.bone.inherit_scale = inherited
+    for frame, length in ((1, 1.0), (9, 1.4)):
+        bones[1].scale = (1.0, length, 0.8)
+        bones[1].keyframe_insert("scale", frame=frame)
+    frames = [2, 6, 9]
+    before = as_blender_shows(armature, frames)
+    clip = read_clip(armature)
+    assert clip.scales is not None
+    assert set(np.flatnonzero((clip.scales != 1.0).any(axis=(0, 2)))) == {1}
+    write_clip(armature, clip)
+    after = as_blender_shows(armature, frames)
+    assert np.abs(after[0] - before[0]).max() < 1e-4
+    assert np.abs(after[1] - before[1]).max() < 1e-4
+
+
 def test_the_object_may_have_parent_scale_delta_and_any_mode():
     armature = make_rig()
     parent = bpy.data.objects.new("Parent", None)

@@ -398,6 +398,39 @@ def test_an_arm_of_an_octopus_goes_onto_another_octopus() -> None:
     assert all(np.array_equal(values, keys(result)[path]) for path, values in before.items())
 
 
+def test_arms_that_stretch_go_on_stretching_and_bring_their_stretch_along() -> None:
+    one, other = make_octopus("One"), make_octopus("Other")
+    for number, each in enumerate((one, other)):
+        give_route(each)
+        generate(each)
+        assert each.data.bones["Arm1_2.L"].parent == each.data.bones["Arm1_1.L"]
+        for bone in each.data.bones:
+            bone.inherit_scale = "ALIGNED"
+        for name in ("Arm1_1.L", "Arm2_1.L"):
+            stretched = each.pose.bones[name]
+            for frame, length in ((1, 1.0), (20, 1.3 + 0.2 * number), (40, 1.0)):
+                stretched.scale = (1.0, length, 1.0)
+                stretched.keyframe_insert("scale", frame=frame)
+    base = other.animation_data.action
+    select(one, other)
+    OPERATORS.splice_add(part="CHAIN", bone="Arm1_1.L")
+    item = stack_of(other).splices[0]
+    item.ease_in = item.ease_out = 0.0
+    OPERATORS.splice_build()
+    scene: Any = bpy.context.scene
+    scene.frame_set(20)
+    assert other.pose.bones["Arm1_1.L"].scale.y == pytest.approx(1.3, abs=1e-4)
+    assert other.pose.bones["Arm2_1.L"].scale.y == pytest.approx(1.5, abs=1e-4)
+    assert other.pose.bones["Arm2_1.R"].scale.y == 1.0
+    # And while it is dragged.
+    shown = {bone.name: np.array(bone.matrix_basis) for bone in other.pose.bones}
+    session = DragSession(prepare(other), 0, scene)
+    session.show()
+    assert_same_pose(shown, poses(other))
+    session.tear_down()
+    assert stack_of(other).base == base
+
+
 def test_legs_bring_their_travel_if_asked() -> None:
     hero, _ = hero_and_source()
     base = hero.animation_data.action

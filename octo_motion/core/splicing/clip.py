@@ -29,6 +29,9 @@ class Clip:
     """(frames, bones, 3) in each bone's rest frame, armature units."""
     world: Floats
     """(frames, 4, 4) world matrix of the armature object; uniform scale."""
+    scales: Floats | None = None
+    """(frames, bones, 3) of bones that get longer or thicker without bending those they carry; none
+    if there are none. They go along with a part, and count for nothing else."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -55,4 +58,5 @@ class Clip:
             rotations=self.rotations[chosen],
             locations=self.locations[chosen],
             world=self.world[chosen],
+            scales=None if self.scales is None else self.scales[chosen],
         )

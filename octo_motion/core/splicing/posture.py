@@ -133,6 +133,17 @@ def sampled(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
     return Posture(clip.skeleton, rotations, location)
 
 
+def sampled_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[int]) -> Floats:
+    """Scales (frames, bones, 3) of some bones of a clip at any times, like :func:`sampled`."""
+    if clip.scales is None:
+        return np.ones((len(frames), len(bones), 3))
+    before, after, share = _between(clip, frames)
+    own = np.asarray(bones, dtype=np.intp)
+    values = clip.scales[before[:, None], own]
+    values += share[:, None, None] * (clip.scales[after[:, None], own] - values)
+    return values + seams[:, None, None] * (clip.scales[0, own] - clip.scales[-1, own])
+
+
 def sampled_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
     """The armature object at any times: rotations (frames, 4), places (frames, 3), and scale."""
     before, after, share = _between(clip, frames)

@@ -25,11 +25,11 @@ from ..rotations import (
     multiply,
     to_rotation_vector,
 )
-from .carry import Side, carriers, carry
+from .carry import Carrier, Side, carriers, carry
 from .clip import Clip
 from .landmarks import Landmarks
 from .parts import Part
-from .posture import posture_of, sampled
+from .posture import posture_of, sampled, sampled_scales
 from .timing import Timing, Window, middle, window
 from .travel import Travel, ground_height
 
@@ -175,7 +175,28 @@ class Splicer:
         if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
             self._travel.move(base, span, whole, rotations, locations)
-        return replace(base, rotations=rotations, locations=locations)
+        scales = _scaled(base, self.splice.clip, span, self._pieces)
+        return replace(base, rotations=rotations, locations=locations, scales=scales)
+
+
+def _scaled(base: Clip, splice: Clip, span: Window, pieces: Sequence[Carrier]) -> Floats | None:
+    """The base's scales with those of the part, which only mean something on the same bones."""
+    if base.scales is None and splice.scales is None:
+        return None
+    shape = base.locations.shape
+    scales = np.ones(shape) if base.scales is None else base.scales.copy()
+    # A view: what is written here is written into the whole.
+    acting = scales[span.frames]
+    weights = span.weights[:, None, None]
+    for piece in pieces:
+        pairs = piece.match.pairs if piece.match.same_rest else {}
+        bones = [bone for bone in piece.bones if bone in pairs]
+        others = [pairs[bone] for bone in bones]
+        rest = [bone for bone in piece.bones if bone not in pairs]
+        there = sampled_scales(splice, span.splice_frames, span.seams, others)
+        acting[:, bones] += weights * (there - acting[:, bones])
+        acting[:, rest] += weights * (1.0 - acting[:, rest])
+    return scales
 
 
 def _ease(

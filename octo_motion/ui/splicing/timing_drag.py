@@ -137,7 +137,8 @@ class DragSession:
         base_start, splice_start = self.drag.starts
         timing = replace(self._timing, base_start=base_start, splice_start=splice_start)
         clip = self._live.at(scene.frame_current_final, timing)
-        show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0])
+        scales = None if clip.scales is None else clip.scales[0]
+        show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0], scales)
 
     def step(self, frames: int) -> None:
         """Go so many frames on, or back."""
