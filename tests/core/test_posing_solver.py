@@ -64,7 +64,7 @@ def busy_world(seed: int) -> World:
 
 # Figures on which Gauss–Seidel arrives within some hundred sweeps; on others it takes thousands,
 # and comes as near to the fast solver as its own changes still are from nothing.
-@pytest.mark.parametrize("seed", [0, 1, 7, 12, 13, 14, 19, 23])
+@pytest.mark.parametrize("seed", [0, 1, 5, 12, 13, 14, 16, 19])
 def test_fast_solver_gives_the_answer_of_gauss_seidel(seed: int):
     world = busy_world(seed)
     rng = np.random.default_rng(seed)
@@ -79,18 +79,18 @@ def test_fast_solver_gives_the_answer_of_gauss_seidel(seed: int):
         if number == 40:
             world.pin(0)
         if number % 20 == 0:
-            problem, _, _ = world.problem()
+            problem, inertias, _ = world.problem()
+            fast = world._newton.solve(problem, inertias, world.state().speeds)
             slow = reference.solve(problem, world.figure.parents, sweeps=600, tolerance=1e-11)
         world.step()
         if number % 20 == 0 and slow.change <= 1e-11:
-            assert world.last is not None
-            assert world.last.miss < 1e-9
+            assert fast.miss < 1e-9
             compared += 1
             touched += len(problem.rows.contacts)
             # Both solve the same laws; what is left is Gauss–Seidel's last change, times the sweeps
             # that its slowest error would still take.
             scale = np.abs(slow.velocities).max()
-            np.testing.assert_allclose(world.last.velocities, slow.velocities, atol=1e-8 * scale)
+            np.testing.assert_allclose(fast.velocities, slow.velocities, atol=1e-8 * scale)
     assert compared >= 2
     assert touched > 0
 
@@ -102,6 +102,7 @@ def test_answer_does_not_hang_on_where_the_solver_begins():
     problem, inertias, _ = world.problem()
     solver = world._newton
     warm = solver.solve(problem, inertias, world.state().speeds)
+    problem, inertias, _ = world.problem()
     cold = solver.solve(problem, inertias, np.zeros_like(world.state().speeds))
     np.testing.assert_allclose(warm.velocities, cold.velocities, atol=1e-7)
 
@@ -202,9 +203,7 @@ def test_slopes_of_contacts_and_holds_are_derivatives_of_convex_functions(seed: 
         np.array([0.5, np.inf]),
         np.zeros((2, 3)),
     )
-    rows = Rows(
-        contacts, holds, np.zeros(3), np.ones(1), 1e-2, 1e-3, 20.0 * rng.normal(size=(count, 3))
-    )
+    rows = Rows(contacts, holds, np.zeros(3), np.ones(1), 1e-2, 20.0 * rng.normal(size=(count, 3)))
     speeds = rng.normal(size=(count + 2, 3))
     answer = rows.answer(speeds)
     slopes = rows.slopes(answer)

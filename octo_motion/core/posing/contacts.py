@@ -183,21 +183,25 @@ class Detector:
             kept = self._keep[near, end] & (distances[:, sample] < limits)
             add(np.flatnonzero(kept), sample, end)
         best = np.argmin(distances, axis=1)
-        inner = (best > 0) & (best < self._samples - 1) & self._long[near]
-        inner &= distances[rows, best] < limits
+        least = distances[rows, best]
+        slack = 1e-6 * self._radii[near]
+        inner = (best > 0) & (best < self._samples - 1) & self._long[near] & (least < limits)
+        # No nearer than an end, and the end will do.
+        inner &= least < np.minimum(distances[:, 0], distances[:, -1]) - slack
         picked = np.flatnonzero(inner)
         if len(picked):
             width = 1.0 / (self._samples - 1)
-            middle = shares[picked, best[picked]]
+            middle = _middle(shares[picked], distances[picked], slack[picked])
             start, along = start[picked], along[picked]
-            rows, near, limits = np.arange(len(picked)), near[picked], limits[picked]
+            rows, near, slack = np.arange(len(picked)), near[picked], slack[picked]
             for _ in range(3):
                 shares = np.clip(middle[:, None] + width * _AROUND, 0.0, 1.0)
                 distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
-                best = np.argmin(distances, axis=1)
-                middle = shares[rows, best]
+                middle = _middle(shares, distances, slack)
                 width *= _AROUND[1] - _AROUND[0]
-            add(rows, best, 2)
+            shares = middle[:, None]
+            distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
+            add(rows, 0, 2)
         chosen = np.concatenate(bodies)
         if not len(chosen):
             return None
@@ -294,6 +298,12 @@ def nearest_on_segments(first: Floats, second: Floats) -> tuple[Floats, Floats]:
     t = np.clip((de * s + er) / np.maximum(ee, _TINY), 0.0, 1.0)
     s = np.clip((de * t - dr) / np.maximum(dd, _TINY), 0.0, 1.0)
     return p + s[..., None] * d, q + t[..., None] * e
+
+
+def _middle(shares: Floats, distances: Floats, slack: Floats) -> Floats:
+    """(rows,) the middle of the samples that are as near as the nearest: of a flat top, its."""
+    least = distances <= distances.min(axis=1, keepdims=True) + slack[:, None]
+    return (shares * least).sum(axis=1) / least.sum(axis=1)
 
 
 def _separate_ends(figure: Figure) -> NDArray[np.bool_]:

@@ -103,20 +103,27 @@ class Newton:
         tree.place(problem.joints)
         slots = len(tree.layout.bodies)
         composite = (tree.beyond @ inertias.reshape(-1, 36)).reshape(slots, 6, 6)
+        rows = problem.rows
         point = self._at(problem, start)
         moving = start
         miss = np.inf
-        count = 0
-        while miss > self._tolerance and count < self._iterations:
+        count = rounds = 0
+        while count < self._iterations:
+            if miss <= self._tolerance:
+                # Where slipping began or ended in a blow, once more with the speed that is left.
+                rounds += 1
+                if rounds > _ROUNDS or not rows.follow(point.row_speeds, problem.blow):
+                    break
+                point = self._at(problem, point.speeds)
             count += 1
             slopes = None if point.rows is None else problem.rows.slopes(point.rows)
             solved = self._linear(problem, composite, point, slopes, corrections)
             moving = solved[..., -1]
             end = self._at(problem, np.ascontiguousarray(solved[..., 0]))
-            joints, rows = _predicted(point, end, slopes)
-            miss = _miss(end, joints, rows)
+            joints, pushes = _predicted(point, end, slopes)
+            miss = _miss(end, joints, pushes)
             if miss > self._tolerance:
-                end = self._lowest(problem, inertias, point, end, joints, rows)
+                end = self._lowest(problem, inertias, point, end, joints, pushes)
             point = end
         return Solution(
             point.speeds,
@@ -326,4 +333,6 @@ _LEAST = 1e-12
 _ENOUGH = 0.1
 """Of the slope at the start: where the lowest point is near enough."""
 _SEARCHES = 6
+_ROUNDS = 3
+"""In which contacts learn from each other how fast they slip."""
 _NO_ROWS = np.zeros((0, 3))

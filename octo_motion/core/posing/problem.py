@@ -59,6 +59,8 @@ class Problem:
     stops: tuple[Stops, ...]
     """Cones and twists."""
     rows: Rows
+    blow: float
+    """Change of speed, m/s, that is great enough to solve again for the slip after it."""
 
 
 def spatial_inertias(masses: Floats, inertias: Floats, skewed: Floats) -> Floats:

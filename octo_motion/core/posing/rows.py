@@ -13,8 +13,9 @@ within Coulomb's cone |p_t| ≤ μ p_n. With a gain a, the gap g, and b the fric
 That is the cone complementarity of Anitescu (2006), softened as by Castro et al. (2022): every
 impulse is the slope of a convex function of the velocities, so the step has one solution and it can
 always be found. What sticks is held by b wholly once it is at rest, so it does not creep; what
-rests sinks in by h p_n/a, less than a micrometre. The price: what slips at |w_t| hovers by
-h μ |w_t|, half a millimetre at 1 m/s, where Coulomb's own law would not.
+rests sinks in by h p_n/a, less than a micrometre. By itself this law lifts what slips off with
+w_n = μ |w_t|. So the gap is seen as g + h μ |w_t|, with |w_t| from before (De Saxcé and Feng 1998):
+at the solution where both are the same, it is Coulomb's own law.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ Integers = NDArray[np.int64]
 
 _GAIN = 50.0
 """a in masses of the body: a contact settles within a step, as from a push against a wall."""
+_LEAST_SHARE = 0.02
+"""Of the figure's mass: what the lightest body counts for there."""
+_WEIGHT = 9.81
 _TINY = 1e-300
 _UNIT = np.eye(3)
 _ONES = np.ones(3)
@@ -89,7 +93,6 @@ class Rows:
         origin: Floats,
         masses: Floats,
         step: float,
-        slack: float,
         grips: Floats | None = None,
     ) -> None:
         """Put them together.
@@ -100,16 +103,11 @@ class Rows:
             origin: (3,) the common one of spatial velocities.
             masses: (bodies,)
             step: h.
-            slack: depth up to which contacts push out as springs, metres; what is deeper is
-                made good by ``corrections``.
             grips: (contacts, 3) friction of the step before; None where nothing touched.
         """
         self.contacts = contacts
         self.holds = holds
         count = len(contacts)
-        self._slack = slack
-        self.rates = np.maximum(contacts.gaps, -slack) / step
-        """(contacts,) g/h."""
         if holds is None:
             self.bodies = contacts.bodies
             self.others = contacts.others
@@ -133,12 +131,21 @@ class Rows:
             self.reach[turning, :, 3:] = 0.0
         self.paired = np.flatnonzero(self.others >= 0)
         """Rows between two bodies of the figure."""
+        whole = float(masses.sum())
         lightest = masses[contacts.bodies]
         if len(self.paired):
             other = masses[contacts.others[self.paired]]
             lightest[self.paired] = np.minimum(lightest[self.paired], other)
-        self.gains = _GAIN * lightest
+        self.gains = _GAIN * np.maximum(lightest, _LEAST_SHARE * whole)
         """(contacts,) a."""
+        # As deep as what rests with twice the figure's weight on one point: so far the contact is a
+        # spring. What is deeper is made good by ``corrections``.
+        self._spring = 2.0 * _WEIGHT * step * whole / self.gains
+        self._closing = np.maximum(contacts.gaps / step, -self._spring)
+        self.rates = self._closing
+        """(contacts,) g/h + μ |w_t|, as ``follow`` was told |w_t| last."""
+        self._followed = np.zeros(count)
+        self._step = step
         self.grips: Floats | None = None
         """(contacts, 3) b; None for zero."""
         if grips is not None and count:
@@ -159,6 +166,21 @@ class Rows:
             own[self.paired] -= velocities[self.others[self.paired]]
         result = (self.reach @ own[:, :, None])[:, :, 0]
         return result if self.still else result - self.targets
+
+    def follow(self, speeds: Floats, tolerance: float) -> bool:
+        """Take |w_t| from w (rows, 3); false where that changes no rate by ``tolerance``, m/s."""
+        count = len(self.contacts)
+        if not count:
+            return False
+        normals, w = self.contacts.normals, speeds[:count]
+        across = w - ((w * normals) @ _ONES)[:, None] * normals
+        slip = np.sqrt((across * across) @ _ONES)
+        change = self.contacts.friction * np.abs(slip - self._followed)
+        if change.max() <= tolerance:
+            return False
+        self._followed = slip
+        self.rates = self._closing + self.contacts.friction * slip
+        return True
 
     def answer(self, speeds: Floats) -> Answer:
         """Impulses at w (rows, 3)."""
@@ -226,14 +248,15 @@ class Rows:
             slopes[count:] = slope
         return slopes
 
-    def corrections(self, step: float, fastest: float) -> Floats | None:
+    def corrections(self, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.
 
-        Overlap deeper than the slack and pins that are off their place, a fifth of it each step
+        Overlap that is deeper than it need be and pins that are off their place, a fifth of it each step
         and no faster than ``fastest``. Used for positions alone and never kept as velocity.
         """
         count = len(self.contacts)
-        depth = -self.contacts.gaps - self._slack
+        step = self._step
+        depth = -self.contacts.gaps - step * self._spring
         deep = depth.max(initial=0.0) > 0.0
         off = self.holds is not None and bool(self.holds.errors.any())
         if not (deep or off):

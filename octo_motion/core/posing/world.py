@@ -48,6 +48,8 @@ Integers = NDArray[np.int64]
 _PIN_GAIN = 1e5
 """Of pins, in masses of the figure: they give way by h·g/10⁵ a second before they are put right."""
 _STOP_GAIN = 1e3
+_BLOW = 50.0
+"""m/s²: a change of speed in a step that only a blow makes."""
 
 
 @dataclass(frozen=True)
@@ -406,7 +408,7 @@ class World:
         h = self.settings.step
         corrections = None
         if len(problem.rows):
-            corrections = problem.rows.corrections(h, self._size)
+            corrections = problem.rows.corrections(self._size)
         solution = self._newton.solve(problem, inertias, self._speeds, corrections)
         self.last = solution
         self.contacts = problem.rows.contacts
@@ -455,9 +457,13 @@ class World:
             origin,
             figure.masses,
             h,
-            1e-4 * self._size,
             self._grips_before(contacts),
         )
+        if len(contacts):
+            now = np.empty((len(figure), 6))
+            now[:, :3] = self._angular
+            now[:, 3:] = self._linear + (skewed @ self._angular[:, :, None])[:, :, 0]
+            rows.follow(rows.speeds(now), 0.0)
         problem = Problem(
             h,
             joints,
@@ -470,6 +476,7 @@ class World:
             axes,
             self._stops(turns),
             rows,
+            _BLOW * h,
         )
         return problem, spatial, inertias
 
@@ -587,7 +594,11 @@ class World:
         if count:
             impulses = solution.impulses[:count]
             loads = (impulses * contacts.normals).sum(axis=1)
-            self._grips = impulses - loads[:, None] * contacts.normals
+            across = impulses - loads[:, None] * contacts.normals
+            # What slips holds on to nothing.
+            size = np.sqrt((across * across).sum(axis=1))
+            sticks = size < (1.0 - 1e-6) * contacts.friction * loads
+            self._grips = sticks[:, None] * across
 
     def _take_wrenches(self, problem: Problem, solution: Solution) -> None:
         if not self._grabs:
