@@ -131,6 +131,16 @@ def test_all_faults_are_told_at_once_with_their_shots(tmp_path: Path) -> None:
     )
 
 
+def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
+    (shot,) = read(
+        tmp_path,
+        '[[shots]]\nname = "loop"\noctopus = {}\noutput = "loop.blend"\n'
+        'settings = { travel_on = "none", cycles = 2 }\n',
+    ).shots
+    assert shot.entry.route == ""
+    assert shot.entry.settings == {"travel_on": "NONE", "cycles": 2}
+
+
 @pytest.mark.parametrize(
     ("text", "fault"),
     [

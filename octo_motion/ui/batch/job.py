@@ -354,9 +354,15 @@ class _Reader:
         if "octopus" in self._table:
             if name:
                 self._fault(f"A new octopus has no curve '{name}': give the route's points.")
-            elif "route" not in self._table:
+            elif "route" not in self._table and not self._stays():
                 self._fault("A new octopus has no route: give the route's points.")
         return name
+
+    def _stays(self) -> bool:
+        """Whether the settings let nothing travel, which takes no route."""
+        settings = self._table.get("settings")
+        travel_on = settings.get("travel_on") if isinstance(settings, dict) else None
+        return isinstance(travel_on, str) and travel_on.strip().upper() == "NONE"
 
     def _route_table(self, route: dict[str, Any]) -> str | NewRoute:
         for key in route:
