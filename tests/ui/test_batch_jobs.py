@@ -237,7 +237,7 @@ def test_entry_survives_its_way_to_another_process(tmp_path: Path) -> None:
 def test_example_of_the_documentation_is_in_order(tmp_path: Path) -> None:
     path = shutil.copy(REPOSITORY / "docs/examples/shots.toml", tmp_path)
     job = read_job(Path(path), known(), tmp_path / "report.json")
-    assert [shot.entry.name for shot in job.shots] == ["walk", "sideways", "swim"]
+    assert [shot.entry.name for shot in job.shots] == ["walk", "sideways", "swim", "loop"]
     assert job.shots[2].entry.octopus
     assert job.shots[2].entry.octopus.shape == OctopusShape(arm_length=0.4)
 
