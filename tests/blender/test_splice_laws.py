@@ -27,6 +27,7 @@ from octo_motion.core.splicing.landmarks import Landmarks
 from octo_motion.core.splicing.mapping import map_skeleton
 from octo_motion.core.splicing.parts import LEFT_ARM, LEGS, PARTS, RIGHT_ARM, Part, part_bones
 from octo_motion.core.splicing.posture import posture_of, sampled
+from octo_motion.core.splicing.quality import feet_at_rest, limb_length
 from octo_motion.core.splicing.splice import Reach, Splice, build, spliced
 from octo_motion.core.splicing.timing import Timing, window
 from octo_motion.core.splicing.unpose import unposed
@@ -332,6 +333,58 @@ def test_limbs_turn_hardly_faster_than_in_the_clips_they_are_made_from(
     # An elbow that has to reach further than the other one straightens faster; a pop is faster by
     # far, five times and more.
     assert step < 3.0 * own
+
+
+def drifts(clip: Clip, landmarks: Landmarks, stances: list[tuple[int, int, int]]) -> Floats:
+    """How far a foot that should stand moves along the ground, at most, on a body of 1.7 m.
+
+    Args:
+        clip: the motion.
+        landmarks: its landmarks.
+        stances: foot (0 left, 1 right), first and last frame.
+    """
+    index, skeleton = clip.skeleton.index, clip.skeleton
+    feet = np.stack(
+        [positions(clip)[:, index[landmarks[f"foot.{side}"]], :2] for side in "LR"], axis=1
+    )
+    leg = clip.scale * limb_length(skeleton, landmarks, "leg.L")
+    # Of a body of 1.7 m, legs are 0.82 m long.
+    return np.array(
+        [
+            0.82
+            / leg
+            * np.linalg.norm(feet[first : last + 1, foot] - feet[first, foot], axis=1).max()
+            for foot, first, last in stances
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    "name", ["cmu/12_03_walk", "cmu/111_28_daz43", "secondlife/avatar_punch_L"]
+)
+@pytest.mark.parametrize("base_name", ["secondlife/avatar_jump", "cmu/12_01_walk"])
+def test_with_their_travel_feet_do_not_skate(shared_data: SharedData, base_name: str, name: str):
+    base, landmarks = load(shared_data(f"{base_name}.bvh"))
+    clip, marks = load(shared_data(f"{name}.bvh"))
+    clip = clip.taken(range(min(len(clip), 400)))
+    fine = at_pace(base, len(clip) / clip.rate, clip.rate)
+    still = feet_at_rest(clip, marks)[:, :2]
+    stances = []
+    for foot in (0, 1):
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], still[:, foot], [False]])))
+        stances += [(foot, a, b - 1) for a, b in edges.reshape(-1, 2) if b - a > 2]
+    assert stances
+    assert drifts(clip, marks, stances).max() < 0.015
+    for reach in REACHES:
+        timing = Timing(0.0, clip.frames[0])
+        along, without = (
+            spliced(fine, landmarks, Splice(LEGS, clip, timing, marks, reach, travel))
+            for travel in (True, False)
+        )
+        assert drifts(along, landmarks, stances).max() < 0.021
+        # What it is good for: without, they slide by far more.
+        assert drifts(without, landmarks, stances).max() > 0.01
+        assert drifts(along, landmarks, stances).max() < drifts(without, landmarks, stances).max()
 
 
 @pytest.mark.parametrize("name", ["cmu/02_02_walk_daz43.bvh", "secondlife/avatar_dance1.bvh"])
