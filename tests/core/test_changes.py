@@ -80,7 +80,7 @@ def test_no_arm_goes_over_while_it_holds_on(
     change = Change(start, start + 2.0, 1)
     before, after = [each[0] for each in arms], [each[1] for each in arms]
     found = windows(change, before, after)
-    assert np.all(found.end - found.start >= 0.2 * 2.0 - 1e-9)
+    assert np.all(found.end - found.start >= 0.4 * 2.0 - 1e-9)
     assert np.all(found.start >= change.start - 1e-9)
     assert np.all(found.end <= change.end + 1e-9)
     for arm in range(len(arms)):

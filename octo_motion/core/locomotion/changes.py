@@ -27,7 +27,7 @@ from ..rotations import (
     to_rotation_vector,
 )
 
-_HELD: Final = 0.4
+_HELD: Final = 0.3
 """Share of a change, from either end, in which arms may still hold on, or hold on again: in between
 the body turns too far for an arm to follow."""
 
@@ -153,6 +153,12 @@ def windows(
         first_drops.append(dropped)
         last_drops.append(late)
     return Windows(starts, ends, tuple(first_drops), tuple(last_drops))
+
+
+def slowing(way: Floats, within: float) -> Floats:
+    """A way (…,) from 0 on that comes to a stop: at full speed at 0, still from ``within`` on."""
+    inside = np.clip(way, 0.0, within)
+    return inside - 0.5 * inside * inside / within
 
 
 def between(first: Floats, second: Floats, share: Floats, sense: Floats | None = None) -> Floats:

@@ -17,6 +17,7 @@ from ...core.locomotion.changes import (
     changes_by_height,
     check_changes,
     eased,
+    slowing,
     way_weights,
     windows,
 )
@@ -26,13 +27,15 @@ from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Generator
 from ...core.locomotion.grounded import GroundedWalk
 from ...core.locomotion.route import Route
-from ...core.locomotion.travel import TravelSettings, bearings_of, travel_at
+from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, travel_at
 from ...core.rotations import Floats
 from .change_properties import OCTO_MOTION_PG_change
 from .standing import Standing
 
 _SAMPLES: Final = 40
 """Places per arm length at which a route's height over the ground is looked at."""
+_CALM: Final = 0.2
+"""Share of a change within which an arm that goes over comes to rest."""
 _CYCLE: Final = 2.0 * np.pi
 
 
@@ -116,15 +119,57 @@ class Changing:
             for start in range(0, len(part), step):
                 chosen = part[start : start + step]
                 self._pose(way, distance, places, chosen, moved)
-                yield 0.95 * (number + start / max(len(part), 1)) / (len(self.changes) + 1)
+                yield 0.9 * (number + start / max(len(part), 1)) / (len(self.changes) + 1)
+            self._calm(number, way, distance, moved)
             result = moved if result is None else self._joined(result, moved, shares)
         assert result is not None
         yield result
+
+    def _calm(self, number: int, way: int, distance: Floats, moved: Moved) -> None:
+        """Let arms that are about to go over, or have just done so, come to rest in their way.
+
+        The body turns meanwhile as no walking body does: what an arm on the ground would make of
+        that is wild. So an arm goes over from the pose in which it let go.
+        """
+        walk = self.walks[way]
+        if walk is None:
+            return
+        ends = np.cumsum([0, *self.bones])
+        for change, leaving in ((number, True), (number - 1, False)):
+            if not 0 <= change < len(self.changes):
+                continue
+            window = self.windows[change]
+            within = _CALM * (self.changes[change].end - self.changes[change].start)
+            for arm in range(len(self.bones)):
+                start, end = window.start[arm], window.end[arm]
+                chosen = np.flatnonzero((distance > start) & (distance < end))
+                if not len(chosen):
+                    continue
+                here = distance[chosen]
+                if leaving:
+                    here = start + slowing(here - start, within)
+                else:
+                    here = end - slowing(end - here, within)
+                travel = self._travel(way, here)
+                stood = walk.pose(travel.phase, travel.turn, *self.course.at(here))
+                bones = slice(int(ends[arm]), int(ends[arm + 1]))
+                moved.rotations[chosen, bones] = stood.rotations[:, bones]
+                moved.strains[chosen, bones] = stood.strains[:, bones]
+                moved.late[chosen, arm] = 0.0
 
     def _shares(self, change: int, distance: Floats) -> Floats:
         """How far each arm (frames, arms) has gone over at a change."""
         found = self.windows[change]
         return eased((distance[:, None] - found.start) / (found.end - found.start))
+
+    def _travel(self, number: int, distance: Floats) -> Travel:
+        """The body at some distances as one of the ways has it."""
+        way, line = self.ways[number], self.course.lines[number]
+        if isinstance(line, SwumLine):
+            return line.travel(distance)
+        phase = _CYCLE * distance / way.travel.stride
+        bearings = way.standing.bearings if way.standing else bearings_of(line.route, way.travel)
+        return travel_at(line.route, way.travel, bearings, distance, phase)
 
     def _pose(
         self,
@@ -134,16 +179,8 @@ class Changing:
         chosen: np.ndarray,
         moved: Moved,
     ) -> None:
-        way, line = self.ways[number], self.course.lines[number]
-        if isinstance(line, SwumLine):
-            travel = line.travel(distance[chosen])
-        else:
-            phase = _CYCLE * distance[chosen] / way.travel.stride
-            bearings = (
-                way.standing.bearings if way.standing else bearings_of(line.route, way.travel)
-            )
-            travel = travel_at(line.route, way.travel, bearings, distance[chosen], phase)
-        walk = self.walks[number]
+        way, walk = self.ways[number], self.walks[number]
+        travel = self._travel(number, distance[chosen])
         if walk is not None:
             stood = walk.pose(travel.phase, travel.turn, places[0][chosen], places[1][chosen])
             moved.rotations[chosen], moved.strains[chosen] = stood.rotations, stood.strains
