@@ -17,6 +17,7 @@ from stage import Pixels, Points
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _CELL: Final = (300, 230)
+_CLOSE: Final = (440, 330)
 _GLASS: Final = (0.1, 0.35, 0.16)
 _BLUE: Final = (0.1, 0.3, 0.6)
 _AROUND: Final = 48
@@ -110,7 +111,7 @@ def _sheet(
     stage.add_ground(seen, 0.0)
     camera = stage.add_camera("Camera", lens=50.0)
     stage.look(camera, np.array(view.forward), _UP)
-    size = _CELL if view.around == 0.0 else (2 * _CELL[0], 2 * _CELL[1])
+    size = _CELL if view.around == 0.0 else _CLOSE
     stage.set_resolution(*size)
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     if view.around:
