@@ -39,9 +39,9 @@ class CrawlSettings:
     """Largest angle between an arm's push and the way to go of an arm that pushes."""
     astray: float = np.radians(50.0)
     """Angle by which a hold may come to lie beside the arm's own direction before it lets go."""
-    pause: tuple[float, float] = (0.12, 0.4)
+    pause: tuple[float, float] = (0.2, 0.45)
     """Shortest and longest way between two holds of an arm that pushes."""
-    search: tuple[float, float] = (0.2, 0.7)
+    search: tuple[float, float] = (0.3, 0.8)
     """Shortest and longest way between two holds of an arm that does not."""
     hold: tuple[float, float] = (0.5, 1.0)
     """Shares of the longest possible hold after which an arm lets go."""
