@@ -26,16 +26,20 @@ UNROLLING: Final = 0.3
 """Share of a hold in which the arm lies down, from where it first touches to its tip."""
 PEELING: Final = 0.5
 """Share of a hold in which the arm is peeled off, in the same direction, as the body pulls."""
-_SLACK: Final = 0.82
+_SLACK: Final = 0.84
 """Distance from root to where it is peeled off, as a share of the arm between, that peels no more."""
 _FEW: Final = 2
 """Joints that lie down of an arm that is too stiff to be peeled off."""
-_LEFT: Final = 0.25
+_LEFT: Final = 0.4
 """Share of the part that lies down which is not peeled off, but let go with the tip."""
 _EASY: Final = 0.80
 """Distance from root to foothold half way through, as a share of the arm between them."""
 _TAUT: Final = 0.94
 """The same at its longest."""
+_SLACKEST: Final = 0.55
+"""The same at its shortest: an arm that is slacker has to fold."""
+_SHORTER: Final = 0.5
+"""Share of the most stretch by which a bone that may stretch may get shorter."""
 _STRETCHED: Final = 0.6
 """Share of the most stretch that footholds are laid for."""
 _NEAREST: Final = 0.20
@@ -241,6 +245,7 @@ def lay(
     joint = limbs.touching(settings.planted)
     along = limbs.reach
     free, whole = along[joint][:, None], along[-1][:, None]
+    crowded = _SLACKEST * (1.0 - _SHORTER * settings.stretch * limbs.may_stretch)
     longer = 1.0 + _STRETCHED * settings.stretch * limbs.may_stretch
     distance = np.zeros((arms, count))
     half = np.zeros((arms, count))
@@ -266,9 +271,10 @@ def lay(
             easy = (_EASY * free) ** 2 - (roots[..., 2] - z) ** 2
             limit = np.sqrt(np.maximum(easy, nearest**2))
             least = np.broadcast_to(nearest, limit.shape)
-            for root in seen[:1] + seen[-1:]:
+            for root in (seen[0], roots, seen[-1]):
                 onto = np.sum((root[..., :2] - roots[..., :2]) * aim, axis=-1)
-                least = np.maximum(least, nearest + onto)
+                loosest = (crowded * free) ** 2 - (root[..., 2] - z) ** 2
+                least = np.maximum(least, onto + np.sqrt(np.maximum(loosest, nearest**2)))
             lack, farthest = np.zeros((arms, count)), np.full((arms, count), np.inf)
             for root, far, extra in zip(seen, reaches, beyond, strict=True):
                 level = far**2 - (root[..., 2] - z) ** 2
