@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -39,6 +40,8 @@ _TOO_SLOW: Final = 3e-3
 """s for a step, with which seven more at a grab would be noticed."""
 _STALE: Final = 0.25
 """s without a word from a hand: it has let go."""
+_PAUSE: Final = 0.05
+"""s: a longer turn means that the whole machine was busy, and the hand could not speak either."""
 
 
 @dataclass
@@ -55,6 +58,8 @@ class Hand:
     refused: int = 0
     """The grab that found nothing near."""
     pull: Pull = field(default_factory=Pull)
+    silence: float = 0.0
+    """s that this process has run without a word from the hand."""
 
 
 class Simulation:
@@ -80,6 +85,7 @@ class Simulation:
         self._nominal = settings.step
         self._clock = clock
         self._calm = 0.0
+        self._now = -math.inf
         self._obstacles: dict[int, Obstacle] = {}
         self._pins: dict[int, bool] = {}
 
@@ -146,6 +152,8 @@ class Simulation:
             scale: m of the scene for a metre of the hand.
         """
         hand = self.hands.setdefault(message.pointer, Hand(message))
+        if message.time != hand.told.time:
+            hand.silence = 0.0
         hand.told, hand.device, hand.scale = message, device, scale
         if hand.handle is not None and message.grab != hand.grab:
             self._release(hand)
@@ -264,8 +272,9 @@ class Simulation:
             if hand.handle is None:
                 continue
             told = hand.told
-            if now - told.time > _STALE:
-                log.info("A hand was not heard of for %.2f s and let go", now - told.time)
+            hand.silence += min(now - self._now, _PAUSE)
+            if hand.silence > _STALE:
+                log.info("A hand was not heard of for %.2f s and let go", hand.silence)
                 hand.refused = hand.grab  # let go is let go, until it grabs anew
                 self._release(hand)
                 continue
@@ -275,6 +284,7 @@ class Simulation:
                 np.array(told.orientation),
                 np.array((*told.velocity, *told.angular_velocity)),
             )
+        self._now = now
         if self.resting:
             return
         before = self._clock()

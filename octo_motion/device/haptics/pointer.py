@@ -33,7 +33,7 @@ from .safety import Limits, Shaper
 _FULL_PUSH: Final = 0.1
 """s: a rate device that has not been read for so long stands still."""
 _GIVE_UP: Final = 0.25
-"""s without a word from the simulation, after which the hand has let go for good."""
+"""s of ticks without a word from the simulation, after which the hand has let go for good."""
 _TEST_SECONDS: Final = 0.6
 _TEST_SHARE: Final = 0.15
 """Of the device's force, for the test of a device."""
@@ -69,6 +69,7 @@ class Pointer:
         self._model = LocalModel()
         self._answered = 0
         self._heard = -math.inf
+        self._silence = 0.0
         self._grabs = 0
         self._told_place = False
         self._test_until = -math.inf
@@ -141,6 +142,7 @@ class Pointer:
             self._push.forget()
             self._turn.forget()
         self._heard = now
+        self._silence = 0.0
 
     def test(self, now: float) -> None:
         """Let the hand feel that the device works: gently to the right, then to the left."""
@@ -164,7 +166,8 @@ class Pointer:
         force, torque, age = self._asked(now)
         self._observe()
         velocity, spin = self.sample.velocity, self.sample.angular_velocity
-        if self._answered and now - self._heard > _GIVE_UP:
+        self._silence += self.period
+        if self._answered and self._silence > _GIVE_UP:
             self.want(grab=False)
             self._answered = 0
         if self._answered:
