@@ -31,7 +31,8 @@ class Puppet:
         self.name = armature.name
         self.rig = rig or read_rig(armature)
         self._bones = armature_bones(armature)
-        self._written: Pose | None = None
+        # What the bones show already is not written: their own values stay exactly as they are.
+        self._written: Pose | None = self.rig.pose
         self._set_frames(armature)
 
     @property
@@ -58,7 +59,7 @@ class Puppet:
         posed = posed_bones(armature, even_scale(armature))
         bodies = list(self.rig.roles.bodies)
         pose = Pose(posed.heads[bodies] * self.rig.unit, posed.rotations[bodies])
-        self._written = None
+        self._written = pose
         return pose
 
     def write(self, pose: Pose) -> list[str]:

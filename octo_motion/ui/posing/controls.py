@@ -260,7 +260,8 @@ class PoseControls:
         session = self.session
         parts = [f"Posing {session.puppet.name}"]
         if self.holding and session.core.grip is not None:
-            parts.append(f"{session.bone(session.core.grip.body)}: pull {session.pull():.2f}")
+            bone = session.bone(session.core.grip.body)
+            parts.append(f"{bone}: pulled by {session.pull():.2f} of the figure's weight")
         elif self.hover is not None:
             parts.append(session.bone(self.hover.body))
         if session.recording:
