@@ -21,6 +21,7 @@ from .obstacles import Obstacle, Plane
 Integers = NDArray[np.int64]
 
 _MOST_SAMPLES: Final = 9
+_MOST_KEPT: Final = 1024
 _TINY: Final = 1e-12
 
 
@@ -81,6 +82,7 @@ class Detector:
         most = float(np.max(lengths / np.maximum(figure.radii, _TINY), initial=1.0))
         self._samples = int(min(max(np.ceil(most) + 1, 3), _MOST_SAMPLES))
         self._pairs = _pairs(figure) if self_collision else None
+        self._planes: dict[int, tuple[Plane, Floats, float]] = {}
         self._corner_cache: dict[int, tuple[Obstacle, Floats | None]] = {}
         self._reach = float(figure.radii.max(initial=0.0))
 
@@ -125,11 +127,11 @@ class Detector:
         return np.minimum(first, second) - around, np.maximum(first, second) + around
 
     def _on_plane(self, ends: Floats, plane: Plane, margin: float, label: int) -> Contacts | None:
-        normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
+        normal, height = self._plane(plane)
         centres = ends.reshape(-1, 3)[self._end_flat]
         gaps = centres @ normal
         gaps -= self._end_radii
-        gaps -= normal @ plane.position
+        gaps -= height
         near = np.flatnonzero(gaps < margin)
         if not len(near):
             return None
@@ -265,6 +267,17 @@ class Detector:
         friction.fill(self._friction if obstacle.friction is None else obstacle.friction)
         return Contacts(bodies, others, points, normals, gaps, speeds, friction, labels)
 
+    def _plane(self, plane: Plane) -> tuple[Floats, float]:
+        """Its normal and how high it lies along that; kept as long as it stays the same."""
+        known = self._planes.get(id(plane))
+        if known is None or known[0] is not plane:
+            normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
+            known = (plane, normal, float(normal @ plane.position))
+            if len(self._planes) > _MOST_KEPT:
+                self._planes.clear()
+            self._planes[id(plane)] = known
+        return known[1], known[2]
+
     def _world_box(self, obstacle: Obstacle) -> Floats | None:
         """Lower and upper corner in the world; kept as long as the obstacle stays the same."""
         known = self._corner_cache.get(id(obstacle))
@@ -277,7 +290,7 @@ class Detector:
             middle = frame @ bounds.mean(axis=0) + obstacle.position
             half = np.abs(frame) @ (0.5 * (bounds[1] - bounds[0]))
             box = np.stack([middle - half, middle + half])
-        if len(self._corner_cache) > 4096:
+        if len(self._corner_cache) > _MOST_KEPT:
             self._corner_cache.clear()
         self._corner_cache[id(obstacle)] = (obstacle, box)
         return box

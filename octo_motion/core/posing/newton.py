@@ -155,7 +155,7 @@ class Newton:
             _add_stops(stops, problem.step, joint_speeds, impulses, slopes)
         rows = problem.rows
         row_speeds, answer = _NO_ROWS, None
-        if len(rows):
+        if len(rows.bodies):
             row_speeds = rows.speeds(velocities)
             answer = rows.answer(row_speeds)
         return _Point(
@@ -191,7 +191,7 @@ class Newton:
             assert point.rows is not None
             # p_k + W w_k − W w, with w the velocity less the target.
             at = point.row_speeds if rows.still else point.row_speeds + rows.targets
-            pulls = np.empty((len(rows), 3, columns))
+            pulls = np.empty((len(slopes), 3, columns))
             pulls[:, :, 0] = point.rows.impulses + (slopes @ at[:, :, None])[:, :, 0]
             if corrections is not None:
                 pulls[:, :, 1] = pulls[:, :, 0] + (slopes @ corrections[:, :, None])[:, :, 0]
@@ -204,7 +204,7 @@ class Newton:
             chain = tree.beyond[:, rows.bodies]
             composite = composite + (chain @ blocks.reshape(-1, 36)).reshape(-1, 6, 6)
             pushes = turned @ pulls
-            right += tree.motion @ (chain @ pushes.reshape(len(rows), -1)).reshape(-1, 6, columns)
+            right += tree.motion @ (chain @ pushes.reshape(len(slopes), -1)).reshape(-1, 6, columns)
             if len(paired):
                 chain = tree.beyond[:, rows.others[paired]]
                 against = chain @ pushes[paired].reshape(len(paired), -1)
@@ -333,6 +333,6 @@ _LEAST = 1e-12
 _ENOUGH = 0.1
 """Of the slope at the start: where the lowest point is near enough."""
 _SEARCHES = 6
-_ROUNDS = 3
+_ROUNDS = 2
 """In which contacts learn from each other how fast they slip."""
 _NO_ROWS = np.zeros((0, 3))

@@ -33,7 +33,7 @@ Integers = NDArray[np.int64]
 
 _GAIN = 50.0
 """a in masses of the body: a contact settles within a step, as from a push against a wall."""
-_LEAST_SHARE = 0.02
+_LEAST_SHARE = 0.002
 """Of the figure's mass: what the lightest body counts for there."""
 _WEIGHT = 9.81
 _TINY = 1e-300
@@ -107,7 +107,9 @@ class Rows:
         """
         self.contacts = contacts
         self.holds = holds
-        count = len(contacts)
+        count = len(contacts.bodies)
+        self.count = count
+        """Number of contacts, the first rows."""
         if holds is None:
             self.bodies = contacts.bodies
             self.others = contacts.others
@@ -169,7 +171,7 @@ class Rows:
 
     def follow(self, speeds: Floats, tolerance: float) -> bool:
         """Take |w_t| from w (rows, 3); false where that changes no rate by ``tolerance``, m/s."""
-        count = len(self.contacts)
+        count = self.count
         if not count:
             return False
         normals, w = self.contacts.normals, speeds[:count]
@@ -184,7 +186,7 @@ class Rows:
 
     def answer(self, speeds: Floats) -> Answer:
         """Impulses at w (rows, 3)."""
-        count = len(self.contacts)
+        count = self.count
         holds = self.holds
         impulses = np.empty_like(speeds)
         sticks, slips, toward, aside = _NOBODY, None, _NO_ROWS, _NO_ONES
@@ -222,7 +224,7 @@ class Rows:
 
     def slopes(self, answer: Answer) -> Floats:
         """−∂p/∂w (rows, 3, 3), symmetric and positive semidefinite."""
-        count = len(self.contacts)
+        count = self.count
         slopes = np.empty((len(self.bodies), 3, 3))
         if count:
             block = np.where(answer.sticks, self.gains, 0.0)[:, None, None] * _UNIT
@@ -254,7 +256,7 @@ class Rows:
         Overlap that is deeper than it need be and pins that are off their place, a fifth of it each step
         and no faster than ``fastest``. Used for positions alone and never kept as velocity.
         """
-        count = len(self.contacts)
+        count = self.count
         step = self._step
         depth = -self.contacts.gaps - step * self._spring
         deep = depth.max(initial=0.0) > 0.0
