@@ -18,6 +18,8 @@ _MOST_POINTS: Final = 1500
 """Points of a skin that are looked at; an arm's thickness needs no more."""
 _THICKEST: Final = 0.2
 """Arm lengths from an arm's middle line: what is further away is not its skin."""
+_SLENDER: Final = (0.03, 0.008)
+"""Radius of an arm without a skin at its root and at its tip, in arm lengths."""
 _SHARE: Final = 0.5
 """Of the points round a joint, the share that lies nearer to it than its radius."""
 
@@ -54,19 +56,23 @@ def arm_radii(
 ) -> list[Floats]:
     """For each arm (bones + 1,) how far the skin is from each joint at rest, armature units.
 
-    Zero where no mesh hangs on the armature.
+    Where no mesh hangs on the armature, arms are taken to be slender.
     """
     points = _skin(armature)
     joints = [joint_positions(skeleton, bones) for bones in arms]
-    if len(points) == 0:
-        return [np.zeros(len(each)) for each in joints]
     lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
+    slender = [
+        length * np.linspace(*_SLENDER, len(each))
+        for length, each in zip(lengths, joints, strict=True)
+    ]
+    if len(points) == 0:
+        return slender
     found = [_distances(points, each) for each in joints]
     nearest = np.stack([distance for distance, _ in found]).argmin(axis=0)
     radii = []
     for arm, (distance, along) in enumerate(found):
         own = (nearest == arm) & (distance < _THICKEST * lengths[arm])
-        radii.append(_radii(distance[own], along[own], len(joints[arm])))
+        radii.append(_radii(distance[own], along[own], slender[arm]))
     return radii
 
 
@@ -98,15 +104,15 @@ def _distances(points: Floats, joints: Floats) -> tuple[Floats, Floats]:
     return apart[rows, segment], segment + share[rows, segment]
 
 
-def _radii(distance: Floats, along: Floats, joints: int) -> Floats:
+def _radii(distance: Floats, along: Floats, otherwise: Floats) -> Floats:
     """The radius at each joint (joints,), where there are points round it, else its neighbours'."""
-    places = np.arange(joints)
-    radii = np.full(joints, np.nan)
+    places = np.arange(len(otherwise))
+    radii = np.full(len(otherwise), np.nan)
     for joint in places:
         near = distance[np.abs(along - joint) <= 0.5]
         if len(near):
             radii[joint] = np.quantile(near, _SHARE)
     known = np.isfinite(radii)
     if not np.any(known):
-        return np.zeros(joints)
+        return otherwise
     return np.interp(places, places[known], radii[known])

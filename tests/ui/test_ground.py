@@ -1,0 +1,244 @@
+"""Walks that hold the ground, as the artist makes them: settings, markers, what is told."""
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.blender.contacts import markers
+from octo_motion.core.errors import GroundError
+from octo_motion.core.locomotion import quality
+from octo_motion.core.locomotion.ground import Plane
+from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.ui.locomotion.workflow import prepare
+from tests.blender.test_ground import make_mesh, make_square
+from tests.ui.rig import click, generate, give_route, joints_in_world, keys
+
+WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
+
+
+@pytest.fixture
+def octopus() -> Any:
+    """The default octopus without its skin, a route of some four arm lengths, and 160 frames."""
+    click("add_octopus", with_mesh=False)
+    armature: Any = bpy.context.object
+    click("detect_arms")
+    give_route(armature, WAY)
+    settings = armature.octo_motion.locomotion
+    settings.timing, settings.frame_end = "RANGE", 160
+    return armature
+
+
+def ground_of(armature: Any) -> Any:
+    return armature.octo_motion.locomotion.ground
+
+
+def warnings(armature: Any) -> list[str]:
+    """What the button warns of."""
+    shot = prepare(armature, bpy.context)
+    for _ in shot.compute():
+        pass
+    return list(shot.write().warnings)
+
+
+def arms_in_world(armature: Any, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Joints (frames, arms, joints, 3) as played, which of them must rest, and cycles."""
+    shot = prepare(armature, bpy.context)
+    standing = shot.standing
+    assert standing is not None
+    times = np.interp(frames, shot.frames, shot.times)
+    travel = plan_travel(shot.route, shot.travel, times, standing.bearings)
+    poses = standing.pose(travel, slice(None), standing.place(travel))
+    (arms,) = standing.walk.builds
+    order = [bone.name for bone in armature.pose.bones]
+    numbers = [[order.index(bone) for bone in shot.arms[arm].bones] for arm in arms]
+    played = []
+    for frame in frames:
+        ends = joints_in_world(armature, frame)
+        played.append([np.concatenate([ends[own, 0], ends[own[-1:], 1]]) for own in numbers])
+    return np.array(played), poses.lying[0], poses.cycles[:, list(arms)]
+
+
+def test_one_click_walks_on_a_plane_and_nothing_slides(octopus: Any) -> None:
+    generate(octopus)
+    length = prepare(octopus, bpy.context).generator.lengths
+    frames = np.arange(20.0, 60.0, 0.5)
+    joints, lying, cycles = arms_in_world(octopus, frames)
+    # Within a hundredth of the arm between frames, and what single precision leaves at them.
+    assert quality.slip(joints, lying, cycles, length).value < 0.01
+    assert quality.slip(joints[::2], lying[::2], cycles[::2], length).value < 1e-5
+    assert quality.depth(joints, Plane(0.0), length).value < 0.005
+    assert lying.any(axis=-1).sum(axis=1).min() >= 2
+
+
+def test_bones_that_stretch_get_keys_and_lose_them_again(octopus: Any) -> None:
+    scaled = {path for path, _ in keys(generate(octopus)) if path.endswith(".scale")}
+    assert scaled
+    ground_of(octopus).stretch = 0.0
+    bpy.context.scene.frame_set(30)
+    again = {path for path, _ in keys(generate(octopus)) if path.endswith(".scale")}
+    assert again == set()
+    for bone in octopus.pose.bones:
+        assert tuple(bone.scale) == (1.0, 1.0, 1.0)
+    assert warnings(octopus) == []
+
+
+def test_a_second_click_does_not_warn_of_the_first_ones_stretch(octopus: Any) -> None:
+    generate(octopus)
+    bpy.context.scene.frame_set(30)
+    assert warnings(octopus) == []
+
+
+def test_few_keys_hold_the_ground_too(octopus: Any) -> None:
+    octopus.octo_motion.locomotion.keys = "REDUCED"
+    generate(octopus)
+    length = prepare(octopus, bpy.context).generator.lengths
+    joints, lying, cycles = arms_in_world(octopus, np.arange(20.0, 60.0, 1.0))
+    # The tolerance, to either side.
+    tolerance = octopus.octo_motion.locomotion.key_distance
+    assert quality.slip(joints, lying, cycles, length).value < 2.5 * tolerance
+
+
+def test_a_mesh_is_walked_on_where_it_is(octopus: Any) -> None:
+    ground = make_square(12.0)
+    ground.location.z, ground.rotation_euler.x = 0.4, np.radians(20.0)
+    ground_of(octopus).object = ground
+    bpy.context.view_layer.update()
+    generate(octopus)
+    plane = Plane(0.4, (0.0, float(np.tan(np.radians(20.0)))))
+    length = prepare(octopus, bpy.context).generator.lengths
+    joints, lying, cycles = arms_in_world(octopus, np.arange(20.0, 60.0, 1.0))
+    assert quality.depth(joints, plane, length).value < 0.005
+    assert quality.slip(joints, lying, cycles, length).value < 1e-5
+    assert np.abs(joints[lying][:, 2] - plane.height(joints[lying])).max() < 0.03
+
+
+def test_the_ground_may_be_left_out(octopus: Any) -> None:
+    ground_of(octopus).use = False
+    action = generate(octopus)
+    assert not any(path.endswith(".scale") for path, _ in keys(action))
+    assert prepare(octopus, bpy.context).standing is None
+
+
+def test_a_swim_holds_nothing(octopus: Any) -> None:
+    octopus.octo_motion.locomotion.gait = "swim"
+    ground_of(octopus).object = make_mesh([(0, 0, 0)], [])
+    generate(octopus)
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (lambda: make_mesh([(0, 0, 0), (1, 0, 0)], []), "The ground 'Ground' has no faces"),
+        (lambda: make_square(2.0), r"The route leaves the ground after \d+ % of its length"),
+    ],
+)
+def test_a_ground_that_cannot_be_walked_on_is_told(octopus: Any, make: Any, told: str) -> None:
+    ground_of(octopus).object = make()
+    with pytest.raises(GroundError, match=told):
+        prepare(octopus, bpy.context)
+    with pytest.raises(RuntimeError, match=told):
+        click("generate_locomotion")
+    assert octopus.animation_data is None or octopus.animation_data.action is None
+
+
+def test_a_route_over_itself_is_warned_of(octopus: Any) -> None:
+    stairs = ((0.0, 0.0, 0.0), (9.0, -2.0, 0.2), (-9.0, -2.0, 1.2), (0.2, 0.0, 1.4))
+    give_route(octopus, stairs)
+    assert any("passes over itself" in told for told in warnings(octopus))
+
+
+# --- Contacts -------------------------------------------------------------------------------------
+
+
+def test_markers_show_where_arms_hold_and_change_nothing(octopus: Any) -> None:
+    before = keys(generate(octopus))
+    click("contacts_show")
+    shown = markers(octopus)
+    standing = prepare(octopus, bpy.context).standing
+    assert standing is not None
+    assert len(shown) == len(standing.walk.footholds())
+    after = keys(generate(octopus))
+    assert all(np.array_equal(after[key], values) for key, values in before.items())
+    assert len(ground_of(octopus).contacts) == 0
+
+
+def middle_marker(octopus: Any) -> Any:
+    arm = octopus.octo_motion.locomotion.arms[2].name
+    own = [item for item in markers(octopus) if item.octo_motion.contact.arm == arm]
+    return own[len(own) // 2]
+
+
+def test_a_dragged_contact_is_held_there_and_survives_everything(octopus: Any) -> None:
+    generate(octopus)
+    click("contacts_show")
+    marker = middle_marker(octopus)
+    place = marker.octo_motion.contact.arm, marker.octo_motion.contact.cycle
+    marker.location.x += 0.03
+    wanted = np.array(marker.location)
+    bpy.context.view_layer.update()
+    generate(octopus)
+    (item,) = ground_of(octopus).contacts
+    assert (item.arm, item.cycle, item.locked) == (*place, True)
+    np.testing.assert_allclose(np.array(marker.location)[:2], wanted[:2], atol=1e-6)
+    frames = np.arange(np.ceil(marker.octo_motion.contact.frame_on) + 1.0, 160.0)[:4]
+    joints, lying, _ = arms_in_world(octopus, frames)
+    gap = np.linalg.norm(joints - wanted, axis=-1)[lying].min()
+    assert gap < 0.01
+    click("contacts_hide")
+    assert markers(octopus) == []
+    octopus.octo_motion.locomotion.heading_angle = 0.2
+    generate(octopus)
+    click("contacts_show")
+    again = next(
+        each
+        for each in markers(octopus)
+        if (each.octo_motion.contact.arm, each.octo_motion.contact.cycle) == place
+    )
+    np.testing.assert_allclose(np.array(again.location)[:2], wanted[:2], atol=1e-6)
+    click("contacts_clear")
+    assert len(ground_of(octopus).contacts) == 0
+
+
+def test_a_deleted_marker_is_a_contact_less(octopus: Any) -> None:
+    click("contacts_show")
+    marker = middle_marker(octopus)
+    count = len(markers(octopus))
+    bpy.data.objects.remove(marker)
+    generate(octopus)
+    assert len(markers(octopus)) == count - 1
+    (item,) = ground_of(octopus).contacts
+    assert item.removed
+    generate(octopus)
+    assert len(markers(octopus)) == count - 1
+
+
+def test_a_contact_can_be_shifted_by_frames(octopus: Any) -> None:
+    click("contacts_show")
+    marker = middle_marker(octopus)
+    before = marker.octo_motion.contact.frame_on
+    for each in bpy.context.selected_objects:
+        each.select_set(state=False)
+    marker.select_set(state=True)
+    bpy.context.view_layer.objects.active = marker
+    click("contacts_shift", frames=2.0)
+    # A marker is active: the button knows whose it is.
+    click("generate_locomotion")
+    assert marker.octo_motion.contact.frame_on == pytest.approx(before + 2.0, abs=0.3)
+
+
+def test_a_contact_out_of_reach_is_told_with_its_frame(octopus: Any) -> None:
+    click("contacts_show")
+    marker = middle_marker(octopus)
+    marker.location.x += 2.0
+    bpy.context.view_layer.update()
+    name = marker.octo_motion.contact.arm
+    (told,) = [each for each in warnings(octopus) if "out of reach" in each]
+    assert told.startswith(f"'{name}' slides at frame ")
+
+
+def test_there_are_no_contacts_to_show_of_a_swim(octopus: Any) -> None:
+    octopus.octo_motion.locomotion.gait = "swim"
+    with pytest.raises(RuntimeError, match="does not hold the ground"):
+        click("contacts_show")
