@@ -103,6 +103,24 @@ def test_armature_follows_the_hand_at_the_device(hands: DeviceHands) -> None:
     assert "bone2" in keyed
 
 
+def test_hand_far_from_all_limbs_is_told_so(hands: DeviceHands) -> None:
+    wait(hands, hands.shown, "the hand is there")
+    far = Room(np.array([50.0, 0.0, 0.0]), FRONT, 1.0)
+    hands.tick(TOLD, far)
+    end = time.monotonic() + PATIENCE
+    while hands.shown()[0].position[0] < 40.0:
+        hands.tick(TOLD, far)
+        assert time.monotonic() < end
+    hands.grab()
+    while not hands.said:
+        hands.tick(TOLD, far)
+        assert time.monotonic() < end
+    assert hands.said == "No limb is near enough to grab"
+    hands.client.send(say.Grab(0, grab=False))
+    grabbed(hands)
+    assert hands.said == ""
+
+
 def test_enter_keeps_pose_and_keys_and_escape_takes_them_back(hands: DeviceHands) -> None:
     grabbed(hands)
     wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")

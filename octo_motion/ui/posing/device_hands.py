@@ -6,6 +6,7 @@ Everything that the bridge hears is in the puppet's metres; whatever is shown is
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -32,6 +33,9 @@ _WIDTH: Final = 0.25
 """m: the room of a desktop device, which is as wide as the view."""
 _RATE_WIDTH: Final = 1.0
 """m: full push of a space mouse crosses the view in 2.5 s."""
+_ANSWER: Final = 0.4
+"""s after which a grab that holds nothing has found nothing."""
+_NOTHING_NEAR: Final = "No limb is near enough to grab"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +81,7 @@ class DeviceHands:
         """The limb that is held, for the overlay."""
         self.hand: Floats | None = None
         self.said = ""
+        self._asked: float | None = None
         self._start = session.core.pose
         self._figure: Any = None
         self._world: Any = None
@@ -126,6 +131,8 @@ class DeviceHands:
             return
         held = self.client.pointers[number].body >= 0
         self.client.send(Grab(number, grab=not held))
+        if not held:
+            self._asked = time.monotonic()
 
     def pin(self) -> None:
         """Pin what is held, or take the pin out."""
@@ -177,6 +184,14 @@ class DeviceHands:
         if room is not None:
             self._place(room)
         self._look_at_held()
+        if any(each.pressed and each.button == settings.grab_button for each in buttons):
+            self._asked = time.monotonic()
+        if self.holding:
+            self._asked = None
+            self.said = "" if self.said == _NOTHING_NEAR else self.said
+        elif self._asked is not None and time.monotonic() - self._asked > _ANSWER:
+            self._asked = None
+            self.said = _NOTHING_NEAR
         return buttons
 
     def notices(self) -> list[Notice]:

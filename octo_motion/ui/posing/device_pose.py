@@ -87,6 +87,8 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
     _hands: DeviceHands | None = None
     _overlay: Overlay | None = None
     _timer: Any = None
+    _size: float = 1.0
+    """Of the figure, puppet metres."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -122,6 +124,7 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
             self._end(context, keep=False)
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        self._size = self._session.size * self._session.unit
         try:
             self._hands = DeviceHands(self._session, client, self._told(settings))
             _going_on.append(self._hands)
@@ -166,8 +169,7 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
 
     def _told(self, settings: Any) -> Any:
         assert self._session is not None
-        heads = self._session.figure.lengths
-        return message(settings, float(heads.sum() / max(len(heads), 1) * 5.0))
+        return message(settings, self._size)
 
     def _tick(self, context: bpy.types.Context, hands: DeviceHands) -> None:
         settings = device_settings(context.window_manager)

@@ -195,6 +195,11 @@ class PuppetSession:
         return sorted(self.core.pins)
 
     @property
+    def size(self) -> float:
+        """The largest extent of the puppet as it stands, in units of the world."""
+        return float(np.ptp(self.capsules()[0].reshape(-1, 3), axis=0).max())
+
+    @property
     def root_is_held(self) -> bool:
         """Whether the root neither moves nor turns."""
         return self._shown.root == "HELD"
