@@ -71,10 +71,15 @@ def writable_armature(obj: bpy.types.Object) -> None:
         WriteError: it is linked, a library override that is not editable, or in NLA tweak mode.
     """
     armature_data(obj)
-    _writable_object(obj)
+    writable_object(obj)
 
 
-def _writable_object(obj: bpy.types.Object) -> None:
+def writable_object(obj: bpy.types.Object) -> None:
+    """The same for any object.
+
+    Raises:
+        WriteError: it is linked, a library override that is not editable, or in NLA tweak mode.
+    """
     # Python may assign an action to a linked object: it animates, and is gone when the file is
     # opened again. Of a local object with linked armature data, and of an editable override, the
     # action is saved.
@@ -218,7 +223,7 @@ def write_action(
         WriteError: the object is read-only, or in NLA tweak mode. Nothing has changed then.
     """
     times = _checked(frames, channels)
-    _writable_object(obj)
+    writable_object(obj)
     data = obj.animation_data or obj.animation_data_create()
     assert data is not None
     assigned = data.action

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.errors import RigError
 from ..core.rotations import Floats, continuous, from_matrix
+from .actions import is_generated
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that can have faces."""
@@ -82,6 +83,19 @@ def may_move(target: bpy.types.Object) -> bool:
             return True
         each = each.parent
     return False
+
+
+def can_be_carried(target: bpy.types.Object) -> bool:
+    """Whether an object stands still, but for keys that were made here."""
+    data = target.animation_data
+    if data is not None:
+        if data.action is not None and not is_generated(data.action):
+            return False
+        if len(data.drivers) > 0 or len(data.nla_tracks) > 0:
+            return False
+    if len(target.constraints) > 0 or target.rigid_body is not None:
+        return False
+    return target.parent is None or (target.parent_type == "OBJECT" and not may_move(target.parent))
 
 
 def hangs_on(target: bpy.types.Object, owner: bpy.types.Object) -> bool:

@@ -175,6 +175,50 @@ def test_a_pose_of_the_body_counts(octopus: Any) -> None:
     assert (near < 0.16).sum() >= 3
 
 
+def test_an_object_is_carried_and_left(octopus: Any) -> None:
+    give_route(octopus, [(0, 0, 0), (0, -0.7, 0), (0, -1.4, 0), (0, -2.0, 0)])
+    rod = thing(objects.rod(0.04, 0.6), (0.5, -0.85, 0.0))
+    reach(octopus, rod, carry=True, frame_contact=34, frame_release=75)
+    bpy.context.scene.frame_set(60)
+    first = keys(generate(octopus))
+    places = {}
+    for frame in (20, 34, 49, 50, 62, 75, 80, 100):
+        points = arm_joints(octopus, frame)
+        places[frame] = rod.matrix_world.copy(), points
+    for frame in (20, 34, 49):
+        np.testing.assert_allclose(places[frame][0].translation, (0.5, -0.85, 0.0), atol=1e-5)
+    for frame in (80, 100):
+        left = places[frame][0].translation
+        np.testing.assert_allclose(left, places[75][0].translation, atol=1e-5)
+    assert (places[75][0].translation - places[49][0].translation).length > 0.2
+    held = [
+        [matrix.inverted() @ Vector(each) for each in points[-3:]]
+        for matrix, points in (places[frame] for frame in (50, 62, 75))
+    ]
+    np.testing.assert_allclose(held[1], held[0], atol=1e-4)
+    np.testing.assert_allclose(held[2], held[0], atol=1e-4)
+    # Again, it is taken from where it was, and its keys are made anew in place.
+    own = rod.animation_data.action
+    again = keys(generate(octopus))
+    assert rod.animation_data.action == own
+    assert all(np.allclose(again[path], values, atol=1e-5) for path, values in first.items())
+
+
+def test_what_cannot_be_carried_is_told(octopus: Any) -> None:
+    rod = thing()
+    item = reach(octopus, rod, carry=True)
+    reach(octopus, rod, carry=True, arm="Arm 1 R", name="Other")
+    click("detect_arms")
+    with pytest.raises(RuntimeError, match="Both 'Reach' and 'Other' carry 'Rod'"):
+        click("generate_locomotion")
+    settings_of(octopus).reaches[1].mute = True
+    rod.keyframe_insert("location", frame=1)
+    with pytest.raises(RuntimeError, match="'Rod' moves by itself"):
+        click("generate_locomotion")
+    item.carry = False
+    assert click("generate_locomotion") == {"FINISHED"}
+
+
 def test_few_keys_hold_as_well(octopus: Any) -> None:
     settings = settings_of(octopus)
     settings.keys = "REDUCED"

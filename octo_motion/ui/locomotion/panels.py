@@ -417,7 +417,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
         if settings.timing == "RANGE":
             column.prop(settings, "frame_end")
         layout.prop(settings, "extend_scene_range")
-        layout.row().prop(settings, "travel_on", expand=True)
+        layout.prop(settings, "travel_on")
         if settings.travel_on == "NONE":
             layout.prop(settings, "cycles")
             layout.prop(settings, "repeat")

@@ -199,6 +199,7 @@ def draw_reaches(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     layout.prop_search(item, "arm", settings, "arms")
     if item.mode == "COIL":
         layout.prop(item, "turns")
+        layout.prop(item, "carry")
     if item.mode != "CURL":
         layout.prop(item, "axis")
     column = layout.column(align=True)

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import bpy
 import numpy as np
 
-from ...blender.grasp_target import hangs_on, read_form, read_places
+from ...blender import actions
+from ...blender.grasp_target import can_be_carried, hangs_on, read_form, read_places
 from ...blender.poses import standing_of
 from ...blender.skin_radii import skin_radii
 from ...core.errors import RigError, SettingsError
@@ -62,6 +63,22 @@ class Reach:
     """(frames, 3) of the object, world."""
     rotations: Floats
     """(frames, 4)"""
+    carry: bool = False
+    """Whether the object goes along while it is held."""
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Where an object is taken."""
+
+    target: str
+    """Name of the object."""
+    frames: Floats
+    """(frames,) from when it is held until it is let go."""
+    positions: Floats
+    """(frames, 3) world."""
+    rotations: Floats
+    """(frames, 4) world."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +100,8 @@ class Reaching:
         rotations: Floats,
         travelling: Travelling,
         strains: Floats | None = None,
-    ) -> tuple[str, ...]:
-        """Let arms reach, in place, and say what they do.
+    ) -> tuple[tuple[str, ...], tuple[Carried, ...]]:
+        """Let arms reach, in place; what they do in words, and the objects that they carry.
 
         Args:
             times: (frames,) of the motion.
@@ -100,8 +117,10 @@ class Reaching:
         ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)])
         busy: list[tuple[int, Reach]] = []
         notes: list[str] = []
+        ways = _ways(self.reaches, times, travelling)
         for reach in sorted(self.reaches, key=lambda each: each.timeline.start):
-            seen = travelling.seen(reach.positions, reach.rotations)
+            way = ways.get(reach.target, reach)
+            seen = travelling.seen(way.positions, way.rotations)
             number = self._arm(reach, times, seen)
             shift, turn = self.standings[number]
             places = Places(
@@ -136,7 +155,13 @@ class Reaching:
                     f"'{self.arms[number].name}' winds {grasp.turns:.1f} times round "
                     f"'{reach.target}'."
                 )
-        return tuple(notes)
+        carried: list[Carried] = []
+        for way in ways.values():
+            held = (times >= way.timeline.closed) & (times <= way.timeline.release)
+            carried.append(
+                Carried(way.target, times[held], way.positions[held], way.rotations[held])
+            )
+        return tuple(notes), tuple(carried)
 
     def _arm(self, reach: Reach, times: Floats, places: Places) -> int:
         """The arm that is named; else the one whose root the object is nearest to at the touch."""
@@ -156,6 +181,51 @@ class Reaching:
         goal = places.seen(reach.profile.center)[at]
         away = [float(np.linalg.norm(goal - arm.root) / arm.length) for arm in self.frames]
         return int(np.argmin(away))
+
+
+def _ways(reaches: Sequence[Reach], times: Floats, travelling: Travelling) -> dict[str, Reach]:
+    """Reaches that carry their objects, with where they take them, by the objects' names."""
+    ways: dict[str, Reach] = {}
+    for reach in reaches:
+        held = np.flatnonzero(
+            (times >= reach.timeline.closed) & (times <= reach.timeline.release)
+        )
+        if not reach.carry or len(held) == 0:
+            continue
+        if reach.target in ways:
+            raise SettingsError(
+                f"Both '{ways[reach.target].name}' and '{reach.name}' carry '{reach.target}'.",
+                "Let one of them carry it; the other arm may hold it as well.",
+            )
+        seen = travelling.seen(reach.positions, reach.rotations)
+        positions, rotations = reach.positions.copy(), reach.rotations.copy()
+        turn = travelling.orientations[held]
+        positions[held] = travelling.locations[held] + travelling.scale * rotate(
+            turn, seen.positions[held[0]]
+        )
+        rotations[held] = multiply(turn, seen.rotations[held[0]])
+        positions[held[-1] :], rotations[held[-1] :] = positions[held[-1]], rotations[held[-1]]
+        ways[reach.target] = replace(reach, positions=positions, rotations=rotations)
+    return ways
+
+
+def write_carried(carried: Carried) -> None:
+    """Give an object the keys of its way; those that it got before are made anew.
+
+    Raises:
+        WriteError: it has become read-only.
+    """
+    target = bpy.data.objects.get(carried.target)
+    if target is None:
+        return
+    data = target.animation_data
+    actions.write_action(
+        target,
+        f"{target.name} Carried",
+        carried.frames,
+        actions.object_channels(target, carried.positions, carried.rotations),
+        previous=data.action if data is not None else None,
+    )
 
 
 def _check_free(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach, arm: str) -> None:
@@ -217,11 +287,25 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
             f"'{item.target.name}' hangs on '{armature.name}', which reaches for it.",
             "Clear its parent and its constraints to the armature.",
         )
+    carry = item.carry and item.mode == "COIL"
+    if carry:
+        actions.writable_object(item.target)
+        if not can_be_carried(item.target):
+            raise SettingsError(
+                f"'{item.target.name}' moves by itself and cannot be carried.",
+                "Remove its action, constraints and physics, or switch Carry off.",
+            )
     axis = np.array(_AXES[item.axis]) if item.axis in _AXES else None
     profile = profile_of(*read_form(item.target), axis)
     asked = (frames >= timeline.start) & (frames <= timeline.end)
     positions, rotations = still
-    if np.any(asked):
+    if carry:
+        # Keys that it got before say where it went: it starts from where it is touched.
+        position, rotation = read_places(item.target, np.array([timeline.contact]))
+        positions, rotations = np.tile(position, (len(frames), 1)), np.tile(
+            rotation, (len(frames), 1)
+        )
+    elif np.any(asked):
         positions[asked], rotations[asked] = read_places(item.target, frames[asked])
         # Before and after, nothing asks where it is.
         first, last = np.flatnonzero(asked)[[0, -1]]
@@ -229,5 +313,5 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
         positions[last + 1 :], rotations[last + 1 :] = positions[last], rotations[last]
     return Reach(
         item.name, item.arm, item.mode, item.turns, timeline, item.target.name, profile,
-        positions, rotations,
+        positions, rotations, carry,
     )  # fmt: skip

@@ -64,6 +64,12 @@ class ReachItem(bpy.types.PropertyGroup):
         precision=2,
         override=OVERRIDE,
     )
+    carry: BoolProperty(
+        name="Carry",
+        description="Take the object along, from when the arm is wound until it lets go. The "
+        "object gets keys for that; it must have none of its own",
+        override=OVERRIDE,
+    )
     axis: EnumProperty(
         name="Axis", description="What of the object is wound about", items=AXES, override=OVERRIDE
     )

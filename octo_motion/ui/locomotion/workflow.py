@@ -54,7 +54,7 @@ from .changing import Changing, Moved, Way, gaits_of, read_changes
 from .changing import plan as plan_changes
 from .in_place import breathing_channels
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
-from .reach_motion import Reaching, Travelling, read_reaches
+from .reach_motion import Carried, Reaching, Travelling, read_reaches, write_carried
 from .reduced import Body, Motion, Tolerances, reduced
 from .standing import Standing, read_standing
 from .wishes import Place, Wanted, as_wishes, gathered, note_shown, store
@@ -178,6 +178,8 @@ class Shot:
     """What arms that reach do."""
     swimming: Floats | None = None
     """(frames,) how far the body swims, 0…1, where the gait changes."""
+    carried: tuple[Carried, ...] = ()
+    """Where they take objects."""
     overlaps: tuple[str, ...] = ()
     """Where arms pass through each other or the body."""
 
@@ -224,7 +226,8 @@ class Shot:
                 yield part.stop / count
         if self.reaching is not None:
             travelling = Travelling(locations, orientations, self.scale)
-            self.reached = self.reaching.apply(self.frames, rotations, travelling, strains)
+            reached = self.reaching.apply(self.frames, rotations, travelling, strains)
+            self.reached, self.carried = reached
         if self.apart is not None:
             self.overlaps = self.apart.told(rotations, strains, self.frames)
         self.rotations, self.misses = rotations, misses
@@ -275,6 +278,8 @@ class Shot:
             store(settings.ground, self.wanted)
             if settings.ground.shown:
                 show_contacts(armature, self)
+        for each in self.carried:
+            write_carried(each)
         notes = self._extend_range()
         keys, dense_keys = actions.key_counts(action)
         assert self.misses is not None
