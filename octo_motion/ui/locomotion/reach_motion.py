@@ -187,9 +187,7 @@ def _ways(reaches: Sequence[Reach], times: Floats, travelling: Travelling) -> di
     """Reaches that carry their objects, with where they take them, by the objects' names."""
     ways: dict[str, Reach] = {}
     for reach in reaches:
-        held = np.flatnonzero(
-            (times >= reach.timeline.closed) & (times <= reach.timeline.release)
-        )
+        held = np.flatnonzero((times >= reach.timeline.closed) & (times <= reach.timeline.release))
         if not reach.carry or len(held) == 0:
             continue
         if reach.target in ways:
@@ -302,8 +300,9 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
     if carry:
         # Keys that it got before say where it went: it starts from where it is touched.
         position, rotation = read_places(item.target, np.array([timeline.contact]))
-        positions, rotations = np.tile(position, (len(frames), 1)), np.tile(
-            rotation, (len(frames), 1)
+        positions, rotations = (
+            np.tile(position, (len(frames), 1)),
+            np.tile(rotation, (len(frames), 1)),
         )
     elif np.any(asked):
         positions[asked], rotations[asked] = read_places(item.target, frames[asked])
