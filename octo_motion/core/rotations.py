@@ -232,6 +232,18 @@ def continuous_euler(angles: ArrayLike, order: str) -> Floats:
     gets the triple closest to zero, as Blender itself chooses.
     """
     given = np.asarray(angles, dtype=np.float64)
+    # The two families lie 2π apart and more, so within π of the frame before nothing changes: as a
+    # rule nowhere, which is quickly seen.
+    steps = np.abs(np.diff(given, axis=0)).sum(axis=-1).max(axis=0, initial=0.0)
+    start = np.abs(_less_whole_turns(given[:1])).sum(axis=-1).max(axis=0, initial=0.0)
+    plain = (steps < np.pi) & (start < np.pi)
+    result = given + (_less_whole_turns(given[:1]) - given[:1])
+    if not plain.all():
+        result[:, ~plain] = _continued(given[:, ~plain], order)
+    return result
+
+
+def _continued(given: Floats, order: str) -> Floats:
     i, j, k = ("XYZ".index(letter) for letter in order)
     other = given.copy()
     other[..., (i, k)] += np.pi
