@@ -59,7 +59,7 @@ class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
         forces = {each.number: each for each in hands.shown()}
         for number, device in client.devices.items():
             column = box.column(align=True)
-            row = column.row()
+            row = column.split(factor=0.7)
             row.label(text=device.name, icon="ORIENTATION_GIMBAL")
             shown = forces.get(number)
             if device.force > 0.0:
@@ -70,10 +70,13 @@ class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
                 column.label(text="Leads, without force")
         times = client.times
         if times is not None:
-            row = box.row()
-            row.alert = times.late[1] > _LATE or times.lag > 0.0
-            row.label(text=f"{times.rate:.0f} Hz, {1e3 * times.late[1]:.2f} ms off")
-            row.label(text=f"step {1e3 * times.step:.1f} ms")
+            column = box.column(align=True)
+            row = column.row()
+            row.alert = times.late[1] > _LATE
+            row.label(text=f"{times.rate:.0f} Hz, {1e3 * times.late[1]:.2f} ms off at most")
+            row = column.row()
+            row.alert = times.lag > 0.0
+            row.label(text=f"A step takes {1e3 * times.step:.1f} ms")
 
 
 CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PT_posing_device,)
