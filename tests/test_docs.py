@@ -152,6 +152,14 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(after("An item of `arms`:", arms))
         case "bone":
             return rows(after("An item of its `bones`:", arms))
+        case "change":
+            return rows(section("## Change of gait").split("An item of", 1)[0])
+        case "place":
+            return rows(after("An item of `places`:", "## Change of gait"))
+        case "ground":
+            return rows(section("## The ground").split("An item of", 1)[0])
+        case "contact":
+            return rows(after("An item of `contacts`:", "## The ground"))
         case "reach":
             return rows(section("## Reaches"))
         case "landmarks":
@@ -171,7 +179,9 @@ def described(group: str) -> dict[str, list[str]]:
 def group_class(group: str) -> Any:
     from octo_motion.ui.locomotion import (
         arm_properties,
+        change_properties,
         gait_properties,
+        ground_properties,
         properties,
         reach_properties,
     )
@@ -184,6 +194,10 @@ def group_class(group: str) -> Any:
         "arm": arm_properties.ArmItem,
         "bone": arm_properties.ArmBoneItem,
         "reach": reach_properties.ReachItem,
+        "ground": ground_properties.OCTO_MOTION_PG_ground,
+        "contact": ground_properties.ContactItem,
+        "change": change_properties.OCTO_MOTION_PG_change,
+        "place": change_properties.ChangeItem,
         "landmarks": OCTO_MOTION_PG_landmarks,
         "splicing": OCTO_MOTION_PG_splicing,
         "splice": SpliceItem,
@@ -245,7 +259,8 @@ def number(value: float, definition: Any) -> str:
 @pytest.mark.parametrize(
     "group",
     [
-        *("locomotion", "arm", "bone", "reach", "table", "curve", "knot", "offset", "note"),
+        *("locomotion", "arm", "bone", "reach", "change", "place", "ground", "contact"),
+        *("table", "curve", "knot", "offset", "note"),
         *("splicing", "splice", "landmarks"),
     ],
 )
@@ -353,6 +368,8 @@ NOT_IN_THE_PANELS = (
     *("A joint's weight is not between 0 and 1.", "The contraction is ….", "The softness is …."),
     *("The stride is … m.", "The burst is ….", "The body looks … strides ahead."),
     *("A corner is turned within … strides.", "The speed is … m/s.", "… is …."),
+    *("A setting of the ground is not a number.", "Arms hold on for … of the cycle."),
+    "… of each arm lies on the ground.",
     # An empty list is filled before.
     "The list of arms is empty.",
     # Limits of a splice's properties, and what is asked for before.
@@ -409,7 +426,7 @@ def test_every_message_that_the_guide_explains_is_one_that_artists_can_read() ->
 
 
 ERRORS = frozenset(
-    f"{kind}Error" for kind in ("Clip", "Gait", "Rig", "Route", "Settings", "Write")
+    f"{kind}Error" for kind in ("Clip", "Gait", "Ground", "Rig", "Route", "Settings", "Write")
 )
 
 
@@ -418,9 +435,7 @@ def test_every_error_that_artists_can_meet_is_explained_in_the_guide() -> None:
         text
         for tree in sources()
         for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Name)
-        and node.func.id in ERRORS
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ERRORS
         if node.args and (text := message(node.args[0]))
     ]
     assert len(errors) > len(NOT_IN_THE_PANELS)
