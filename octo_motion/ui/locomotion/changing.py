@@ -140,21 +140,30 @@ class Changing:
                 continue
             window = self.windows[change]
             within = _CALM * (self.changes[change].end - self.changes[change].start)
+            asked: list[tuple[int, np.ndarray, np.ndarray, slice]] = []
+            places: list[Floats] = []
             for arm in range(len(self.bones)):
                 start, end = window.start[arm], window.end[arm]
                 chosen = np.flatnonzero((distance > start) & (distance < end))
-                if not len(chosen):
-                    continue
                 here = distance[chosen]
                 if leaving:
                     here = start + slowing(here - start, within)
                 else:
                     here = end - slowing(end - here, within)
-                travel = self._travel(way, here)
-                stood = walk.pose(travel.phase, travel.turn, *self.course.at(here))
+                # At rest it is in the same pose from frame to frame.
+                here, again = np.unique(here, return_inverse=True)
+                count = sum(len(each) for each in places)
+                places.append(here)
+                asked.append((arm, chosen, again, slice(count, count + len(here))))
+            here = np.concatenate(places)
+            if not len(here):
+                continue
+            travel = self._travel(way, here)
+            stood = walk.pose(travel.phase, travel.turn, *self.course.at(here))
+            for arm, chosen, again, part in asked:
                 bones = slice(int(ends[arm]), int(ends[arm + 1]))
-                moved.rotations[chosen, bones] = stood.rotations[:, bones]
-                moved.strains[chosen, bones] = stood.strains[:, bones]
+                moved.rotations[chosen, bones] = stood.rotations[part, bones][again]
+                moved.strains[chosen, bones] = stood.strains[part, bones][again]
                 moved.late[chosen, arm] = 0.0
 
     def _shares(self, change: int, distance: Floats) -> Floats:

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Walk, crawl and swim along one route, as the artist sees it in the scene."""
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.ui.locomotion.properties import locomotion_settings
+from octo_motion.ui.locomotion.workflow import prepare
+from tests.ui.rig import click
+
+RISING = {"b0": (-2.5, 0, 0), "b1": (-0.5, 0, -0.1), "b2": (-0.2, 0.3, 0.1), "b3": (2.2, 0, 1.6)}
+HUMP = {"b0": (-3.0, 0, 0), "b1": (-1.0, 0, 2.2), "b2": (1.0, 0, 2.2), "b3": (3.0, 0, 0)}
+
+
+@pytest.fixture
+def settings() -> Any:
+    bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    assert bpy.context.object is not None
+    found = locomotion_settings(bpy.context.object)
+    bpy.ops.octo_motion.detect_arms()
+    found.tell_overlaps = False
+    return found
+
+
+def computed(settings: Any) -> Any:
+    shot = prepare(settings.id_data, bpy.context)
+    for _ in shot.compute():
+        pass
+    return shot
+
+
+def steps(rotations: np.ndarray) -> np.ndarray:
+    """Degrees (frames − 1, bones) from frame to frame."""
+    cosine = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1)).clip(0.0, 1.0)
+    return np.degrees(2.0 * np.arccos(cosine))
+
+
+def test_route_that_rises_is_walked_and_then_swum_mantle_first(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route(**RISING)
+    settings.change.by = "HEIGHT"
+    assert click("generate_locomotion") == {"FINISHED"}
+    shot = computed(settings)
+    np.testing.assert_allclose(shot.swimming[[0, -1]], [0.0, 1.0])
+    up = np.array(settings.id_data.matrix_world.to_3x3().col[2])
+    bpy.context.scene.frame_set(1)
+    assert np.array(settings.id_data.matrix_world.col[2])[2] > 0.99
+    bpy.context.scene.frame_set(int(shot.frames[-1]) - 10)
+    before = np.array(settings.id_data.matrix_world.translation)
+    bpy.context.scene.frame_set(int(shot.frames[-1]) - 9)
+    travel = np.array(settings.id_data.matrix_world.translation) - before
+    up = np.array(settings.id_data.matrix_world.to_3x3().col[2])
+    assert up @ travel / np.linalg.norm(travel) > 0.8
+
+
+@pytest.mark.parametrize(("route", "count"), [(RISING, 1), (HUMP, 2)])
+def test_no_arm_jumps_while_the_gait_changes(
+    settings: Any, route: dict[str, Any], count: int
+) -> None:
+    bpy.ops.octo_motion.add_route(**route)
+    settings.change.by = "HEIGHT"
+    largest = []
+    for rate in (24, 48, 96):
+        bpy.context.scene.render.fps = rate
+        shot = computed(settings)
+        assert len(shot.changing.changes) == count
+        distance = plan_travel(shot.route, shot.travel, shot.times).distance[:-1]
+        inside = np.any(
+            [(each.start < distance) & (distance < each.end) for each in shot.changing.changes],
+            axis=0,
+        )
+        largest.append(steps(shot.rotations)[inside].max())
+    # Half the time, about half the way: a jump would stay.
+    assert largest[1] < 0.75 * largest[0]
+    assert largest[2] < 0.75 * largest[1]
+
+
+def test_arms_that_hold_on_do_not_slide_while_the_gait_changes(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route(**RISING)
+    settings.change.by = "HEIGHT"
+    shot = computed(settings)
+    (window,), (walk, _) = shot.changing.windows, shot.changing.walks
+    unit = shot.travel.stride / (2.0 * np.pi)
+    for each in walk.footholds():
+        off = unit * each.off
+        if each.on * unit < shot.changing.changes[0].end:
+            assert off <= window.start[each.arm] + 1e-6
+            assert each.short < 1e-3
+    assert shot.out_of_reach.max() < 1e-3
+
+
+def test_places_let_each_gait_go_where_the_artist_says(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route(**RISING)
+    bpy.ops.octo_motion.change_add(gait="swim", position=0.7)
+    bpy.ops.octo_motion.change_add(gait="crawl", position=0.25)
+    shot = computed(settings)
+    length = shot.route.length
+    assert [each.middle / length for each in shot.changing.changes] == pytest.approx([0.25, 0.7])
+    names = [shot.changing.ways[each.way].gait.name for each in shot.changing.changes]
+    assert names == ["crawl", "swim"]
+    assert click("generate_locomotion") == {"FINISHED"}
+    bpy.ops.octo_motion.change_remove()
+    assert [item.gait for item in settings.change.places] == ["swim"]
+
+
+def test_journey_that_comes_back_to_its_first_gait_ends_as_it_began(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route(**HUMP)
+    settings.change.by = "HEIGHT"
+    shot = computed(settings)
+    assert [each.way for each in shot.changing.changes] == [1, 0]
+    # The change may begin a little before the route does.
+    np.testing.assert_allclose(shot.swimming[[0, -1]], 0.0, atol=0.01)
+    assert shot.swimming.max() == 1.0
+
+
+def test_mantle_is_stretched_out_only_where_it_swims(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route(**RISING)
+    settings.change.by = "HEIGHT"
+    assert click("generate_locomotion") == {"FINISHED"}
+    bone = settings.id_data.pose.bones["mantle"]
+    scene = bpy.context.scene
+    scene.frame_set(1)
+    rest = bone.matrix_basis.copy()
+    scene.frame_set(scene.frame_end)
+    assert rest.to_quaternion().angle == pytest.approx(0.0, abs=1e-5)
+    assert bone.matrix_basis.to_quaternion().angle > 0.05
+
+
+@pytest.mark.parametrize(
+    ("places", "told"),
+    [
+        ([("swim", 0.5), ("crawl", 0.52)], "Two changes of gait overlap"),
+        ([("gone", 0.5)], "There is no gait 'gone'"),
+        ([], "there are none"),
+    ],
+)
+def test_senseless_changes_are_refused_and_nothing_is_made(
+    settings: Any, places: list[tuple[str, float]], told: str
+) -> None:
+    bpy.ops.octo_motion.add_route(**RISING)
+    settings.change.by = "MARKERS"
+    for gait, position in places:
+        item = settings.change.places.add()
+        item.gait, item.position = gait, position
+    with pytest.raises(RuntimeError, match=told):
+        bpy.ops.octo_motion.generate_locomotion()
+    assert settings.result is None
+    assert not bpy.data.actions
+
+
+def test_unknown_gait_is_not_added_as_a_change(settings: Any) -> None:
+    with pytest.raises(RuntimeError, match="There is no gait 'fly'"):
+        bpy.ops.octo_motion.change_add(gait="fly")
+    assert len(settings.change.places) == 0
