@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.rotations import Floats
 
-_MOST_VERTICES: Final = 6_000
+_MOST_VERTICES: Final = 3_000
 """Of more, only every second, third … is looked at."""
 _FEW: Final = 4
 """Vertices of a bone that do not yet tell its thickness."""
@@ -90,5 +90,9 @@ def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
             groups = mesh.vertices[number].groups
             if len(groups) > 0:
                 owner[number // step] = max(groups, key=lambda each: each.weight).group
-        for group in item.vertex_groups:
-            yield group.name, moved[owner == group.index]
+        order = np.argsort(owner, kind="stable")
+        found, starts = np.unique(owner[order], return_index=True)
+        names = {group.index: group.name for group in item.vertex_groups}
+        for group, chosen in zip(found, np.split(order, starts[1:]), strict=True):
+            if group in names:
+                yield names[group], moved[chosen]
