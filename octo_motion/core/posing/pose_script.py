@@ -94,9 +94,12 @@ def parse_script(text: str, name: str) -> PoseScript:
         )
     extra = sorted(set(data) - {"format", "version", "settings", "steps"})
     settings, steps = data.get("settings", {}), data.get("steps")
-    if extra or not isinstance(settings, dict) or not isinstance(steps, list):
-        what = f"an unknown entry '{extra[0]}'" if extra else "no list of steps, or odd settings"
-        raise SettingsError(f"'{name}' has {what}.", "See the scripting reference.")
+    if extra:
+        raise SettingsError(f"'{name}' has an unknown entry '{extra[0]}'.", "Check its spelling.")
+    if not isinstance(settings, dict) or not isinstance(steps, list):
+        raise SettingsError(
+            f"'{name}' has no list of steps, or odd settings.", "See the scripting reference."
+        )
     return PoseScript(
         steps=tuple(_step(each, number) for number, each in enumerate(steps, 1)),
         settings=settings,

@@ -78,6 +78,9 @@ class OCTO_MOTION_OT_pose_start(ArmatureOperator, bpy.types.Operator):
         except BaseException:
             self._end(context, keep=False)
             raise
+        driven = len(self._session.puppet.rig.roles.driven)
+        if driven:
+            self.report({"WARNING"}, f"Constraints or drivers move {driven} of its bones")
         self._last = time.perf_counter()
         self._tell(context)
         return {"RUNNING_MODAL"}
