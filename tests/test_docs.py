@@ -84,7 +84,24 @@ def test_example_runs_in_a_new_file_and_leaves_a_motion(block: str) -> None:
         assert action.frame_end > action.frame_start
 
 
-@pytest.mark.parametrize("block", code_blocks(SCRIPTING, "json"))
+def files_shown(format_name: str) -> list[Any]:
+    """JSON files of a format that the scripting reference shows."""
+    blocks = code_blocks(SCRIPTING, "json")
+    return [block for block in blocks if f'"{format_name}"' in block.values[0]]
+
+
+@pytest.mark.parametrize("block", files_shown("octo_motion.pose"))
+def test_pose_script_that_is_shown_can_be_played(block: str, clean_blender: Path) -> None:
+    import bpy
+
+    file = clean_blender / "pose.json"
+    file.write_text(block, encoding="utf-8")
+    bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    assert bpy.ops.octo_motion.pose_script(filepath=str(file)) == {"FINISHED"}
+    assert bpy.context.object.animation_data.action
+
+
+@pytest.mark.parametrize("block", files_shown("octo_motion.gait"))
 def test_gait_file_that_is_shown_can_be_imported(block: str, clean_blender: Path) -> None:
     import bpy
 
@@ -164,6 +181,8 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(section("## Reaches"))
         case "landmarks":
             return rows(section("## Landmarks"))
+        case "posing":
+            return rows(section("## Posing").split("### Pose scripts", 1)[0])
         case "splicing":
             return rows(section("## Splicing").split("An item of", 1)[0])
         case "splice":
@@ -185,6 +204,7 @@ def group_class(group: str) -> Any:
         properties,
         reach_properties,
     )
+    from octo_motion.ui.posing.properties import OCTO_MOTION_PG_posing
     from octo_motion.ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
     from octo_motion.ui.splicing.properties import OCTO_MOTION_PG_splicing
     from octo_motion.ui.splicing.splice_properties import SpliceItem
@@ -199,6 +219,7 @@ def group_class(group: str) -> Any:
         "change": change_properties.OCTO_MOTION_PG_change,
         "place": change_properties.ChangeItem,
         "landmarks": OCTO_MOTION_PG_landmarks,
+        "posing": OCTO_MOTION_PG_posing,
         "splicing": OCTO_MOTION_PG_splicing,
         "splice": SpliceItem,
     }
@@ -261,7 +282,7 @@ def number(value: float, definition: Any) -> str:
     [
         *("locomotion", "arm", "bone", "reach", "change", "place", "ground", "contact"),
         *("table", "curve", "knot", "offset", "note"),
-        *("splicing", "splice", "landmarks"),
+        *("splicing", "splice", "landmarks", "posing"),
     ],
 )
 def test_every_setting_is_described_with_its_type_and_its_default(group: str) -> None:
@@ -370,6 +391,11 @@ NOT_IN_THE_PANELS = (
     *("A corner is turned within … strides.", "The speed is … m/s.", "… is …."),
     *("A setting of the ground is not a number.", "Arms hold on for … of the cycle."),
     "… of each arm lies on the ground.",
+    # What a session asks of the simulation always makes sense.
+    *("The figure has no bodies.", "The step of the simulation is not positive."),
+    *("A pinned body does not exist.", "There is no material ….", "An obstacle has no faces."),
+    *("The strength of the joints is not positive.", "Nothing moved in the recorded drag."),
+    "The recorded drag is too short or broken.",
     # An empty list is filled before.
     "The list of arms is empty.",
     # Limits of a splice's properties, and what is asked for before.

@@ -16,6 +16,7 @@ import contact_sheet
 import experiment
 import numpy as np
 import plot
+import puppets
 import reaching
 import shots
 import stage
@@ -141,6 +142,8 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "reach": reaching.reach,
     "coil": reaching.coil,
     "hold": reaching.hold,
+    "pose_octopus": puppets.octopus,
+    "pose_doll": puppets.doll,
     "splices": splices,
 }
 """By file name."""
