@@ -294,13 +294,13 @@ class Bridge:
 def run(hand_arguments: Sequence[str]) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent()
+    end_after(1.0, lambda: parent.gone)
     listener = Listener(parent.secret)
     parent.announce(listener.port)
     blender = listener.accept(10.0)
     if blender is None:
         log.error("Nobody connected")
         return 2
-    end_after(1.0, lambda: parent.gone)
     bridge = Bridge(blender, hand_arguments)
     schedule = Schedule(bridge.period, sleep=time.sleep)
     try:

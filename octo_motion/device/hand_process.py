@@ -205,6 +205,7 @@ class HandLoop:
 def run(sources: Sources, rate: float = RATE) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent()
+    end_after(1.0, lambda: parent.gone)
     listener = Listener(parent.secret)
     parent.announce(listener.port)
     channel = listener.accept(10.0)
@@ -217,7 +218,6 @@ def run(sources: Sources, rate: float = RATE) -> int:
         channel.send(Notice(f"The network port cannot be used: {error}.", "Choose another one."))
         discovery = Discovery(Sources(sources.hid, sources.haply, simulated=sources.simulated))
     priority = make_real_time()
-    end_after(1.0, lambda: parent.gone)
     channel.send(Hello(os.getpid(), platform.python_version(), priority))
     schedule = Schedule(1.0 / rate)
     loop = HandLoop(channel, discovery, schedule, schedule.period)

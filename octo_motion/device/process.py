@@ -199,7 +199,8 @@ class Parent:
     @staticmethod
     def announce(port: int) -> None:
         """Say where we listen."""
-        print(f"{PORT_LINE}{port}", flush=True)
+        with contextlib.suppress(OSError):  # gone meanwhile: that is seen elsewhere
+            os.write(sys.stdout.fileno(), f"{PORT_LINE}{port}\n".encode())
 
 
 def end_after(seconds: float, when: Callable[[], bool]) -> None:
