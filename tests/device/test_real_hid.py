@@ -219,6 +219,26 @@ def bent(client: Client, start: np.ndarray) -> float:
     return float(np.abs(client.pose.orientations - start).max())
 
 
+class Press:
+    """A button that is pressed for a while, let go and pressed again, until it has held."""
+
+    def __init__(self) -> None:
+        self.button = 0
+        self._next = 0.0
+
+    def is_due(self) -> bool:
+        """Whether it changes now."""
+        if time.monotonic() < self._next:
+            return False
+        self.button ^= 1
+        self._next = time.monotonic() + (4.0 if self.button else 0.5)
+        return True
+
+    def is_over(self) -> None:
+        """It has held: what comes next is a new press."""
+        self._next = 0.0
+
+
 class Loop:
     """The loop at the devices, tick by tick, with a rock in the place of a puppet."""
 
@@ -329,14 +349,16 @@ def test_force_device_bends_a_puppet_until_it_is_unplugged_in_mid_grab(
     def holds() -> bool:
         # On a machine that stalls the grip is lost, as it must be: grab again, like anyone would.
         held = 0 in client.pointers and client.pointers[0].body == 2
-        if not held:
+        if not held and press.is_due():
             hand.position = ZERO
-            hand.buttons ^= 1
-            time.sleep(0.3)
+            hand.buttons = press.button
         return held
+
+    press = Press()
 
     def bends() -> bool:
         if holds():
+            press.is_over()
             hand.position = (0.04, 0.0, 0.04)
         return bent(client, pose.orientations) > 0.02
 
@@ -400,21 +422,20 @@ def test_space_mouse_bends_a_puppet(
     wait_beside(polled(lambda: client.devices), "the device is found")
     x, y, z = map(float, pose.positions[2] + [0.0, 0.15, 0.0])
     client.send(say.Workspace(0, (x, y, z)))
-    device.report(b"\x03\x01\0\0\0")
     wait_beside(
-        polled(lambda: 0 in client.pointers and client.pointers[0].body == 2), "the tip is held"
+        polled(lambda: 0 in client.pointers and client.pointers[0].position == (x, y, z)),
+        "the pointer is at the tip",
     )
+    press = Press()
+
+    def holds() -> bool:
+        if press.is_due():
+            device.report(bytes([3, press.button, 0, 0, 0]))
+        return client.pointers[0].body == 2
+
+    wait_beside(polled(holds), "the tip is held")
     push = struct.pack("<B3h", 1, 100, 0, -100)
 
-    def bends() -> bool:
-        nonlocal pressed
-        if client.pointers[0].body != 2:
-            pressed ^= 1
-            device.report(bytes([3, pressed, 0, 0, 0]))
-            time.sleep(0.3)
-        return bent(client, pose.orientations) > 0.02
-
-    pressed = 1
-    wait_beside(polled(bends), "the puppet bends")
+    wait_beside(polled(lambda: bent(client, pose.orientations) > 0.02), "the puppet bends")
     device.report(b"\x03\0\0\0\0")
     wait_beside(polled(lambda: client.pointers[0].body == -1), "the tip is let go")
