@@ -8,11 +8,12 @@ import numpy as np
 
 from octo_motion.core.locomotion.body_line import BodyLine, body_line, leaning
 from octo_motion.core.locomotion.chains import BodyFrame
-from octo_motion.core.locomotion.footholds import StanceSettings, Wish, cycles_at
+from octo_motion.core.locomotion.footholds import Wish, cycles_at
 from octo_motion.core.locomotion.gait import presets
 from octo_motion.core.locomotion.generator import GaitSettings, Generator
 from octo_motion.core.locomotion.ground import Ground, HeightField, Plane
 from octo_motion.core.locomotion.grounded import GroundedPoses, GroundedWalk
+from octo_motion.core.locomotion.limbs import StanceSettings
 from octo_motion.core.locomotion.placement import object_transforms
 from octo_motion.core.locomotion.route import Route
 from octo_motion.core.locomotion.travel import TravelSettings, bearings_of, plan_travel
@@ -159,4 +160,3 @@ def largest_turn(rotations: Floats) -> float:
     """Radians that a bone turns at most from one of the frames to the next."""
     cosine = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1))
     return float(2.0 * np.arccos(np.clip(cosine, 0.0, 1.0)).max())
-

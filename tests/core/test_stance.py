@@ -8,8 +8,9 @@ import pytest
 
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion import quality
-from octo_motion.core.locomotion.footholds import StanceSettings, Wish
+from octo_motion.core.locomotion.footholds import Wish
 from octo_motion.core.locomotion.ground import normals
+from octo_motion.core.locomotion.limbs import StanceSettings
 from octo_motion.core.rotations import multiply, rotate
 from tests.core.grounds import FRAMES, GROUNDS, STRAIGHT, TURN, Walker, largest_turn, walker
 

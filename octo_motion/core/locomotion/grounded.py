@@ -14,9 +14,10 @@ from ..skeleton import Skeleton
 from .chains import BodyFrame
 from .columns import turned
 from .course import Line
-from .footholds import Footholds, Limbs, StanceSettings, Wish, cycles_at, lay
+from .footholds import Footholds, Wish, cycles_at, lay
 from .generator import Build, Generator, twist
 from .ground import Ground
+from .limbs import Limbs, StanceSettings
 from .poses import Facing, bone_rotations, sucker_sides
 from .rhythm import Even, Rhythm
 from .stance import Bodies, hold, stand
@@ -246,6 +247,15 @@ class GroundedWalk:
     def builds(self) -> tuple[tuple[int, ...], ...]:
         """Numbers of the arms of each build, in the order of ``GroundedPoses.joints``."""
         return tuple(build.arms for build, _, _ in self._limbs)
+
+    def by_arm(self, values: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """What poses have for each build (frames, arms, …), for each arm (frames, …) instead."""
+        found = {
+            arm: each[:, place]
+            for arms, each in zip(self.builds, values, strict=True)
+            for place, arm in enumerate(arms)
+        }
+        return [found[arm] for arm in sorted(found)]
 
     def footholds(self) -> list[Foothold]:
         """All footholds that are there, arm by arm."""

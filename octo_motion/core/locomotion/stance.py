@@ -19,8 +19,10 @@ import numpy as np
 
 from ..rotations import Floats
 from .columns import dot, product, smallest_arc, turned
-from .footholds import PEELING, UNROLLING, Footholds, Limbs, StanceSettings
+from .foothold_places import PEELING
+from .footholds import UNROLLING, Footholds
 from .ground import Ground
+from .limbs import Limbs, StanceSettings
 
 _STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised."""

@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...core.locomotion.footholds import StanceSettings
+from ...core.locomotion.limbs import StanceSettings
 from .gait_properties import OVERRIDE, OVERRIDE_LIST
 
 
