@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, cast
 
 import bpy
 from bpy.props import EnumProperty
@@ -45,7 +45,8 @@ class ListKind:
 class ListOperator(ArmatureOperator):
     """An operator on the list of the active armature."""
 
-    KIND: ClassVar[ListKind]
+    # A value and no annotation: what Blender 4.5 evaluates of one keeps it from ending.
+    KIND = cast("ListKind", None)
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
