@@ -64,15 +64,15 @@ class Apart:
         ]
         return measure(chains, still), every
 
-    def told(self, rotations: Floats, strains: Floats, frames: Floats) -> tuple[str, ...]:
+    @staticmethod
+    def told(found: Separation, every: int, frames: Floats) -> tuple[str, ...]:
         """A sentence on the deepest overlap, none if arms keep apart.
 
         Args:
-            rotations: (frames, bones, 4) of all arms, one after the other.
-            strains: (frames, bones) by how much bones are longer than at rest.
+            found: what :meth:`measure` says.
+            every: at every how many frames it looked.
             frames: (frames,) their numbers in the scene.
         """
-        found, every = self.measure(rotations, strains)
         worst = found.worst
         if worst is None or worst.depth <= DEEP:
             return ()

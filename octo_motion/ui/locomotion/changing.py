@@ -36,6 +36,7 @@ _SAMPLES: Final = 40
 """Places per arm length at which a route's height over the ground is looked at."""
 _CALM: Final = 0.2
 """Share of a change within which an arm that goes over comes to rest."""
+_APART: Final = 1_000_000
 _CYCLE: Final = 2.0 * np.pi
 
 
@@ -64,6 +65,10 @@ class Moved:
     """(frames, arms) arm lengths from an arm to the foothold that it cannot reach."""
     misses: Floats
     """(arms,) largest of each arm, of targets."""
+    lying: Sequence[np.ndarray]
+    """For each arm (frames, joints) which rest on the ground."""
+    cycles: np.ndarray
+    """(frames, arms) number of each arm's cycle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +119,8 @@ class Changing:
                 np.zeros((count, total)),
                 np.zeros((count, arms)),
                 np.zeros(arms),
+                [np.zeros((count, bones + 1), dtype=bool) for bones in self.bones],
+                np.zeros((count, arms), dtype=np.int64),
             )
             moved.rotations[..., 0] = 1.0
             for start in range(0, len(part), step):
@@ -194,6 +201,10 @@ class Changing:
             stood = walk.pose(travel.phase, travel.turn, places[0][chosen], places[1][chosen])
             moved.rotations[chosen], moved.strains[chosen] = stood.rotations, stood.strains
             moved.late[chosen] = stood.misses
+            # Ways have cycles of their own.
+            moved.cycles[chosen] = stood.cycles + _APART * number
+            for arm, rests in zip(moved.lying, walk.by_arm(stood.lying), strict=True):
+                arm[chosen] = rests
         else:
             posed = way.generator.pose(travel.phase, travel.turn)
             moved.rotations[chosen] = posed.rotations
@@ -214,6 +225,13 @@ class Changing:
             first.strains + per_bone * (second.strains - first.strains),
             late,
             np.maximum(first.misses, second.misses),
+            [
+                np.where(share >= 1.0, there, here & (share <= 0.0))
+                for share, here, there in zip(
+                    shares.T[..., None], first.lying, second.lying, strict=True
+                )
+            ],
+            np.where(shares > 0.0, second.cycles, first.cycles),
         )
 
 

@@ -29,6 +29,7 @@ from .gait_table import (
 )
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .quality_report import draw_figures
 from .reach_list import draw_reaches
 from .setups import OCTO_MOTION_PT_setups
 
@@ -433,6 +434,26 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
         _draw_result(layout, context, settings)
 
 
+class OCTO_MOTION_PT_quality(_Panel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_quality"
+    bl_label = "Quality"
+    bl_parent_id = OCTO_MOTION_PT_generate.bl_idname
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        armature = _armature(context)
+        return armature is not None and len(locomotion_settings(armature).figures) > 0
+
+    def show(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        layout: Any,
+        settings: OCTO_MOTION_PG_locomotion,
+    ) -> None:
+        draw_figures(layout, settings)
+
+
 def _draw_result(
     layout: Any, context: bpy.types.Context, settings: OCTO_MOTION_PG_locomotion
 ) -> None:
@@ -464,4 +485,5 @@ CLASSES: Final = (
     OCTO_MOTION_PT_weights,
     OCTO_MOTION_PT_reaches,
     OCTO_MOTION_PT_generate,
+    OCTO_MOTION_PT_quality,
 )

@@ -41,6 +41,7 @@ from .gait_properties import (
 )
 from .ground_properties import OCTO_MOTION_PG_ground
 from .in_place import TRAVEL_IN_PLACE, InPlace
+from .quality_report import QualityReport
 from .reach_properties import Reaches
 
 AXES: Final = (
@@ -78,7 +79,9 @@ def _make_weight_curve(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.
         )
 
 
-class OCTO_MOTION_PG_locomotion(Reaches, InPlace, KeepingApart, bpy.types.PropertyGroup):
+class OCTO_MOTION_PG_locomotion(
+    QualityReport, Reaches, InPlace, KeepingApart, bpy.types.PropertyGroup
+):
     """How an armature walks or swims along a route."""
 
     # --- The rig -------------------------------------------------------------------------------

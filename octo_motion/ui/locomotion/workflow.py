@@ -34,12 +34,14 @@ from ...blender.stretching import stretch_channels
 from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
 from ...core.keys import check_bounds
+from ...core.locomotion.arm_frames import arm_frames
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.changes import between
 from ...core.locomotion.detection import Detection, detect_arms
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
+from ...core.locomotion.ground import Ground
 from ...core.locomotion.loops import route_in_place, travel_in_place, whole_frames
 from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
@@ -54,6 +56,7 @@ from .changing import Changing, Moved, Way, gaits_of, read_changes
 from .changing import plan as plan_changes
 from .in_place import breathing_channels
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
+from .quality_report import Figure, Measured, figures, write_figures
 from .reach_motion import Carried, Reaching, Travelling, read_reaches, write_carried
 from .reduced import Body, Motion, Tolerances, reduced
 from .standing import Standing, read_standing
@@ -68,6 +71,8 @@ LAST_FRAME: Final = 1_048_574
 MISS: Final = 1e-3
 """Arm lengths by which a target may be missed without a word."""
 
+_RESULTS: Final = frozenset({"result", "shown", "figures"})
+"""What is no setting, though it is kept with them."""
 _WEIGHT_SAMPLES: Final = 33
 _ROUTE_SAMPLES: Final = 257
 _UNEQUAL: Final = 1e-3
@@ -97,6 +102,8 @@ class Summary:
     dense_keys: int
     """How many keys there would be with one per frame."""
     warnings: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    """The worst of each kind."""
     notes: tuple[str, ...] = ()
     """Things that happened as they should, but that one may want to know."""
 
@@ -160,6 +167,8 @@ class Shot:
     """What the artist wants of single contacts."""
     apart: Apart | None
     """What tells whether arms overlap."""
+    measure: bool
+    """Whether figures of the motion are wanted."""
     reaching: Reaching | None
     """What arms reach for."""
     note: str
@@ -182,6 +191,8 @@ class Shot:
     """Where they take objects."""
     overlaps: tuple[str, ...] = ()
     """Where arms pass through each other or the body."""
+    figures: tuple[Figure, ...] = ()
+    """The worst of each kind."""
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
@@ -202,6 +213,8 @@ class Shot:
         rotations = np.empty((count, bones, 4))
         strains, late = np.zeros((count, bones)), np.zeros((count, len(self.arms)))
         misses = np.zeros(len(self.arms))
+        lying = [np.zeros((count, len(arm.bones) + 1), dtype=bool) for arm in self.arms]
+        cycles = np.zeros((count, len(self.arms)), dtype=np.int64)
         step = max(1, _BONES_AT_ONCE // max(bones, 1))
         if self.changing is not None:
             for done in self.changing.compute(travel.distance, places, step):
@@ -209,6 +222,7 @@ class Shot:
                     rotations, strains, late, misses = (
                         *(done.rotations, done.strains, done.late, done.misses),
                     )
+                    lying, cycles = list(done.lying), done.cycles
                 else:
                     yield done
             self.swimming = self.changing.swimming(travel.distance)
@@ -218,6 +232,9 @@ class Shot:
                 stood = standing.pose(travel, part, places)
                 rotations[part], strains[part] = stood.rotations, stood.strains
                 late[part] = stood.misses
+                cycles[part] = stood.cycles
+                for arm, rests in zip(lying, standing.walk.by_arm(stood.lying), strict=True):
+                    arm[part] = rests
             else:
                 poses = self.generator.pose(travel.phase[part], travel.turn[part])
                 rotations[part] = poses.rotations
@@ -228,12 +245,30 @@ class Shot:
             travelling = Travelling(locations, orientations, self.scale)
             reached = self.reaching.apply(self.frames, rotations, travelling, strains)
             self.reached, self.carried = reached
+        separation, every = None, 1
         if self.apart is not None:
-            self.overlaps = self.apart.told(rotations, strains, self.frames)
+            separation, every = self.apart.measure(rotations, strains)
+            self.overlaps = self.apart.told(separation, every, self.frames)
+        if self.measure:
+            names = [arm.name for arm in self.arms]
+            frames = [arm_frames(self.skeleton, arm.bones, self.body) for arm in self.arms]
+            self.figures = figures(
+                Measured(
+                    *(self.frames, frames, names, rotations, strains, np.maximum(late, misses)),
+                    *(locations, orientations, self.scale, self._ground(), lying, cycles),
+                    *(separation, every),
+                )
+            )
         self.rotations, self.misses = rotations, misses
         self.strains, self.out_of_reach = strains, late
         self.locations, self.orientations = locations, orientations
         yield 1.0
+
+    def _ground(self) -> Ground | None:
+        """What the arms stand on, where they do."""
+        ways = self.changing.ways if self.changing is not None else ()
+        stands = [each for each in (self.standing, *(way.standing for way in ways)) if each]
+        return stands[0].ground if stands else None
 
     def write(self) -> Summary:
         """Give the armature its action, in place of the one that was generated before.
@@ -280,6 +315,7 @@ class Shot:
                 show_contacts(armature, self)
         for each in self.carried:
             write_carried(each)
+        write_figures(settings, self.figures)
         notes = self._extend_range()
         keys, dense_keys = actions.key_counts(action)
         assert self.misses is not None
@@ -295,6 +331,7 @@ class Shot:
             keys=keys,
             dense_keys=dense_keys,
             warnings=(*self.warnings, *self._missed(), *self.overlaps),
+            figures=self.figures,
             notes=(*notes, *self.reached),
         )
 
@@ -543,8 +580,11 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         changing=changing,
         wanted=wanted,
         apart=read_apart(armature, skeleton, arms, body) if settings.tell_overlaps else None,
+        measure=True,
         reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
-        note=json.dumps(plain(settings, without=frozenset({"result", "shown"})), sort_keys=True),
+        note=json.dumps(
+            plain(settings, without=frozenset({"result", "shown", "figures"})), sort_keys=True
+        ),
         # Detection has looked for constraints itself.
         warnings=[
             *(detection.notes if detection else _held(skeleton, arms)),
