@@ -38,6 +38,7 @@ class OCTO_MOTION_OT_pose_start(ArmatureOperator, bpy.types.Operator):
     _overlay: Overlay | None = None
     _timer: Any = None
     _last: float = 0.0
+    _shown: tuple[str, int | None] = ("", None)
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -97,7 +98,12 @@ class OCTO_MOTION_OT_pose_start(ArmatureOperator, bpy.types.Operator):
                 now = time.perf_counter()
                 controls.tick(now - self._last)
                 self._last = now
-                self._tell(context)
+                told = self._session.told
+                shown = controls.told(), controls.hover and controls.hover.body
+                # A puppet at rest lets Blender rest.
+                if shown != self._shown or told is None or not told.resting:
+                    self._shown = shown
+                    self._tell(context)
                 return {"PASS_THROUGH"}
             outcome = self._handle(context, controls, event)
         except OctoMotionError as error:
