@@ -166,20 +166,9 @@ class Simulation:
         if hand is not None:
             self._release(hand)
 
-    def nearest(self, point: Floats) -> tuple[int, float]:
-        """The body nearest to a point, and how far its surface is; less than 0 within."""
-        figure = self.world.figure
-        ends = capsules_in_world(figure, self.world.pose())
-        axis = ends[:, 1] - ends[:, 0]
-        along = ((point - ends[:, 0]) * axis).sum(axis=1)
-        share = np.clip(along / np.maximum((axis * axis).sum(axis=1), 1e-12), 0.0, 1.0)
-        gaps = np.linalg.norm(ends[:, 0] + share[:, None] * axis - point, axis=1) - figure.radii
-        body = int(np.argmin(gaps))
-        return body, float(gaps[body])
-
     def _grab(self, hand: Hand) -> None:
         point, turn = np.array(hand.told.position), np.array(hand.told.orientation)
-        body, gap = self.nearest(point)
+        body, gap = nearest_body(self.world.figure, self.world.pose(), point)
         if gap > self.reach:
             hand.refused = hand.told.grab
             return
@@ -358,6 +347,17 @@ class Simulation:
         """Where the held point is, and how a hand would be turned that held it without lag."""
         turn = multiply(self.world.pose().orientations[grab.body], conjugate(grab.grip))
         return self.world.held_point(grab), turn
+
+
+def nearest_body(figure: Figure, pose: Pose, point: Floats) -> tuple[int, float]:
+    """The body nearest to a point (3,), and how far its surface is; less than 0 within."""
+    ends = capsules_in_world(figure, pose)
+    axis = ends[:, 1] - ends[:, 0]
+    along = ((point - ends[:, 0]) * axis).sum(axis=1)
+    share = np.clip(along / np.maximum((axis * axis).sum(axis=1), 1e-12), 0.0, 1.0)
+    gaps = np.linalg.norm(ends[:, 0] + share[:, None] * axis - point, axis=1) - figure.radii
+    body = int(np.argmin(gaps))
+    return body, float(gaps[body])
 
 
 def _tuple(values: Floats) -> Vector:

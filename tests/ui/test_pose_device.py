@@ -15,6 +15,7 @@ from octo_motion.device import messages as say
 from octo_motion.device.client import Client, State
 from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.device_hands import DeviceHands, Room
+from octo_motion.ui.posing.device_ndof import NdofHands
 from octo_motion.ui.posing.device_overlay import device_lines
 from octo_motion.ui.posing.device_settings import device_settings, message
 from octo_motion.ui.posing.puppet_session import PuppetSession
@@ -204,6 +205,40 @@ def test_killed_bridge_leaves_pose_and_keys_and_can_be_started_again(hands: Devi
     hands.recentre()
     wait(hands, hands.shown, "the hand is back")
     assert hands.client.state is State.RUNNING
+
+
+def test_space_mouse_that_blender_has_poses_without_a_bridge() -> None:
+    session = PuppetSession(arm(), bpy.context.scene, clock=None)
+    now = 0.0
+    hands = NdofHands(session, clock=lambda: now)
+    try:
+        assert device_pose.line(hands) == "Posing Arm    Space mouse, through Blender"
+        hands.tick(TOLD)
+        hands.grab()
+        assert hands.said == "Push the space mouse first"
+        hands.move((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, room(), TOLD)
+        assert hands.shown()[0].position == pytest.approx((0.0, 0.0, 1.3))
+        hands.grab()
+        assert hands.holding
+        for _ in range(60):
+            now += 1.0 / 60.0
+            hands.move((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0 / 60.0, room(), TOLD)
+            hands.tick(TOLD)
+        # Pushed to the right for a second: 0.4 of the view's width.
+        assert hands.shown()[0].position == pytest.approx((0.4, 0.0, 1.3))
+        assert hands.hover
+        assert session.bone(hands.hover.body) == "bone2"
+        assert abs(turn_of("bone2")[1:]).max() > 0.02
+        assert len(device_lines(hands, np.array([0.0, -1.0, 0.0]))) >= 4
+        hands.grab()
+        assert not hands.holding
+        assert "bone2" in session.key()
+        hands.restore()
+        hands.tick(TOLD)
+        assert abs(turn_of("bone2")[1:]).max() < 1e-5
+    finally:
+        hands.stop()
+        session.cancel()
 
 
 def test_settings_of_the_panel_are_told_in_the_bridges_units() -> None:

@@ -31,11 +31,11 @@ from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25
 """m: the room of a desktop device, which is as wide as the view."""
-_RATE_WIDTH: Final = 1.0
+RATE_WIDTH: Final = 1.0
 """m: full push of a space mouse crosses the view in 2.5 s."""
 _ANSWER: Final = 0.4
 """s after which a grab that holds nothing has found nothing."""
-_NOTHING_NEAR: Final = "No limb is near enough to grab"
+NOTHING_NEAR: Final = "No limb is near enough to grab"
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,10 +188,10 @@ class DeviceHands:
             self._asked = time.monotonic()
         if self.holding:
             self._asked = None
-            self.said = "" if self.said == _NOTHING_NEAR else self.said
+            self.said = "" if self.said == NOTHING_NEAR else self.said
         elif self._asked is not None and time.monotonic() - self._asked > _ANSWER:
             self._asked = None
-            self.said = _NOTHING_NEAR
+            self.said = NOTHING_NEAR
         return buttons
 
     def notices(self) -> list[Notice]:
@@ -265,7 +265,7 @@ class DeviceHands:
             if rate and before is not None:
                 # A space mouse has its pointer where it was pushed to, whatever the view does.
                 middle = np.array(before.origin)
-            own = _RATE_WIDTH if rate else _WIDTH
+            own = RATE_WIDTH if rate else _WIDTH
             scale = room.width * unit / own
             a, b, c = (float(each) for each in middle)
             space = Workspace(number, (a, b, c), (w, x, y, z), scale)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.rotations import Floats
 from .device_hands import DeviceHands
+from .device_ndof import NdofHands
 from .overlay import Lines, overlay_lines
 
 _FREE: Final = (0.6, 0.9, 1.0, 1.0)
@@ -18,7 +19,7 @@ _SIZE: Final = 0.03
 """Of the figure."""
 
 
-def device_lines(hands: DeviceHands, eye: Floats, *, loads: bool = True) -> Lines:
+def device_lines(hands: DeviceHands | NdofHands, eye: Floats, *, loads: bool = True) -> Lines:
     """All lines of a session with devices, in the world; as ``overlay_lines``."""
     found = overlay_lines(hands, eye, loads=loads)  # type: ignore[arg-type]
     ends, _ = hands.session.capsules()

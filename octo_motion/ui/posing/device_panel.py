@@ -8,8 +8,13 @@ from typing import Any, Final
 import bpy
 
 from ...device.client import State
-from .device_hands import DeviceHands
-from .device_pose import OCTO_MOTION_OT_device_test, OCTO_MOTION_OT_pose_device, active_hands
+from .device_ndof import NAME, NdofHands
+from .device_pose import (
+    Hands,
+    OCTO_MOTION_OT_device_test,
+    OCTO_MOTION_OT_pose_device,
+    active_hands,
+)
 from .device_settings import device_settings
 from .panels import OCTO_MOTION_PT_posing, _Panel
 
@@ -46,13 +51,16 @@ class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
         row.prop(own, "simulate")
 
     @staticmethod
-    def _devices(layout: Any, hands: DeviceHands) -> None:
+    def _devices(layout: Any, hands: Hands) -> None:
         box = layout.box()
         client = hands.client
         if client.state is State.LOST:
             box.alert = True
             box.label(text="The program has ended", icon="ERROR")
             box.label(text="B over the viewport starts it again")
+            return
+        if isinstance(hands, NdofHands):
+            box.label(text=NAME, icon="ORIENTATION_GIMBAL")
             return
         if not client.devices:
             box.label(text="No device is plugged in", icon="INFO")

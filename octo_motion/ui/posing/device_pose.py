@@ -16,6 +16,7 @@ from ..locomotion.armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room
+from .device_ndof import GRAB_BUTTONS, KEY_BUTTONS, NAME, NdofHands
 from .device_overlay import device_lines
 from .device_settings import device_settings, message
 from .overlay import Overlay
@@ -39,10 +40,12 @@ HELP: Final = (
 )
 _KEYS: Final = frozenset({"ESC", "RET", "NUMPAD_ENTER", "G", "K", "P", "O", "R", "HOME", "B"})
 
-_going_on: list[DeviceHands] = []
+Hands = DeviceHands | NdofHands
+
+_going_on: list[Hands] = []
 
 
-def active_hands() -> DeviceHands | None:
+def active_hands() -> Hands | None:
     """The devices that pose now, if any do."""
     return _going_on[0] if _going_on else None
 
@@ -84,7 +87,7 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     _session: PuppetSession | None = None
-    _hands: DeviceHands | None = None
+    _hands: Hands | None = None
     _overlay: Overlay | None = None
     _timer: Any = None
     _size: float = 1.0
@@ -147,6 +150,9 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
             if event.type == "TIMER":
                 self._tick(context, hands)
                 return {"PASS_THROUGH"}
+            if event.type.startswith("NDOF_"):
+                self._push(context, hands, event)
+                return {"RUNNING_MODAL"}
             outcome = self._handle(hands, event)
         except OctoMotionError as error:
             self._end(context, keep=False)
@@ -171,7 +177,7 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
         assert self._session is not None
         return message(settings, self._size)
 
-    def _tick(self, context: bpy.types.Context, hands: DeviceHands) -> None:
+    def _tick(self, context: bpy.types.Context, hands: Hands) -> None:
         settings = device_settings(context.window_manager)
         was_holding = hands.holding
         told = self._told(settings)
@@ -184,18 +190,49 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
             self.report({"WARNING"}, f"{notice.problem} {notice.remedy}".strip())
         self._tell(context, hands)
 
-    def _let_go(self, context: bpy.types.Context, hands: DeviceHands) -> None:
+    def _let_go(self, context: bpy.types.Context, hands: Hands) -> None:
         tools = context.scene.tool_settings if context.scene else None
         if tools is not None and tools.use_keyframe_insert_auto and not hands.session.recording:
             self._key(hands, all_bones=False)
 
     @staticmethod
-    def _key(hands: DeviceHands, *, all_bones: bool) -> None:
+    def _key(hands: Hands, *, all_bones: bool) -> None:
         names = hands.session.key(all_bones=all_bones)
         frame = hands.session.scene().frame_current
         hands.said = f"Keyed {len(names)} bones at frame {frame}" if names else "Nothing to key"
 
-    def _handle(self, hands: DeviceHands, event: Any) -> Outcome:
+    def _push(self, context: bpy.types.Context, hands: Hands, event: Any) -> None:
+        """Blender has a space mouse itself: without a force device, that one poses."""
+        if isinstance(hands, DeviceHands):
+            if any(each.force > 0.0 for each in hands.client.devices.values()) or hands.holding:
+                return
+            hands.stop()
+            assert self._session is not None
+            hands = self.replace(hands, NdofHands(self._session))
+        settings = device_settings(context.window_manager)
+        told = self._told(settings)
+        if event.type == "NDOF_MOTION":
+            room, motion = room_of(context, settings.scale), event.ndof_motion
+            if room is not None and motion is not None:
+                hands.move(*(motion.translation, motion.rotation, motion.time_delta, room, told))
+        elif event.type in GRAB_BUTTONS:
+            if event.value == "PRESS" or (not told.toggle and hands.holding):
+                hands.grab()
+                if not hands.holding:
+                    self._let_go(context, hands)
+        elif event.type in KEY_BUTTONS and event.value == "PRESS":
+            self._key(hands, all_bones=False)
+
+    def replace(self, old: Hands, new: NdofHands) -> NdofHands:
+        """Let other hands take over the session."""
+        assert self._overlay is not None
+        self._hands = new
+        _going_on[:] = [new if each is old else each for each in _going_on]
+        self._overlay.take_down()
+        self._overlay = Overlay(new, device_lines)
+        return new
+
+    def _handle(self, hands: Hands, event: Any) -> Outcome:
         if event.type not in _KEYS:
             return Outcome.PASSED
         if event.value != "PRESS":
@@ -218,14 +255,16 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
                 hands.said = "As at the start"
             case "HOME":
                 hands.recentre()
-            case _:
+            case _ if isinstance(hands, DeviceHands):
                 hands.client.restart()
                 hands.recentre()
                 hands.said = "Started again"
+            case _:
+                return Outcome.PASSED
         return Outcome.TAKEN
 
     @staticmethod
-    def _record(hands: DeviceHands) -> None:
+    def _record(hands: Hands) -> None:
         if hands.session.recording:
             bones, count = hands.session.stop_record()
             hands.said = f"Recorded {bones} bones on {count} key frames"
@@ -234,7 +273,7 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
             hands.said = "Recording while the frames go by: play, and drag"
 
     @staticmethod
-    def _tell(context: bpy.types.Context, hands: DeviceHands) -> None:
+    def _tell(context: bpy.types.Context, hands: Hands) -> None:
         text = line(hands)
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
@@ -272,14 +311,15 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
                 context.workspace.status_text_set(None)
 
 
-def line(hands: DeviceHands) -> str:
+def line(hands: Hands) -> str:
     """One line about devices, for the header."""
     parts = [f"Posing {hands.session.puppet.name}"]
     shown = hands.shown()
     if hands.client.state is State.LOST:
         parts.append("The device's program has ended: B starts it again")
     elif not shown:
-        parts.append("No device yet: plug one in")
+        is_blenders = isinstance(hands, NdofHands)
+        parts.append(NAME if is_blenders else "No device yet: plug one in")
     for each in shown:
         what = hands.session.bone(each.body) if each.body >= 0 else "free"
         parts.append(f"{each.name}: {what}")

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A space mouse that Blender itself has: its own events move the pointer, no bridge is needed.
+
+The puppet is then simulated in Blender, as with the mouse.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from ...core.posing.picking import Hit
+from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
+from ...device.client import Client
+from ...device.messages import Button, Notice
+from ...device.messages import Settings as DeviceSettings
+from ...device.simulation import nearest_body
+from .device_hands import NOTHING_NEAR, RATE_WIDTH, Room, Shown
+from .puppet_session import PuppetSession
+
+NAME: Final = "Space mouse, through Blender"
+GRAB_BUTTONS: Final = frozenset({"NDOF_BUTTON_MENU", "NDOF_BUTTON_1", "NDOF_BUTTON_V1"})
+KEY_BUTTONS: Final = frozenset({"NDOF_BUTTON_FIT", "NDOF_BUTTON_2", "NDOF_BUTTON_V2"})
+_LONGEST: Final = 0.1
+"""s: a longer time between two events is a pause, not a long push."""
+
+
+class NdofHands:
+    """One pointer on a session's puppet, moved by Blender's events; as ``DeviceHands``.
+
+    Args:
+        session: of posing.
+        clock: seconds.
+    """
+
+    def __init__(
+        self, session: PuppetSession, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self.session = session
+        self.client = Client()
+        """Off: there is no bridge."""
+        self.hover: Hit | None = None
+        self.hand: Floats | None = None
+        self.said = ""
+        self.position: Floats | None = None
+        """(3,) of the pointer, world; none before the first push."""
+        self._turn = IDENTITY.copy()
+        self._reach = 0.0
+        self._clock = clock
+        self._last = clock()
+
+    lost = False
+
+    @property
+    def holding(self) -> bool:
+        """Whether the pointer holds a limb."""
+        return self.session.core.grip is not None
+
+    def shown(self) -> list[Shown]:
+        """The pointer."""
+        if self.position is None:
+            return []
+        grip, held = self.session.core.grip, self.session.held_point()
+        body = -1 if grip is None else grip.body
+        place = self.position if held is None else held
+        return [Shown(0, self.position, place, body, min(1.0, self.session.pull()), NAME)]
+
+    def move(
+        self,
+        translation: Sequence[float],
+        rotation: Sequence[float],
+        seconds: float,
+        room: Room,
+        settings: DeviceSettings,
+    ) -> None:
+        """One event of Blender's.
+
+        Args:
+            translation: (3,) push, −1…1: right, up, towards the user.
+            rotation: (3,) turn about these, −1…1.
+            seconds: since the event before.
+            room: what the view shows.
+            settings: how devices behave.
+        """
+        if self.position is None:
+            self.position = room.middle.copy()
+        seconds = min(max(seconds, 0.0), _LONGEST)
+        way = room.axes @ np.array(translation, dtype=np.float64)
+        self.position = self.position + way * (settings.speed * seconds * room.width / RATE_WIDTH)
+        swing = room.axes @ np.array(rotation, dtype=np.float64)
+        turn = from_rotation_vector(swing * settings.angular_speed * seconds)
+        self._turn = multiply(turn, self._turn)
+
+    def grab(self) -> None:
+        """Grab what is near, or let go."""
+        if self.holding:
+            self.session.release()
+            return
+        if self.position is None:
+            self.said = "Push the space mouse first"
+            return
+        point = self.position * self.session.unit
+        body, gap = nearest_body(self.session.figure, self.session.core.pose, point)
+        if gap > self._reach:
+            self.said = NOTHING_NEAR
+            return
+        self.said = ""
+        self._turn = IDENTITY.copy()
+        self.session.grab(Hit(body, point, 0.0))
+
+    def pin(self) -> None:
+        """Pin what is held, or take the pin out."""
+        grip = self.session.core.grip
+        if grip is None:
+            self.said = "Hold a limb to pin it"
+            return
+        pinned = self.session.toggle_pin(grip.body)
+        self.said = f"{self.session.bone(grip.body)} {'pinned' if pinned else 'free again'}"
+
+    def restore(self) -> None:
+        """Back to the pose at the start; the pointer lets go."""
+        self.session.restore()
+
+    def test(self, number: int) -> None:
+        """Nothing: a space mouse has no motors."""
+
+    def recentre(self) -> None:
+        """Bring the pointer to the middle of the view, with the next push."""
+        self.position = None
+
+    def tick(self, settings: DeviceSettings, room: Room | None = None) -> list[Button]:  # noqa: ARG002
+        """Simulate what has passed, and pose the armature."""
+        now = self._clock()
+        seconds, self._last = now - self._last, now
+        self._reach = settings.reach
+        grip = self.session.core.grip
+        if grip is None or self.position is None:
+            self.session.tick(seconds)
+        else:
+            self.session.tick(seconds, self.position, self._turn)
+        self.hover = None if grip is None else Hit(grip.body, np.zeros(3), 0.0)
+        return []
+
+    def notices(self) -> list[Notice]:
+        """None: there is no bridge to complain."""
+        return []
+
+    def stop(self) -> None:
+        """Let go."""
+        self.session.core.release()
