@@ -70,7 +70,7 @@ def test_suckers_face_the_object(name: str) -> None:
     profile = profile_of(*FORMS[name])
     coil = wound(profile, outside(profile))
     middles = 0.5 * (coil.joints[1:] + coil.joints[:-1])
-    assert np.all(np.sum(coil.facing * profile.way_out(middles), axis=1) < -0.99)
+    assert np.all(np.sum(coil.facing * profile.way_out(middles, np.array(1e-9)), axis=1) < -0.99)
 
 
 def test_turns_lie_beside_each_other() -> None:

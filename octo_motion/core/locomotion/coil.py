@@ -78,11 +78,20 @@ class Profile:
         sizes = (factor * self.heights, factor * self.support)
         return Profile(factor * self.center, self.axes, *sizes)
 
-    def way_out(self, points: Floats) -> Floats:
-        """Unit vectors (…, 3) from the axis to points (…, 3), across it; object's frame."""
+    def way_out(self, points: Floats, near: Floats) -> Floats:
+        """Vectors (…, 3) from the axis towards points (…, 3), across it; object's frame.
+
+        Their length is 1 far from the axis and 0 on it, so that nothing jumps where a point
+        passes from one side to the other.
+
+        Args:
+            points: in the object's frame.
+            near: (…) distance from the axis at which they are 0.7 long.
+        """
         local = self.to_profile(points)
         local[..., 2] = 0.0
-        return normalized(local) @ self.axes.T
+        size = np.sqrt(np.sum(local * local, axis=-1) + near * near)
+        return (local / size[..., None]) @ self.axes.T
 
     def grown(self, skin: float) -> Floats:
         """Support (slices, directions) of the object with a skin of this thickness all over it."""

@@ -47,6 +47,8 @@ _LOOSE: Final = 1.5
 """A free part longer than this is not made for the sake of a shorter coil."""
 _LEAST_FREE: Final = 0.3
 """Share of the arm between the body and the coil, at least."""
+_LEAST_HELD: Final = 0.1
+"""Share of the arm that takes hold, at least."""
 _TWISTED: Final = 0.8
 """The twist that brings suckers to the object lies in this last share of the free part."""
 _LIFT: Final = 0.25
@@ -60,6 +62,12 @@ _FAR: Final = 3.0
 _AT_FAR: Final = 0.5 * (np.sqrt(_FAR * _FAR + 1.0) - _FAR)
 """What the rounding leaves at so many roundings from the surface."""
 _CLEARINGS: Final = 4
+_TOGETHER: Final = 2
+"""How many joints on either side of one give way with it."""
+_FARTHEST: Final = 0.4
+"""Bone lengths that a joint gives way in one go."""
+_CLOSING: Final = 20
+"""Steps of Newton's method: an arm that is close to what it holds is folded up a lot."""
 _X: Final = np.array([1.0, 0.0, 0.0])
 _Y: Final = np.array([0.0, 1.0, 0.0])
 _UP: Final = np.array([0.0, 0.0, 1.0])
@@ -145,7 +153,7 @@ class Grasp:
         lengths = arm.lengths[:first]
         outward = rotate(arm.at_rest[0], _X)
         shape = _approach(lengths, goal, held, outward=outward, up=self.up)
-        shape = closed(np.ascontiguousarray(shape), lengths, goal.T)
+        shape = closed(np.ascontiguousarray(shape), lengths, goal.T, _CLOSING)
         near = np.arange(len(goal))
         for _ in range(_CLEARINGS):
             joints = arm.root + np.cumsum(
@@ -159,7 +167,7 @@ class Grasp:
             joints[:, :-1] += shifts[moves]
             pushed = np.diff(joints, axis=1, prepend=np.broadcast_to(arm.root, (len(near), 1, 3)))
             pushed = np.ascontiguousarray(np.moveaxis(normalized(pushed), 0, -1))
-            shape[..., near] = closed(pushed, lengths, goal[near].T)
+            shape[..., near] = closed(pushed, lengths, goal[near].T, _CLOSING)
         directions = np.moveaxis(shape, -1, 0)
         frames = transported(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
         twist = _twist(frames[:, -1], held)
@@ -185,7 +193,13 @@ class Grasp:
         most = np.maximum(shift[:, :count], 0.0)
         most[:, 1:] = np.maximum(most[:, 1:], shift[:, count:])
         most[:, :-1] = np.maximum(most[:, :-1], shift[:, count:])
-        out = self.profile.way_out(inside[:, :count]) * most[..., None]
+        # Neighbours give way together, and none by more than bones can follow.
+        for _ in range(_TOGETHER):
+            around = np.pad(most, ((0, 0), (1, 1)), mode="edge")
+            most = np.maximum(most, 0.5 * (around[:, 2:] + around[:, :-2]))
+        farthest = _FARTHEST * self.arm.lengths[:count]
+        most = farthest * np.tanh(most / farthest)
+        out = self.profile.way_out(inside[:, :count], skin) * most[..., None]
         return rotate(places.rotations[:, None], out)
 
     def _cleared(self, frames: Floats, places: Places, amount: Floats) -> Floats:
@@ -219,7 +233,9 @@ class Grasp:
         if not np.any(moves):
             return result
         width = front_width(lengths)
-        touches = arm.reach[self.coil.first] + width
+        # What only touches is there with all that it lays on the object.
+        laid = 0 if self.wraps else len(self.coil.facing)
+        touches = arm.reach[self.coil.first + laid] + width
         ends = arm.length + width if self.wraps else touches
         front_at = first_place(lengths)
         front = timeline.front(times[moves], front_at, touches, ends)
@@ -303,7 +319,9 @@ def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coi
     part not too loose.
     """
     root = places[:1].into(arm.root[None])[0]
-    last = len(arm.bones) - 1
+    # A last bone alone would hold on to nothing.
+    last = int(np.searchsorted(arm.reach, (1.0 - _LEAST_HELD) * arm.length, side="right")) - 1
+    last = min(max(last, 2), len(arm.bones) - 1)
 
     def wound(first: int) -> Coil:
         return wind(skins, arm.lengths, Start(first, root), winding)
