@@ -8,7 +8,8 @@ Blender's is the bake alone, without constraints and targets. Then how fast spli
 measurement has a process of its own.
 
 "splicing" as the first word measures the quality of splices instead; its own --help tells more.
-"device" measures how well the loop at the devices keeps time.
+"device" measures how well the loop at the devices keeps time, "posing" how long a step of the
+plastic puppet takes.
 """
 
 from __future__ import annotations
@@ -37,6 +38,11 @@ def main() -> None:
         from tests.bench import splicing
 
         splicing.main(sys.argv[2:])
+        return
+    if sys.argv[1:2] == ["posing"]:
+        from tests.bench import posing
+
+        posing.main(sys.argv[2:])
         return
     if sys.argv[1:2] == ["device"]:
         from tests.bench import device_loop

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from octo_motion.core.posing.figure import Elements, Figure, Limits, Pose
-from octo_motion.core.posing.kinematics import pose_of
-from octo_motion.core.rotations import Floats, from_rotation_vector, normalized
+from octo_motion.core.posing.kinematics import pose_of, product
+from octo_motion.core.posing.world import World
+from octo_motion.core.rotations import Floats, from_rotation_vector, normalized, rotate
 
 DENSITY = 1000.0
 
@@ -86,11 +87,8 @@ def doll(elements: Elements | None = None) -> Figure:
     lengths += [0.42, 0.42, 0.16]
     radii = [0.1, 0.09, 0.1, 0.05, 0.08] + [0.05, 0.045, 0.035, 0.03] * 2
     radii += [0.07, 0.05, 0.035, 0.03, 0.07, 0.05, 0.035]
-    anchors: list[list[float]] = []
     turns = np.zeros((20, 3))
-    for body, parent in enumerate(parents):
-        anchors.append([0.0, lengths[parent], 0.0] if parent >= 0 else [0.0, 0.0, 0.0])
-        del body
+    anchors = [[0.0, lengths[parent] if parent >= 0 else 0.0, 0.0] for parent in parents]
     for side, first in ((1.0, 5), (-1.0, 9)):
         anchors[first] = [0.05 * side, 0.16, 0.0]
         turns[first, 2] = -0.5 * np.pi * side
@@ -129,8 +127,8 @@ def tree(rng: np.random.Generator, count: int, elements: Elements | None = None)
     lengths = rng.uniform(0.1, 0.4, count)
     radii = rng.uniform(0.2, 0.4, count) * lengths
     anchors = [[0.0, 0.0, 0.0]]
-    for body in range(1, count):
-        anchors.append([*(0.3 * radii[0] * rng.normal(size=1)), float(lengths[parents[body]]), 0.0])
+    aside = 0.3 * radii[0] * rng.normal(size=count)
+    anchors += [[aside[body], lengths[parents[body]], 0.0] for body in range(1, count)]
     rest = normalized(rng.normal(size=(count, 4)))
     return puppet(parents, anchors, lengths.tolist(), radii.tolist(), elements, rest=rest)
 
@@ -139,9 +137,54 @@ def posed(
     figure: Figure, turns: Floats | None = None, at: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> Pose:
     """The figure with its joints turned from rest by rotation vectors in the parents' frames."""
-    from octo_motion.core.posing.kinematics import product
-
     own = figure.rest
     if turns is not None:
         own = product(from_rotation_vector(turns), own)
     return pose_of(figure, own, np.tile(np.array(at, dtype=np.float64), (len(figure), 1)))
+
+
+def opening(figure: Figure, pose: Pose) -> float:
+    """Greatest gap of a joint, against the length of its bone."""
+    worst = 0.0
+    for body, parent in enumerate(figure.parents):
+        if parent >= 0:
+            at = pose.positions[parent] + rotate(pose.orientations[parent], figure.anchors[body])
+            gap = float(np.linalg.norm(at - pose.positions[body]))
+            worst = max(worst, gap / float(figure.lengths[body]))
+    return worst
+
+
+def torn(world: World, rng: np.random.Generator, steps: int) -> tuple[float, float]:
+    """Random grabs, pulls and pins; joints closed and numbers finite all along.
+
+    Returns the widest opening of a joint against its bone's length, and the highest speed, m/s.
+    """
+    figure = world.figure
+    widest = fastest = 0.0
+    for _ in range(steps):
+        if rng.random() < 0.03:
+            body = int(rng.integers(len(figure)))
+            at = world.pose().positions[body]
+            hand = np.array([1.0, 0.0, 0.0, 0.0]) if rng.random() < 0.5 else None
+            world.grab(body, at, hand)
+        if world.grabs and rng.random() < 0.03:
+            world.release(world.grabs[int(rng.integers(len(world.grabs)))])
+        for grab in world.grabs:
+            turn = None if grab.target_orientation is None else rng.normal(size=4)
+            world.pull(grab, grab.target_position + 0.05 * rng.normal(size=3), turn)
+        if rng.random() < 0.01:
+            body = int(rng.integers(len(figure)))
+            (world.unpin if body in world.pinned else world.pin)(body)
+        if len(world.pinned) > 2:
+            world.unpin(min(world.pinned))
+        world.step()
+        pose = world.pose()
+        assert np.isfinite(pose.positions).all()
+        assert np.isfinite(world.velocities()).all()
+        widest = max(widest, opening(figure, pose))
+        fastest = max(fastest, float(np.abs(world.velocities()[:, :3]).max()))
+        # A hand moves at 50 m/s here; nothing may be faster than that by orders.
+        assert fastest < 1e4
+        # The bound is 1 %; joints that are coordinates stay closed to rounding.
+        assert widest < 1e-9
+    return widest, fastest

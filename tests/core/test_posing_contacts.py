@@ -222,7 +222,10 @@ def test_a_sled_sticks_below_its_friction_angle_and_slides_above_as_coulomb_says
         world = World(
             figure, pose, WorldSettings(step=2e-3, gravity=WEIGHT), [slope(kind, angle, friction)]
         )
-        for _ in range(250):
+        for _ in range(125):
+            world.step()
+        halfway = world.pose().positions[0]
+        for _ in range(125):
             world.step()
         way = world.pose().positions[0] - start
         slid.append(float(np.linalg.norm(way)))
@@ -231,8 +234,10 @@ def test_a_sled_sticks_below_its_friction_angle_and_slides_above_as_coulomb_says
             pull = 9.81 * (np.sin(angle) - friction * np.cos(angle))
             assert slid[-1] == pytest.approx(0.5 * pull * 0.25, rel=0.03)
             assert rotate(turn, [0.0, -1.0, 0.0]) @ way == pytest.approx(slid[-1], rel=1e-3)
-    # Below the angle it stays: less than a tenth of a millimetre, all told.
-    assert slid[0] < 1e-4
+        else:
+            # It stays: half a millimetre until it bears its weight, and then nothing.
+            assert slid[-1] < 5e-4
+            assert np.linalg.norm(world.pose().positions[0] - halfway) < 1e-6
 
 
 def test_what_slides_neither_lifts_off_nor_digs_in():
@@ -306,8 +311,10 @@ def test_a_fallen_chain_lies_on_every_kind_of_obstacle(obstacle: Obstacle):
         deepest = min(deepest, float(world.contacts.gaps.min(initial=0.0)))
     # It lands at 1.2 m/s and never sinks deeper than a hundredth of its radius.
     assert deepest > -3e-4
-    assert len(world.contacts) >= 2
-    assert np.abs(world.contacts.gaps).min() < 1e-4
+    contacts = world.contacts
+    assert contacts is not None
+    assert len(contacts) >= 2
+    assert np.abs(contacts.gaps).min() < 1e-4
     assert world.energy().kinetic < 1e-3
 
 

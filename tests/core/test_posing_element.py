@@ -161,6 +161,7 @@ def test_element_is_stable_at_every_step_length(  # noqa: PLR0917
     for _ in range(20):
         # λ falls with v: halve the interval in which m (v' − v) = h λ(v') lies.
         low, high = -abs(v) - abs(q) / step - 1.0, abs(v) + abs(q) / step + 1.0
+        new = v
         for _ in range(80):
             new = 0.5 * (low + high)
             load = law.respond(axis(q), axis(new)).load[0, 0]

@@ -23,7 +23,7 @@ from octo_motion.core.rotations import (
     multiply,
     rotate,
 )
-from tests.core.puppets import chain, doll, free, octopus, posed, soft, tree
+from tests.core.puppets import chain, doll, free, octopus, posed, soft, torn, tree
 
 WEIGHT = (0.0, 0.0, -9.81)
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -33,17 +33,6 @@ seeds = st.integers(0, 2**31)
 def run(world: World, seconds: float) -> None:
     for _ in range(round(seconds / world.settings.step)):
         world.step()
-
-
-def opening(figure: Figure, pose: Pose) -> float:
-    """Greatest gap of a joint, against the length of its bone."""
-    worst = 0.0
-    for body, parent in enumerate(figure.parents):
-        if parent >= 0:
-            at = pose.positions[parent] + rotate(pose.orientations[parent], figure.anchors[body])
-            gap = float(np.linalg.norm(at - pose.positions[body]))
-            worst = max(worst, gap / float(figure.lengths[body]))
-    return worst
 
 
 # Known physics
@@ -407,33 +396,3 @@ def test_nothing_explodes_however_it_is_torn(seed: int):
         ],
     )
     torn(world, rng, 700 if seed < 2 else 200)
-
-
-def torn(world: World, rng: np.random.Generator, steps: int) -> None:
-    """Random grabs, pulls and pins; joints closed and numbers finite all along."""
-    figure = world.figure
-    pulls: dict[int, Floats] = {}
-    for _ in range(steps):
-        if rng.random() < 0.03:
-            body = int(rng.integers(len(figure)))
-            at = world.pose().positions[body]
-            hand = np.array([1.0, 0.0, 0.0, 0.0]) if rng.random() < 0.5 else None
-            pulls[len(world.grabs)] = world.grab(body, at, hand).target_position
-        if world.grabs and rng.random() < 0.03:
-            world.release(world.grabs[int(rng.integers(len(world.grabs)))])
-        for grab in world.grabs:
-            turn = None if grab.target_orientation is None else rng.normal(size=4)
-            world.pull(grab, grab.target_position + 0.05 * rng.normal(size=3), turn)
-        if rng.random() < 0.01:
-            body = int(rng.integers(len(figure)))
-            (world.unpin if body in world.pinned else world.pin)(body)
-        if len(world.pinned) > 2:
-            world.unpin(min(world.pinned))
-        world.step()
-        pose = world.pose()
-        assert np.isfinite(pose.positions).all()
-        assert np.isfinite(world.velocities()).all()
-        # A hand moves at 50 m/s here; nothing may be faster than that by orders.
-        assert np.abs(world.velocities()).max() < 1e4
-        # The bound is 1 %; joints that are coordinates stay closed to rounding.
-        assert opening(figure, pose) < 1e-9

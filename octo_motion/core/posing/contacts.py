@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..rotations import Floats, cross, rotate, to_matrix
 from .figure import Figure
+from .kinematics import rest_pose
 from .obstacles import Obstacle, Plane
 
 Integers = NDArray[np.int64]
@@ -246,7 +247,7 @@ class Detector:
             bodies * len(self._radii) + second[near],
         )
 
-    def _contacts(
+    def _contacts(  # noqa: PLR0917
         self,
         bodies: Integers,
         points: Floats,
@@ -358,8 +359,6 @@ def _pairs(figure: Figure) -> NDArray[np.bool_]:
 
 def rest_ends(figure: Figure) -> Floats:
     """(bodies, 2, 3) ends of the capsules' axes in the rest pose, from the first root's joint."""
-    from .kinematics import rest_pose
-
     pose = rest_pose(figure)
     return pose.positions[:, None] + rotate(pose.orientations[:, None], figure.capsules)
 

@@ -249,7 +249,7 @@ class Newton:
         result = both[:, :, 3 * count :] - both[:, :, : 3 * count] @ pull
         return result.reshape(-1, 3, columns)
 
-    def _lowest(
+    def _lowest(  # noqa: PLR0917
         self,
         problem: Problem,
         inertias: Floats,

@@ -61,7 +61,7 @@ class Obstacle:
 class Plane(Obstacle):
     """All below z = 0 of its own frame is solid."""
 
-    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
+    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:  # noqa: ARG002
         return points[..., 2], np.broadcast_to(_UP, points.shape)
 
     @property
@@ -75,7 +75,7 @@ class Sphere(Obstacle):
 
     radius: float
 
-    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
+    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:  # noqa: ARG002
         return _from_core(points, self.radius)
 
     @property
@@ -91,7 +91,7 @@ class Capsule(Obstacle):
     """(2, 3) in its own frame."""
     radius: float
 
-    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
+    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:  # noqa: ARG002
         start, along = self.ends[0], self.ends[1] - self.ends[0]
         length = max(float(along @ along), _TINY)
         share = np.clip((points - start) @ along / length, 0.0, 1.0)
@@ -109,7 +109,7 @@ class Box(Obstacle):
     half: Floats
     """(3,) half of its sizes."""
 
-    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
+    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:  # noqa: ARG002
         beyond = np.abs(points) - self.half
         outside = np.maximum(beyond, 0.0)
         distance = np.sqrt((outside * outside).sum(axis=-1))
@@ -141,7 +141,7 @@ class Hull(Obstacle):
         object.__setattr__(self, "corners", corners)
         object.__setattr__(self, "_normals", np.where(inward[:, None], -normals, normals))
 
-    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
+    def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:  # noqa: ARG002
         shape = points.shape[:-1]
         flat = points.reshape(-1, 3)
         height = ((flat[:, None] - self.corners[:, 0]) * self._normals).sum(axis=-1)

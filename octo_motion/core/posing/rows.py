@@ -3,7 +3,7 @@
 
 Each row answers the velocity w of a point, or of a turn, with an impulse p(w), the nearest one
 that the row can give to what it would give without bound: of a hold within a ball, of a contact
-within Coulomb's cone |p_t| ≤ μ p_n. With a gain a, the gap g, and b the friction of the step before,
+within Coulomb's cone |p_t| ≤ μ p_n. With a gain a, the gap g and the last step's friction b,
 
     y_n = −a (w_n + g/h),   y_t = b − a w_t
     apart    p = 0                                                 where μ |y_t| < −y_n
@@ -31,7 +31,7 @@ from .kinematics import skew
 
 Integers = NDArray[np.int64]
 
-_GAIN = 50.0
+_GAIN = 10.0
 """a in masses of the body: a contact settles within a step, as from a push against a wall."""
 _LEAST_SHARE = 0.002
 """Of the figure's mass: what the lightest body counts for there."""
@@ -86,7 +86,7 @@ class Answer:
 class Rows:
     """Contacts and holds of one step, as arrays: contacts first."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0917
         self,
         contacts: Contacts,
         holds: Holds | None,
@@ -162,7 +162,7 @@ class Rows:
         return len(self.bodies)
 
     def speeds(self, velocities: Floats) -> Floats:
-        """w (rows, 3) of spatial velocities (bodies, 6)."""
+        """The rows' velocities w (rows, 3), of spatial velocities (bodies, 6)."""
         own = velocities[self.bodies]
         if len(self.paired):
             own[self.paired] -= velocities[self.others[self.paired]]
@@ -253,8 +253,8 @@ class Rows:
     def corrections(self, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.
 
-        Overlap that is deeper than it need be and pins that are off their place, a fifth of it each step
-        and no faster than ``fastest``. Used for positions alone and never kept as velocity.
+        Overlap that is deeper than it need be and pins that are off their place, a fifth of it
+        each step and no faster than ``fastest``. Used for positions alone, never kept as velocity.
         """
         count = self.count
         step = self._step

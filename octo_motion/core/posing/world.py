@@ -48,6 +48,7 @@ Integers = NDArray[np.int64]
 _PIN_GAIN = 1e5
 """Of pins, in masses of the figure: they give way by h·g/10⁵ a second before they are put right."""
 _STOP_GAIN = 1e3
+_WEIGHT = 9.81
 _BLOW = 50.0
 """m/s²: a change of speed in a step that only a blow makes."""
 
@@ -419,8 +420,12 @@ class World:
         self.time += h
 
     def problem(self) -> tuple[Problem, Floats, Floats]:
-        """The question of the coming step, the spatial inertias (bodies, 6, 6) about its origin
-        and those (bodies, 3, 3) about the centres of mass."""
+        """The question of the coming step, and inertias in world axes.
+
+        Returns:
+            The problem, the spatial inertias (bodies, 6, 6) about its origin, and those (bodies,
+            3, 3) about the centres of mass.
+        """
         figure = self.figure
         h = self.settings.step
         frames = self._matrices
@@ -595,10 +600,10 @@ class World:
             impulses = solution.impulses[:count]
             loads = (impulses * contacts.normals).sum(axis=1)
             across = impulses - loads[:, None] * contacts.normals
-            # What slips holds on to nothing.
-            size = np.sqrt((across * across).sum(axis=1))
-            sticks = size < (1.0 - 1e-6) * contacts.friction * loads
-            self._grips = sticks[:, None] * across
+            # A blow is not held on to: no more than twice the figure's weight on that point.
+            most = 2.0 * _WEIGHT * self.settings.step * self._mass * contacts.friction
+            size = np.sqrt((across * across).sum(axis=1)) + 1e-300
+            self._grips = np.minimum(most / size, 1.0)[:, None] * across
 
     def _take_wrenches(self, problem: Problem, solution: Solution) -> None:
         if not self._grabs:
@@ -719,7 +724,7 @@ class _HoldBuilder:
     ) -> None:
         self._row(body, point, gain, bias, bound, np.zeros(3))
 
-    def _row(
+    def _row(  # noqa: PLR0917
         self,
         body: int,
         point: Floats | None,

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long a step of the plastic puppet takes, beside MuJoCo, and whether it ever breaks.
+
+Figures of 20 and of 97 capsules fall onto a floor and lie there; then a hand drags them over it.
+MuJoCo steps the same figures on the same floor in the same run, once with springs at the joints and
+once with the three elements as two joints in series. One core, steps of 1 ms.
+
+make bench ARGS="posing --random 100000"
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from octo_motion.core.posing.figure import Figure
+from octo_motion.core.posing.obstacles import Box, Plane, Sphere
+from octo_motion.core.posing.presets import elements_for
+from octo_motion.core.posing.world import World, WorldSettings
+from octo_motion.core.rotations import Floats
+from tests.core.puppets import doll, octopus, posed, soft, torn, tree
+
+_HIGH: Final = 0.12
+"""Metres from which a figure falls."""
+_ONE_CORE: Final = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+_SETTLE: Final = 1500
+_WEIGHT: Final = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Seconds of the steps of one figure in one way."""
+
+    name: str
+    bodies: int
+    contacts: float
+    """Mean number of contacts that were carried in a step."""
+    median: float
+    p99: float
+    processor: float
+    """Median of the processor's time, which other programs disturb less; 0 if not known."""
+
+
+def main(words: Sequence[str]) -> None:
+    """Measure, print tables and write JSON if wanted."""
+    if os.environ.get("OPENBLAS_NUM_THREADS") != "1":
+        # Numpy reads it when it is loaded: once more, on one core.
+        again = [sys.executable, "-m", "tests.bench", "posing", *words]
+        sys.exit(subprocess.run(again, env=os.environ | _ONE_CORE, check=False).returncode)
+    parser = argparse.ArgumentParser(prog="python -m tests.bench posing", description=__doc__)
+    parser.add_argument("--steps", type=int, default=3000, help="measured, of each figure")
+    parser.add_argument("--random", type=int, default=0, help="steps of random tearing as well")
+    parser.add_argument("--json", type=Path, help="file to write all numbers to")
+    arguments = parser.parse_args(words)
+    figures = {"doll": _doll(), "octopus": _octopus()}
+    rows: list[Measured] = []
+    for name, figure in figures.items():
+        rows += _ours(name, figure, arguments.steps)
+    rows += _mujoco(figures, arguments.steps)
+    _table(rows)
+    report: dict[str, Any] = {"rows": [asdict(row) for row in rows]}
+    if arguments.random:
+        report["random"] = _random(arguments.random)
+    if arguments.json:
+        arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+def _doll() -> Figure:
+    return doll(soft(20, 40.0, 2.0, 5.0, 10.0))
+
+
+def _octopus() -> Figure:
+    return octopus(soft(97, 0.5, 0.02, 0.05, 0.1))
+
+
+def _ours(name: str, figure: Figure, steps: int) -> list[Measured]:
+    world = World(
+        figure, posed(figure, at=(0.0, 0.0, _HIGH)), WorldSettings(gravity=_WEIGHT), [Plane()]
+    )
+    # A mixed time of falling, landing and coming to rest: what is measured begins with it.
+    rows = [_timed(world, f"{name}, falling onto the floor", _SETTLE)]
+    rows.append(_timed(world, f"{name}, lying on the floor", steps))
+    body = len(figure) - 1
+    start = world.pose().positions[body]
+    grab = world.grab(body, start)
+
+    def drag(number: int) -> None:
+        angle = 2.0 * np.pi * number / 2000.0
+        way = np.array([0.3 * np.sin(angle), 0.3 - 0.3 * np.cos(angle), 0.1])
+        world.pull(grab, start + way)
+
+    rows.append(_timed(world, f"{name}, dragged over the floor", steps, drag))
+    return rows
+
+
+def _timed(world: World, name: str, steps: int, before: Any = None) -> Measured:
+    clock, processor = np.empty(steps), np.empty(steps)
+    carried = 0
+    gc.collect()
+    for number in range(steps):
+        if before is not None:
+            before(number)
+        start, own = time.perf_counter(), time.thread_time()
+        world.step()
+        clock[number] = time.perf_counter() - start
+        processor[number] = time.thread_time() - own
+        assert world.last is not None
+        assert world.contacts is not None
+        pushes = world.last.impulses[: len(world.contacts)]
+        carried += int(pushes.any(axis=1).sum())
+    return Measured(
+        name,
+        len(world.figure),
+        carried / steps,
+        *_middle_and_worst(clock),
+        float(np.median(processor)),
+    )
+
+
+def _middle_and_worst(seconds: Floats) -> tuple[float, float]:
+    return float(np.median(seconds)), float(np.percentile(seconds, 99.0))
+
+
+def _mujoco(figures: dict[str, Figure], steps: int) -> list[Measured]:
+    found = subprocess.run([".ci/venv", "mujoco"], capture_output=True, text=True, check=False)
+    if found.returncode != 0:
+        print("Without MuJoCo, which could not be set up:", found.stderr.strip().splitlines()[-1:])
+        return []
+    asked = {
+        "settle": _SETTLE,
+        "steps": steps,
+        "figures": [_described(name, figure) for name, figure in figures.items()],
+    }
+    run = subprocess.run(
+        [found.stdout.strip(), str(Path(__file__).with_name("mujoco_side.py"))],
+        input=json.dumps(asked),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if run.returncode != 0:
+        print("Without MuJoCo, which failed:", run.stderr.strip().splitlines()[-1:])
+        return []
+    answer = json.loads(run.stdout)
+    rows: list[Measured] = []
+    for row in answer["rows"]:
+        kind = "elements as joints in series" if row["series"] else "springs"
+        middle, worst = _middle_and_worst(np.array(row["seconds"]))
+        name = f"{row['name']}, lying, MuJoCo {answer['version']}, {kind}"
+        if not row["finite"]:
+            name += " (broke)"
+        rows.append(Measured(name, len(figures[row["name"]]), row["contacts"], middle, worst, 0.0))
+    return rows
+
+
+def _described(name: str, figure: Figure) -> dict[str, Any]:
+    elements = figure.elements
+    return {
+        "name": name,
+        "parents": list(figure.parents),
+        "anchors": figure.anchors.tolist(),
+        "rest": figure.rest.tolist(),
+        "masses": figure.masses.tolist(),
+        "centres": figure.centres.tolist(),
+        "inertias": figure.inertias.tolist(),
+        "capsules": figure.capsules.tolist(),
+        "radii": figure.radii.tolist(),
+        "root": [0.0, 0.0, _HIGH],
+        "stiffness": float(elements.stiffness[0, 0]),
+        "damping": float(elements.damping[0, 0]),
+        "flow": float(elements.flow[0, 0]),
+    }
+
+
+def _table(rows: list[Measured]) -> None:
+    print(f"{'':<58} {'bodies':>6} {'contacts':>8} {'median':>8} {'99 %':>8} {'processor':>9}")
+    for row in rows:
+        own = f"{1e6 * row.processor:>9.0f}" if row.processor else f"{'':>9}"
+        print(
+            f"{row.name:<58} {row.bodies:>6} {row.contacts:>8.1f} {1e6 * row.median:>8.0f}"
+            f" {1e6 * row.p99:>8.0f} {own}"
+        )
+    print("\nµs a step; contacts: carried, in the mean; processor: median of its time\n")
+
+
+def _random(steps: int) -> list[dict[str, Any]]:
+    """Grabs, pulls and pins at random, among a floor, a box and a ball.
+
+    The octopus, whose steps take ten times as long, has a tenth of them.
+    """
+    rng = np.random.default_rng(0)
+    kinds = {
+        "doll of clay": replace(_doll(), elements=elements_for(_doll(), "clay")),
+        "octopus of wire": replace(_octopus(), elements=elements_for(_octopus(), "wire")),
+        "random tree of rubber": tree(rng, 12),
+    }
+    last = kinds["random tree of rubber"]
+    kinds["random tree of rubber"] = replace(last, elements=elements_for(last, "rubber"))
+    results: list[dict[str, Any]] = []
+    for name, figure in kinds.items():
+        world = World(
+            figure,
+            posed(figure, at=(0.0, 0.0, 0.5)),
+            WorldSettings(gravity=_WEIGHT, self_collision=True),
+            [
+                Plane(),
+                Box(position=np.array([0.4, 0.4, 0.1]), half=np.array([0.2, 0.2, 0.1])),
+                Sphere(position=np.array([-0.4, 0.4, 0.1]), radius=0.2),
+            ],
+        )
+        count = steps if len(figure) < 50 else steps // 10
+        widest, fastest = torn(world, rng, count)
+        print(
+            f"{count} random steps, {name}: joints open by at most {widest:.1e} of a bone,"
+            f" speeds up to {fastest:.0f} m/s",
+            flush=True,
+        )
+        results.append({"name": name, "steps": count, "widest": widest, "fastest": fastest})
+    return results
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
