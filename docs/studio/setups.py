@@ -32,6 +32,8 @@ _FINE: Final = 0.04
 """Arm lengths between the points of the ground."""
 _ROUTE: Final = ((-1.1, 0.35, 0.0), (-0.4, -0.45, 0.0), (0.3, 0.5, 0.0), (1.1, 0.0, 0.0))
 _RISING: Final = ((-3.6, 0.6, 0.9), (-1.2, -1.5, 0.6), (0.9, 1.8, 1.8), (3.6, 0.3, 2.0))
+_LENGTH: Final = 0.58
+"""Metres that an arm of the add-on's octopus is long: what the routes are made for."""
 _THUMBNAIL: Final = 160
 _BACKGROUND: Final = (0.06, 0.06, 0.065)
 
@@ -43,6 +45,10 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help=f"of {', '.join(names)}; all if none is named")
     parser.add_argument("--folder", type=Path, default=Path("build/setups"), help="where they go")
     parser.add_argument("--film", action="store_true", help="videos as well")
+    parser.add_argument(
+        "--rig", type=Path, help="a .blend, .glb or .fbx file with another creature"
+    )
+    parser.add_argument("--armature", default="", help="which of its armatures, if it has several")
     parser.add_argument(
         "--thumbnails", action="store_true", help="only the pictures of the buttons, in their place"
     )
@@ -58,7 +64,7 @@ def main() -> None:
     try:
         for name in arguments.names or names:
             start = time.perf_counter()
-            performance = perform(name)
+            performance = perform(name, arguments.rig, arguments.armature)
             if arguments.thumbnails:
                 path = ours.setup_paths()[name].with_suffix(".png")
                 stage.save_pixels(_thumbnail(performance), path)
@@ -73,42 +79,76 @@ def main() -> None:
         octo_motion.unregister()
 
 
-def perform(name: str) -> shots.Performance:
-    """Start from an empty file: an octopus that moves as the set-up says."""
+def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Performance:
+    """Start from an empty file: an octopus that moves as the set-up says.
+
+    Args:
+        name: of the set-up.
+        rig: a file with another creature, none for the octopus of the add-on.
+        armature: its name, if the file has several.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    if rig is None:
+        bpy.ops.octo_motion.add_octopus()
+        octopus = bpy.context.object
+    else:
+        octopus = _load(rig, armature)
+    assert octopus is not None
     scene = stage.the_scene()
     scene.render.fps = shots.RATE
-    bpy.ops.octo_motion.add_octopus()
-    octopus = bpy.context.object
-    assert octopus is not None
     bpy.ops.octo_motion.detect_arms()
     settings = octopus.octo_motion.locomotion
     bpy.ops.octo_motion.setup_load(name=name)
     swims = settings.table.manner == "SWIM"
-    route = _RISING if swims else _ROUTE
+    unit = _arm_length(octopus)
+    route = np.array(_RISING if swims else _ROUTE) * (unit / _LENGTH)
     bpy.ops.octo_motion.add_route(**dict(zip(("b0", "b1", "b2", "b3"), route, strict=True)))
     scene.frame_end = 1
     if not swims:
-        settings.ground.object = add_bumps(np.array(route), _arm_length(octopus))
+        settings.ground.object = add_bumps(route, unit)
     bpy.ops.octo_motion.generate_locomotion()
     octopus.show_in_front = False
     points = stage.skin_points(octopus, range(scene.frame_start, scene.frame_end + 1, 4))
     stage.set_light(scene)
     if swims:
-        stage.add_ground(points, float(points[..., 2].min()) - 0.25)
+        stage.add_ground(points, float(points[..., 2].min()) - 0.4 * unit)
     camera = stage.add_camera("Camera", lens=50.0)
     stage.look(camera, np.array((-0.35, 0.9, -0.45)), np.array([0.0, 0.0, 1.0]))
     stage.set_resolution(640, 360)
     stage.frame_points(camera, points)
     scene.frame_set(scene.frame_start)
-    shot = shots.Shot(settings.gait, route, (-0.35, 0.9, -0.45), None)
+    shot = shots.Shot(settings.gait, (), (-0.35, 0.9, -0.45), None)
     return shots.Performance(shot, octopus, settings.route, points)
 
 
+def _load(path: Path, name: str) -> bpy.types.Object:
+    """Open or import a creature, and make it the active object."""
+    importers = {
+        ".blend": bpy.ops.wm.open_mainfile,
+        ".glb": bpy.ops.import_scene.gltf,
+        ".fbx": bpy.ops.import_scene.fbx,
+    }
+    importers[path.suffix.lower()](filepath=str(path))
+    found = [each for each in bpy.data.objects if each.type == "ARMATURE"]
+    creature = bpy.data.objects[name] if name else found[0]
+    view_layer = bpy.context.view_layer
+    assert view_layer is not None
+    view_layer.objects.active = creature
+    if bpy.context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    for each in bpy.data.objects:
+        # Lights, cameras and floors of the file are not part of the creature.
+        own = each == creature or each.find_armature() == creature or each.type == "EMPTY"
+        each.hide_render = not own
+    return creature
+
+
 def _arm_length(octopus: bpy.types.Object) -> float:
+    """Metres that an arm is long."""
     assert isinstance(octopus.data, bpy.types.Armature)
     arm = octopus.octo_motion.locomotion.arms[0]
-    return float(sum(octopus.data.bones[bone.name].length for bone in arm.bones))
+    scale = octopus.matrix_world.to_scale()[0]
+    return float(scale * sum(octopus.data.bones[bone.name].length for bone in arm.bones))
 
 
 def add_bumps(points: Points, unit: float, height: float = BUMPS) -> bpy.types.Object:
