@@ -35,6 +35,14 @@ armature of the .blend file) say where the part is from; landmarks.NAME=BONE say
 which, where it cannot be told.
 """
 
+_POSE: Final = """\
+Pose an armature by a script of grabs, pulls, pins and keys, and save the result as a new file.
+
+The script is a JSON file, as it is described in the scripting reference. The same script gives the
+same keys each time, on the same computer. The file that is read stays as it is, unless --overwrite
+is given; an output is written whole or not at all.
+"""
+
 _BAKE: Final = """\
 Make many shots from a job file, each in a process of its own.
 
@@ -90,12 +98,13 @@ def parser(program: str, *, has_open_file: bool) -> argparse.ArgumentParser:
     main = argparse.ArgumentParser(
         prog=program,
         description="Octo Motion: creatures with arms walk and swim along a route, parts of one "
-        "motion are put onto another.",
+        "motion are put onto another, figures are posed like puppets.",
         epilog=f"{_STATUS} '{program} bake --help' shows what a job file looks like.",
     )
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_generate(commands, has_open_file=has_open_file)
     _add_splice(commands, has_open_file=has_open_file)
+    _add_pose(commands, has_open_file=has_open_file)
     _add_bake(commands)
     return main
 
@@ -161,6 +170,26 @@ def _add_splice(
         help="how long the base lasts: a walk of one cycle is repeated, a longer one is cut",
     )
     _add_settings(command, "a setting of the base, such as visual=true or landmarks.chest=Spine2")
+
+
+def _add_pose(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser], *, has_open_file: bool
+) -> None:
+    command = commands.add_parser(
+        "pose",
+        help="pose an armature by a script",
+        description=_POSE,
+        epilog=_STATUS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    _add_files(command, "the .blend file to read", "the figure", has_open_file=has_open_file)
+    command.add_argument(
+        "--script", metavar="FILE", type=Path, required=True, help="the pose script (.json)"
+    )
+    command.add_argument(
+        "--armature", metavar="NAME", default="", help="default: the only one, or the active one"
+    )
+    command.add_argument("--fps", type=_frame_rate, help="frames per second of the scene")
 
 
 def _add_files(

@@ -62,8 +62,8 @@ def _bake(options: argparse.Namespace) -> int:
 
 
 def _make(options: argparse.Namespace) -> int:
-    """One file, to walk or swim or with splices."""
-    make_entry = _splice_entry if options.command == "splice" else _entry
+    """One file, to walk or swim, with splices or posed."""
+    make_entry = {"splice": _splice_entry, "pose": _pose_entry}.get(options.command, _entry)
     try:
         entry = make_entry(options, known())
     except OctoMotionError as error:
@@ -128,6 +128,29 @@ def _splice_entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
         output=output,
         exports=exports,
         splicing=SpliceWork(options.base, options.frames, splices),
+    )
+
+
+def _pose_entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
+    """What the arguments of ``pose`` ask for.
+
+    Raises:
+        OctoMotionError: they make no sense.
+    """
+    del may_name
+    source, read = _files(options)
+    script = options.script.resolve()
+    if not script.is_file():
+        raise SettingsError(f"There is no file '{script}'.", "Give the path of a pose script.")
+    output, exports = _outputs(options, read, script)
+    return ShotEntry(
+        name=read.stem,
+        file=source,
+        armature=options.armature,
+        fps=options.fps,
+        output=output,
+        exports=exports,
+        posing=script,
     )
 
 

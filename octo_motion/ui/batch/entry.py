@@ -84,13 +84,15 @@ class ShotEntry:
     output: Path | None = None
     exports: tuple[Path, ...] = ()
     splicing: SpliceWork | None = None
-    """What to splice; none: the armature is to walk or swim."""
+    """What to splice."""
+    posing: Path | None = None
+    """The pose script to play. With neither: the armature is to walk or swim."""
 
     @property
     def inputs(self) -> tuple[Path, ...]:
         """All files that are named to be read: scene and clips."""
         splices = (self.splicing and self.splicing.splices) or ()
-        named = (self.file, *(splice.clip for splice in splices))
+        named = (self.file, self.posing, *(splice.clip for splice in splices))
         return tuple(dict.fromkeys(path for path in named if path is not None))
 
     @property
@@ -102,6 +104,7 @@ class ShotEntry:
         """For JSON; ``from_plain`` reads it."""
         plain = asdict(self)
         plain["file"] = str(self.file) if self.file else None
+        plain["posing"] = str(self.posing) if self.posing else None
         plain["output"] = str(self.output) if self.output else None
         plain["exports"] = [str(path) for path in self.exports]
         for splice in (plain["splicing"] or {}).get("splices") or ():
@@ -129,6 +132,7 @@ class ShotEntry:
             output=Path(plain["output"]) if plain["output"] else None,
             exports=tuple(Path(path) for path in plain["exports"]),
             splicing=_splice_work(plain["splicing"]) if plain["splicing"] else None,
+            posing=Path(plain["posing"]) if plain["posing"] else None,
         )
 
 

@@ -20,7 +20,7 @@ from ...core.locomotion import gait
 from ...core.locomotion.detection import detect_arms
 from ..locomotion.properties import locomotion_settings, set_gait
 from ..locomotion.workflow import Summary, generate
-from . import splice_stage
+from . import pose_stage, splice_stage
 from .blender_said import blender_said
 from .entry import NewRoute, ShotEntry, frame_rate
 from .exports import check_export, export
@@ -35,7 +35,7 @@ _COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 class Performed:
     """What came of a shot."""
 
-    summary: Summary | splice_stage.SpliceSummary
+    summary: Summary | splice_stage.SpliceSummary | pose_stage.PoseSummary
     armature: str
     libraries: tuple[str, ...]
     """Paths of the files that the scene is linked from, and of those that clips consist of."""
@@ -70,6 +70,8 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
         if entry.splicing is not None:
             work = (entry.splicing, entry.settings)
             summary = splice_stage.splice(armature, *work, clips, motion)
+        elif entry.posing is not None:
+            summary = pose_stage.pose(armature, scene, entry.posing)
         else:
             _apply(entry, armature, scene)
             summary = generate(armature, bpy.context)
@@ -94,6 +96,8 @@ def _find(entry: ShotEntry) -> tuple[bpy.types.Object, bpy.types.Scene]:
         )
         return armature, scene
     fits = splice_stage.has_splices if entry.splicing else _has_arms
+    if entry.posing is not None:
+        fits = pose_stage.is_posable
     armature = find_armature(entry.armature, scene, fits)
     return armature, _scene_of(armature, scene)
 

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pose scripts on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from octo_motion.ui.batch.commands import main
+from octo_motion.ui.batch.entry import ShotEntry
+
+STEPS = (
+    {"do": "grab", "bone": "arm1.04.L", "at": 1.0},
+    {"do": "pull", "by": [-0.05, 0.0, 0.1], "seconds": 0.2},
+    {"do": "release"},
+    {"do": "key"},
+)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    bpy.ops.octo_motion.add_octopus(with_mesh=False, arms=4, joints=4)
+    path = tmp_path / "octopus.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def script(folder: Path, *steps: Any) -> Path:
+    path = folder / "wave.json"
+    text = json.dumps({"format": "octo_motion.pose", "version": 1, "steps": list(steps)})
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def run(*words: object) -> int:
+    return main([str(word) for word in words], "octo_motion", has_open_file=False)
+
+
+def test_script_is_played_and_the_result_saved_elsewhere(
+    file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    before = file.read_bytes()
+    output = tmp_path / "posed.blend"
+    assert run("pose", file, "--script", script(tmp_path, *STEPS), "-o", output) == 0
+    assert "played 'wave.json'" in capfd.readouterr().out
+    assert file.read_bytes() == before
+    bpy.ops.wm.open_mainfile(filepath=str(output))
+    armature: Any = bpy.data.objects["Octopus"]
+    assert armature.animation_data.action
+    assert not armature.pose.bones["arm1.04.L"].matrix_basis.is_identity
+
+
+def test_script_that_fails_writes_nothing(
+    file: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "posed.blend"
+    wrong = script(tmp_path, {"do": "grab", "bone": "nose"})
+    assert run("pose", file, "--script", wrong, "-o", output) == 1
+    assert "has no bone 'nose'" in capfd.readouterr().err
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--script", "nowhere.json", "-o", "posed.blend"), "There is no file"),
+        (("--script", "{script}"), "There is nothing to write"),
+        (("--script", "{script}", "-o", "posed.fbx"), "is no .blend file"),
+        (("--script", "{script}", "-o", "posed.blend", "--armature", "Knight"), "Knight"),
+    ],
+)
+def test_arguments_that_make_no_sense_are_said(  # noqa: PLR0917
+    file: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    words: tuple[str, ...],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = str(script(tmp_path, *STEPS))
+    assert run("pose", file, *(word.replace("{script}", path) for word in words)) in {1, 2}
+    assert said in capfd.readouterr().err
+    assert not (tmp_path / "posed.blend").exists()
+
+
+def test_shot_with_a_script_survives_the_way_to_another_process(tmp_path: Path) -> None:
+    entry = ShotEntry(name="a", file=tmp_path / "a.blend", posing=tmp_path / "wave.json")
+    again = ShotEntry.from_plain(json.loads(json.dumps(entry.to_plain())))
+    assert again == entry
+    assert tmp_path / "wave.json" in entry.inputs
