@@ -349,7 +349,7 @@ def test_ranges_of_the_octopus_are_the_operators_own() -> None:
         assert table[name][0] == expected
 
 
-@pytest.mark.parametrize("word", ["generate", "splice", "bake"])
+@pytest.mark.parametrize("word", ["generate", "splice", "bake", "pose"])
 def test_every_option_of_the_command_line_is_described(word: str) -> None:
     from octo_motion.ui.batch.command_line import parser
 
