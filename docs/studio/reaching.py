@@ -37,7 +37,7 @@ _WIDE: Final = View((-0.5, 0.8, -0.35))
 
 
 def reach() -> Pixels:
-    """An arm reaches for a bottle: the bend runs along it, and it winds about the neck's foot."""
+    """An arm reaches for a bottle: the bend runs along it, and it winds about the bottle."""
     octopus = _octopus()
     thing = _bottle((0.2, -0.4, 0.0))
     _reach(octopus, thing)
