@@ -420,7 +420,7 @@ def _check_inheritance(armature: bpy.types.Object, skeleton: Skeleton, scaled: n
         if bone.inherit_scale != "FULL" or not bone.use_inherit_rotation:
             raise ClipError(
                 f"'{armature.name}' scales bones above '{bone.name}', which does not inherit it.",
-                "Turn on Visual to read the motion as it is shown.",
+                "Turn on As Shown: the motion is then read as the scene shows it.",
             )
         beneath[number] = True
 

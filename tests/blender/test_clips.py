@@ -226,7 +226,7 @@ def test_scale_that_is_not_inherited_is_refused_unless_read_as_shown():
     armature = make_rig()
     animate(armature, scale=True)
     armature.data.bones[3].inherit_scale = "NONE"
-    with pytest.raises(ClipError, match=r"does not inherit it.*Visual"):
+    with pytest.raises(ClipError, match=r"does not inherit it.*As Shown"):
         read_clip(armature)
     assert_shown(armature, read_clip(armature, visual=True), 20.0, y_only=True)
 
