@@ -16,6 +16,7 @@ import contact_sheet
 import experiment
 import numpy as np
 import plot
+import puppet_curves
 import puppets
 import reaching
 import shots
@@ -124,6 +125,11 @@ def gaits() -> Pixels:
     return plot.gait_pixels([presets["walk"], presets["swim"]], (1000, 600))
 
 
+def puppet_plots() -> Pixels:
+    """The plastic element under load, and the energy of an arm."""
+    return puppet_curves.pixels((1000, 400))
+
+
 def splices() -> Pixels:
     """The paper's experiment with clips of the project's own."""
     return experiment.sheet(experiment.find_clips(experiment.CLIPS))
@@ -144,6 +150,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "hold": reaching.hold,
     "pose_octopus": puppets.octopus,
     "pose_doll": puppets.doll,
+    "puppet_plots": puppet_plots,
     "splices": splices,
 }
 """By file name."""

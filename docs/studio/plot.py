@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The knots of gaits as curves over one cycle, drawn by Blender: tubes, text and a flat light."""
+"""Curves drawn by Blender: tubes, text and a flat light."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -14,6 +15,7 @@ from mathutils import Vector
 from stage import Colour, Pixels
 
 from octo_motion.core.locomotion.gait import GaitTable
+from octo_motion.core.rotations import Floats
 
 _LINKS: Final[tuple[tuple[str, Colour], ...]] = (
     ("link 1", (0.60, 0.09, 0.05)),
@@ -67,6 +69,71 @@ def _plot(table: GaitTable, left: float) -> None:
         y = np.degrees(curve.angles[:, link, 0]) / _MOST
         _line(np.stack([x, y], axis=1).tolist(), colour, 0.014, height=0.1 * (link + 1))
         _text(name, left + 0.6 + 0.35 * link, 1.16, "LEFT", colour, size=0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """Curves over one axis, from 0."""
+
+    title: str
+    along: str
+    """Unit of the axis to the right."""
+    up: str
+    """Unit of the axis upwards."""
+    x: Floats
+    """(samples,)"""
+    curves: dict[str, Floats]
+    """(samples,) by name; not below 0."""
+
+
+def curves_pixels(panels: Sequence[Panel], size: tuple[int, int]) -> Pixels:
+    """Panels side by side, each with axes of its own."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    stage.set_flat_light(stage.the_scene(), _PAPER)
+    for number, panel in enumerate(panels):
+        _panel(panel, number * _APART)
+    camera = stage.add_camera("Plot")
+    assert isinstance(camera.data, bpy.types.Camera)
+    left, right = -0.42, (len(panels) - 1) * _APART + _WIDTH + 0.12
+    camera.data.ortho_scale = right - left
+    camera.location = Vector((0.5 * (left + right), 0.5, 5.0))
+    return stage.render_pixels(*size, finer=3)
+
+
+def _panel(panel: Panel, left: float) -> None:
+    longest = float(panel.x[-1])
+    highest = max(float(curve.max()) for curve in panel.curves.values())
+    across, up = _round_step(longest), _round_step(highest)
+    top = np.ceil(highest / up) * up
+    for value in np.arange(0.0, top + 0.5 * up, up):
+        y = float(value / top)
+        _line([(left, y), (left + _WIDTH, y)], _FAINT if value else _INK, 0.004)
+        _text(f"{value:.4g}", left - 0.04, y, "RIGHT", _INK)
+    for value in np.arange(0.0, longest + 0.01 * across, across):
+        x = left + _WIDTH * float(value) / longest
+        _line([(x, 0.0), (x, 1.0)], _FAINT if value else _INK, 0.004)
+        _text(f"{value:.4g}", x, -0.08, "CENTER", _INK)
+    _text(panel.along, left + 0.5 * _WIDTH, -0.2, "CENTER", _INK)
+    _text(panel.up, left - 0.04, 1.14, "RIGHT", _INK)
+    _text(panel.title, left, 1.14, "LEFT", _INK, size=0.12)
+    kept = np.unique(np.linspace(0, len(panel.x) - 1, 250).astype(int))
+    for number, (name, curve) in enumerate(panel.curves.items()):
+        colour = _LINKS[number][1]
+        x = left + _WIDTH * panel.x[kept] / longest
+        _line(
+            np.stack([x, curve[kept] / top], axis=1).tolist(),
+            colour,
+            0.014,
+            height=0.1 * (number + 1),
+        )
+        _text(name, left + _WIDTH - 0.05, 0.93 - 0.12 * number, "RIGHT", colour)
+
+
+def _round_step(most: float) -> float:
+    """A step of 1, 2 or 5 times a power of ten, three to eight of which reach ``most``."""
+    power = 10.0 ** np.floor(np.log10(most))
+    steps = [power * factor for factor in (0.1, 0.2, 0.5, 1.0)]
+    return float(next(step for step in steps if most / step <= 8.0))
 
 
 def _line(
