@@ -62,8 +62,7 @@ def read_markers(armature: bpy.types.Object) -> dict[tuple[str, int], Contact]:
     for item in markers(armature):
         own = _own(item)
         place = np.array(item.matrix_world.translation, dtype=np.float64)
-        along = item.matrix_world.to_3x3().col[1]
-        heading = float(np.arctan2(along.y, along.x))
+        heading = _heading(item)
         moved = np.abs(place - np.array(own.position)).max() > _MOVED * item.empty_display_size
         turn = np.mod(heading - own.heading + np.pi, 2.0 * np.pi) - np.pi
         contacts.setdefault(
@@ -131,8 +130,13 @@ def _write(item: bpy.types.Object, armature: bpy.types.Object, contact: Contact)
     item.matrix_world = Matrix.Translation(contact.position.tolist()) @ turn
     # As single precision has them: what is read back must not look moved.
     own.position = item.matrix_world.translation
-    along = item.matrix_world.to_3x3().col[1]
-    own.heading = float(np.arctan2(along.y, along.x))
+    own.heading = _heading(item)
+
+
+def _heading(item: bpy.types.Object) -> float:
+    """Which way a marker points, radians about world Z from +X."""
+    along = np.array(item.matrix_world, dtype=np.float64)[:2, 1]
+    return float(np.arctan2(along[1], along[0]))
 
 
 def _remove(items: Iterable[bpy.types.Object]) -> None:

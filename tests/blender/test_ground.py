@@ -36,7 +36,7 @@ def make_square(size: float = 4.0) -> Any:
 
 def triangles(item: Any) -> np.ndarray:
     bpy.context.view_layer.update()
-    return read_triangles(item, bpy.context.evaluated_depsgraph_get())
+    return read_triangles(item, bpy.context.evaluated_depsgraph_get())[0]
 
 
 def test_a_ground_is_read_where_it_stands() -> None:
@@ -81,7 +81,7 @@ def arms_of(armature: Any) -> list[tuple[str, ...]]:
 
 def test_the_skin_tells_how_thick_arms_are() -> None:
     click("add_octopus")
-    armature = bpy.context.object
+    armature: Any = bpy.context.object
     click("detect_arms")
     skeleton = read_skeleton(armature)
     radii = arm_radii(armature, skeleton, arms_of(armature))

@@ -146,7 +146,7 @@ def walker(
         body,
         line,
         ground,
-        settings,
+        settings=settings,
         scale=1.0,
         radii=[np.linspace(0.045, 0.012, joints + 1)] * arms,
         may_stretch=[stretch] * arms,

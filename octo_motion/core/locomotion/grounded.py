@@ -20,7 +20,7 @@ from .ground import Ground
 from .limbs import Limbs, StanceSettings
 from .poses import Facing, bone_rotations, sucker_sides
 from .rhythm import Even, Rhythm
-from .stance import Bodies, hold, stand
+from .stance import Batch, hold, stand
 
 _CYCLE: Final = 2.0 * np.pi
 _ASKEW: Final = np.radians(35.0)
@@ -87,7 +87,7 @@ class GroundedWalk:
         rhythm: when arms hold on; none for the gait's own.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0917 - what it is made of, in the order in which it is made
         self,
         skeleton: Skeleton,
         generator: Generator,
@@ -199,21 +199,20 @@ class GroundedWalk:
             facing = multiply(orientations[:, None], generator.outward[columns]).reshape(batch, 4).T
             shapes = turned(facing, shapes.reshape(segments, 3, batch))
             roots = centres[:, None] + rotate(orientations[:, None], limbs.roots)
-            bodies = Bodies(
+            held_by = Batch(
+                limbs,
+                np.tile(np.arange(many), frames),
                 np.ascontiguousarray(roots.reshape(batch, 3).T),
                 turned(facing, np.array([1.0, 0.0, 0.0])[:, None]),
                 turned(facing, np.array([0.0, 0.0, 1.0])[:, None]),
             )
-            arms = np.tile(np.arange(many), frames)
             held = hold(
+                held_by,
                 footholds,
-                limbs,
                 cycles[:, columns].reshape(batch),
                 since[:, columns].reshape(batch),
-                arms,
-                bodies.roots,
             )
-            stood = stand(limbs, arms, shapes, bodies, held, self._ground, self._settings)
+            stood = stand(held_by, shapes, held, self._ground, self._settings)
             back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
             in_armature = turned(back, stood.directions)
             towards = turned(back, -held.upwards(segments)).reshape(segments, 3, frames, many)
@@ -230,7 +229,7 @@ class GroundedWalk:
             for place, arm in enumerate(columns):
                 rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
                 strains[:, ends[arm] : ends[arm + 1]] = longer[:, :, place].T
-            whole = limbs.reach[-1][arms]
+            whole = held_by.reach[-1]
             misses[:, columns] = (stood.misses / whole).reshape(frames, many)
             joints.append(np.moveaxis(stood.joints.reshape(segments + 1, 3, frames, many), 1, -1))
             lying.append(stood.lying.reshape(segments + 1, frames, many))

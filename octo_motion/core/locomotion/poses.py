@@ -19,7 +19,6 @@ from ..skeleton import Skeleton
 from .chains import AXES, joint_positions
 from .columns import cross, dot, product, smallest_arc, turned
 
-
 _NO_SIDE: Final = 0.1
 """Length of what is across a segment, of a unit vector that does not tell which side is which."""
 
