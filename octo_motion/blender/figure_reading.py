@@ -30,6 +30,9 @@ from .armature import armature_data, read_skeleton
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
 
+MOST_LIMBS: Final = 300
+"""More cannot be moved at a speed at which one could pose them."""
+
 _TOLERANT: Final = frozenset({"LIMIT_ROTATION", "LIMIT_LOCATION", "LIMIT_SCALE", "MAINTAIN_VOLUME"})
 """Constraints under which a bone still turns as its keys say."""
 _ANGLE_LIMIT: Final = 2.0 * np.pi - 1e-4
@@ -83,6 +86,11 @@ def read_rig(
         smallest=smallest,
     )
     roles = find_roles(skeleton, facts, armature.name)
+    if len(roles.bodies) > MOST_LIMBS:
+        raise RigError(
+            f"'{armature.name}' has {len(roles.bodies)} limbs, more than {MOST_LIMBS}.",
+            "Raise Smallest Bone, or mark bones that are to follow.",
+        )
     bodies = list(roles.bodies)
     unit = SIZE / (diagonal(skeleton.heads[bodies], skeleton.tails[bodies]) * scale)
     figure, pose = build_figure(

@@ -290,6 +290,13 @@ def test_armature_without_bones_is_refused() -> None:
         read_rig(empty)
 
 
+def test_armature_with_too_many_limbs_is_refused() -> None:
+    armature = octopus(with_mesh=False, arms=24, joints=14)
+    with pytest.raises(RigError, match=r"'Octopus' has 340 limbs, more than 300\. Raise Smallest"):
+        read_rig(armature)
+    assert len(read_rig(armature, smallest=0.02).figure) <= 300
+
+
 @pytest.mark.parametrize(
     ("scale", "said"),
     [

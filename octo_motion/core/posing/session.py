@@ -33,6 +33,8 @@ COARSEST: Final = 4e-3
 """Seconds: longer steps would let a fast hand shake the puppet."""
 LONGEST_TICK: Final = 0.1
 """Seconds: what is longer (Blender was busy) is not made up for, so that nothing jerks."""
+LONGEST_WORK: Final = 0.05
+"""Seconds that one tick may compute."""
 TOUCHED: Final = float(np.radians(0.1))
 """A joint that was turned by more counts as touched."""
 BUSY: Final = 0.75
@@ -211,6 +213,9 @@ class Session:
         self._left += min(max(seconds, 0.0), LONGEST_TICK)
         count = int(self._left / step + 1e-9)
         self._left -= count * step
+        if self._clock and self._load > 0.0:
+            # Slower than real time is better than a window that stands still.
+            count = min(count, max(1, int(LONGEST_WORK / (self._load * step))))
         before = self._clock() if self._clock else 0.0
         self._run(count, sample)
         if self._clock and seconds > 0.0:

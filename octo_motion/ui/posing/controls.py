@@ -168,7 +168,7 @@ class PoseControls:
             else:
                 session.restore()
                 self.said = "As at the start"
-        elif kind == "Z" and (event.ctrl or getattr(event, "oskey", False)):
+        elif kind == "Z" and (event.ctrl or getattr(event, "oskey", False)) and not event.shift:
             self.hand = None
             self.said = "Back" if session.step_back() else "Nothing to take back"
         else:
