@@ -24,7 +24,7 @@ def walking(ground: str, **options: Any) -> Walker:
 
 
 PLACES = [*GROUNDS, "turn"]
-RIGS = [{"stretch": True}, {}, {"joints": 7}, {"joints": 30}]
+RIGS = [{"stretch": True}, {}, {"joints": 7}, {"joints": 30}, {"joints": 3}]
 
 
 @pytest.fixture(params=[(ground, 0) for ground in PLACES] + [("bumps", 1), ("bumps", 2)], ids=str)
@@ -84,7 +84,8 @@ def test_motion_is_continuous(rig: dict[str, Any]) -> None:
         for count in (1, 2, 4, 8)
     ]
     # As of the gait itself: steps halve with the frame time once frames resolve a stretched arm.
-    assert turns[0] < np.radians(50.0)
+    # Three stiff bones have to fold a lot in one joint.
+    assert turns[0] < np.radians(50.0 if rig != {"joints": 3} else 90.0)
     assert turns[2] < 0.5 * turns[0]
     assert turns[3] < 0.75 * turns[2]
 

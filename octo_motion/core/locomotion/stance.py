@@ -35,6 +35,11 @@ _RAISED: Final = np.radians(12.0)
 _RAISES: Final = 6
 _RAISES_BETWEEN: Final = 2
 """How often the lowest joints of an arm are raised, in the air and before it is drawn down."""
+_KNEE: Final = 2
+"""Free segments that have one joint between them: it must point up, or it is in the way."""
+_KNEE_UP: Final = np.radians(50.0)
+_KNEE_DOWN: Final = 0.8
+"""How much more such an arm rises, and the tangent of how steeply it comes down."""
 _ARCHED: Final = np.radians(15.0)
 _ARCHING: Final = 0.5
 """How much more where it is slack, and over what share of its length that comes."""
@@ -257,7 +262,8 @@ def _held(
     short = (over - _REST * np.tanh(over / _REST)) / np.maximum(ratio, _TINY)
     goal = held.carried + np.where(held.by_tip, held.joints[-1], held.joints[0]) - short * chord
     # Some of the gait stays, but for what lies or unrolls.
-    own = unit(guess + (_KEPT * free)[:, None] * (shapes - guess))
+    kept = _KEPT if held.touching > _KNEE else 0.0
+    own = unit(guess + (kept * free)[:, None] * (shapes - guess))
     before = np.arange(len(lengths))[:, None] < held.touching
     to_goal = (before | held.by_tip).astype(np.float64)
 
@@ -343,6 +349,9 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
     # A cubic from body to ground that leaves and arrives as the arm does, and is as long. The
     # slacker the arm, the more it rises.
     rising = _RAISED + _ARCHED * smooth((_EASY - ratio) / _ARCHING)
+    if held.touching <= _KNEE:
+        rising = rising + _KNEE_UP
+        arriving = unit(arriving - _KNEE_DOWN * batch.upward)
     leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
     size = held.lies_from * (1.0 + strain[0])
     middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
