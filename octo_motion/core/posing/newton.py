@@ -112,7 +112,10 @@ class Newton:
             if miss <= self._tolerance:
                 # Where slipping began or ended in a blow, once more with the speed that is left.
                 rounds += 1
-                if rounds > _ROUNDS or not rows.follow(point.row_speeds, problem.blow):
+                none = point.rows is None or point.rows.slips is None
+                if rounds > _ROUNDS or not rows.follow(
+                    point.row_speeds, problem.blow, slips_none=none
+                ):
                     break
                 point = self._at(problem, point.speeds)
             count += 1

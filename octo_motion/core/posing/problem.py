@@ -44,6 +44,8 @@ class Problem:
     """(bodies, 3) where the joints are."""
     centres: Floats
     """(bodies, 3) centres of mass."""
+    skewed: Floats
+    """(bodies, 3, 3) matrices of the cross product with ``centres``."""
     masses: Floats
     """(bodies,)"""
     inertias: Floats

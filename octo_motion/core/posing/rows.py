@@ -147,6 +147,7 @@ class Rows:
         self.rates = self._closing
         """(contacts,) g/h + μ |w_t|, as ``follow`` was told |w_t| last."""
         self._followed = np.zeros(count)
+        self._fastest = 0.0
         self._step = step
         self.grips: Floats | None = None
         """(contacts, 3) b; None for zero."""
@@ -169,10 +170,15 @@ class Rows:
         result = (self.reach @ own[:, :, None])[:, :, 0]
         return result if self.still else result - self.targets
 
-    def follow(self, speeds: Floats, tolerance: float) -> bool:
-        """Take |w_t| from w (rows, 3); false where that changes no rate by ``tolerance``, m/s."""
+    def follow(self, speeds: Floats, tolerance: float, *, slips_none: bool = False) -> bool:
+        """Take |w_t| from w (rows, 3); false where that changes no rate by ``tolerance``, m/s.
+
+        ``slips_none`` tells that nothing slips at w, which saves looking.
+        """
         count = self.count
         if not count:
+            return False
+        if slips_none and self._fastest <= tolerance:
             return False
         normals, w = self.contacts.normals, speeds[:count]
         across = w - ((w * normals) @ _ONES)[:, None] * normals
@@ -181,6 +187,7 @@ class Rows:
         if change.max() <= tolerance:
             return False
         self._followed = slip
+        self._fastest = float((self.contacts.friction * slip).max())
         self.rates = self._closing + self.contacts.friction * slip
         return True
 

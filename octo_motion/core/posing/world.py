@@ -473,6 +473,7 @@ class World:
             h,
             joints,
             centres,
+            skewed,
             figure.masses,
             inertias,
             momenta,
@@ -570,7 +571,7 @@ class World:
         velocities = solution.velocities
         self._speeds = solution.speeds
         self._angular = velocities[:, :3].copy()
-        around = (skew(problem.centres) @ self._angular[:, :, None])[:, :, 0]
+        around = (problem.skewed @ self._angular[:, :, None])[:, :, 0]
         self._linear = velocities[:, 3:] - around
         self._spin = (inertias @ self._angular[:, :, None])[:, :, 0]
         loads = solution.loads
