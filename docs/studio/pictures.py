@@ -14,6 +14,7 @@ from typing import Final
 import bpy
 import contact_sheet
 import experiment
+import grounds
 import numpy as np
 import plot
 import puppet_curves
@@ -143,6 +144,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "swim_above": cycle_of(shots.SWIM, contact_sheet.ABOVE),
     "walk_route": along_route(_FAR_WALK, 4),
     "swim_route": along_route(shots.SWIM, 5),
+    "ground": grounds.sheet,
     "rig": rig,
     "gaits": gaits,
     "reach": reaching.reach,
