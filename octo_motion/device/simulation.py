@@ -32,6 +32,8 @@ BUSY: Final = 0.7
 FELT: Final = 0.1
 """Of the puppet's weight, held with all the force that a device has: what bends a limb is then
 felt as a good part of that."""
+_SLACK: Final = 0.1
+"""Of the puppet's size, by which a hand that lifts it all is ahead of it at most."""
 _STILL: Final = 2e-3
 _REST_SECONDS: Final = 0.3
 _PROBE: Final = 1e-3
@@ -194,31 +196,31 @@ class Simulation:
         """How firmly a hand holds: so that what it can feel fits the puppet's weight.
 
         The hand feels its own spring over the way by which the body lags behind. A world's
-        spring r times as stiff then means that r newtons on the puppet are one on the hand.
+        spring r times as stiff then means that r newtons on the puppet are one on the hand. But
+        the softest device must still move the puppet: the world's spring lifts it all when it is
+        drawn out by a tenth of the puppet's size.
         """
         figure = self.world.figure
         firm = Coupling.for_figure(figure)
         device = hand.device
         if device is None or device.force <= 0.0 or device.stiffness <= 0.0:
             return firm
-        mass = float(figure.masses.sum())
-        ratio = FELT * mass * 9.81 / device.force
-        stiffness = min(firm.stiffness, ratio * device.stiffness / hand.scale)
-        soft = stiffness / firm.stiffness
-        damping = firm.damping * float(np.sqrt(soft))
-        turning, turning_damping = firm.turning_stiffness, firm.turning_damping
+        weight = float(figure.masses.sum()) * 9.81
+        size = float(np.ptp(capsules_in_world(figure, self.world.pose()), axis=(0, 1)).max())
+        arm = float(np.median(figure.lengths))
+        softest = weight / (_SLACK * size)
+        wanted = FELT * weight / device.force * device.stiffness / hand.scale
+        stiffness = min(firm.stiffness, max(softest, wanted))
+        turning = firm.turning_stiffness
         if device.angular_stiffness > 0.0 and device.torque > 0.0:
-            arm = float(np.median(figure.lengths))
-            torque_ratio = FELT * mass * 9.81 * arm / device.torque
-            wanted = min(turning, torque_ratio * device.angular_stiffness)
-            turning_damping *= float(np.sqrt(wanted / turning))
-            turning = wanted
+            wanted = FELT * weight * arm / device.torque * device.angular_stiffness
+            turning = min(turning, max(softest * arm * arm, wanted))
         return replace(
             firm,
             stiffness=stiffness,
-            damping=damping,
+            damping=firm.damping * math.sqrt(stiffness / firm.stiffness),
             turning_stiffness=turning,
-            turning_damping=turning_damping,
+            turning_damping=firm.turning_damping * math.sqrt(turning / firm.turning_stiffness),
         )
 
     def _mobility(self, body: int, point: Floats) -> tuple[float, float]:

@@ -9,13 +9,15 @@ import math
 import numpy as np
 import pytest
 
+from octo_motion.core.posing.coupling import Coupling
 from octo_motion.core.posing.world import WorldSettings
 from octo_motion.core.rotations import from_rotation_vector
 from octo_motion.device.driver import DeviceLostError, Kind, Sample
 from octo_motion.device.haptics.local_model import Held, Pull
 from octo_motion.device.haptics.pointer import Pointer
-from octo_motion.device.messages import Settings, Workspace
+from octo_motion.device.messages import DeviceMessage, Settings, Workspace
 from octo_motion.device.simulated_hand import Hand, SimulatedHand
+from octo_motion.device.simulation import Hand as HandInWorld
 from octo_motion.device.simulation import Simulation
 from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector, length
 from tests.core.puppets import chain, posed, soft
@@ -303,6 +305,21 @@ def test_puppet_follows_the_hand_and_the_hand_feels_it(every: int) -> None:
     assert bench.work <= 0.02 + 1e-3, "no more than the store holds came out"
     # Calm at the end: the hand stands still, whatever the step of the simulation.
     assert length(bench.hand.velocity) < 0.02
+
+
+@pytest.mark.parametrize("stiffness", [5.0, 640.0, 1e6])
+@pytest.mark.parametrize("scale", [0.1, 1.0, 30.0])
+def test_softest_device_moves_the_puppet_and_the_stiffest_does_not_shake_it(
+    stiffness: float, scale: float
+) -> None:
+    bench = Bench(4)
+    told = bench.pointer.message(0.0)
+    device = DeviceMessage(*(0, True, 1, 8.0, 0.4, stiffness, 1.0, "Device", ()))
+    coupling = bench.simulation._coupling(HandInWorld(told, device, scale))
+    weight = 9.81 * float(bench.figure.masses.sum())
+    assert 0.1 * 0.7 * coupling.stiffness > 0.9 * weight  # drawn out by a tenth, it lifts all
+    assert coupling.stiffness <= Coupling.for_figure(bench.figure).stiffness
+    assert coupling.damping > 0.0
 
 
 def test_twist_of_a_held_limb_is_felt() -> None:
