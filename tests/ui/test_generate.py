@@ -740,7 +740,7 @@ def test_targets_that_are_missed_are_told(octopus: Any) -> None:
     for _ in shot.compute():
         pass
     assert shot.misses is not None
-    shot.misses[1] = 0.02
+    shot.misses[:, 1] = 0.02
     told = shot.write().warnings
     assert told == (
         "1 of 4 arms cannot follow the gait everywhere: 'Arm 1 R' stays 0.02 arm lengths away.",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...core.errors import OctoMotionError
-from .child import child_command, child_environment, read_answer, write_request
+from .child import Answer, child_command, child_environment, read_answer, write_request
 from .entry import ShotEntry
 from .fingerprint import digest, fingerprint
 from .job import Job, JobError, JobShot, Known, load_gait_file, read_job
@@ -197,7 +197,7 @@ class _Run:
                 error = str(problem)
         seconds = round(ended.seconds, 3)
         if error or answer is None:
-            self._fail(plan, error, seconds, last_lines(stage.log(name)))
+            self._fail(plan, error, seconds, last_lines(stage.log(name)), answer)
             stage.leave(name)
             return
         read = [*plan.inputs, *(Path(each) for each in answer.libraries)]
@@ -209,6 +209,9 @@ class _Run:
             frame_end=answer.frame_end,
             seconds=seconds,
             warnings=list(answer.warnings),
+            quality=answer.quality,
+            keys=answer.keys,
+            dense_keys=answer.dense_keys,
             outputs={self.relative(path): digest(path) for path in plan.entry.outputs},
             inputs={path: self.digest(path) for path in map(self.relative, read)},
             fingerprint=plan.fingerprint,
@@ -216,14 +219,29 @@ class _Run:
         stage.leave(name)
         self._tell(name, f"done, {answer.frames} frames in {seconds:.1f} s", answer.warnings)
 
-    def _fail(self, plan: _Plan, error: str, seconds: float | None = None, log: str = "") -> None:
+    def _fail(
+        self,
+        plan: _Plan,
+        error: str,
+        seconds: float | None = None,
+        log: str = "",
+        answer: Answer | None = None,
+    ) -> None:
         name = plan.entry.name
         before = self.records.get(name)
+        said = answer or Answer()
         self.records[name] = ShotRecord(
             name=name,
             status="failed",
             error=error,
+            frames=said.frames,
+            frame_start=said.frame_start,
+            frame_end=said.frame_end,
             seconds=seconds,
+            warnings=list(said.warnings),
+            quality=said.quality,
+            keys=said.keys,
+            dense_keys=said.dense_keys,
             earlier_outputs=before.written if before else {},
             log=log,
         )

@@ -9,18 +9,20 @@ import shutil
 import sys
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
 import bpy
 
 from ...core.errors import OctoMotionError
+from ..locomotion.workflow import Summary
 from .entry import ShotEntry
+from .limits import LimitError, quality
 from .outputs import remove_staged, write_json
 from .processes import dying_with_parent
 from .registration import COMMAND
-from .stage import perform
+from .stage import AnySummary, perform
 
 RUN_SHOT: Final = "--run-shot"
 """First argument of a process that makes one shot; the paths of request and answer follow."""
@@ -38,6 +40,9 @@ class Answer:
     frame_end: int | None = None
     warnings: tuple[str, ...] = ()
     libraries: tuple[str, ...] = ()
+    quality: dict[str, dict[str, Any]] = field(default_factory=dict)
+    keys: int | None = None
+    dense_keys: int | None = None
 
 
 def child_command(request: Path, answer: Path) -> list[str]:
@@ -102,6 +107,9 @@ def run_shot(request: Path, answer: Path) -> int:
     try:
         with dying_with_parent(clean_up):
             performed = perform(entry, places)
+    except LimitError as error:
+        write_json(answer, {"error": str(error), **_said(error.summary)})
+        return 1
     except OctoMotionError as error:
         write_json(answer, {"error": str(error)})
         return 1
@@ -109,13 +117,19 @@ def run_shot(request: Path, answer: Path) -> int:
         traceback.print_exc()
         write_json(answer, {"error": f"{type(error).__name__}: {error}"})
         return 1
-    summary = performed.summary
+    write_json(answer, {**_said(performed.summary), "libraries": performed.libraries})
+    return 0
+
+
+def _said(summary: AnySummary) -> dict[str, Any]:
+    """What an answer says of a motion."""
     said: dict[str, Any] = {
         "frames": summary.frames,
         "frame_start": summary.frame_start,
         "frame_end": summary.frame_end,
         "warnings": summary.warnings,
-        "libraries": performed.libraries,
     }
-    write_json(answer, said)
-    return 0
+    if isinstance(summary, Summary):
+        said["quality"] = quality(summary.figures)
+        said["keys"], said["dense_keys"] = summary.keys, summary.dense_keys
+    return said

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from .entry import EXPORT_SUFFIXES, HIGHEST_FPS, MOST_FRAMES
+from .limits import NAMES
 
 _STATUS: Final = "Exit status: 0 all went well, 1 something failed, 2 wrong arguments or job."
 
@@ -57,6 +58,7 @@ A job file is TOML; its paths are relative to its folder. [defaults] is for all 
   fps = 25
   output = "shots/{name}.blend"
   settings = { timing = "SPEED", speed = 0.4 }
+  limits = { slip = 0.01, depth = 0.005, turn = 45.0 }   # worse, and the shot fails
 
   [[shots]]
   name = "along_the_wall"
@@ -130,6 +132,15 @@ def _add_generate(
         "--gait", metavar="NAME", default="", help="a gait by name, or a gait file (.json)"
     )
     _add_settings(command, "a setting, such as speed=0.4, sway=12° or table.stride=1.2")
+    command.add_argument(
+        "--limit",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        dest="limits",
+        help=f"write nothing if a figure of the motion ({', '.join(NAMES)}) is above; "
+        "may be repeated",
+    )
 
 
 def _add_splice(

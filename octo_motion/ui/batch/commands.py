@@ -13,12 +13,14 @@ import bpy
 
 from ...core.errors import OctoMotionError, SettingsError, WriteError
 from ...core.locomotion import gait
+from ..locomotion.workflow import Summary
 from .bake import STOPPED, BakeOptions, bake
 from .child import RUN_SHOT, run_shot
 from .command_line import parse
 from .entry import ShotEntry, SpliceWork
 from .job import Known, export_fault, is_gait_file, read_gait_file
 from .known import check_file, known
+from .limits import parse_limits, told
 from .motion_files import is_motion
 from .outputs import commit, staged
 from .processes import stoppable
@@ -77,6 +79,8 @@ def _make(options: argparse.Namespace) -> int:
     for warning in performed.summary.warnings:
         _say(f"Warning: {warning}")
     _say(f"{performed.armature}: {performed.summary.message}")
+    if isinstance(performed.summary, Summary):
+        _say(f"Quality: {told(performed.summary.figures)}.")
     for path in entry.outputs:
         _say(f"Written: {path}")
     return 0
@@ -97,6 +101,7 @@ def _entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
         route=options.route,
         gait=_gait(options.gait, may_name),
         settings=_settings(options, may_name.settings),
+        limits=parse_limits(options.limits),
         fps=options.fps,
         output=output,
         exports=exports,

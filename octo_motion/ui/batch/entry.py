@@ -87,6 +87,8 @@ class ShotEntry:
     """What to splice."""
     posing: Path | None = None
     """The pose script to play. With neither: the armature is to walk or swim."""
+    limits: dict[str, float] = field(default_factory=dict)
+    """How bad the figures of its motion may be, by name; see ``limits``."""
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -133,6 +135,7 @@ class ShotEntry:
             exports=tuple(Path(path) for path in plain["exports"]),
             splicing=_splice_work(plain["splicing"]) if plain["splicing"] else None,
             posing=Path(plain["posing"]) if plain["posing"] else None,
+            limits=plain["limits"],
         )
 
 

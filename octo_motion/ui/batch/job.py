@@ -30,6 +30,7 @@ from .entry import (
     ShotEntry,
     SpliceWork,
 )
+from .limits import read_limits
 from .motion_files import is_motion
 from .setting_values import Setting, check_settings, unknown
 from .splice_job import read_splices
@@ -37,7 +38,7 @@ from .splice_job import read_splices
 KINDS: Final = {
     "generate": (
         *("name", "kind", "file", "octopus", "armature", "route", "gait", "settings", "fps"),
-        *("output", "export"),
+        *("limits", "output", "export"),
     ),
     "splice": (
         *("name", "kind", "file", "armature", "base", "frames", "splices", "settings", "fps"),
@@ -187,7 +188,11 @@ def _merged(defaults: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
             merged.pop(other, None)
     for key, value in table.items():
         shared = merged.get(key)
-        if key in {"settings", "octopus"} and isinstance(value, dict) and isinstance(shared, dict):
+        if (
+            key in {"settings", "octopus", "limits"}
+            and isinstance(value, dict)
+            and isinstance(shared, dict)
+        ):
             merged[key] = _united(shared, value)
         else:
             merged[key] = value
@@ -258,6 +263,7 @@ class _Reader:
             fps=self._fps(),
             output=output,
             exports=exports,
+            limits=self._limits(),
         )
         return JobShot(entry, self._table, gait_file)
 
@@ -431,6 +437,12 @@ class _Reader:
         for fault in faults:
             self._fault(fault)
         return values
+
+    def _limits(self) -> dict[str, float]:
+        limits, faults = read_limits(self._table.get("limits", {}))
+        for fault in faults:
+            self._fault(fault)
+        return limits
 
     def _fps(self) -> float | None:
         fps = self._table.get("fps")

@@ -32,6 +32,12 @@ class ShotRecord:
     seconds: float | None = None
     """What the shot took when it was baked."""
     warnings: list[str] = field(default_factory=list)
+    quality: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """The worst of each figure, of a motion that was generated."""
+    keys: int | None = None
+    """Its keys …"""
+    dense_keys: int | None = None
+    """… and how many there would be with one per frame."""
     outputs: dict[str, str] = field(default_factory=dict)
     """Digest of each file that was written."""
     inputs: dict[str, str] = field(default_factory=dict)

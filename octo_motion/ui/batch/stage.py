@@ -24,6 +24,7 @@ from . import pose_stage, splice_stage
 from .blender_said import blender_said
 from .entry import NewRoute, ShotEntry, frame_rate
 from .exports import check_export, export
+from .limits import check_limits
 from .motion_files import is_motion
 
 _ROUTE_NAME: Final = "Octopus Route"
@@ -31,11 +32,14 @@ _COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 """How files compressed with Zstandard and with gzip begin."""
 
 
+AnySummary = Summary | splice_stage.SpliceSummary | pose_stage.PoseSummary
+
+
 @dataclass(frozen=True)
 class Performed:
     """What came of a shot."""
 
-    summary: Summary | splice_stage.SpliceSummary | pose_stage.PoseSummary
+    summary: AnySummary
     armature: str
     libraries: tuple[str, ...]
     """Paths of the files that the scene is linked from, and of those that clips consist of."""
@@ -50,6 +54,7 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
+        LimitError: the motion is not as good as it has to be; nothing has been written.
     """
     clips = splice_stage.Clips()
     motion = entry.file if entry.splicing and entry.file and is_motion(entry.file) else None
@@ -75,6 +80,7 @@ def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
         else:
             _apply(entry, armature, scene)
             summary = generate(armature, bpy.context)
+            check_limits(entry.limits, summary)
         if entry.octopus is not None or motion is not None:
             scene.frame_start, scene.frame_end = summary.frame_start, summary.frame_end
         if entry.output is not None:

@@ -64,7 +64,7 @@ class Moved:
     late: Floats
     """(frames, arms) arm lengths from an arm to the foothold that it cannot reach."""
     misses: Floats
-    """(arms,) largest of each arm, of targets."""
+    """(frames, arms) arm lengths from an arm to the targets of its gait."""
     lying: Sequence[np.ndarray]
     """For each arm (frames, joints) which rest on the ground."""
     cycles: np.ndarray
@@ -118,7 +118,7 @@ class Changing:
                 np.zeros((count, total, 4)),
                 np.zeros((count, total)),
                 np.zeros((count, arms)),
-                np.zeros(arms),
+                np.zeros((count, arms)),
                 [np.zeros((count, bones + 1), dtype=bool) for bones in self.bones],
                 np.zeros((count, arms), dtype=np.int64),
             )
@@ -208,7 +208,7 @@ class Changing:
         else:
             posed = way.generator.pose(travel.phase, travel.turn)
             moved.rotations[chosen] = posed.rotations
-            np.maximum(moved.misses, posed.misses.max(axis=(0, 2)), out=moved.misses)
+            moved.misses[chosen] = posed.misses.max(axis=2)
 
     def _joined(self, first: Moved, second: Moved, shares: Floats) -> Moved:
         per_bone = np.repeat(shares, self.bones, axis=1)
@@ -219,12 +219,16 @@ class Changing:
             inside = slice(int(part[0]), int(part[-1]) + 1)
             turned = blended(first.rotations[inside], second.rotations[inside], per_bone[inside])
             rotations[inside] = np.where(going[inside][..., None], turned, rotations[inside])
-        late = np.where(shares >= 1.0, second.late, np.where(shares <= 0.0, first.late, 0.0))
+        # On the way from one to the other an arm has no place of its own to be at.
+        late, misses = (
+            np.where(shares >= 1.0, there, np.where(shares <= 0.0, here, 0.0))
+            for here, there in ((first.late, second.late), (first.misses, second.misses))
+        )
         return Moved(
             rotations,
             first.strains + per_bone * (second.strains - first.strains),
             late,
-            np.maximum(first.misses, second.misses),
+            misses,
             [
                 np.where(share >= 1.0, there, here & (share <= 0.0))
                 for share, here, there in zip(

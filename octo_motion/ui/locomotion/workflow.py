@@ -38,6 +38,7 @@ from ...core.locomotion.arm_frames import arm_frames
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.changes import between
 from ...core.locomotion.detection import Detection, detect_arms
+from ...core.locomotion.figures import Figure, Measured, Poses, figures
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
@@ -56,7 +57,7 @@ from .changing import Changing, Moved, Way, gaits_of, read_changes
 from .changing import plan as plan_changes
 from .in_place import breathing_channels
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
-from .quality_report import Figure, Measured, figures, write_figures
+from .quality_report import write_figures
 from .reach_motion import Carried, Reaching, Travelling, read_reaches, write_carried
 from .reduced import Body, Motion, Tolerances, reduced
 from .standing import Standing, read_standing
@@ -178,7 +179,7 @@ class Shot:
     locations: Floats | None = None
     orientations: Floats | None = None
     misses: Floats | None = None
-    """(arms,) largest of each arm."""
+    """(frames, arms) arm lengths from an arm to the targets of its gait."""
     strains: Floats | None = None
     """(frames, bones) by how much each bone is longer than at rest, as a share."""
     out_of_reach: Floats | None = None
@@ -212,7 +213,7 @@ class Shot:
         count, bones = len(self.frames), len(self.generator.bones)
         rotations = np.empty((count, bones, 4))
         strains, late = np.zeros((count, bones)), np.zeros((count, len(self.arms)))
-        misses = np.zeros(len(self.arms))
+        misses = np.zeros((count, len(self.arms)))
         lying = [np.zeros((count, len(arm.bones) + 1), dtype=bool) for arm in self.arms]
         cycles = np.zeros((count, len(self.arms)), dtype=np.int64)
         step = max(1, _BONES_AT_ONCE // max(bones, 1))
@@ -238,14 +239,16 @@ class Shot:
             else:
                 poses = self.generator.pose(travel.phase[part], travel.turn[part])
                 rotations[part] = poses.rotations
-                misses = np.maximum(misses, poses.misses.max(axis=(0, 2)))
+                misses[part] = poses.misses.max(axis=2)
             if part.stop < count:
                 yield part.stop / count
         if self.reaching is not None:
             travelling = Travelling(locations, orientations, self.scale)
             reached = self.reaching.apply(self.frames, rotations, travelling, strains)
+            before = rotations.copy()
             self.reached, self.carried = reached
         separation, every = None, 1
+            self._let_go(np.any(rotations != before, axis=-1), lying, late, misses)
         if self.apart is not None:
             separation, every = self.apart.measure(rotations, strains)
             self.overlaps = self.apart.told(separation, every, self.frames)
@@ -254,9 +257,17 @@ class Shot:
             frames = [arm_frames(self.skeleton, arm.bones, self.body) for arm in self.arms]
             self.figures = figures(
                 Measured(
-                    *(self.frames, frames, names, rotations, strains, np.maximum(late, misses)),
-                    *(locations, orientations, self.scale, self._ground(), lying, cycles),
-                    *(separation, every),
+                    frames=self.frames,
+                    arms=frames,
+                    names=names,
+                    poses=Poses(rotations, strains, locations, orientations),
+                    misses=np.maximum(late, misses),
+                    scale=self.scale,
+                    ground=self._ground(),
+                    lying=lying,
+                    cycles=cycles,
+                    separation=separation,
+                    every=every,
                 )
             )
         self.rotations, self.misses = rotations, misses
@@ -265,6 +276,25 @@ class Shot:
         yield 1.0
 
     def _ground(self) -> Ground | None:
+    def _let_go(
+        self, moved: np.ndarray, lying: Sequence[np.ndarray], late: Floats, misses: Floats
+    ) -> None:
+        """Note in place that arms which reach hold no ground and follow no gait.
+
+        Args:
+            moved: (frames, bones) which bones reach.
+            lying: for each arm (frames, joints) which rest on the ground.
+            late: (frames, arms) arm lengths to footholds.
+            misses: (frames, arms) arm lengths to targets.
+        """
+        start = 0
+        for number, arm in enumerate(self.arms):
+            own = moved[:, start : start + len(arm.bones)]
+            start += len(arm.bones)
+            lying[number][:, 1:] &= ~np.logical_or.accumulate(own, axis=1)
+            reaches = own.any(axis=1)
+            late[reaches, number] = misses[reaches, number] = 0.0
+
         """What the arms stand on, where they do."""
         ways = self.changing.ways if self.changing is not None else ()
         stands = [each for each in (self.standing, *(way.standing for way in ways)) if each]
@@ -396,13 +426,14 @@ class Shot:
                 "Stretch or shorten the stride."
             )
             return [told]
-        worst = int(self.misses.argmax())
-        if self.misses[worst] <= MISS:
+        misses = self.misses.max(axis=0)
+        worst = int(misses.argmax())
+        if misses[worst] <= MISS:
             return []
-        many = int((self.misses > MISS).sum())
+        many = int((misses > MISS).sum())
         told = (
             f"{many} of {len(self.arms)} arms cannot follow the gait everywhere: "
-            f"'{self.arms[worst].name}' stays {self.misses[worst]:.2g} arm lengths away."
+            f"'{self.arms[worst].name}' stays {misses[worst]:.2g} arm lengths away."
         )
         return [told]
 
