@@ -244,11 +244,11 @@ class Shot:
                 yield part.stop / count
         if self.reaching is not None:
             travelling = Travelling(locations, orientations, self.scale)
-            reached = self.reaching.apply(self.frames, rotations, travelling, strains)
             before = rotations.copy()
+            reached = self.reaching.apply(self.frames, rotations, travelling, strains)
             self.reached, self.carried = reached
-        separation, every = None, 1
             self._let_go(np.any(rotations != before, axis=-1), lying, late, misses)
+        separation, every = None, 1
         if self.apart is not None:
             separation, every = self.apart.measure(rotations, strains)
             self.overlaps = self.apart.told(separation, every, self.frames)
@@ -275,7 +275,6 @@ class Shot:
         self.locations, self.orientations = locations, orientations
         yield 1.0
 
-    def _ground(self) -> Ground | None:
     def _let_go(
         self, moved: np.ndarray, lying: Sequence[np.ndarray], late: Floats, misses: Floats
     ) -> None:
@@ -295,6 +294,7 @@ class Shot:
             reaches = own.any(axis=1)
             late[reaches, number] = misses[reaches, number] = 0.0
 
+    def _ground(self) -> Ground | None:
         """What the arms stand on, where they do."""
         ways = self.changing.ways if self.changing is not None else ()
         stands = [each for each in (self.standing, *(way.standing for way in ways)) if each]
