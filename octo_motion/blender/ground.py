@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.errors import GroundError
 from ..core.locomotion.chains import joint_positions
+from ..core.remembered import Remembered, key_of
 from ..core.rotations import Floats
 from ..core.skeleton import Skeleton
 
@@ -20,12 +21,22 @@ _THICKEST: Final = 0.2
 """Arm lengths from an arm's middle line: what is further away is not its skin."""
 _SLENDER: Final = (0.03, 0.008)
 """Radius of an arm without a skin at its root and at its tip, in arm lengths."""
-_SHARE: Final = 0.5
+_ROUNDED: Final = 1e-5
+"""Share of an armature's size, and of 1, to which it is known where its skin is."""
+_SHARE: Final = 0.7
 """Of the points round a joint, the share that lies nearer to it than its radius."""
 
 
-def read_triangles(ground: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+_radii_known: Final[Remembered[list[Floats]]] = Remembered(4)
+_faces_known: Final[Remembered[Floats]] = Remembered(2)
+
+
+def read_triangles(
+    ground: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats, bytes]:
     """The faces of a mesh object as it is seen, modifiers and all, (faces, 3, 3) world.
+
+    With them comes a key of their content, for what is made from them.
 
     Raises:
         GroundError: the object is no mesh, or has no faces.
@@ -47,8 +58,13 @@ def read_triangles(ground: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> 
     finally:
         evaluated.to_mesh_clear()
     world = np.array(evaluated.matrix_world, dtype=np.float64)
-    moved = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
-    return moved[corners]
+    key = key_of(points, corners, world)
+
+    def placed() -> Floats:
+        moved = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+        return moved[corners]
+
+    return _faces_known.get(key, placed), key
 
 
 def arm_radii(
@@ -58,8 +74,13 @@ def arm_radii(
 
     Where no mesh hangs on the armature, arms are taken to be slender.
     """
-    points = _skin(armature)
     joints = [joint_positions(skeleton, bones) for bones in arms]
+    points = _skin(armature, float(np.ptp(np.concatenate(joints), axis=0).max()))
+    return _radii_known.get(key_of(points, joints), lambda: _arm_radii(points, joints))
+
+
+def _arm_radii(points: Floats, joints: Sequence[Floats]) -> list[Floats]:
+    """The same from points (n, 3) of the skin and each arm's joints (bones + 1, 3)."""
     lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
     slender = [
         length * np.linspace(*_SLENDER, len(each))
@@ -76,8 +97,13 @@ def arm_radii(
     return radii
 
 
-def _skin(armature: bpy.types.Object) -> Floats:
-    """Some points (n, 3) of the meshes that the armature moves, at rest, armature space."""
+def _skin(armature: bpy.types.Object, size: float) -> Floats:
+    """Some points (n, 3) of the meshes that the armature moves, at rest, armature space.
+
+    Args:
+        armature: the armature object.
+        size: how large it is, armature units.
+    """
     inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
     parts: list[Floats] = []
     for item in armature.children_recursive:
@@ -87,6 +113,9 @@ def _skin(armature: bpy.types.Object) -> Floats:
         points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
         mesh.vertices.foreach_get("co", points.ravel())
         place = inverse @ np.array(item.matrix_world, dtype=np.float64)
+        # Wherever the armature has walked to, its skin is as thick.
+        place[:3, :3] = np.round(place[:3, :3] / _ROUNDED) * _ROUNDED
+        place[:3, 3] = np.round(place[:3, 3] / (_ROUNDED * size)) * (_ROUNDED * size)
         parts.append(points.astype(np.float64) @ place[:3, :3].T + place[:3, 3])
     whole = np.concatenate(parts) if parts else np.empty((0, 3))
     return whole[:: max(1, len(whole) // _MOST_POINTS)]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -348,6 +349,11 @@ def _arm_of(key: str) -> tuple[int, str]:
 
 def presets() -> dict[str, GaitTable]:
     """The gaits that come with the extension, by name."""
+    return dict(_shipped())
+
+
+@cache
+def _shipped() -> dict[str, GaitTable]:
     tables = (
         from_json(path.read_text(encoding="utf-8"), path.name)
         for path in sorted((Path(__file__).parent / "gaits").glob("*.json"))

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from ..errors import RigError, SettingsError
+from ..remembered import Remembered, key_of
 from ..rotations import Floats, from_axis_angle, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
 from .arm import GROUPS, group_lengths, split_groups
@@ -29,6 +30,8 @@ from .targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targ
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _CHUNK: Final = 4096
 """Arms solved at a time, counted over frames: what stays within a processor's cache."""
+_FEW: Final = 100
+"""Shapes that are kept: of a few arms at a few frames, which cost as much to start as many."""
 _CYCLE_SAMPLES: Final = 96
 """Phases at which a cycle is looked at as a whole."""
 _STANDING: Final = 0.3
@@ -165,6 +168,7 @@ class Generator:
         self._sway = settings.sway * sway
         self._builds = self._group(segments)
         self._floor = -np.inf
+        self._few: Remembered[tuple[Floats, Floats]] = Remembered()
         if settings.stand and gait.on_ground:
             floor = float(np.quantile(self._cycle_depths(), _STANDING))
             if floor < -_LEAST_DEPTH * self.arm_length:
@@ -324,6 +328,13 @@ class Generator:
             angles: (frames, arms, links, 3) of these, from :meth:`asked`.
             steering: (frames, arms) of these.
         """
+        if angles.shape[0] * angles.shape[1] > _FEW:
+            return self._shapes(build, angles, steering)
+        # What is asked again and again, about a gait as such.
+        key = key_of(build.arms, angles, steering)
+        return self._few.get(key, lambda: self._shapes(build, angles, steering))
+
+    def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
         frames, arms = angles.shape[:2]
         batch = frames * arms
         width = build.widths * (1.0 + contraction(angles, self._settings.contraction)) ** (

@@ -7,21 +7,27 @@ table, for all frames, arms and joints at once. Heights between the samples are 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 import numpy as np
 
 from ..errors import GroundError
+from ..remembered import Remembered, key_of
 from ..rotations import Floats
 
 _EDGE: Final = 1e-6
 """Share of a face by which it reaches beyond its edges, so that none falls between two."""
 _AT_ONCE: Final = 2_000_000
 """Pairs of faces and samples that are looked at together."""
+_BLOCK: Final = 16
+"""Samples: a ground's border lies at multiples of as many from the world's origin."""
 _MOST_SAMPLES: Final = 4_000_000
 """Samples of a ground; a longer route is sampled more coarsely."""
+
+
+_extents: Final[Remembered[tuple[Floats, Floats]]] = Remembered(3)
 
 
 class Ground(Protocol):
@@ -108,11 +114,13 @@ def sampled(
     reach: float,
     spacing: float,
     headroom: float,
+    content: bytes | None = None,
 ) -> HeightField:
     """The ground that faces make along a path.
 
     Of several surfaces one above the other, the highest counts that is not further than the
-    headroom above the path: what a creature walks on, not the roof above it.
+    headroom above the path: what a creature walks on, not the roof above it. Where the samples lie
+    does not depend on the path: another path over the same place finds the same ground.
 
     Args:
         triangles: (faces, 3, 3) corners, world.
@@ -121,6 +129,8 @@ def sampled(
         reach: metres to all sides of the path that are sampled.
         spacing: metres between samples.
         headroom: metres.
+        content: a key of the faces' content, where it is known, so that they need not be looked at
+            again for another path.
 
     Raises:
         GroundError: there are no faces, or none under some point of the path.
@@ -129,10 +139,16 @@ def sampled(
         raise GroundError("The ground has no faces.", "Choose a mesh that has faces.")
     low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
     spacing = max(spacing, float(np.sqrt(np.prod(high - low) / _MOST_SAMPLES)))
-    shape = tuple(int(each) + 2 for each in np.ceil((high - low) / spacing))
+    block = _BLOCK * spacing
+    low, high = block * np.floor(low / block), block * np.ceil(high / block)
+    shape = tuple(int(each) + 1 for each in np.rint((high - low) / spacing))
     grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
     coarse = _near_path(grid, path, reach)
-    heights = _rasterised(triangles, grid, coarse(path[:, 2]) + headroom)
+    if content is None:
+        content = key_of(triangles)
+    key = key_of(content, grid.origin, spacing, shape)
+    lowest, highest = _extents.get(key, lambda: _extent(triangles, grid))
+    heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
     inside = np.flatnonzero(needed)
     bare = np.isnan(heights[_nearest(grid, path[inside])])
     if np.any(bare):
@@ -157,7 +173,10 @@ def along_path(path: Floats, *, reach: float, spacing: float, softness: float) -
         return Plane(float(path[:, 2].mean()))
     low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
     spacing = max(spacing, float(np.sqrt(np.prod(high - low) * len(path) / _MOST_SAMPLES / 4.0)))
-    x, y = (np.arange(np.ceil((b - a) / spacing) + 2) * spacing + a for a, b in zip(low, high))
+    x, y = (
+        np.arange(np.ceil((end - start) / spacing) + 2) * spacing + start
+        for start, end in zip(low, high, strict=True)
+    )
     heights = np.empty((len(x), len(y)))
     for column, place in enumerate(x):
         apart = (place - path[:, 0]) ** 2 + (y[:, None] - path[:, 1]) ** 2
@@ -176,7 +195,10 @@ def passes_over_itself(path: Floats, apart: float, above: float) -> bool:
 
 
 def _near_path(grid: HeightField, path: Floats, reach: float) -> Callable[[Floats], Floats]:
-    """A function that spreads a value of each point of the path over the samples near it."""
+    """A function that spreads a value of each point of the path over the samples near it.
+
+    It reaches into the corners beside the path's ends, and NaN is what lies beyond.
+    """
     factor = max(1, int(0.25 * reach / grid.spacing))
     nx, ny = (-(-each // factor) for each in grid.heights.shape)
     width = factor * grid.spacing
@@ -187,7 +209,7 @@ def _near_path(grid: HeightField, path: Floats, reach: float) -> Callable[[Float
     for column, place in enumerate(x):
         apart = (place - path[:, 0]) ** 2 + (y[:, None] - path[:, 1]) ** 2
         nearest[column] = apart.argmin(axis=1)
-        far[column] = apart.min(axis=1) > (reach + width) ** 2
+        far[column] = apart.min(axis=1) > (1.5 * reach + width) ** 2
 
     def spread(values: Floats) -> Floats:
         coarse = np.where(far, np.nan, values[nearest])
@@ -202,15 +224,38 @@ def _nearest(grid: HeightField, points: Floats) -> tuple[np.ndarray, np.ndarray]
     return place[:, 0], place[:, 1]
 
 
-def _rasterised(triangles: Floats, grid: HeightField, ceiling: Floats) -> Floats:
+def _extent(triangles: Floats, grid: HeightField) -> tuple[Floats, Floats]:
+    """Lowest and highest of all faces at each sample (nx, ny); +∞ and −∞ where there is none."""
+    lowest, highest = np.full(grid.heights.size, np.inf), np.full(grid.heights.size, -np.inf)
+    for place, z in _hits(triangles, grid):
+        np.minimum.at(lowest, place, z)
+        np.maximum.at(highest, place, z)
+    return lowest.reshape(grid.heights.shape), highest.reshape(grid.heights.shape)
+
+
+def _beneath(
+    triangles: Floats, grid: HeightField, ceiling: Floats, lowest: Floats, highest: Floats
+) -> Floats:
     """Heights (nx, ny) of the faces at the samples; NaN where there is none, or no ceiling.
 
     The highest below the ceiling; where there is none, the lowest above it.
     """
+    heights = np.where(highest <= ceiling, highest, np.where(lowest > ceiling, lowest, np.nan))
+    heights[~np.isfinite(heights)] = np.nan
+    between = (lowest <= ceiling) & (highest > ceiling)
+    if np.any(between):
+        # Only where faces are on both sides does it matter which ones there are.
+        below, limit = np.full(heights.size, -np.inf), ceiling.ravel()
+        for place, z in _hits(triangles, grid):
+            low = z <= limit[place]
+            np.maximum.at(below, place[low], z[low])
+        heights[between] = below.reshape(heights.shape)[between]
+    return heights
+
+
+def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Floats]]:
+    """Numbers of samples and heights there, of faces that lie over or under them, in blocks."""
     shape = grid.heights.shape
-    below = np.full(shape[0] * shape[1], -np.inf)
-    above = np.full(shape[0] * shape[1], np.inf)
-    limit = ceiling.ravel()
     corners = triangles[..., :2] - np.array(grid.origin)
     corners = corners / grid.spacing
     first = np.maximum(np.ceil(corners.min(axis=1) - _EDGE), 0.0).astype(np.int64)
@@ -234,31 +279,30 @@ def _rasterised(triangles: Floats, grid: HeightField, ceiling: Floats) -> Floats
         third = (y * edges[face, 0, 0] - x * edges[face, 0, 1]) / area[face]
         hit = (second >= -_EDGE) & (third >= -_EDGE) & (second + third <= 1.0 + _EDGE)
         face, second, third = face[hit], second[hit], third[hit]
-        place = column[hit] * shape[1] + row[hit]
         corner = triangles[face, :, 2]
         z = corner[:, 0]
         z = z + second * (corner[:, 1] - z) + third * (corner[:, 2] - z)
-        low = z <= limit[place]
-        np.maximum.at(below, place[low], z[low])
-        high = z > limit[place]
-        np.minimum.at(above, place[high], z[high])
-    heights = np.where(np.isfinite(below), below, above)
-    return np.where(np.isfinite(heights), heights, np.nan).reshape(shape)
+        yield column[hit] * shape[1] + row[hit], z
 
 
 def _filled(heights: Floats) -> Floats:
-    """Heights whose gaps go on level from their borders."""
-    filled = heights.copy()
-    while np.any(missing := np.isnan(filled)):
-        padded = np.pad(filled, 1, constant_values=np.nan)
-        around = np.stack(
-            [padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]]
-        )
-        known = ~np.isnan(around)
-        count = known.sum(axis=0)
-        spread = np.where(known, around, 0.0).sum(axis=0) / np.maximum(count, 1)
-        grown = missing & (count > 0)
-        if not np.any(grown):
-            break
-        filled[grown] = spread[grown]
-    return filled
+    """Heights whose gaps go on level from their borders, ring by ring."""
+    padded = np.pad(heights, 1, constant_values=np.nan)
+    width = padded.shape[1]
+    flat = padded.ravel()
+    gap = np.isnan(flat)
+    border = np.ones(padded.shape, dtype=bool)
+    border[1:-1, 1:-1] = False
+    gap &= ~border.ravel()
+    steps = np.array([width, -width, 1, -1])
+    known = np.flatnonzero(~np.isnan(flat))
+    # Only what lies next to a ring that was filled can be filled next.
+    while len(known):
+        beside = (known[:, None] + steps).ravel()
+        ring = np.unique(beside[gap[beside]])
+        around = flat[ring[:, None] + steps]
+        there = ~np.isnan(around)
+        flat[ring] = np.where(there, around, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
+        gap[ring] = False
+        known = ring
+    return padded[1:-1, 1:-1].copy()

@@ -24,6 +24,7 @@ from ...core.locomotion.grounded import GroundedPoses, GroundedWalk
 from ...core.locomotion.rhythm import crawling
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, strides, walked_at
+from ...core.remembered import Remembered, key_of
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
 from .ground_properties import OCTO_MOTION_PG_ground, stance_settings
@@ -45,6 +46,9 @@ _OVER_ITSELF: Final = (
     "The route passes over itself: the ground between its levels is half way up. Choose a mesh as "
     "the ground, or switch Hold the Ground off."
 )
+
+
+_grounds: Final[Remembered[Ground]] = Remembered(2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +120,9 @@ def read_standing(
     if settings.object is None and plane is not None:
         ground, warnings = Plane(plane), ()
     else:
-        ground, warnings = _ground(settings, depsgraph, route, travel, bearings, reach)
+        ground, warnings = _ground(
+            settings, depsgraph, route=route, travel=travel, bearings=bearings, reach=reach
+        )
     radii = arm_radii(armature, skeleton, [arm.bones for arm in arms])
     if height is None:
         thickness = float(np.mean([each[len(each) // 2] for each in radii]))
@@ -152,7 +158,7 @@ def read_standing(
             body,
             along,
             ground,
-            stance,
+            settings=stance,
             scale=scale,
             radii=radii,
             may_stretch=stretch,
@@ -168,11 +174,13 @@ def read_standing(
 def _ground(
     settings: OCTO_MOTION_PG_ground,
     depsgraph: bpy.types.Depsgraph,
+    *,
     route: Route,
     travel: TravelSettings,
     bearings: Bearings,
     reach: float,
 ) -> tuple[Ground, tuple[str, ...]]:
+    """The ground of a walk, and what there is to warn of."""
     beyond = 0.0 if route.cyclic else travel.stride + reach
     count = int(np.ceil((route.length + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
     distance = np.linspace(-beyond, route.length + beyond, count)
@@ -186,15 +194,10 @@ def _ground(
         ground = along_path(path, reach=around, spacing=spacing, softness=0.3 * reach)
         return ground, warnings
     inside = (distance >= 0.0) & (distance <= route.length)
-    triangles = read_triangles(settings.object, depsgraph)
-    return (
-        sampled(
-            triangles,
-            path,
-            inside,
-            reach=_AROUND * reach,
-            spacing=_FINE * reach,
-            headroom=_HEADROOM * reach,
-        ),
-        (),
+    triangles, content = read_triangles(settings.object, depsgraph)
+    sizes = {"reach": _AROUND * reach, "spacing": _FINE * reach, "headroom": _HEADROOM * reach}
+    ground = _grounds.get(
+        key_of(content, path, inside, sizes),
+        lambda: sampled(triangles, path, inside, **sizes, content=content),
     )
+    return ground, ()

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Results that are kept for the next time, by the content of what they were made from.
+
+For functions whose result depends on nothing but their arguments. The key is a hash of all of
+these, arrays included: a changed number is another key, so what is kept can be old, but not wrong.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import weakref
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Generic, TypeVar
+
+import numpy as np
+
+_Result = TypeVar("_Result")
+
+_ALL: Final[weakref.WeakSet[Remembered[Any]]] = weakref.WeakSet()
+
+
+class Remembered(Generic[_Result]):
+    """The last few results of one function.
+
+    Args:
+        most: how many are kept; of more, the one that was not asked for longest goes.
+    """
+
+    def __init__(self, most: int = 8) -> None:
+        self._most = most
+        self._kept: OrderedDict[bytes, _Result] = OrderedDict()
+        _ALL.add(self)
+
+    def get(self, key: bytes, make: Callable[[], _Result]) -> _Result:
+        """What was made for this key, else what is made now. It must not be changed afterwards.
+
+        Args:
+            key: from :func:`key_of`, of everything that the result depends on.
+            make: makes it; if it raises, nothing is kept.
+        """
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        made = make()
+        self._kept[key] = made
+        while len(self._kept) > self._most:
+            self._kept.popitem(last=False)
+        return made
+
+    def __len__(self) -> int:
+        """How many results are kept."""
+        return len(self._kept)
+
+    def clear(self) -> None:
+        """Keep nothing."""
+        self._kept.clear()
+
+
+def forget() -> None:
+    """Keep no result of any function: another file, another world."""
+    for each in list(_ALL):
+        each.clear()
+
+
+def key_of(*values: Any) -> bytes:
+    """A hash of values: numbers, texts, arrays, and tuples, mappings and dataclasses of them.
+
+    Raises:
+        TypeError: a value's content is not known to be all that there is to it.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    for value in values:
+        _add(digest, value)
+    return digest.digest()
+
+
+def _add(digest: hashlib.blake2b, value: Any) -> None:
+    # Each begins with its type and its size: no two rows of values read the same.
+    if isinstance(value, np.ndarray):
+        if value.dtype.hasobject:
+            raise TypeError("arrays of objects have no content of their own")
+        digest.update(f"array {value.dtype.str} {value.shape};".encode())
+        digest.update(np.ascontiguousarray(value).data if value.size else b"")
+    elif value is None or isinstance(value, (bool, int, float, np.generic)):
+        digest.update(f"{type(value).__name__} {value!r};".encode())
+    elif isinstance(value, str):
+        encoded = value.encode()
+        digest.update(f"text {len(encoded)};".encode() + encoded)
+    elif isinstance(value, bytes):
+        digest.update(f"bytes {len(value)};".encode() + value)
+    elif isinstance(value, (tuple, list)):
+        digest.update(f"row {len(value)};".encode())
+        for each in value:
+            _add(digest, each)
+    elif isinstance(value, Mapping):
+        digest.update(f"mapping {len(value)};".encode())
+        for name, each in value.items():
+            _add(digest, name)
+            _add(digest, each)
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = dataclasses.fields(value)
+        digest.update(f"{type(value).__qualname__} {len(fields)};".encode())
+        for each in fields:
+            _add(digest, getattr(value, each.name))
+    else:
+        raise TypeError(f"the content of a {type(value).__name__} is not known")
