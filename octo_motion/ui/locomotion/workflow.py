@@ -48,6 +48,7 @@ from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import TravelSettings, duration, plan_travel, strides
+from ...core.remembered import Remembered, key_of
 from ...core.rotations import IDENTITY, Floats, from_matrix, rotate
 from ...core.skeleton import Skeleton
 from ..plain import plain
@@ -72,7 +73,7 @@ LAST_FRAME: Final = 1_048_574
 MISS: Final = 1e-3
 """Arm lengths by which a target may be missed without a word."""
 
-_RESULTS: Final = frozenset({"result", "shown", "figures"})
+_RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
 """What is no setting, though it is kept with them."""
 _WEIGHT_SAMPLES: Final = 33
 _ROUTE_SAMPLES: Final = 257
@@ -493,12 +494,14 @@ def generate(armature: bpy.types.Object, context: bpy.types.Context) -> Summary:
     return shot.write()
 
 
-def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
+def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Shot:
     """Read all that the journey of an armature needs. Nothing is changed.
 
     Args:
         armature: the armature object, with its settings.
         context: for the scene, its frame rate and its evaluated state.
+        live: whether it is to be quick: the same motion with a key on every frame, and without
+            figures of how good it is.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -519,7 +522,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     scale = _uniform_scale(armature, world)
     arms, body, detection = _arms(settings, armature, skeleton)
     gait = read_gait(settings)
-    generator = Generator(skeleton, arms, body, _gait_settings(settings, gait))
+    generator = _generator(skeleton, arms, body, _gait_settings(settings, gait))
     stride = gait.stride * generator.arm_length * scale
     if settings.route is None or in_place:
         route = route_in_place(stride, settings.cycles)
@@ -566,7 +569,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     def read_gait_of(name: str) -> Way:
         """One of the ways that the gait changes to."""
         table = presets.load_gait(name)
-        own = Generator(skeleton, arms, body, _gait_settings(settings, table))
+        own = _generator(skeleton, arms, body, _gait_settings(settings, table))
         return read_way(table, own, ())
 
     first = read_way(gait, generator, wishes)
@@ -582,6 +585,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         changing = plan_changes(ways, changes, route, wishes, [len(arm.bones) for arm in arms])
         if any(not way.gait.on_ground for way in changing.ways) and settings.streamline > 0.0:
             mantle = head
+    apart = None
+    if settings.tell_overlaps and not live:
+        apart = read_apart(armature, skeleton, arms, body)
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -602,7 +608,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         root_bone=_root_bone(settings, armature, detection),
         mantle=mantle,
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
-        tolerances=_tolerances(settings, generator.arm_length),
+        tolerances=None if live else _tolerances(settings, generator.arm_length),
         in_place=in_place,
         repeats=in_place and settings.repeat,
         breath=breath,
@@ -610,12 +616,10 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
         standing=standing,
         changing=changing,
         wanted=wanted,
-        apart=read_apart(armature, skeleton, arms, body) if settings.tell_overlaps else None,
-        measure=True,
+        apart=apart,
+        measure=not live,
         reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
-        note=json.dumps(
-            plain(settings, without=frozenset({"result", "shown", "figures"})), sort_keys=True
-        ),
+        note=settings_note(settings),
         # Detection has looked for constraints itself.
         warnings=[
             *(detection.notes if detection else _held(skeleton, arms)),
@@ -624,6 +628,11 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
             *(standing.warnings if standing else ()),
         ],
     )
+
+
+def settings_note(settings: OCTO_MOTION_PG_locomotion) -> str:
+    """The settings as JSON, without what is no setting."""
+    return json.dumps(plain(settings, without=_RESULTS), sort_keys=True)
 
 
 def _local_object(name: str) -> bpy.types.Object:
@@ -807,6 +816,15 @@ def _displaced(
 
 
 # --- Settings to core's --------------------------------------------------------------------------
+
+_generators: Final[Remembered[Generator]] = Remembered(12)
+
+
+def _generator(
+    skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame, settings: GaitSettings
+) -> Generator:
+    key = key_of(skeleton, arms, body, settings)
+    return _generators.get(key, lambda: Generator(skeleton, arms, body, settings))
 
 
 def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> GaitSettings:
