@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures of whole motions: each finds the fault that was put in, with its frame and its arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from octo_motion.core.locomotion.arm_frames import ArmFrames
+from octo_motion.core.locomotion.figures import KINDS, Figure, Measured, Poses, figures
+from octo_motion.core.locomotion.ground import Plane
+from octo_motion.core.locomotion.poses import ArmRest
+from octo_motion.core.locomotion.separation import Overlap, Separation
+from octo_motion.core.rotations import IDENTITY, from_axis_angle
+
+COUNT = 5
+"""Frames, from 10 on."""
+Y = np.array([0.0, 1.0, 0.0])
+
+
+def straight_arm() -> ArmFrames:
+    """Two bones of length 1 along X, whose rest frames are the armature's."""
+    still = np.tile(IDENTITY, (2, 1))
+    rest = ArmRest(np.tile([1.0, 0.0, 0.0], (2, 1)), still, (False, True))
+    return ArmFrames(("upper", "lower"), np.zeros(3), np.ones(2), rest, still)
+
+
+def poses(count: int = COUNT) -> Poses:
+    """Two arms that lie straight, a hand's breadth above the ground, and do not move."""
+    return Poses(
+        rotations=np.tile(IDENTITY, (count, 4, 1)),
+        strains=np.zeros((count, 4)),
+        locations=np.tile([0.0, 0.0, 0.1], (count, 1)),
+        orientations=np.tile(IDENTITY, (count, 1)),
+    )
+
+
+def still() -> Measured:
+    """A motion without a fault: all joints rest."""
+    return Measured(
+        frames=np.arange(10.0, 10.0 + COUNT),
+        arms=[straight_arm(), straight_arm()],
+        names=["left", "right"],
+        poses=poses(),
+        misses=np.zeros((COUNT, 2)),
+        scale=1.0,
+        ground=Plane(0.0),
+        lying=[np.ones((COUNT, 3), dtype=bool), np.ones((COUNT, 3), dtype=bool)],
+        cycles=np.zeros((COUNT, 2), dtype=int),
+        separation=Separation(np.zeros(COUNT), ()),
+        every=1,
+    )
+
+
+def found(measured: Measured) -> dict[str, Figure]:
+    return {figure.kind: figure for figure in figures(measured)}
+
+
+def test_all_kinds_are_there_in_their_order_and_nothing_is_wrong_with_what_lies_still() -> None:
+    told = figures(still())
+    assert tuple(figure.kind for figure in told) == KINDS
+    assert [figure.value for figure in told] == [0.0] * len(KINDS)
+    # What is above the ground is not below it by less than nothing.
+    assert np.signbit([figure.value for figure in told]).sum() == 0
+
+
+def test_a_body_that_drifts_lets_its_arms_slip() -> None:
+    motion = still()
+    motion.poses.locations[3:, 0] = 0.2
+    # Both arms are two units long and slip alike; the first is named.
+    assert found(motion)["SLIP"] == Figure("SLIP", pytest.approx(0.1), 13, "left")
+
+
+def test_a_slip_between_frames_is_found_and_has_the_frame_before() -> None:
+    motion = still()
+    half = poses(COUNT - 1)
+    half.locations[2, 0] = 0.2
+    assert found(replace(motion, halfway=half))["SLIP"] == Figure(
+        "SLIP", pytest.approx(0.1), 12, "left"
+    )
+    assert found(motion)["SLIP"].value == 0.0
+
+
+def test_a_tip_that_is_right_on_frames_alone_is_found_out_between_them() -> None:
+    """Keys on both frames hold the tip where it is; half way the body is off the arc."""
+    motion = still()
+    angle = np.array([0.0, 0.0, 1.0, 1.0, 1.0])
+    motion.poses.rotations[:, 2] = from_axis_angle(Y, -angle)
+    motion.poses.locations[:, 0] = 2.0 - 2.0 * np.cos(angle)
+    motion.poses.locations[:, 2] = 0.1 - 2.0 * np.sin(angle)
+    tip = np.zeros((COUNT, 3), dtype=bool)
+    tip[:, 2] = True
+    figure = found(replace(motion, lying=[np.zeros_like(tip), tip]))["SLIP"]
+    off = [2.0 * np.cos(0.5) - 1.0 - np.cos(1.0), 2.0 * np.sin(0.5) - np.sin(1.0)]
+    assert figure == Figure("SLIP", pytest.approx(np.hypot(*off) / 2.0), 11, "right")
+
+
+def test_what_rests_only_before_or_only_after_does_not_slip_in_between() -> None:
+    motion = still()
+    half = poses(COUNT - 1)
+    half.locations[1, 0] = 5.0
+    lying = np.ones((COUNT, 3), dtype=bool)
+    lying[2:] = False
+    assert found(replace(motion, halfway=half, lying=[lying, lying]))["SLIP"].value == 0.0
+    cycles = np.zeros((COUNT, 2), dtype=int)
+    cycles[2:] = 1
+    assert found(replace(motion, halfway=half, cycles=cycles))["SLIP"].value == 0.0
+
+
+def test_depth_is_that_of_the_deepest_joint_in_arm_lengths_of_the_world() -> None:
+    motion = replace(still(), scale=10.0)
+    motion.poses.rotations[4, 2] = from_axis_angle(Y, np.array(np.pi / 2.0))
+    # The second arm hangs straight down from 0.1: its tip, 20 metres long, is 19.9 below.
+    assert found(motion)["DEPTH"] == Figure("DEPTH", pytest.approx(19.9 / 20.0), 14, "right")
+
+
+def test_strain_turn_and_miss_name_the_bones_own_arm() -> None:
+    motion = still()
+    motion.poses.strains[1, 3] = -0.25
+    motion.poses.rotations[2:, 1] = from_axis_angle(Y, np.array(0.7))
+    motion.misses[3, 1] = 0.04
+    told = found(motion)
+    assert told["STRAIN"] == Figure("STRAIN", 0.25, 11, "right")
+    assert told["TURN"] == Figure("TURN", pytest.approx(0.7), 11, "left")
+    assert told["MISS"] == Figure("MISS", 0.04, 13, "right")
+
+
+def test_overlaps_are_told_with_both_and_with_the_frame_that_was_looked_at() -> None:
+    deepest = Overlap("left", "Head", 1, 0.3)
+    motion = replace(still(), separation=Separation(np.zeros(3), (deepest,)), every=2)
+    assert found(motion)["OVERLAP"] == Figure("OVERLAP", 0.3, 12, "left, Head")
+    assert "OVERLAP" not in found(replace(motion, separation=None))
+
+
+def test_what_holds_no_ground_has_no_slip_depth_or_strain() -> None:
+    assert set(found(replace(still(), ground=None))) == {"MISS", "TURN", "OVERLAP"}
+
+
+def test_what_is_no_number_is_the_worst_of_all() -> None:
+    motion = still()
+    motion.poses.rotations[3, 0] = np.nan
+    told = found(motion)
+    assert np.isnan([told["SLIP"].value, told["DEPTH"].value, told["TURN"].value]).all()
+    assert told["SLIP"].arm == told["DEPTH"].arm == "left"
+
+
+def test_one_frame_is_measured_too() -> None:
+    motion = still()
+    one = replace(
+        motion,
+        frames=motion.frames[:1],
+        poses=poses(1),
+        misses=motion.misses[:1],
+        lying=[each[:1] for each in motion.lying],
+        cycles=motion.cycles[:1],
+    )
+    assert set(found(one)) == set(KINDS) - {"TURN"}
