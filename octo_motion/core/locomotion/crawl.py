@@ -31,17 +31,17 @@ _BEFORE: Final = 1.5
 class CrawlSettings:
     """How a crawl is made. Lengths in arm lengths, angles in radians."""
 
-    near: float = 0.15
+    near: float = 0.25
     """From an arm's root to where it takes hold to push."""
-    far: float = 0.5
+    far: float = 0.45
     """From there to where it lets go."""
     pushing: float = np.radians(70.0)
     """Largest angle between an arm's push and the way to go of an arm that pushes."""
-    astray: float = np.radians(50.0)
+    astray: float = np.radians(25.0)
     """Angle by which a hold may come to lie beside the arm's own direction before it lets go."""
-    pause: tuple[float, float] = (0.2, 0.45)
+    pause: tuple[float, float] = (0.12, 0.25)
     """Shortest and longest way between two holds of an arm that pushes."""
-    search: tuple[float, float] = (0.3, 0.8)
+    search: tuple[float, float] = (0.2, 0.5)
     """Shortest and longest way between two holds of an arm that does not."""
     hold: tuple[float, float] = (0.5, 1.0)
     """Shares of the longest possible hold after which an arm lets go."""

@@ -8,5 +8,5 @@ settings = armature.octo_motion.locomotion
 
 settings.gait = "crawl"
 settings.cycle_time = 2.4
-settings.variation_min = -0.15
-settings.variation_max = 0.15
+settings.ground.duty = 0.5
+settings.ground.planted = 0.25
