@@ -294,7 +294,7 @@ class Bridge:
 def run(hand_arguments: Sequence[str]) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent()
-    end_after(1.0, lambda: parent.gone)
+    end_after(0.5, lambda: parent.gone)
     listener = Listener(parent.secret)
     parent.announce(listener.port)
     blender = listener.accept(10.0)

@@ -205,7 +205,7 @@ class HandLoop:
 def run(sources: Sources, rate: float = RATE) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent()
-    end_after(1.0, lambda: parent.gone)
+    end_after(0.5, lambda: parent.gone)
     listener = Listener(parent.secret)
     parent.announce(listener.port)
     channel = listener.accept(10.0)

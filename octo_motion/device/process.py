@@ -211,7 +211,7 @@ def end_after(seconds: float, when: Callable[[], bool]) -> None:
 
     def watch() -> None:
         while not when():
-            time.sleep(0.1)
+            time.sleep(0.05)
         time.sleep(seconds)
         os._exit(3)
 

@@ -33,6 +33,8 @@ from tests.device.bridges import (
     wait_for,
 )
 
+SOON = 5.0
+"""s: on a machine that has other things to do; python -m tests.device.kill says how soon it is."""
 linux = pytest.mark.skipif(sys.platform != "linux", reason="finds processes through /proc")
 
 
@@ -128,13 +130,12 @@ def test_bridge_that_is_stopped_ends_at_once_and_is_not_lost(client: Client) -> 
 @linux
 def test_killed_bridge_is_told_keeps_the_pose_and_can_be_started_again() -> None:
     noticed, ended = kill_bridge_and_start_again()
-    assert noticed < 1.0
-    assert ended < 1.0
+    assert max(noticed, ended) < SOON
 
 
 @linux
 def test_killed_blender_leaves_no_process_behind() -> None:
-    assert kill_blender() < 1.0
+    assert kill_blender() < SOON
 
 
 @linux
