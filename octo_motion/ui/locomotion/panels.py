@@ -29,7 +29,7 @@ from .gait_table import (
 )
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from .quality_report import draw_figures
+from .quality_report import draw_figures, known_figures
 from .reach_list import draw_reaches
 from .setups import OCTO_MOTION_PT_setups
 
@@ -443,7 +443,7 @@ class OCTO_MOTION_PT_quality(_Panel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         armature = _armature(context)
-        return armature is not None and len(locomotion_settings(armature).figures) > 0
+        return armature is not None and bool(known_figures(locomotion_settings(armature)))
 
     def show(
         self,

@@ -8,12 +8,21 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
 import numpy as np
-from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    StringProperty,
+)
 
 from ...blender.armature import active_armature
+from ...blender.overrides import linked_names
 from ...core.errors import SettingsError
 from ...core.locomotion.figures import Figure
 from .armature_operator import ArmatureOperator
+from .gait_properties import OVERRIDE, OVERRIDE_LIST
 
 if TYPE_CHECKING:
     from .properties import OCTO_MOTION_PG_locomotion
@@ -44,17 +53,29 @@ def shown(kind: str, value: float) -> str:
 class FigureItem(bpy.types.PropertyGroup):
     """The worst of one kind, as it is kept with the settings."""
 
-    kind: EnumProperty(name="Kind", description="What was measured", items=KINDS)
+    kind: EnumProperty(name="Kind", description="What was measured", items=KINDS, override=OVERRIDE)
     value: FloatProperty(
         name="Value",
         description="Slip, depth and miss in arm lengths, strain as a share, turn in radians per "
         "frame, overlap in radii",
         precision=5,
+        override=OVERRIDE,
     )
     frame: IntProperty(
-        name="Frame", description="Where it is worst; between two frames the first of them"
+        name="Frame",
+        description="Where it is worst; between two frames the first of them",
+        override=OVERRIDE,
     )
-    arm: StringProperty(name="Arm", description="Of which arm; of an overlap both")
+    arm: StringProperty(
+        name="Arm", description="Of which arm; of an overlap both", override=OVERRIDE
+    )
+    known: BoolProperty(
+        name="Known",
+        description="Whether it was measured in this motion. Off for what a linked file tells of "
+        "another one",
+        default=True,
+        override=OVERRIDE,
+    )
 
 
 class QualityReport:
@@ -64,24 +85,42 @@ class QualityReport:
         name="Quality",
         description="The worst of each kind in the motion that was generated last",
         type=FigureItem,
+        override=OVERRIDE_LIST,
     )
 
 
-def write_figures(settings: OCTO_MOTION_PG_locomotion, found: Sequence[Figure]) -> None:
-    """Keep figures with the settings."""
+def known_figures(settings: OCTO_MOTION_PG_locomotion) -> list[Any]:
+    """Items of the figures that were measured, in the order of ``KINDS``."""
     items = cast("Any", settings).figures
-    items.clear()
+    found = {item.kind: item for item in items if item.known}
+    return [found[kind] for kind in _NAMES if kind in found]
+
+
+def write_figures(settings: OCTO_MOTION_PG_locomotion, found: Sequence[Figure]) -> None:
+    """Keep figures with the settings.
+
+    What a library override has from its linked file can be changed, but not removed.
+    """
+    items = cast("Any", settings).figures
+    linked = linked_names(settings, "figures")
+    for number in reversed(range(len(items))):
+        if items[number].name in linked:
+            items[number].known = False
+        else:
+            items.remove(number)
     for figure in found:
-        item = items.add()
-        item.name = figure.kind
-        item.kind, item.value = figure.kind, figure.value
-        item.frame, item.arm = figure.frame, figure.arm
+        item = items.get(figure.kind)
+        if item is None:
+            item = items.add()
+            item.name = item.kind = figure.kind
+        item.value, item.frame, item.arm = figure.value, figure.frame, figure.arm
+        item.known = True
 
 
 def draw_figures(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     """A row for each figure, with a button that goes to its frame."""
     column = layout.column(align=True)
-    for item in cast("Any", settings).figures:
+    for item in known_figures(settings):
         row = column.row(align=True)
         row.label(text=_told(item))
         jump = row.operator(
@@ -108,7 +147,7 @@ class OCTO_MOTION_OT_quality_jump(ArmatureOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
         settings = cast("Any", armature).octo_motion.locomotion
-        item = next((each for each in settings.figures if each.kind == self.kind), None)
+        item = next((each for each in known_figures(settings) if each.kind == self.kind), None)
         if item is None:
             raise SettingsError(
                 f"Nothing is known of {_NAMES[self.kind].lower()}.", "Generate a motion first."
