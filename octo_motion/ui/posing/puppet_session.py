@@ -21,6 +21,7 @@ from ...blender.pose_keys import Keyed, PoseKeys
 from ...blender.puppet import Puppet
 from ...blender.shown_pose import pose_values, restore_pose
 from ...core.errors import OctoMotionError, RigError
+from ...core.posing.blas_threads import OneThread
 from ...core.posing.figure import Figure, Pose
 from ...core.posing.figure_building import turned_bodies
 from ...core.posing.obstacles import Obstacle, Plane
@@ -118,6 +119,7 @@ class PuppetSession:
         self._recorded: dict[float, Pose] | None = None
         self._down = False
         self.told: Told | None = None
+        self._one_thread = OneThread()
         bpy.app.handlers.frame_change_post.append(self._follow)
         bpy.app.handlers.load_pre.append(self._file_goes)
         _active.append(self)
@@ -383,6 +385,7 @@ class PuppetSession:
 
     def _leave(self) -> None:
         self._down = True
+        self._one_thread.end()
         followers, loaders = bpy.app.handlers.frame_change_post, bpy.app.handlers.load_pre
         if self._follow in followers:
             followers.remove(self._follow)
