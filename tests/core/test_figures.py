@@ -2,6 +2,7 @@
 """Figures of whole motions: each finds the fault that was put in, with its frame and its arm."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,6 +53,11 @@ def still() -> Measured:
     )
 
 
+def about(value: float) -> Any:
+    """What a figure is to be but for rounding."""
+    return pytest.approx(value)
+
+
 def found(measured: Measured) -> dict[str, Figure]:
     return {figure.kind: figure for figure in figures(measured)}
 
@@ -68,16 +74,14 @@ def test_a_body_that_drifts_lets_its_arms_slip() -> None:
     motion = still()
     motion.poses.locations[3:, 0] = 0.2
     # Both arms are two units long and slip alike; the first is named.
-    assert found(motion)["SLIP"] == Figure("SLIP", pytest.approx(0.1), 13, "left")
+    assert found(motion)["SLIP"] == Figure("SLIP", about(0.1), 13, "left")
 
 
 def test_a_slip_between_frames_is_found_and_has_the_frame_before() -> None:
     motion = still()
     half = poses(COUNT - 1)
     half.locations[2, 0] = 0.2
-    assert found(replace(motion, halfway=half))["SLIP"] == Figure(
-        "SLIP", pytest.approx(0.1), 12, "left"
-    )
+    assert found(replace(motion, halfway=half))["SLIP"] == Figure("SLIP", about(0.1), 12, "left")
     assert found(motion)["SLIP"].value == 0.0
 
 
@@ -92,7 +96,7 @@ def test_a_tip_that_is_right_on_frames_alone_is_found_out_between_them() -> None
     tip[:, 2] = True
     figure = found(replace(motion, lying=[np.zeros_like(tip), tip]))["SLIP"]
     off = [2.0 * np.cos(0.5) - 1.0 - np.cos(1.0), 2.0 * np.sin(0.5) - np.sin(1.0)]
-    assert figure == Figure("SLIP", pytest.approx(np.hypot(*off) / 2.0), 11, "right")
+    assert figure == Figure("SLIP", about(np.hypot(*off) / 2.0), 11, "right")
 
 
 def test_what_rests_only_before_or_only_after_does_not_slip_in_between() -> None:
@@ -111,7 +115,7 @@ def test_depth_is_that_of_the_deepest_joint_in_arm_lengths_of_the_world() -> Non
     motion = replace(still(), scale=10.0)
     motion.poses.rotations[4, 2] = from_axis_angle(Y, np.array(np.pi / 2.0))
     # The second arm hangs straight down from 0.1: its tip, 20 metres long, is 19.9 below.
-    assert found(motion)["DEPTH"] == Figure("DEPTH", pytest.approx(19.9 / 20.0), 14, "right")
+    assert found(motion)["DEPTH"] == Figure("DEPTH", about(19.9 / 20.0), 14, "right")
 
 
 def test_strain_turn_and_miss_name_the_bones_own_arm() -> None:
@@ -121,7 +125,7 @@ def test_strain_turn_and_miss_name_the_bones_own_arm() -> None:
     motion.misses[3, 1] = 0.04
     told = found(motion)
     assert told["STRAIN"] == Figure("STRAIN", 0.25, 11, "right")
-    assert told["TURN"] == Figure("TURN", pytest.approx(0.7), 11, "left")
+    assert told["TURN"] == Figure("TURN", about(0.7), 11, "left")
     assert told["MISS"] == Figure("MISS", 0.04, 13, "right")
 
 

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The quality report, as the artist has it: figures after generating, and a button to each."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.core.locomotion import quality
+from octo_motion.core.locomotion.figures import KINDS, Figure
+from octo_motion.ui.locomotion import quality_report
+from octo_motion.ui.locomotion.workflow import Shot, prepare
+from tests.blender.test_ground import make_mesh
+from tests.ui.rig import click, generate, give_route, joints_in_world, make_octopus
+
+WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
+OF_ARM = 0.01
+"""The most that a foot may slip, in arm lengths."""
+
+
+@pytest.fixture
+def octopus() -> Any:
+    """The default octopus without its skin, a route of some four arm lengths, and 80 frames."""
+    click("add_octopus", with_mesh=False)
+    armature: Any = bpy.context.object
+    click("detect_arms")
+    give_route(armature, WAY)
+    settings = armature.octo_motion.locomotion
+    settings.timing, settings.frame_end = "RANGE", 80
+    return armature
+
+
+@pytest.fixture
+def small() -> Any:
+    """An octopus of four arms that swims, which is soon done."""
+    armature = make_octopus()
+    give_route(armature)
+    settings = armature.octo_motion.locomotion
+    settings.timing, settings.frame_start, settings.frame_end = "RANGE", 5, 30
+    settings.gait = "swim"
+    return armature
+
+
+def figures(armature: Any) -> dict[str, Any]:
+    """What is known, by kind."""
+    return {
+        item.kind: item for item in quality_report.known_figures(armature.octo_motion.locomotion)
+    }
+
+
+def bumpy() -> Any:
+    """Hills of a tenth of a metre from valley to top, in faces of a few centimetres."""
+    steps = np.arange(-3.0, 3.01, 0.06)
+    x, y = np.meshgrid(steps, steps, indexing="ij")
+    z = 0.05 * np.sin(2.0 * np.pi * x / 0.6) * np.cos(2.0 * np.pi * y / 0.5)
+    count = len(steps)
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    faces = np.stack([corner, corner + count, corner + count + 1, corner + 1], axis=1)
+    return make_mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3).tolist(), faces.tolist())
+
+
+def test_a_walk_on_a_plane_has_all_figures_and_keeps_to_its_limits(octopus: Any) -> None:
+    generate(octopus)
+    found = figures(octopus)
+    assert tuple(found) == KINDS
+    assert found["SLIP"].value < OF_ARM
+    assert found["DEPTH"].value < 0.005
+    assert 0.01 < found["STRAIN"].value <= 0.4  # it stretches, and no more than it may
+    assert found["MISS"].value < 1e-3
+    assert 0.0 < found["TURN"].value < np.radians(90.0)
+    arms = {arm.name for arm in octopus.octo_motion.locomotion.arms}
+    for kind in ("SLIP", "STRAIN", "TURN"):
+        assert found[kind].arm in arms
+        assert 1 <= found[kind].frame <= 80
+
+
+def test_the_figure_of_the_turn_is_what_blender_plays(octopus: Any) -> None:
+    generate(octopus)
+    figure = figures(octopus)["TURN"]
+    bones = [bone.name for arm in octopus.octo_motion.locomotion.arms for bone in arm.bones]
+    poses = []
+    for frame in range(1, 81):
+        bpy.context.scene.frame_set(frame)
+        poses.append([octopus.pose.bones[name].rotation_quaternion[:] for name in bones])
+    played = quality.change(np.array(poses), np.arange(1.0, 81.0))
+    # Blender keeps quaternions in single precision.
+    assert played.value == pytest.approx(figure.value, abs=1e-5)
+    assert played.sample + 1 == figure.frame
+
+
+def test_the_figure_of_the_depth_is_what_blender_plays_between_frames(octopus: Any) -> None:
+    """In a hurry over bumps an arm dives below the ground between two frames that are right."""
+    octopus.octo_motion.locomotion.ground.object = bumpy()
+    generate(octopus)
+    figure = figures(octopus)["DEPTH"]
+    assert figure.value > 0.0
+    shot = prepare(octopus, bpy.context)
+    assert shot.standing is not None
+    number = [arm.name for arm in shot.arms].index(figure.arm)
+    names = [bone.name for bone in octopus.pose.bones]
+    chosen = [names.index(name) for name in shot.arms[number].bones]
+    deepest = 0.0
+    for later in (0.0, 0.5):
+        tails = joints_in_world(octopus, figure.frame + later)[chosen, 1]
+        below = shot.standing.ground.height(tails) - tails[:, 2]
+        deepest = max(deepest, below.max() / shot.generator.lengths[number])
+    # The object's Euler angles do not go quite the way of its quaternions.
+    assert deepest == pytest.approx(figure.value, abs=1e-3)
+
+
+def test_a_swim_has_no_slip(small: Any) -> None:
+    generate(small)
+    assert set(figures(small)) == {"MISS", "TURN", "OVERLAP"}
+    small.octo_motion.locomotion.tell_overlaps = False
+    generate(small)
+    assert set(figures(small)) == {"MISS", "TURN"}
+
+
+def test_misses_of_a_gait_have_their_frame(small: Any) -> None:
+    # So few bones cannot take every shape that the gait asks for.
+    shot = prepare(small, bpy.context)
+    for _ in shot.compute():
+        pass
+    assert shot.misses is not None
+    frame, arm = np.unravel_index(shot.misses.argmax(), shot.misses.shape)
+    figure = next(each for each in shot.figures if each.kind == "MISS")
+    assert figure.frame == shot.frames[frame]
+    assert figure.arm == shot.arms[arm].name
+    assert figure.value == pytest.approx(shot.misses.max())
+    assert shot.misses.shape == (26, 4)
+    assert np.ptp(shot.misses.max(axis=1)) > 0.0
+
+
+def computed(armature: Any) -> Shot:
+    shot = prepare(armature, bpy.context)
+    for _ in shot.compute():
+        pass
+    return shot
+
+
+def test_an_arm_that_reaches_neither_slips_nor_misses(octopus: Any) -> None:
+    before = {figure.kind: figure for figure in computed(octopus).figures}
+    cube: Any = make_mesh(
+        [(x, y, z) for x in (-0.03, 0.03) for y in (-0.03, 0.03) for z in (-0.03, 0.03)],
+        [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)],
+    )
+    cube.location = (0.25, -0.1, 0.15)
+    item = octopus.octo_motion.locomotion.reaches.add()
+    item.mode, item.target, item.arm = "TOUCH", cube, "Arm 1 L"
+    item.frame_start, item.frame_contact, item.frame_release = 2, 12, 16
+    item.back_frames = 10
+    bpy.context.view_layer.update()
+    after = {figure.kind: figure for figure in computed(octopus).figures}
+    assert after["SLIP"].value < OF_ARM
+    assert after["SLIP"].value == pytest.approx(before["SLIP"].value, abs=OF_ARM / 2.0)
+    assert after["MISS"].value == pytest.approx(before["MISS"].value)
+
+
+def test_a_button_goes_to_the_worst_frame_and_is_no_step_of_undo(small: Any) -> None:
+    generate(small)
+    frame = figures(small)["TURN"].frame
+    bpy.context.scene.frame_set(1)
+    assert click("quality_jump", kind="TURN") == {"FINISHED"}
+    assert bpy.context.scene.frame_current == frame
+    assert "UNDO" not in quality_report.OCTO_MOTION_OT_quality_jump.bl_options
+
+
+def test_what_is_not_known_is_told(small: Any) -> None:
+    with pytest.raises(RuntimeError, match=r"Nothing is known of slip. Generate a motion first."):
+        click("quality_jump", kind="SLIP")
+    generate(small)
+    bpy.context.scene.frame_set(3)
+    with pytest.raises(RuntimeError, match="Nothing is known of slip"):
+        click("quality_jump", kind="SLIP")
+    assert bpy.context.scene.frame_current == 3
+
+
+class Drawn:
+    """A layout that remembers what it shows."""
+
+    def __init__(self) -> None:
+        self.labels: list[str] = []
+        self.buttons: list[tuple[str, Any]] = []
+
+    def column(self, **_: Any) -> "Drawn":
+        return self
+
+    def row(self, **_: Any) -> "Drawn":
+        return self
+
+    def label(self, *, text: str) -> None:
+        self.labels.append(text)
+
+    def operator(self, name: str, *, text: str, icon: str) -> Any:  # noqa: ARG002 - Blender's
+        button = SimpleNamespace(kind="")
+        self.buttons.append((text, button))
+        return button
+
+
+def test_rows_say_what_how_much_and_whose_with_a_button_to_the_frame(small: Any) -> None:
+    settings = small.octo_motion.locomotion
+    quality_report.write_figures(
+        settings,
+        [
+            Figure("TURN", np.radians(12.34), 40, "Left"),
+            Figure("SLIP", 0.00123, 17, "Right"),
+            Figure("OVERLAP", 0.0, 1, ""),
+            Figure("STRAIN", 0.251, 5, "Left"),
+        ],
+    )
+    drawn = Drawn()
+    quality_report.draw_figures(drawn, settings)
+    assert drawn.labels == [
+        "Slip: 0.12 %, Right",
+        "Strain: 25.1 %, Left",
+        "Turn: 12.3° a frame, Left",
+        "Overlap: 0.0 radii",
+    ]
+    assert [(text, button.kind) for text, button in drawn.buttons] == [
+        ("17", "SLIP"),
+        ("5", "STRAIN"),
+        ("40", "TURN"),
+        ("1", "OVERLAP"),
+    ]
+
+
+def test_figures_are_saved_with_the_file_and_are_no_setting(small: Any, tmp_path: Path) -> None:
+    generate(small)  # which fills the list of arms
+    shot = computed(small)
+    small.octo_motion.locomotion.figures.clear()
+    assert prepare(small, bpy.context).note == shot.note
+    shot.write()
+    expected = [(figure.kind, figure.frame, figure.arm) for figure in shot.figures]
+    values = [figure.value for figure in shot.figures]
+    # The same settings give the same note, whatever was found.
+    assert "figures" not in json.loads(prepare(small, bpy.context).note)
+    assert prepare(small, bpy.context).note == shot.note
+
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    again: Any = bpy.data.objects["Octopus"]
+    items = list(again.octo_motion.locomotion.figures)
+    assert [(item.kind, item.frame, item.arm) for item in items] == expected
+    np.testing.assert_allclose([item.value for item in items], values, rtol=1e-6, atol=1e-9)
+
+
+def test_an_override_forgets_what_its_linked_file_knew_of_another_motion(
+    small: Any, tmp_path: Path
+) -> None:
+    settings = small.octo_motion.locomotion
+    quality_report.write_figures(settings, [Figure("SLIP", 0.5, 7, "A"), Figure("MISS", 0, 7, "A")])
+    library = str(tmp_path / "rig.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=library)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(library, link=True) as (_, wanted):  # type: ignore[attr-defined]
+        wanted.objects = ["Octopus"]
+    linked: Any = bpy.data.objects["Octopus"]
+    bpy.context.scene.collection.objects.link(linked)
+    armature = linked.override_create(remap_local_usages=True)
+    bpy.context.view_layer.objects.active = armature
+    give_route(armature)
+    generate(armature)
+    assert set(figures(armature)) == {"MISS", "TURN", "OVERLAP"}
+    frames = {kind: item.frame for kind, item in figures(armature).items()}
+
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    again = next(each for each in bpy.data.objects if each.override_library)
+    assert {kind: item.frame for kind, item in figures(again).items()} == frames
+    bpy.context.view_layer.objects.active = again
+    with pytest.raises(RuntimeError, match="Nothing is known of slip"):
+        click("quality_jump", kind="SLIP")
