@@ -107,6 +107,7 @@ def lay(
     cycles: tuple[int, int],
     wishes: Sequence[Wish] = (),
     seed: int = 0,
+    alike: bool = False,
 ) -> Footholds:
     """Lay all footholds of some arms.
 
@@ -120,6 +121,7 @@ def lay(
         cycles: the first and the last that are wanted.
         wishes: the artist's; of arms by their number in the body.
         seed: of the small differences from step to step.
+        alike: whether there are none, so that each cycle is like the one before.
     """
     first, last = cycles
     shape = len(limbs.arms), last - first + 1
@@ -145,7 +147,7 @@ def lay(
     found = spots(limbs, ground, settings, passings, aim)
     spot = roots.copy()
     spot[..., :2] += found.distance[..., None] * aim
-    side = _hash(np.array(limbs.arms)[:, None], numbers, seed)
+    side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if alike else numbers, seed)
     joint = limbs.touching(settings.planted)
     heading = np.where(wanted.turned, wanted.headings, np.arctan2(lie[..., 1], lie[..., 0]))
     joints = laid(

@@ -85,6 +85,7 @@ class GroundedWalk:
         phases: the first and the last of the body's phases, radians.
         wishes: the artist's footholds.
         rhythm: when arms hold on; none for the gait's own.
+        alike: whether each cycle is like the one before.
     """
 
     def __init__(  # noqa: PLR0917 - what it is made of, in the order in which it is made
@@ -102,6 +103,7 @@ class GroundedWalk:
         phases: tuple[float, float],
         wishes: Sequence[Wish] = (),
         rhythm: Rhythm | None = None,
+        alike: bool = False,
     ) -> None:
         self._generator, self._line, self._ground = generator, line, ground
         self._settings, self._scale = settings, scale
@@ -133,6 +135,7 @@ class GroundedWalk:
                     cycles=self._cycles,
                     wishes=wishes,
                     seed=seed,
+                    alike=alike,
                 )
                 self._limbs.append((part, limbs, footholds))
 

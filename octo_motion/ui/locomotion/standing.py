@@ -93,6 +93,7 @@ def read_standing(
     height: float | None,
     wishes: Sequence[Wish],
     plane: float | None = None,
+    alike: bool = False,
 ) -> Standing:
     """Read the ground under a walk, and lay its footholds.
 
@@ -110,6 +111,7 @@ def read_standing(
         height: metres from the ground to the body's centre, none for as high as the gait is.
         wishes: the artist's, for single contacts.
         plane: world Z of the level ground where no mesh is set, none to follow the route.
+        alike: whether each cycle is like the one before, on level ground: for a loop in place.
 
     Raises:
         GroundError: the ground is no mesh, has no faces, or the route leaves it.
@@ -117,7 +119,9 @@ def read_standing(
     stance = stance_settings(settings)
     reach = generator.arm_length * scale
     bearings = bearings_of(route, travel)
-    if settings.object is None and plane is not None:
+    if alike:
+        ground, warnings = Plane(0.0), ()
+    elif settings.object is None and plane is not None:
         ground, warnings = Plane(plane), ()
     else:
         ground, warnings = _ground(
@@ -165,6 +169,7 @@ def read_standing(
             phases=(0.0, 2.0 * np.pi * strides(route, travel)),
             wishes=wished,
             rhythm=rhythm,
+            alike=alike,
         )
 
     walk = build(line, wishes)
