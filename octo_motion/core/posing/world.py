@@ -190,9 +190,9 @@ class World:
         self._loads = np.zeros((count, 3))
         self._place(pose)
         self._plastic_rest = self._turns()
+        self._use_elements(figure.elements)
         for body in sorted(self.settings.pinned):
             self.pin(body)
-        self._use_elements(figure.elements)
 
     # What the caller reads
 
@@ -291,8 +291,7 @@ class World:
         self._pins[body] = _Pin(
             self._positions[body].copy(), self._orientations[body].copy(), firm=bool(firm)
         )
-        if hasattr(self, "_elements"):
-            self._use_elements(self._elements)
+        self._use_elements(self._elements)
 
     def unpin(self, body: int) -> None:
         """Let a pinned body go; one that is not pinned stays as it is."""
