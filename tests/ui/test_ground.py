@@ -240,5 +240,5 @@ def test_a_contact_out_of_reach_is_told_with_its_frame(octopus: Any) -> None:
 
 def test_there_are_no_contacts_to_show_of_a_swim(octopus: Any) -> None:
     octopus.octo_motion.locomotion.gait = "swim"
-    with pytest.raises(RuntimeError, match="does not hold the ground"):
+    with pytest.raises(RuntimeError, match="has no contacts with the ground"):
         click("contacts_show")

@@ -30,9 +30,10 @@ class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
         shot = prepare(armature, context)
-        if shot.standing is None:
+        if shot.standing is None or shot.in_place:
             raise SettingsError(
-                "This motion does not hold the ground.", "Choose a walk, and Hold the Ground."
+                "This motion has no contacts with the ground.",
+                "Choose a walk along a route, and Hold the Ground.",
             )
         count = show_contacts(armature, shot)
         self.report({"INFO"}, f"{count} contacts.")
@@ -72,7 +73,7 @@ class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
         _activate(context, armature)
         if shown:
             shot = prepare(armature, context)
-            if shot.standing is not None:
+            if shot.standing is not None and not shot.in_place:
                 show_contacts(armature, shot)
 
 
