@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.actions import is_edited
+from octo_motion.core.locomotion import quality
 from octo_motion.core.locomotion.gait import presets
+from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.ui.locomotion.workflow import prepare
 from tests.ui.rig import generate, joints_in_world, keys, make_octopus
 
 
@@ -100,3 +103,28 @@ def test_the_mantle_breathes() -> None:
     settings.breathing = 0.0
     generate(octopus)
     assert tuple(octopus.pose.bones["mantle"].scale) == pytest.approx((1.0, 1.0, 1.0))
+
+
+def test_in_place_the_ground_goes_by_under_arms_that_hold_it() -> None:
+    operators: Any = bpy.ops.octo_motion
+    operators.add_octopus(with_mesh=False)
+    armature: Any = bpy.context.object
+    operators.detect_arms()
+    settings = armature.octo_motion.locomotion
+    settings.travel_on, settings.cycles, settings.cycle_time = "NONE", 1, 2.0
+    generate(armature)
+    shot = prepare(armature, bpy.context)
+    standing = shot.standing
+    assert standing is not None
+    travel = plan_travel(shot.route, shot.travel, shot.times, standing.bearings)
+    poses = standing.pose(travel, slice(None), standing.place(travel))
+    (arms,) = standing.walk.builds
+    order = [bone.name for bone in armature.pose.bones]
+    heads = [[order.index(bone) for bone in shot.arms[arm].bones] for arm in arms]
+    played = np.array([joints_in_world(armature, frame)[:, 0] for frame in shot.frames])[:, heads]
+    # As if the body had gone on.
+    played = played - travel.distance[:, None, None, None] * np.array([0.0, 1.0, 0.0])
+    lying, lengths = poses.lying[0][:, :, :-1], shot.generator.lengths[list(arms)]
+    worst = quality.slip(played, lying, poses.cycles[:, list(arms)], lengths)
+    assert lying.any(axis=-1).sum(axis=1).min() >= 2
+    assert worst.value < 1e-5

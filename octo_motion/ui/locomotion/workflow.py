@@ -340,7 +340,7 @@ class Shot:
             write_body(settings, self.detection)
         rest_bones(armature, left_behind - animated_bones(action))
         unscale_bones(armature, scaled - animated_bones(action, SCALE))
-        if self.standing is not None and self.changing is None:
+        if self.standing is not None and self.changing is None and not self.in_place:
             store(settings.ground, self.wanted)
             if settings.ground.shown:
                 show_contacts(armature, self)
@@ -548,7 +548,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         """One way of moving along this route."""
         going = _travel_settings(settings, table, table.stride * own.arm_length * scale)
         holding = None
-        if table.on_ground and settings.ground.use and not in_place:
+        # In place each cycle has to be like the one before, which a crawl's are not.
+        repeating = in_place and table.manner != "CRAWL"
+        if table.on_ground and settings.ground.use and (repeating or not in_place):
             holding = read_standing(
                 settings.ground,
                 armature,
@@ -561,8 +563,10 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
                 travel=going,
                 scale=scale,
                 height=settings.height if settings.height_mode == "MANUAL" else None,
-                wishes=wished,
+                # Contacts are places in the world; in place the ground goes by.
+                wishes=() if in_place else wished,
                 plane=plane,
+                alike=in_place,
             )
         return Way(table, own, going, holding, _height(settings, table, own.clearance * scale))
 
@@ -601,7 +605,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         travel=travel,
         world=world,
         scale=scale,
-        height=_height(settings, gait, generator.clearance * scale),
+        height=standing.line.clearance
+        if standing
+        else _height(settings, gait, generator.clearance * scale),
         frames=frames,
         times=times,
         seconds=seconds,
