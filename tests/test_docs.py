@@ -169,6 +169,8 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(after("An item of `arms`:", arms))
         case "bone":
             return rows(after("An item of its `bones`:", arms))
+        case "figure":
+            return rows(after("An item of `figures`:", "## Quality"))
         case "change":
             return rows(section("## Change of gait").split("An item of", 1)[0])
         case "place":
@@ -202,6 +204,7 @@ def group_class(group: str) -> Any:
         gait_properties,
         ground_properties,
         properties,
+        quality_report,
         reach_properties,
     )
     from octo_motion.ui.posing.properties import OCTO_MOTION_PG_posing
@@ -213,6 +216,7 @@ def group_class(group: str) -> Any:
         "locomotion": properties.OCTO_MOTION_PG_locomotion,
         "arm": arm_properties.ArmItem,
         "bone": arm_properties.ArmBoneItem,
+        "figure": quality_report.FigureItem,
         "reach": reach_properties.ReachItem,
         "ground": ground_properties.OCTO_MOTION_PG_ground,
         "contact": ground_properties.ContactItem,
@@ -281,6 +285,7 @@ def number(value: float, definition: Any) -> str:
     "group",
     [
         *("locomotion", "arm", "bone", "reach", "change", "place", "ground", "contact"),
+        "figure",
         *("table", "curve", "knot", "offset", "note"),
         *("splicing", "splice", "landmarks", "posing"),
     ],
