@@ -168,6 +168,44 @@ def test_job_makes_its_good_shots_and_tells_of_the_bad_ones(scene: Path, tmp_pat
     assert len(bpy.data.actions) == 2
 
 
+def test_motion_worse_than_its_limits_fails_its_shot_and_the_report_has_the_figures(
+    tmp_path: Path,
+) -> None:
+    shots = (
+        f'[defaults]\noutput = "out/{{name}}.blend"\n{SMALL}{ROUTE}{RANGE}'
+        "limits = { depth = 9, overlap = 99 }\n"
+        '[[shots]]\nname = "good"\nsettings = { keys = "REDUCED" }\n'
+        '[[shots]]\nname = "bad"\nlimits = { turn = 0.5 }\n'
+    )
+    job = write(tmp_path / "job.toml", shots)
+    assert run_here("bake", job) == 1
+    told = report(job)
+
+    good, bad = told["good"], told["bad"]
+    assert (good["status"], bad["status"]) == ("done", "failed")
+    assert names(tmp_path / "out") == {"good.blend"}
+    assert list(good["quality"]) == ["slip", "depth", "strain", "miss", "turn", "overlap"]
+    assert good["quality"]["turn"]["value"] > 0.5
+    assert 1 <= good["quality"]["turn"]["frame"] <= 6
+    # Half of them, or more, are left out; 12 bones of 4 components and the travel at 6 frames.
+    assert 0 < good["keys"] < good["dense_keys"]
+    assert bad["keys"] == bad["dense_keys"] >= 6 * (12 * 4 + 6)
+    # A shot that fails its limits tells how bad it is.
+    worst = bad["quality"]["turn"]
+    assert (bad["frames"], worst["arm"][:3]) == (6, "Arm")
+    assert bad["error"] == (
+        f"Turn is {worst['value']:.3g} at frame {worst['frame']} ({worst['arm']}), "
+        "above its limit of 0.5."
+    )
+
+    # Again: what was good is kept, what was bad is made as soon as it is good enough.
+    write(job, shots.replace("turn = 0.5", "turn = inf"))
+    assert run_here("bake", job) == 0
+    assert statuses(job) == {"good": "skipped", "bad": "done"}
+    assert report(job)["good"]["quality"] == good["quality"]
+    assert names(tmp_path / "out") == {"good.blend", "bad.blend"}
+
+
 def test_second_run_makes_only_what_is_new_or_changed(tmp_path: Path) -> None:
     text = f'[defaults]\noutput = "{{name}}.blend"\n{SMALL}{ROUTE}{RANGE}'
     shot = '[[shots]]\nname = "{}"\n'
@@ -389,6 +427,23 @@ def test_one_file_is_read_and_another_written(scene: Path, tmp_path: Path) -> No
     assert tuple(octopus.animation_data.action.frame_range) == (1, 5)
     assert octopus.octo_motion.locomotion.sway == pytest.approx(0.2094395)
     assert bpy.context.scene.render.fps == 25
+
+
+def test_file_is_written_only_if_its_motion_keeps_to_the_limits(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "a.blend"
+    given = ("generate", scene, "-o", output, "--route", "Wall", "--set", "timing=RANGE")
+    assert run_here(*given, "--limit", "slide=1") == 2
+    assert "There is no figure 'slide'. Did you mean 'slip'?" in capsys.readouterr().err
+    assert run_here(*given, "--limit", "depth=9", "--limit", "turn=0.1") == 1
+    told = capsys.readouterr().err
+    assert "Error: Turn is " in told
+    assert "above its limit of 0.1." in told
+    assert names(tmp_path) == {"reef.blend"}
+    assert run_here(*given, "--limit", "turn=180") == 0
+    assert "\nQuality: slip " in capsys.readouterr().out
+    assert names(tmp_path) == {"reef.blend", "a.blend"}
 
 
 def test_file_is_overwritten_only_if_that_is_asked_for(

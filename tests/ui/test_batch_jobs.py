@@ -86,6 +86,21 @@ def test_route_is_four_control_points_or_leads_through_points(tmp_path: Path) ->
     assert c == NewRoute(((0, 0, 0), (1, 0, 0), (1, 1, 0.5)), is_bezier=False, cyclic=True)
 
 
+def test_limits_are_added_to_those_of_the_defaults_and_inf_lifts_one(tmp_path: Path) -> None:
+    job = read(
+        tmp_path,
+        '[defaults]\nfile = "reef.blend"\noutput = "{name}.blend"\n'
+        "limits = { slip = 0.01, turn = 45 }\n"
+        '[[shots]]\nname = "a"\n'
+        '[[shots]]\nname = "b"\nlimits = { slip = inf, overlap = 0.1 }\n'
+        '[[shots]]\nname = "c"\nkind = "splice"\n',
+    )
+    a, b, c = (shot.entry.limits for shot in job.shots)
+    assert a == {"slip": 0.01, "turn": 45.0}
+    assert b == {"turn": 45.0, "overlap": 0.1}
+    assert c == {}
+
+
 def test_gait_file_is_read_beside_the_job(tmp_path: Path) -> None:
     table = gait.renamed(gait.presets()["swim"], "sneak")
     (tmp_path / "sneak.json").write_text(gait.to_json(table), encoding="utf-8")
@@ -199,6 +214,22 @@ def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
         (NEW + "octopus = { arms = 8.5 }\n" + ROUTE, "arms must be a whole number, not 8.5."),
         (NEW + 'octopus = { taper = "x" }\n' + ROUTE, "taper must be a number, not 'x'."),
         (NEW + "octopus = { with_mesh = 1 }\n" + ROUTE, "with_mesh must be true or false, not 1."),
+        (WALK + "limits = 3\n", "limits must be a table, such as { slip = 0.01 }, not 3."),
+        (
+            WALK + "limits = { slide = 0.01 }\n",
+            "limits: There is no figure 'slide'. Did you mean 'slip'? Valid: slip, depth, strain,",
+        ),
+        (
+            WALK + "limits = { slip = -0.01 }\n",
+            "slip must be a number of 0 or more, not -0.01. Valid: slip, depth",
+        ),
+        (WALK + "limits = { turn = nan }\n", "turn must be a number of 0 or more, not nan."),
+        (WALK + "limits = { turn = true }\n", "turn must be a number of 0 or more, not True."),
+        (WALK + 'limits = { turn = "45°" }\n', "turn must be a number of 0 or more, not '45°'."),
+        (
+            WALK + 'kind = "splice"\nlimits = { turn = 45 }\n',
+            'limits is for shots with kind = "generate".',
+        ),
         ("[[shots]\n", "It is not TOML"),
     ],
 )
@@ -226,6 +257,7 @@ def test_entry_survives_its_way_to_another_process(tmp_path: Path) -> None:
     job = read(
         tmp_path,
         WALK + 'gait = "walk"\nfps = 29.97\nsettings = { heading = "fixed" }\nexport = "a.fbx"\n'
+        "limits = { slip = 0.01, turn = 45 }\n"
         "[[shots]]\nname = 'b'\noctopus = { taper = 0.2, with_mesh = false }\n"
         "output = 'b.blend'\n" + ROUTE,
     )

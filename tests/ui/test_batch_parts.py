@@ -3,18 +3,23 @@
 
 import errno
 import json
+import math
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from octo_motion.core.errors import OctoMotionError, WriteError
+from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError
+from octo_motion.core.locomotion.figures import Figure
 from octo_motion.ui.batch.blender_said import blender_said
 from octo_motion.ui.batch.command_line import parse
+from octo_motion.ui.batch.limits import LimitError, check_limits, parse_limits, quality, told
 from octo_motion.ui.batch.outputs import commit, remove_staged, staged, write_json
 from octo_motion.ui.batch.processes import (
     Ended,
@@ -109,6 +114,100 @@ def test_file_that_is_no_report_is_not_overwritten(tmp_path: Path) -> None:
     path.mkdir()
     with pytest.raises(OctoMotionError, match="cannot be read"):
         read_report(path)
+
+
+# --- Limits -------------------------------------------------------------------------------------
+
+MEASURED = (
+    Figure("SLIP", 0.0123, 40, "Arm 3 L"),
+    Figure("TURN", math.radians(50.0), 41, "Arm 1 R"),
+    Figure("OVERLAP", 0.0, 1, ""),
+)
+
+
+def limited(*figures: Figure, **limits: float) -> str:
+    """What is told of a motion with these figures, which does not keep to its limits."""
+    summary = SimpleNamespace(figures=figures or MEASURED)
+    with pytest.raises(LimitError) as caught:
+        check_limits(limits, summary)
+    assert caught.value.summary is summary
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {},
+        {"slip": 0.0123, "turn": 50.1, "overlap": 0.0},
+        # What a motion does not have keeps to any limit, as the depth of a swim.
+        {"depth": 0.0, "miss": 0.0},
+    ],
+)
+def test_motion_that_keeps_to_its_limits_is_done(limits: dict[str, float]) -> None:
+    check_limits(limits, SimpleNamespace(figures=MEASURED))
+
+
+def test_figure_above_its_limit_is_told_with_frame_arm_and_limit() -> None:
+    assert limited(slip=0.01) == ("Slip is 0.0123 at frame 40 (Arm 3 L), above its limit of 0.01.")
+    assert limited(turn=45, slip=0.01) == (
+        "Slip is 0.0123 at frame 40 (Arm 3 L), above its limit of 0.01; "
+        "turn is 50 at frame 41 (Arm 1 R), above its limit of 45."
+    )
+
+
+def test_figure_is_told_with_as_many_digits_as_it_takes() -> None:
+    close = Figure("SLIP", 0.010000042, 40, "A")
+    assert limited(close, slip=0.01) == (
+        "Slip is 0.01000004 at frame 40 (A), above its limit of 0.01."
+    )
+
+
+def test_figure_that_is_no_number_keeps_to_no_limit() -> None:
+    assert limited(Figure("DEPTH", math.nan, 3, "A"), depth=1e9) == (
+        "Depth is nan at frame 3 (A), above its limit of 1e+09."
+    )
+
+
+def test_overlaps_that_nobody_looked_for_keep_to_no_limit() -> None:
+    assert limited(MEASURED[0], overlap=0.1) == (
+        "Overlaps are limited, but were not looked for. "
+        "Switch tell_overlaps on, or leave the limit out."
+    )
+
+
+def test_figures_of_a_report_are_in_the_units_of_limits() -> None:
+    assert quality(MEASURED) == {
+        "slip": {"value": 0.0123, "frame": 40, "arm": "Arm 3 L"},
+        "turn": {"value": pytest.approx(50.0), "frame": 41, "arm": "Arm 1 R"},
+        "overlap": {"value": 0.0, "frame": 1, "arm": ""},
+    }
+    assert told(MEASURED) == (
+        "slip 0.0123 at frame 40 (Arm 3 L); turn 50 at frame 41 (Arm 1 R); overlap 0 at frame 1"
+    )
+
+
+def test_limits_of_the_command_line_are_numbers_by_name() -> None:
+    assert parse_limits(["slip=1", " turn = 45.5 ", "slip=0.01", "miss=inf"]) == {
+        "slip": 0.01,
+        "turn": 45.5,
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("slip", "'slip' limits nothing. Write --limit name=value."),
+        ("=3", "'=3' limits nothing."),
+        ("slide=1", "There is no figure 'slide'. Did you mean 'slip'? Valid: slip, depth"),
+        ("slip=-1", "slip must be a number of 0 or more, not -1.0. Valid: slip, depth"),
+        ("slip=nan", "slip must be a number of 0 or more, not nan."),
+        ("turn=45°", "turn must be a number of 0 or more, not '45°'."),
+        ("turn=", "turn must be a number of 0 or more, not ''."),
+    ],
+)
+def test_limit_that_makes_no_sense_is_told(text: str, fault: str) -> None:
+    with pytest.raises(SettingsError, match=re.escape(fault)):
+        parse_limits([text])
 
 
 # --- Outputs -------------------------------------------------------------------------------------
