@@ -87,8 +87,12 @@ class Puppet:
         return self._local(self.armature(), pose)
 
     def forget(self) -> None:
-        """Something else has posed the armature: the next pose is written whole."""
+        """Something else has posed the armature: the next pose is written whole.
+
+        What carries the limbs may have been posed as well, a root bone that travels.
+        """
         self._written = None
+        self._set_frames(self.armature())
 
     def places(self, body: int) -> bool:
         """Whether a body's bone is placed by its location too, not only turned."""

@@ -135,12 +135,12 @@ def test_it_is_told_how_much_slower_than_real_time_the_puppet_is() -> None:
 
 
 def test_window_does_not_stand_still_while_a_large_figure_is_computed() -> None:
-    # Each tick takes a tenth of a second, however few its steps.
-    session = session_of(clock=Clock(each_look=0.1))
+    # Each tick takes 0.4 seconds, however few its steps.
+    session = session_of(clock=Clock(each_look=0.4))
     session.grab(tip(session))
     assert session.tick(0.1).steps == 25
     told = ticks(session, 20, 0.1)
-    assert told.steps < 10
+    assert told.steps <= 10
     assert told.ratio < 0.5
 
 

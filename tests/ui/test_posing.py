@@ -305,6 +305,28 @@ def test_poses_at_two_frames_are_two_keys_and_scrubbing_shows_them(
     assert tip(octopus) == pytest.approx(bent, abs=1e-4)
 
 
+def test_figure_whose_root_bone_travels_is_posed_where_it_is(octopus: Any) -> None:
+    scene, root = bpy.context.scene, octopus.pose.bones["root"]
+    for frame, x, angle in ((1, 0.0, 0.0), (21, 0.7, 0.5)):
+        root.location, root.rotation_quaternion = (x, 0.2 * x, 0.0), (1.0, 0.0, angle, 0.0)
+        root.keyframe_insert("location", frame=frame)
+        root.keyframe_insert("rotation_quaternion", frame=frame)
+    scene.frame_set(1)
+    settings_of(octopus).root = "FREE"
+    session = PuppetSession(octopus, scene, clock=None)
+    session.core.change(step=4e-3)
+    controls = PoseControls(session)
+    scene.frame_set(21)
+    start = tip(octopus)
+    controls.tick(TICK)
+    assert tip(octopus) == pytest.approx(start, abs=1e-4)
+    drag(controls, "arm1.04.L", (-60.0, 20.0))
+    shown = session.puppet.read()
+    posed = session.core.pose
+    session.cancel()
+    assert np.abs(shown.positions - posed.positions).max() < 1e-4
+
+
 def test_arrow_keys_step_through_the_frames(controls: PoseControls) -> None:
     bpy.context.scene.frame_set(5)
     controls.handle(Event("RIGHT_ARROW"), VIEW)
@@ -337,6 +359,22 @@ def test_record_writes_the_motion_of_the_drag_as_few_keys(
         scene.frame_set(frame)
         # One degree at each of four joints of an arm of 0.6 m.
         assert np.linalg.norm(tip(octopus) - place) < 0.03
+
+
+def test_recording_ends_where_playback_comes_round(octopus: Any, controls: PoseControls) -> None:
+    scene = bpy.context.scene
+    scene.frame_set(5)
+    controls.handle(Event("O"), VIEW)
+    x, y = over(controls.session, "arm1.04.L")
+    controls.handle(Event("LEFTMOUSE"), VIEW, x, y)
+    for number in range(1, 11):
+        controls.handle(MOVE, VIEW, x - 6.0 * number, y)
+        controls.tick(1.0 / 24.0)
+        scene.frame_set(5 + number)
+    scene.frame_set(1)
+    assert not controls.session.recording
+    found = keyed(octopus)["arm1.04.L"]
+    assert (min(found), max(found)) == (5.0, 15.0)
 
 
 # --- Ends ----------------------------------------------------------------------------------------
@@ -546,10 +584,10 @@ def test_marked_object_stops_an_arm(octopus: Any, kind: str) -> None:
 def test_obstacle_without_a_surface_is_refused(octopus: Any) -> None:
     empty = bpy.data.objects.new("Nothing", None)
     bpy.context.scene.collection.objects.link(empty)
-    empty.octo_motion.posing.obstacle = "MESH"  # type: ignore[attr-defined]
+    empty.octo_motion.posing.obstacle = "MESH"
     with pytest.raises(RigError, match="'Nothing' has no faces"):
         PuppetSession(octopus, bpy.context.scene)
-    empty.octo_motion.posing.obstacle = "SPHERE"  # type: ignore[attr-defined]
+    empty.octo_motion.posing.obstacle = "SPHERE"
     PuppetSession(octopus, bpy.context.scene).cancel()
 
 

@@ -33,7 +33,7 @@ COARSEST: Final = 4e-3
 """Seconds: longer steps would let a fast hand shake the puppet."""
 LONGEST_TICK: Final = 0.1
 """Seconds: what is longer (Blender was busy) is not made up for, so that nothing jerks."""
-LONGEST_WORK: Final = 0.05
+LONGEST_WORK: Final = 0.1
 """Seconds that one tick may compute."""
 TOUCHED: Final = float(np.radians(0.1))
 """A joint that was turned by more counts as touched."""

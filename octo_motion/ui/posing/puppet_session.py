@@ -63,6 +63,17 @@ class _Shown:
         return self.floor, self.floor_height, self.use_obstacles
 
 
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    """One frame of a recording."""
+
+    pose: Pose
+    rotations: Floats
+    """(bodies, 4) of the bones, from rest."""
+    locations: Floats
+    """(bodies, 3)"""
+
+
 _active: list[PuppetSession] = []
 
 
@@ -116,7 +127,7 @@ class PuppetSession:
         self._hold_root()
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
-        self._recorded: dict[float, Pose] | None = None
+        self._recorded: dict[float, _Moment] | None = None
         self._down = False
         self.told: Told | None = None
         self._one_thread = OneThread()
@@ -296,7 +307,7 @@ class PuppetSession:
 
     def record(self) -> None:
         """Begin to keep the pose at each frame, from this one on."""
-        self._recorded = {self.scene().frame_current_final: self.core.pose}
+        self._recorded = {self.scene().frame_current_final: self._moment()}
 
     def stop_record(self) -> tuple[int, int]:
         """Write what was kept as few keys; number of bones and of key frames."""
@@ -304,18 +315,18 @@ class PuppetSession:
         if recorded is None or len(recorded) < 2:
             return 0, 0
         frames = np.array(sorted(recorded))
-        poses = [recorded[frame] for frame in frames]
+        moments = [recorded[frame] for frame in frames]
         moved: set[int] = set()
-        for pose in poses[1:]:
-            moved |= set(turned_bodies(self.figure, poses[0], pose, TOUCHED))
+        for each in moments[1:]:
+            moved |= set(turned_bodies(self.figure, moments[0].pose, each.pose, TOUCHED))
         if not moved:
             return 0, 0
-        local = [self.puppet.local(pose) for pose in poses]
         rotations = {
-            self.bone(body): np.stack([turns[body] for turns, _ in local]) for body in sorted(moved)
+            self.bone(body): np.stack([each.rotations[body] for each in moments])
+            for body in sorted(moved)
         }
         locations = {
-            self.bone(body): np.stack([places[body] for _, places in local])
+            self.bone(body): np.stack([each.locations[body] for each in moments])
             for body in sorted(moved)
             if self.puppet.places(body)
         }
@@ -413,6 +424,10 @@ class PuppetSession:
             # The next tick says what is wrong.
             return
 
+    def _moment(self) -> _Moment:
+        pose = self.core.pose
+        return _Moment(pose, *self.puppet.local(pose))
+
     def _record_frame(self, frame: float) -> None:
         assert self._recorded is not None
         if self._recorded and frame < max(self._recorded):
@@ -420,7 +435,7 @@ class PuppetSession:
             self.stop_record()
             self.core.adopt(self.puppet.read())
             return
-        self._recorded[frame] = self.core.pose
+        self._recorded[frame] = self._moment()
         self.puppet.write(self.core.pose)
 
     def _apply_settings(self, armature: bpy.types.Object) -> None:
