@@ -180,7 +180,7 @@ class PoseKeys:
                     if slot.handle == before.new_slot:
                         data.action.slots.remove(slot)
                         break
-        action = bpy.data.actions.get((before.action, None)) if before.action else None
+        action = _local_action(before.action)
         data.action = action
         if action is not None:
             data.action_slot = next(
@@ -190,7 +190,7 @@ class PoseKeys:
         data.action_blend_type = before.blend  # type: ignore[assignment]
         if before.track is not None and before.track in data.nla_tracks:
             data.nla_tracks.remove(data.nla_tracks[before.track])
-        made = bpy.data.actions.get((before.made, None)) if before.made else None
+        made = _local_action(before.made)
         if made is not None:
             bpy.data.actions.remove(made)
         if not before.had_data:
@@ -396,8 +396,14 @@ def _channels(
     return ["location", rotation] if placed else [rotation]
 
 
+def _local_action(name: str | None) -> bpy.types.Action | None:
+    """An action of this file by name."""
+    found = bpy.data.actions.get((name, None)) if name else None
+    return found if isinstance(found, bpy.types.Action) else None
+
+
 def _chosen_action(name: str) -> bpy.types.Action:
-    action = bpy.data.actions.get((name, None)) if name else None
+    action = _local_action(name)
     if action is None:
         raise WriteError("The action for the keys is gone.", "Choose another one.")
     return action
