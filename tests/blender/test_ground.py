@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Mesh objects as grounds, skins as thickness, bones that stretch, markers of contacts."""
 
 from typing import Any
@@ -90,7 +91,8 @@ def test_the_skin_tells_how_thick_arms_are() -> None:
         assert len(each) == 13
         assert 0.01 < each[6] / length < 0.05
         assert each[1] > each[6] > each[12]
-    np.testing.assert_allclose(radii[0], radii[1], rtol=0.25)
+    # At the root the web between the arms is taken for either.
+    np.testing.assert_allclose(radii[0][1:], radii[1][1:], rtol=0.25)
 
 
 def test_arms_without_a_skin_are_slender() -> None:

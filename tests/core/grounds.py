@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Walks over grounds, made from numbers: no Blender needed."""
 
 from collections.abc import Sequence

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """What a creature walks on: planes, meshes sampled onto a grid, and the route itself."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Figures of a motion: each finds the fault that was put in, and where."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Arms that hold the ground: no sliding, nothing through it, no pops, on any ground and rig."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """Walks that hold the ground, as the artist makes them: settings, markers, what is told."""
 
 from typing import Any
