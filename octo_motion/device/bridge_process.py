@@ -52,7 +52,9 @@ log = logging.getLogger(__name__)
 
 _TELL_EVERY: Final = 1.0 / 60.0
 _IDLE_PERIOD: Final = 2e-3
-_RESTARTS: Final = 3
+_STARTS: Final = 4
+_SETTLED: Final = 60.0
+"""s after which a process at the devices counts as one that runs."""
 
 
 class Bridge:
@@ -62,7 +64,9 @@ class Bridge:
         self._blender = blender
         self._hand_arguments = tuple(hand_arguments)
         self._hands: Child | None = None
-        self._restarts = 0
+        self._starts = 0
+        self._started = 0.0
+        self._gave_up = False
         self._told_hello = False
         self._figure: FigureMessage | None = None
         self._world = WorldSettings(step=WorldMessage.step)
@@ -80,11 +84,19 @@ class Bridge:
         return _IDLE_PERIOD if self.simulation is None else self.simulation.step_seconds
 
     def start_hands(self) -> None:
-        """Start the process at the devices, and tell it what it needs to know."""
-        python = Path(sys.executable)
-        self._hands = Child.start(("hands", *self._hand_arguments), python)
-        for message in self._remembered.values():
-            self._hands.channel.send(message)
+        """Start the process at the devices, and tell it what it needs to know.
+
+        Where that fails it is tried again at the next turns, a few times.
+        """
+        self._starts += 1
+        self._started = time.monotonic()
+        try:
+            self._hands = Child.start(("hands", *self._hand_arguments), Path(sys.executable))
+            for message in self._remembered.values():
+                self._hands.channel.send(message)
+        except (DeviceError, ChannelClosedError) as error:
+            log.warning("The process at the devices did not start: %s", error)
+            self._hands = None
 
     def turn(self, now: float) -> None:
         """Hear both sides, go on by a step, tell both sides.
@@ -94,6 +106,8 @@ class Bridge:
         """
         for message in self._blender.receive():
             self._hear_blender(message)
+        if self._hands is None:
+            self._start_again()
         self._hear_hands()
         simulation = self.simulation
         if simulation is not None:
@@ -251,6 +265,8 @@ class Bridge:
             self._blender.send(Hello(os.getpid(), platform.python_version(), message.priority))
 
     def _tell_times(self, message: LoopTimesMessage) -> None:
+        if time.monotonic() - self._started > _SETTLED:
+            self._starts = 1  # what was long ago does not count
         simulation = self.simulation
         cost = simulation.cost if simulation else 0.0
         behind = max(0.0, cost - simulation.step_seconds) if simulation else 0.0
@@ -260,7 +276,7 @@ class Bridge:
         )
 
     def _lose_hands(self) -> None:
-        """The process at the devices ended: let go of everything, and start it again."""
+        """The process at the devices ended: let go of everything; the next turn starts it again."""
         if self._hands is not None:
             self._hands.stop(0.0)
         self._hands = None
@@ -269,20 +285,20 @@ class Bridge:
                 *(pointer, False, device.kind, 0.0, 0.0, 0.0, 0.0, device.name, ())
             )
             self._hear_device(gone)
-        self._restarts += 1
-        if self._restarts > _RESTARTS:
+        log.warning("The process at the devices ended")
+
+    def _start_again(self) -> None:
+        if self._starts <= _STARTS:
+            self.start_hands()
+            return
+        if not self._gave_up:
+            self._gave_up = True
             self._blender.send(
                 Notice(
                     "The program at the devices ends again and again.",
                     "Unplug the device, then start the bridge again.",
                 )
             )
-            return
-        log.warning("The process at the devices ended; it is started again")
-        try:
-            self.start_hands()
-        except DeviceError as error:
-            self._blender.send(Notice(error.problem, error.remedy))
 
     def close(self) -> None:
         """End the process at the devices."""
@@ -297,17 +313,13 @@ def run(hand_arguments: Sequence[str]) -> int:
     end_after(0.5, lambda: parent.gone)
     listener = Listener(parent.secret)
     parent.announce(listener.port)
-    blender = listener.accept(10.0)
+    blender = listener.accept(20.0)
     if blender is None:
         log.error("Nobody connected")
         return 2
     bridge = Bridge(blender, hand_arguments)
     schedule = Schedule(bridge.period, sleep=time.sleep)
     try:
-        try:
-            bridge.start_hands()
-        except DeviceError as error:
-            blender.send(Notice(error.problem, error.remedy))
         while not parent.gone:
             schedule.period = bridge.period
             now = schedule.begin()

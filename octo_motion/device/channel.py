@@ -27,8 +27,8 @@ HOST: Final = "127.0.0.1"
 _NONCE: Final = 32
 _CHALLENGE: Final = struct.Struct(f"<4sH{_NONCE}s")
 _ANSWER: Final = struct.Struct(f"<4sH{_NONCE}s32s")
-_PATIENCE: Final = 1.0
-"""s that a connection may take to prove itself."""
+_PATIENCE: Final = 3.0
+"""s that a connection may take to prove itself, on a machine that has much else to do."""
 _MOST_WAITING: Final = 8_000_000
 """Bytes that may wait for a peer which does not read; then it counts as gone."""
 _DROPPABLE_BEYOND: Final = 65_536

@@ -208,7 +208,7 @@ def run(sources: Sources, rate: float = RATE) -> int:
     end_after(0.5, lambda: parent.gone)
     listener = Listener(parent.secret)
     parent.announce(listener.port)
-    channel = listener.accept(10.0)
+    channel = listener.accept(20.0)
     if channel is None:
         log.error("Nobody connected")
         return 2
