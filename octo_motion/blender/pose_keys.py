@@ -398,8 +398,8 @@ def _channels(
 
 def _local_action(name: str | None) -> bpy.types.Action | None:
     """An action of this file by name."""
-    found = bpy.data.actions.get((name, None)) if name else None
-    return found if isinstance(found, bpy.types.Action) else None
+    local = (each for each in bpy.data.actions if each.library is None)
+    return next((each for each in local if each.name == name), None)
 
 
 def _chosen_action(name: str) -> bpy.types.Action:

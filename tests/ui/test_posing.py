@@ -591,6 +591,26 @@ def test_obstacle_without_a_surface_is_refused(octopus: Any) -> None:
     PuppetSession(octopus, bpy.context.scene).cancel()
 
 
+def test_joint_turns_no_further_than_the_rig_allows(octopus: Any) -> None:
+    limit = octopus.pose.bones["arm1.02.L"].constraints.new("LIMIT_ROTATION")
+    limit.owner_space = "LOCAL"
+    limit.use_limit_x = limit.use_limit_y = limit.use_limit_z = True
+    limit.min_x = limit.min_z = limit.min_y = -0.1
+    limit.max_x = limit.max_z = limit.max_y = 0.1
+    leaning = {}
+    for mute in (False, True):
+        limit.mute = mute
+        session = PuppetSession(octopus, bpy.context.scene, clock=None)
+        session.core.change(step=4e-3)
+        session.core.pin(session.body("arm1.01.L"), state=True)
+        drag(PoseControls(session), "arm1.03.L", (-120.0, 60.0))
+        leaning[mute] = octopus.pose.bones["arm1.02.L"].matrix_basis.to_quaternion().angle
+        session.cancel()
+    assert leaning[True] > 0.3
+    # Twist and lean together may be a little more than each.
+    assert leaning[False] < 0.16
+
+
 # --- Marks and drawing ---------------------------------------------------------------------------
 
 
