@@ -108,7 +108,7 @@ def test_momentum_of_a_free_figure_is_kept():
 
 
 @given(seed=seeds, count=st.integers(1, 9), touching=st.booleans(), alike=st.booleans())
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_energy_never_grows_without_input(seed: int, count: int, touching: bool, alike: bool):  # noqa: FBT001
     rng = np.random.default_rng(seed)
     elements = soft(count, *np.exp(rng.uniform(-4.0, 2.0, 4)))
@@ -174,7 +174,7 @@ def test_a_joint_that_yielded_keeps_its_new_pose_a_minute_later(material: str):
     settled = world.pose()
     moved = np.degrees(angle_between(settled.orientations, posed(figure).orientations))
     assert moved.max() > 20.0
-    later = World(figure, settled, WorldSettings(step=0.02, pinned=frozenset({0})))
+    later = World(figure, settled, WorldSettings(step=0.04, pinned=frozenset({0})))
     later.restore(world.state())
     run(later, 60.0)
     kept = np.degrees(angle_between(settled.orientations, later.pose().orientations).max())
@@ -395,4 +395,4 @@ def test_nothing_explodes_however_it_is_torn(seed: int):
             Sphere(position=np.array([-0.4, 0.4, 0.1]), radius=0.2),
         ],
     )
-    torn(world, rng, 700 if seed < 2 else 200)
+    torn(world, rng, 500 if seed < 2 else 120)
