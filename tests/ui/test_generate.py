@@ -714,6 +714,7 @@ def test_constraints_that_hide_the_keys_are_told(octopus: Any) -> None:
 
 
 def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
+    settings_of(octopus).tell_overlaps = False
     assert workflow.generate(octopus, bpy.context).warnings == ()
     octopus.pose.bones["Root"].rotation_quaternion = (0.8, 0.6, 0.0, 0.0)
     (told,) = workflow.generate(octopus, bpy.context).warnings
@@ -736,6 +737,7 @@ def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
 
 
 def test_targets_that_are_missed_are_told(octopus: Any) -> None:
+    settings_of(octopus).tell_overlaps = False
     shot = workflow.prepare(octopus, bpy.context)
     for _ in shot.compute():
         pass
@@ -816,7 +818,7 @@ class Operator:
 @pytest.fixture
 def long_job(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     """The operator at work in ten steps, each of which takes a whole turn."""
-    del octopus
+    settings_of(octopus).tell_overlaps = False
     monkeypatch.setattr(workflow, "_BONES_AT_ONCE", 24 * 6)
     monkeypatch.setattr("octo_motion.ui.locomotion.generate.PATIENCE", 0.0)
     monkeypatch.setattr("octo_motion.ui.locomotion.generate._TURN", 0.0)
