@@ -163,14 +163,7 @@ def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Float
     Raises:
         RigError: the parent's scale is zero in some direction.
     """
-    frame = parent_frame(obj)
-    # The rotation within a frame that may scale, shear and mirror: its polar decomposition.
-    left, sizes, right = np.linalg.svd(frame[:3, :3])
-    if sizes[-1] < 1e-6 * sizes[0]:
-        raise RigError(f"The parent of '{obj.name}' is flat or has no size.", "Repair its scale.")
-    turn = left @ right
-    # Blender takes a mirrored frame's axes the other way round: so reads its matrix_world.
-    turn = from_matrix(turn if np.linalg.det(turn) > 0.0 else -turn)
+    frame, turn = parent_frame(obj), _parent_turn(obj)
     mode = obj.rotation_mode
     own_rotations = multiply(
         multiply(conjugate(delta_rotation(obj)), conjugate(turn)), normalized(quaternions)
@@ -180,6 +173,24 @@ def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Float
         Channel("location", own_locations - np.array(obj.delta_location), _OBJECT_GROUP),
         Channel(_rotation_property(mode), _in_rotation_mode(own_rotations, mode), _OBJECT_GROUP),
     ]
+
+
+def object_places(
+    obj: bpy.types.Object, locations: Floats, quaternions: Floats
+) -> tuple[Floats, Floats]:
+    """Inverse of :func:`object_channels`: where values of an object's channels put it.
+
+    Args:
+        obj: the object.
+        locations: (frames, 3), values of its location.
+        quaternions: (frames, 4), what the values of its rotation mean.
+
+    Returns:
+        Locations (frames, 3) and orientations (frames, 4) in the world.
+    """
+    frame, turn = parent_frame(obj), _parent_turn(obj)
+    places = (locations + np.array(obj.delta_location)) @ frame[:3, :3].T + frame[:3, 3]
+    return places, multiply(multiply(turn, delta_rotation(obj)), quaternions)
 
 
 def channel_unit(obj: bpy.types.Object) -> float:
@@ -592,6 +603,12 @@ def _pose_bones(armature: bpy.types.Object, bones: Sequence[str]) -> list[bpy.ty
     return [found[name] for name in bones]
 
 
+def rotation_path(owner: bpy.types.Object | bpy.types.PoseBone) -> str:
+    """Data path of the rotation of an object or of a bone, in the mode that it has."""
+    name = _rotation_property(owner.rotation_mode)
+    return owner.path_from_id(name) if isinstance(owner, bpy.types.PoseBone) else name
+
+
 def _rotation_property(mode: str) -> str:
     if mode in ("QUATERNION", "AXIS_ANGLE"):
         return f"rotation_{mode.lower()}"
@@ -619,6 +636,21 @@ def parent_frame(obj: bpy.types.Object) -> Floats:
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     parent = evaluated.matrix_world @ evaluated.matrix_local.inverted_safe()
     return np.array(parent @ obj.matrix_parent_inverse, dtype=np.float64)
+
+
+def _parent_turn(obj: bpy.types.Object) -> Floats:
+    """The rotation (4,) within the frame in which the object's own channels stand.
+
+    Raises:
+        RigError: the parent's scale is zero in some direction.
+    """
+    # The frame may scale, shear and mirror: its polar decomposition.
+    left, sizes, right = np.linalg.svd(parent_frame(obj)[:3, :3])
+    if sizes[-1] < 1e-6 * sizes[0]:
+        raise RigError(f"The parent of '{obj.name}' is flat or has no size.", "Repair its scale.")
+    turn = left @ right
+    # Blender takes a mirrored frame's axes the other way round: so reads its matrix_world.
+    return from_matrix(turn if np.linalg.det(turn) > 0.0 else -turn)
 
 
 def delta_rotation(obj: bpy.types.Object) -> Floats:

@@ -8,7 +8,7 @@ stretched bones shear those that bend away from them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -70,3 +70,32 @@ def stretch_channels(
             scales = np.stack([across, along, across], axis=1)
             channels.append(Channel(bone.path_from_id("scale"), scales, bone.name))
     return channels
+
+
+def strains_of(
+    armature: bpy.types.Object,
+    arms: Sequence[Sequence[str]],
+    alongs: Mapping[str, Floats],
+    count: int,
+) -> Floats:
+    """Inverse of :func:`stretch_channels`: by how much bones are longer, as a share.
+
+    Args:
+        armature: the armature object.
+        arms: bones of each arm, root to tip.
+        alongs: by bone, its scale along itself (moments,); a bone without is not scaled.
+        count: number of moments.
+
+    Returns:
+        (moments, bones) of all arms, one after the other.
+    """
+    data = armature_data(armature).bones
+    strains = []
+    for bones in arms:
+        longer = np.ones(count)
+        for place, name in enumerate(bones):
+            own = alongs.get(name, 1.0)
+            handed_on = place and data[name].inherit_scale == ALIGNED
+            longer = longer * own if handed_on else np.ones(count) * own
+            strains.append(longer - 1.0)
+    return np.stack(strains, axis=1)

@@ -147,14 +147,21 @@ def _halved(values: Floats, half: Floats | None, *, turns: bool = False) -> Floa
         half: those half way, none for straight on from one frame to the next.
         turns: whether they are unit quaternions.
     """
-    if half is None:
-        before, after = values[:-1], values[1:]
-        if turns:
-            other = np.sum(before * after, axis=-1, keepdims=True) < 0.0
-            half = normalized(before + np.where(other, -after, after))
-        else:
-            half = 0.5 * (before + after)
-    return _joined(values, half)
+    return _joined(values, between(values, turns=turns) if half is None else half)
+
+
+def between(values: Floats, *, turns: bool = False) -> Floats:
+    """Values (frames − 1, …) half way from each frame's (frames, …) straight on to the next one's.
+
+    Args:
+        values: at the frames.
+        turns: whether they are unit quaternions.
+    """
+    before, after = values[:-1], values[1:]
+    if not turns:
+        return 0.5 * (before + after)
+    other = np.sum(before * after, axis=-1, keepdims=True) < 0.0
+    return normalized(before + np.where(other, -after, after))
 
 
 def _joined(values: np.ndarray, half: np.ndarray) -> np.ndarray:

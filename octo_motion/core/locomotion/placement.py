@@ -54,3 +54,28 @@ def root_bone_transforms(
     head = skeleton.heads[number]
     moved = rotate(turn, head) + shift - head
     return rotate(conjugate(rest), moved), multiply(conjugate(rest), multiply(turn, rest))
+
+
+def carried_by_root_bone(
+    skeleton: Skeleton, bone: str, world: Floats, locations: Floats, rotations: Floats
+) -> tuple[Floats, Floats]:
+    """Inverse of :func:`root_bone_transforms`.
+
+    Args:
+        skeleton: the rig.
+        bone: name of the root bone.
+        world: (4, 4) world matrix of the object, which stays where it is; uniform scale.
+        locations: (frames, 3) of the bone, in its rest frame.
+        rotations: (frames, 4) likewise.
+
+    Returns:
+        Locations (frames, 3) and orientations (frames, 4) in the world that the object would have
+        to have, were it the one that travels.
+    """
+    scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
+    stands = from_matrix(world[:3, :3] / scale)
+    number = skeleton.index[bone]
+    rest, head = skeleton.rest_rotations[number], skeleton.heads[number]
+    turn = multiply(multiply(rest, rotations), conjugate(rest))
+    shift = rotate(rest, locations) + head - rotate(turn, head)
+    return world[:3, 3] + scale * rotate(stands, shift), multiply(stands, turn)

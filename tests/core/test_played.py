@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What few keys play is what was asked of them, and on the keys themselves exactly."""
+
+import numpy as np
+import pytest
+
+from octo_motion.core.keys import LOCATION, Limb, Track, reduce_keys
+from octo_motion.core.played import rotations_of, values_at
+from octo_motion.core.rotations import from_euler
+
+FRAMES = np.arange(1.0, 61.0)
+
+
+def test_curves_keep_to_their_bound_and_meet_their_keys() -> None:
+    values = np.stack([np.sin(0.15 * FRAMES), 0.3 * np.cos(0.4 * FRAMES), 0.0 * FRAMES], axis=1)
+    ((keys,),) = reduce_keys(FRAMES, [Limb([Track(values, LOCATION)], np.pi, 0.01)])
+    assert len(keys) < 30
+    played = values_at(keys, FRAMES)
+    assert np.linalg.norm(played - values, axis=1).max() <= 0.01
+    # Keys are in single precision.
+    np.testing.assert_allclose(values_at(keys, keys.frames.astype(float)), keys.values, atol=1e-7)
+
+
+def test_before_the_first_key_and_after_the_last_nothing_moves() -> None:
+    values = np.stack([FRAMES, FRAMES, FRAMES], axis=1)
+    ((keys,),) = reduce_keys(FRAMES, [Limb([Track(values, LOCATION)], np.pi, 0.01)])
+    assert len(keys) == 2
+    np.testing.assert_allclose(
+        values_at(keys, np.array([-5.0, 1.0, 30.25, 60.0, 99.0]))[:, 0],
+        [1.0, 1.0, 30.25, 60.0, 60.0],
+        atol=1e-5,
+    )
+
+
+def test_one_key_holds_still() -> None:
+    values = np.ones((1, 3))
+    ((keys,),) = reduce_keys(FRAMES[:1], [Limb([Track(values, LOCATION)], np.pi, 0.01)])
+    np.testing.assert_array_equal(values_at(keys, np.array([0.0, 9.0])), np.ones((2, 3)))
+
+
+def test_values_of_every_rotation_mode_are_rotations() -> None:
+    expected = np.array([np.cos(0.25), np.sin(0.25), 0.0, 0.0])
+    # Blender plays quaternions of any length.
+    np.testing.assert_allclose(rotations_of(2.0 * expected, "QUATERNION"), expected, atol=1e-12)
+    np.testing.assert_allclose(
+        rotations_of(np.array([0.5, 3.0, 0.0, 0.0]), "AXIS_ANGLE"), expected, atol=1e-12
+    )
+    euler = np.array([0.5, 0.2, -0.1])
+    np.testing.assert_allclose(rotations_of(euler, "ZXY"), from_euler(euler, "ZXY"))
+    assert rotations_of(euler, "XYZ") != pytest.approx(rotations_of(euler, "ZYX"))
