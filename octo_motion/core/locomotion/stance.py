@@ -35,6 +35,8 @@ _RAISED: Final = np.radians(12.0)
 _RAISES: Final = 6
 _RAISES_BETWEEN: Final = 2
 """How often the lowest joints of an arm are raised, in the air and before it is drawn down."""
+_FALLING: Final = 0.2
+"""Share of downward in the way that a slack arm comes to the ground."""
 _KNEE: Final = 2
 """Free segments that have one joint between them: it must point up, or it is in the way."""
 _KNEE_UP: Final = np.radians(50.0)
@@ -349,6 +351,9 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
     # A cubic from body to ground that leaves and arrives as the arm does, and is as long. The
     # slacker the arm, the more it rises.
     rising = _RAISED + _ARCHED * smooth((_EASY - ratio) / _ARCHING)
+    # Slack, it comes down rather than back from under the body.
+    falling = _FALLING * smooth((_EASY - ratio) / _ARCHING)
+    arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
     if held.touching <= _KNEE:
         rising = rising + _KNEE_UP
         arriving = unit(arriving - _KNEE_DOWN * batch.upward)
