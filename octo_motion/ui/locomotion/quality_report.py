@@ -36,15 +36,17 @@ KINDS: Final = (
     ("OVERLAP", "Overlap", "How deep arms pass through each other or the body, in radii", 5),
 )
 
+_WORDS: Final = 0.7
+"""Share of a row that a figure and its arm need beside the button."""
 _NAMES: Final = {kind: name for kind, name, _, _ in KINDS}
 
 
 def shown(kind: str, value: float) -> str:
     """A figure as people read it."""
     if kind == "TURN":
-        return f"{np.degrees(value):.1f}° a frame"
+        return f"{np.degrees(value):.1f}°"
     if kind == "OVERLAP":
-        return f"{value:.1f} radii"
+        return f"{value:.2f} radii"
     percent = 100.0 * value
     # The aims are hundredths of a percent; of what is large nobody wants to know so much.
     return f"{percent:.2f} %" if percent < 1.0 else f"{percent:.1f} %"
@@ -121,7 +123,7 @@ def draw_figures(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     """A row for each figure, with a button that goes to its frame."""
     column = layout.column(align=True)
     for item in known_figures(settings):
-        row = column.row(align=True)
+        row = column.split(factor=_WORDS, align=True)
         row.label(text=_told(item))
         jump = row.operator(
             OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
