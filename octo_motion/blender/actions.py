@@ -210,6 +210,7 @@ def write_action(
     previous: bpy.types.Action | None,
     settings_note: str = "",
     repeats: bool = False,
+    replaceable: bool = False,
 ) -> bpy.types.Action:
     """Give an object an action with these channels: their own keys, or one linear key per frame.
 
@@ -226,6 +227,7 @@ def write_action(
         previous: the action to write anew, or none.
         settings_note: kept with the action, for whoever wants to know how it was made.
         repeats: whether curves go on before their first key and after their last, over and over.
+        replaceable: whether :func:`may_replace` has just said yes of ``previous``.
 
     Returns:
         The action, assigned to the object together with its slot.
@@ -238,7 +240,7 @@ def write_action(
     data = obj.animation_data or obj.animation_data_create()
     assert data is not None
     assigned = data.action
-    if previous is not None and _may_replace(previous, obj):
+    if previous is not None and (replaceable or may_replace(previous, obj)):
         action = previous
     else:
         action = _new_action(obj, name)
@@ -301,7 +303,7 @@ def key_count(action: bpy.types.Action) -> int:
     )
 
 
-def _may_replace(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+def may_replace(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
     """Whether this action is the object's alone, and all that is in it was generated."""
     if action.library is not None or action.override_library is not None:
         return False

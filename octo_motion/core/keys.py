@@ -16,7 +16,7 @@ Blender keeps them, in single precision, and keys are added until all bounds hol
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final
@@ -42,6 +42,8 @@ _STRETCH: Final = 64
 """Frames that are worked on at once; stretches meet where a key is needed anyway."""
 _ROWS: Final = 8192
 """Frames times limbs measured at a time: what stays within a processor's cache."""
+_CHOOSING: Final = 0.8
+"""Share of the work that it takes to choose key frames; the rest is for their handles."""
 _PULL: Final = 0.01
 """Weight, against that of a frame, of the wish that handles follow the motion's slope."""
 _SPARE: Final = 0.998
@@ -161,6 +163,18 @@ def reduce_keys(frames: Floats, limbs: Sequence[Limb]) -> list[list[BezierKeys]]
     Raises:
         SettingsError: a bound is not above zero.
     """
+    steps = reducing(frames, limbs)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as finished:
+            return finished.value
+
+
+def reducing(
+    frames: Floats, limbs: Sequence[Limb]
+) -> Generator[float, None, list[list[BezierKeys]]]:
+    """The same in steps, yielding the share that is done: 0…1. May be dropped between any two."""
     for limb in limbs:
         check_bounds(limb.angle, limb.distance)
     times = np.asarray(frames, dtype=np.float32).astype(np.float64)
@@ -170,10 +184,20 @@ def reduce_keys(frames: Floats, limbs: Sequence[Limb]) -> list[list[BezierKeys]]
         form = tuple((track.kind, track.values.shape[1]) for track in limb.tracks)
         alike.setdefault((form, chain), []).append(number)
     result: list[list[BezierKeys]] = [[] for _ in limbs]
+    tracks = [len(limb.tracks) for limb in limbs]
+    done, whole = 0, max(sum(tracks), 1)
     for numbers in alike.values():
-        work = _Work(times, [limbs[number] for number in numbers])
-        for number, keys in zip(numbers, work.reduced(), strict=True):
-            result[number] = keys
+        own = sum(tracks[number] for number in numbers)
+        steps = _Work(times, [limbs[number] for number in numbers]).reduced()
+        while True:
+            try:
+                share = next(steps)
+            except StopIteration as finished:
+                for number, keys in zip(numbers, finished.value, strict=True):
+                    result[number] = keys
+                break
+            yield (done + own * share) / whole
+        done += own
     return result
 
 
@@ -245,20 +269,22 @@ class _Work:
             self._rotations.reshape(numbers.size * len(times), -1, 4),
         ).reshape(*exact.shape[:2], -1)
 
-    def reduced(self) -> list[list[BezierKeys]]:
-        """The keys of each limb's tracks."""
+    def reduced(self) -> Generator[float, None, list[list[BezierKeys]]]:
+        """The keys of each limb's tracks, in steps that yield the share that is done."""
         last = len(self._times) - 1
         keyed = np.zeros(self._values.shape[:2], dtype=bool)
         keyed[:, (0, last)] = True
         if last > 0:
-            self._choose(keyed)
-        return self._written(keyed)
+            for share in self._choose(keyed):
+                yield _CHOOSING * share
+        return (yield from self._written(keyed))
 
     # --- Which frames ------------------------------------------------------------------------
 
-    def _choose(self, keyed: Booleans) -> None:
-        """Mark the key frames of all limbs, (limbs, frames)."""
+    def _choose(self, keyed: Booleans) -> Iterator[float]:
+        """Mark the key frames of all limbs, (limbs, frames); the share that is done."""
         limbs, starts, ends = self._stretches()
+        whole = int((ends - starts).sum())
         keyed[limbs, starts] = True
         # Of each stretch: the last key, the furthest frame that it can span, the nearest that it
         # cannot, and how far to look next.
@@ -287,6 +313,7 @@ class _Work:
             going = at < ends
             limbs, ends = limbs[going], ends[going]
             at, good, bad, guess = at[going], good[going], bad[going], guess[going]
+            yield 1.0 - int((ends - at).sum()) / whole
 
     def _stretches(self) -> tuple[Integers, Integers, Integers]:
         """Limb, first and last frame of the stretches, cut where the motion bends most."""
@@ -431,7 +458,7 @@ class _Work:
 
     # --- Keys as Blender keeps them --------------------------------------------------------------
 
-    def _written(self, keyed: Booleans) -> list[list[BezierKeys]]:
+    def _written(self, keyed: Booleans) -> Generator[float, None, list[list[BezierKeys]]]:
         """Keys at these frames; more are added where rounding would break a bound."""
         while True:
             spans = _spans_between(keyed)
@@ -442,6 +469,7 @@ class _Work:
             if not split.any():
                 return self._as_keys(spans, keyed, self._joined(spans))
             keyed[limbs[split], (starts + ends)[split] // 2] = True
+            yield _CHOOSING
 
     def _joined(self, spans: _Spans) -> Booleans:
         """Bring the two handles of a key into line wherever that keeps to the bounds.

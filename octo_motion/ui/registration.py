@@ -21,6 +21,7 @@ from .locomotion import (
     gait_table,
     generate,
     ground_properties,
+    live,
     panels,
     properties,
     quality_report,
@@ -94,6 +95,7 @@ def register() -> None:
     for each in CLASSES:
         bpy.utils.register_class(each)
     settings.register()
+    live.register()
     device_settings.register()
     setups.register()
     for menu, draw in MENUS:
@@ -109,6 +111,7 @@ def unregister() -> None:
     for menu, draw in reversed(MENUS):
         menu.remove(draw)
     setups.unregister()
+    live.unregister()
     settings.unregister()
     for each in reversed(CLASSES):
         bpy.utils.unregister_class(each)

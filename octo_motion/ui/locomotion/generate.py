@@ -10,6 +10,7 @@ import bpy
 from ...blender.armature import active_armature
 from ...core.errors import OctoMotionError
 from ..job import Job
+from . import live
 from .armature_operator import ArmatureOperator
 from .workflow import Shot, Summary, generate, prepare
 
@@ -37,7 +38,9 @@ class OCTO_MOTION_OT_generate_locomotion(ArmatureOperator, bpy.types.Operator):
     _timer: bpy.types.Timer | None = None
 
     def run(self, context: bpy.types.Context) -> None:
-        self._tell(generate(active_armature(context), context))
+        armature = active_armature(context)
+        self._tell(generate(armature, context))
+        live.made(armature)
 
     def invoke(
         self,
@@ -89,6 +92,7 @@ class OCTO_MOTION_OT_generate_locomotion(ArmatureOperator, bpy.types.Operator):
         assert shot is not None
         self._tear_down(context)
         self._tell(shot.write())
+        live.made(bpy.data.objects[shot.armature, None])  # type: ignore[index]
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:

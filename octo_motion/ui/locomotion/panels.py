@@ -428,9 +428,14 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             column.prop(settings, "key_angle", text="Tolerance Angle")
             column.prop(settings, "key_distance")
         layout.prop(settings, "tell_overlaps")
-        row = layout.row()
+        row = layout.row(align=True)
         row.scale_y = 1.5
         row.operator(OCTO_MOTION_OT_generate_locomotion.bl_idname, icon="PLAY", text="Generate")
+        row.prop(settings, "live", toggle=True, icon="FILE_REFRESH")
+        if settings.live_error:
+            row = layout.row()
+            row.alert = True
+            row.label(text=settings.live_error, icon="ERROR")
         _draw_result(layout, context, settings)
 
 

@@ -41,6 +41,7 @@ from .gait_properties import (
 )
 from .ground_properties import OCTO_MOTION_PG_ground
 from .in_place import TRAVEL_IN_PLACE, InPlace
+from .live_properties import Live
 from .quality_report import QualityReport
 from .reach_properties import Reaches
 
@@ -80,7 +81,7 @@ def _make_weight_curve(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.
 
 
 class OCTO_MOTION_PG_locomotion(
-    QualityReport, Reaches, InPlace, KeepingApart, bpy.types.PropertyGroup
+    QualityReport, Reaches, InPlace, KeepingApart, Live, bpy.types.PropertyGroup
 ):
     """How an armature walks or swims along a route."""
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...blender import actions
-from ...core.keys import LOCATION, Limb, Track, chain_to_tip, reduce_keys
+from ...core.keys import LOCATION, Limb, Track, chain_to_tip, reducing
 from ...core.locomotion.generator import Arm
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
@@ -74,8 +74,8 @@ class Motion:
 
 def reduced(
     frames: Floats, body: Body, motion: Motion, tolerances: Tolerances
-) -> list[actions.Channel]:
-    """The channels with few keys, grouped by arm.
+) -> Generator[float, None, list[actions.Channel]]:
+    """The channels with few keys, grouped by arm, in steps that yield the share that is done.
 
     Args:
         frames: (frames,) at which the channels have their values.
@@ -114,7 +114,7 @@ def reduced(
         bound = _STRETCH_SHARE * tolerances.distance / _length(body.skeleton, arm)
         parts.append([replace(each, group=arm.name) for each in part])
         limbs.append(Limb([Track(each.values, LOCATION) for each in part], np.pi, bound))
-    found = reduce_keys(frames, limbs)
+    found = yield from reducing(frames, limbs)
     return [
         replace(channel, keys=keys)
         for part, each in zip(parts, found, strict=True)

@@ -57,6 +57,7 @@ from .arm_items import bones_of, write_arms, write_body
 from .changing import Changing, Moved, Way, gaits_of, read_changes
 from .changing import plan as plan_changes
 from .in_place import breathing_channels
+from .keyed import Rig, as_keyed
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
 from .quality_report import write_figures
 from .reach_motion import Carried, Reaching, Travelling, read_reaches, write_carried
@@ -73,11 +74,13 @@ LAST_FRAME: Final = 1_048_574
 MISS: Final = 1e-3
 """Arm lengths by which a target may be missed without a word."""
 
-_RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
+RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
 """What is no setting, though it is kept with them."""
 _WEIGHT_SAMPLES: Final = 33
 _ROUTE_SAMPLES: Final = 257
 _UNEQUAL: Final = 1e-3
+_MOVING: Final = 0.4
+"""Share of the work that is over when the motion is there, but not yet its few keys."""
 _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
 
@@ -193,8 +196,12 @@ class Shot:
     """Where they take objects."""
     overlaps: tuple[str, ...] = ()
     """Where arms pass through each other or the body."""
+    measured: Measured | None = None
+    """What the figures are taken from, none where they are not wanted."""
     figures: tuple[Figure, ...] = ()
     """The worst of each kind."""
+    few: list[actions.Channel] | None = None
+    """The channels with few keys, where there are tolerances."""
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
@@ -209,6 +216,8 @@ class Shot:
             up = rotate(travel.rotations, _UP) if self.gait.on_ground else _UP
             places = travel.positions + self.height * up, travel.rotations
         locations, orientations = object_transforms(self.body, self.scale, *places)
+        # In place the ground goes by, and arms are measured as if the body went along it.
+        going = locations, orientations
         if self.in_place:
             locations, orientations = self._in_place()
         count, bones = len(self.frames), len(self.generator.bones)
@@ -218,6 +227,7 @@ class Shot:
         lying = [np.zeros((count, len(arm.bones) + 1), dtype=bool) for arm in self.arms]
         cycles = np.zeros((count, len(self.arms)), dtype=np.int64)
         step = max(1, _BONES_AT_ONCE // max(bones, 1))
+        moving = 1.0 if self.tolerances is None else _MOVING
         if self.changing is not None:
             for done in self.changing.compute(travel.distance, places, step):
                 if isinstance(done, Moved):
@@ -226,7 +236,7 @@ class Shot:
                     )
                     lying, cycles = list(done.lying), done.cycles
                 else:
-                    yield done
+                    yield moving * done
             self.swimming = self.changing.swimming(travel.distance)
         for start in range(0, 0 if self.changing else count, step):
             part = slice(start, min(start + step, count))
@@ -242,7 +252,7 @@ class Shot:
                 rotations[part] = poses.rotations
                 misses[part] = poses.misses.max(axis=2)
             if part.stop < count:
-                yield part.stop / count
+                yield moving * part.stop / count
         if self.reaching is not None:
             travelling = Travelling(locations, orientations, self.scale)
             before = rotations.copy()
@@ -256,25 +266,57 @@ class Shot:
         if self.measure:
             names = [arm.name for arm in self.arms]
             frames = [arm_frames(self.skeleton, arm.bones, self.body) for arm in self.arms]
-            self.figures = figures(
-                Measured(
-                    frames=self.frames,
-                    arms=frames,
-                    names=names,
-                    poses=Poses(rotations, strains, locations, orientations),
-                    misses=np.maximum(late, misses),
-                    scale=self.scale,
-                    ground=self._ground(),
-                    lying=lying,
-                    cycles=cycles,
-                    separation=separation,
-                    every=every,
-                )
+            self.measured = Measured(
+                frames=self.frames,
+                arms=frames,
+                names=names,
+                poses=Poses(rotations, strains, *going),
+                misses=np.maximum(late, misses),
+                scale=self.scale,
+                ground=self._ground(),
+                lying=lying,
+                cycles=cycles,
+                separation=separation,
+                every=every,
             )
         self.rotations, self.misses = rotations, misses
         self.strains, self.out_of_reach = strains, late
         self.locations, self.orientations = locations, orientations
+        if self.tolerances is not None:
+            yield moving
+            for share in self._reduce(self.tolerances):
+                yield moving + (1.0 - moving) * share
+        self._tell_quality()
         yield 1.0
+
+    def _tell_quality(self) -> None:
+        """Measure what the keys play, where figures are wanted."""
+        if self.measured is None:
+            return
+        if self.few is not None:
+            rig = Rig(
+                armature=_local_object(self.armature),
+                skeleton=self.skeleton,
+                arms=[arm.bones for arm in self.arms],
+                travels=not self.in_place,
+                root_bone=self.root_bone,
+                world=self.world,
+            )
+            self.measured = as_keyed(self.measured, rig, self.few)
+        self.figures = figures(self.measured)
+
+    def _reduce(self, tolerances: Tolerances) -> Iterator[float]:
+        """Find few keys, in steps that yield the share that is done."""
+        armature = _local_object(self.armature)
+        body = Body(*(armature, self.scale, self.skeleton, self.arms, self.mantle, self.root_bone))
+        steps = reduced(self.frames, body, self._motion(armature), tolerances)
+        while True:
+            try:
+                share = next(steps)
+            except StopIteration as finished:
+                self.few = finished.value
+                return
+            yield share
 
     def _let_go(
         self, moved: np.ndarray, lying: Sequence[np.ndarray], late: Floats, misses: Floats
@@ -301,8 +343,11 @@ class Shot:
         stands = [each for each in (self.standing, *(way.standing for way in ways)) if each]
         return stands[0].ground if stands else None
 
-    def write(self) -> Summary:
+    def write(self, *, unedited: bool = False) -> Summary:
         """Give the armature its action, in place of the one that was generated before.
+
+        Args:
+            unedited: whether it is known already that the one before may be made anew.
 
         Raises:
             WriteError: the object is gone, or has become read-only.
@@ -311,7 +356,7 @@ class Shot:
         actions.writable_armature(armature)
         settings = locomotion_settings(armature)
         channels = self._channels(armature)
-        previous = _previous_action(armature, settings)
+        previous = previous_action(armature, settings)
         left_behind = animated_bones(previous) if previous is not None else set[str]()
         scaled = animated_bones(previous, SCALE) if previous is not None else set[str]()
         # An arm that was switched off is left to the artist, in the pose that it has.
@@ -329,6 +374,7 @@ class Shot:
                 previous=previous,
                 settings_note=self.note,
                 repeats=self.repeats,
+                replaceable=unedited,
             )
         except WriteError:
             settings.result = previous
@@ -367,6 +413,11 @@ class Shot:
         )
 
     def _channels(self, armature: bpy.types.Object) -> list[actions.Channel]:
+        few = self.few if self.few is not None else self._motion(armature).all()
+        return [*few, *self.breath]
+
+    def _motion(self, armature: bpy.types.Object) -> Motion:
+        """What was computed, as channels with a key on every frame."""
         assert self.rotations is not None
         assert self.locations is not None
         assert self.orientations is not None
@@ -386,16 +437,12 @@ class Shot:
             ]
         else:
             travel = actions.object_channels(armature, self.locations, self.orientations)
-        motion = Motion(
+        return Motion(
             travel=travel,
             arms=actions.rotation_channels(armature, self.generator.bones, self.rotations),
             mantle=actions.rotation_channels(armature, self.mantle, held),
             stretch=self._stretch(armature),
         )
-        if self.tolerances is None:
-            return [*motion.all(), *self.breath]
-        body = Body(*(armature, self.scale, self.skeleton, self.arms, self.mantle, self.root_bone))
-        return [*reduced(self.frames, body, motion, self.tolerances), *self.breath]
 
     def _in_place(self) -> tuple[Floats, Floats]:
         """Locations (frames, 3) and orientations (frames, 4) of an armature that stays.
@@ -638,7 +685,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
 
 def settings_note(settings: OCTO_MOTION_PG_locomotion) -> str:
     """The settings as JSON, without what is no setting."""
-    return json.dumps(plain(settings, without=_RESULTS), sort_keys=True)
+    return json.dumps(plain(settings, without=RESULTS), sort_keys=True)
 
 
 def _local_object(name: str) -> bpy.types.Object:
@@ -648,13 +695,18 @@ def _local_object(name: str) -> bpy.types.Object:
         raise WriteError(f"'{name}' is gone.", "Generate again.") from None
 
 
-def _previous_action(
+def playing_action(armature: bpy.types.Object) -> bpy.types.Action | None:
+    """The action that an armature has."""
+    data = armature.animation_data
+    return data.action if data is not None else None
+
+
+def previous_action(
     armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion
 ) -> bpy.types.Action | None:
     """The action to make anew: the one that plays if it was generated, else the last result."""
-    data = armature.animation_data
     spliced = cast("Any", armature).octo_motion.splicing.result
-    playing = data.action if data is not None else None
+    playing = playing_action(armature)
     if playing is not None and playing != spliced and actions.is_generated(playing):
         return playing
     return settings.result
@@ -805,7 +857,7 @@ def _displaced(
     own = {skeleton.names[number] for number in carrying} - set(turned)
     if settings.travel_on == "BONE":
         own.discard(settings.root_bone)
-    if (previous := _previous_action(armature, settings)) is not None:
+    if (previous := previous_action(armature, settings)) is not None:
         # These go back to rest if they are not keyed again.
         own -= animated_bones(previous)
         stretched_by_it = animated_bones(previous, SCALE)

@@ -1,0 +1,375 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live motion: whoever drags a point of the route or a slider sees the motion follow.
+
+Blender tells after each update what has changed. If that is something that a motion was made from,
+a timer makes the motion anew a moment later, in place, outside the update; what changes in the
+meantime waits for the same turn. Only an action that was generated and that nobody has edited is
+touched. What our own writing changes is let through Blender's update before we listen again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ...blender import actions
+from ...blender.armature import read_skeleton
+from ...core import remembered
+from ...core.errors import OctoMotionError, RigError
+from ...core.remembered import key_of
+from ..plain import plain
+from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .wishes import gathered
+from .workflow import RESULTS, playing_action, prepare, previous_action
+
+_SOON: Final = 0.03
+"""Seconds from a change to the new motion at least: what changes together is made together."""
+_LATER: Final = 0.3
+"""Seconds until it is tried again, while Blender renders or a tool of ours runs."""
+_NO_MATTER: Final = RESULTS | {
+    *("contacts", "active_arm", "active_reach", "active_curve", "active_change", "shown_angle"),
+    *("keys", "key_angle", "key_distance", "tell_overlaps"),
+}
+"""Settings that the motion does not depend on while it is live; contacts are looked at otherwise.
+"""
+
+
+class _State:
+    """What is known between two updates."""
+
+    def __init__(self) -> None:
+        self.seen: dict[str, str | None] = {}
+        """What each live armature's motion was made from, by the object's name."""
+        self.changed: dict[str, bool] = {}
+        """Armatures to look at, and whether it is known already that they changed."""
+        self.rate = 0.0
+        """Frames per second."""
+        self.busy = False
+
+    def clear(self) -> None:
+        self.seen.clear()
+        self.changed.clear()
+        self.busy = False
+
+
+_state: Final = _State()
+
+
+def register() -> None:
+    """Listen to Blender."""
+    for handlers, function in _handlers():
+        handlers.append(function)
+
+
+def unregister() -> None:
+    """Listen no more, and drop what was about to be made."""
+    _drop()
+    _state.clear()
+    remembered.forget()
+    for handlers, function in _handlers():
+        if function in handlers:
+            handlers.remove(function)
+
+
+def _handlers() -> list[tuple[Any, Any]]:
+    known = bpy.app.handlers
+    return [
+        (known.depsgraph_update_post, _after_update),
+        (known.undo_pre, _before_undo),
+        (known.redo_pre, _before_undo),
+        (known.undo_post, _after_undo),
+        (known.redo_post, _after_undo),
+        (known.load_pre, _before_loading),
+        (known.load_post, _after_loading),
+    ]
+
+
+def made(armature: bpy.types.Object) -> None:
+    """Tell that an armature's motion has just been made from its settings as they are."""
+    settings = locomotion_settings(armature)
+    if settings.live:
+        _state.seen[armature.name] = _made_from(armature, settings)
+    if settings.live_error:
+        settings.live_error = ""
+
+
+def pending() -> bool:
+    """Whether a motion is about to be made."""
+    return bpy.app.timers.is_registered(run_pending)
+
+
+def run_pending() -> float | None:
+    """What the timer does: make the motions anew whose sources have changed.
+
+    Returns:
+        Seconds until it has to be called again, none if all is done.
+    """
+    if _state.busy or _others_at_work():
+        return _LATER
+    changed = dict(_state.changed)
+    _state.changed.clear()
+    for name, certain in changed.items():
+        _follow(name, certain=certain)
+    return None
+
+
+# --- What Blender tells --------------------------------------------------------------------------
+
+
+@persistent
+def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if _state.busy:
+        return
+    touched = {
+        update.id.original
+        for update in depsgraph.updates
+        # The rest of what happens to an object, a selection for one, moves nothing.
+        if update.id is not None
+        and (
+            not isinstance(update.id, bpy.types.Object)
+            or update.is_updated_geometry
+            or update.is_updated_transform
+        )
+    }
+    for each in touched:
+        if isinstance(each, bpy.types.Object) and each.type == "ARMATURE":
+            _look_at(each)
+    if not _state.seen:
+        return
+    rate = scene.render.fps / scene.render.fps_base
+    another_rate, _state.rate = rate != _state.rate and _state.rate > 0.0, rate
+    marked = {_marked(each) for each in touched if isinstance(each, bpy.types.Object)}
+    for name in list(_state.seen):
+        armature = _armature(name)
+        if armature is None:
+            del _state.seen[name]
+        elif another_rate or not touched.isdisjoint(_sources(armature)):
+            _soon(name, certain=True)
+        elif name in marked:
+            _soon(name, certain=False)
+
+
+def _look_at(armature: bpy.types.Object) -> None:
+    """Begin or cease to follow an armature, or see whether its settings have changed."""
+    name = armature.name
+    if armature.library is not None or not locomotion_settings(armature).live:
+        _state.seen.pop(name, None)
+        _state.changed.pop(name, None)
+    elif name in _state.seen:
+        _soon(name, certain=False)
+    else:
+        _state.seen[name] = None
+        _soon(name, certain=True)
+
+
+def _marked(item: bpy.types.Object) -> str:
+    """Name of the armature whose contact an object marks."""
+    return item.octo_motion.contact.armature if item.type == "EMPTY" else ""  # type: ignore[attr-defined]
+
+
+def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
+    """Data-blocks that a motion is made from, but for its armature object."""
+    settings = locomotion_settings(armature)
+    roots: list[bpy.types.Object | None] = [
+        *(settings.route, settings.ground.object, armature.parent),
+        # What is carried gets keys from us.
+        *(each.target for each in settings.reaches if not each.carry),
+    ]
+    found: set[bpy.types.ID] = set()
+    for root in roots:
+        each = root
+        while each is not None and each != armature:
+            found.add(each)
+            if each.data is not None:
+                found.add(each.data)
+            each = each.parent
+    # Blender tags the armature's data with every pose: its bones are looked at themselves.
+    parts = [settings.weight_curve, *(child.data for child in armature.children)]
+    return found | {each for each in parts if each is not None}
+
+
+@persistent
+def _before_undo(*_: object) -> None:
+    _drop()
+
+
+@persistent
+def _after_undo(*_: object) -> None:
+    """A step may have been made between a change and the motion that follows from it."""
+    _state.clear()
+    for armature in _live_armatures():
+        _state.seen[armature.name] = None
+        _soon(armature.name, certain=True)
+
+
+@persistent
+def _before_loading(*_: object) -> None:
+    _drop()
+    _state.clear()
+    remembered.forget()
+
+
+@persistent
+def _after_loading(*_: object) -> None:
+    for armature in _live_armatures():
+        _state.seen[armature.name] = _made_from(armature, locomotion_settings(armature))
+
+
+def _live_armatures() -> list[bpy.types.Object]:
+    return [
+        each
+        for each in bpy.data.objects
+        if each.type == "ARMATURE" and each.library is None and locomotion_settings(each).live
+    ]
+
+
+# --- The motion ----------------------------------------------------------------------------------
+
+
+def _soon(name: str, *, certain: bool) -> None:
+    _state.changed[name] = certain or _state.changed.get(name, False)
+    if not pending():
+        bpy.app.timers.register(run_pending, first_interval=_SOON)
+
+
+def _drop() -> None:
+    _state.changed.clear()
+    if pending():
+        bpy.app.timers.unregister(run_pending)
+
+
+def _others_at_work() -> bool:
+    """Whether Blender renders, or a modal tool of ours has the screen."""
+    if bpy.app.is_job_running("RENDER"):
+        return True
+    manager = bpy.context.window_manager
+    return manager is not None and any(
+        operator.bl_idname.startswith("OCTO_MOTION_OT_")
+        for window in manager.windows
+        for operator in window.modal_operators
+    )
+
+
+def _armature(name: str) -> bpy.types.Object | None:
+    found = bpy.data.objects.get((name, None))
+    return found if found is not None and found.type == "ARMATURE" else None
+
+
+def _follow(name: str, *, certain: bool) -> None:
+    """Make an armature's motion anew, if it is not what it is made from says already."""
+    armature = _armature(name)
+    settings = locomotion_settings(armature) if armature is not None else None
+    if armature is None or settings is None or not settings.live:
+        _state.seen.pop(name, None)
+        return
+    if armature.mode == "EDIT" or not _within_scene(armature):
+        # Leaving edit mode is a change of its own.
+        return
+    if not certain and _state.seen.get(name) == _made_from(armature, settings):
+        return
+    with _deaf(), _window_of(armature):
+        try:
+            _make(armature, settings)
+        except OctoMotionError as error:
+            settings.live_error = str(error)
+        except BaseException:
+            settings.live = False
+            settings.live_error = "Live has stopped at a fault: the console tells which."
+            raise
+    if settings.live:
+        _state.seen[name] = _made_from(armature, settings)
+
+
+def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
+    kept = _whose(armature, settings)
+    if kept:
+        settings.live = False
+        settings.live_error = kept
+        _state.seen.pop(armature.name, None)
+        return
+    shot = prepare(armature, bpy.context, live=True)
+    for _ in shot.compute():
+        pass
+    shot.write(unedited=True)
+    if settings.live_error:
+        settings.live_error = ""
+
+
+def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
+    """Why the armature's action must be left alone, "" if it is ours."""
+    previous, playing = previous_action(armature, settings), playing_action(armature)
+    if playing is not None and playing != previous:
+        return f"Live is off: '{playing.name}' is not what was generated."
+    if previous is None or actions.may_replace(previous, armature):
+        return ""
+    if actions.is_edited(previous):
+        return f"Live is off: '{previous.name}' was edited and is yours."
+    return f"Live is off: '{previous.name}' has other users too."
+
+
+def _made_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
+    """All that a motion is made from and that belongs to the armature object itself, as text."""
+    wishes = [
+        (place, each.removed, each.shift, each.heading, np.asarray(each.position).tolist())
+        for place, each in sorted(gathered(settings.ground, armature).items())
+    ]
+    bones = armature.pose.bones if armature.pose is not None else ()
+    try:
+        rest = key_of(read_skeleton(armature)).hex()
+    except RigError:
+        # Generating says what is wrong with it.
+        rest = ""
+    # Where it travels itself, its place is what the motion makes of it.
+    travels = settings.travel_on == "OBJECT"
+    place = armature.scale if travels else [value for row in armature.matrix_world for value in row]
+    return json.dumps(
+        [
+            *(plain(settings, without=_NO_MATTER), wishes, [*place], armature.rotation_mode),
+            *(rest, [bone.rotation_mode for bone in bones]),
+        ],
+        sort_keys=True,
+    )
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Let nothing that happens within be a change to follow."""
+    _state.busy = True
+    try:
+        yield
+    finally:
+        try:
+            # What was written is told now, while nobody listens.
+            if bpy.context.view_layer is not None:
+                bpy.context.view_layer.update()
+        finally:
+            _state.busy = False
+
+
+def _within_scene(armature: bpy.types.Object) -> bool:
+    return _windows(armature) != [] or armature.name in bpy.context.view_layer.objects
+
+
+def _windows(armature: bpy.types.Object) -> list[bpy.types.Window]:
+    """Windows that show a view layer with the armature."""
+    manager = bpy.context.window_manager
+    if manager is None:
+        return []
+    return [each for each in manager.windows if armature.name in each.view_layer.objects]
+
+
+@contextmanager
+def _window_of(armature: bpy.types.Object) -> Iterator[None]:
+    """A context in which the armature's scene is the one that is worked on."""
+    windows = _windows(armature)
+    if not windows:
+        yield
+        return
+    with bpy.context.temp_override(window=windows[0]):
+        yield

@@ -1,0 +1,390 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live motion: what is dragged is followed, and nothing else is touched.
+
+Blender as a module runs no timers: what a timer would do is called by hand.
+"""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+import octo_motion
+from octo_motion.blender import actions
+from octo_motion.blender.contacts import markers
+from octo_motion.ui.locomotion import live, panels, workflow
+from tests.blender.test_ground import make_mesh, make_square
+from tests.ui.rig import click, generate, give_route, keys, make_octopus
+from tests.ui.test_panels import Layout
+
+MADE: list[str] = []
+"""Armatures whose motion was to be made anew."""
+
+
+@pytest.fixture(autouse=True)
+def counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    make = live._make
+
+    def counting(armature: Any, settings: Any) -> None:
+        MADE.append(armature.name)
+        make(armature, settings)
+
+    monkeypatch.setattr(live, "_make", counting)
+
+
+@pytest.fixture
+def octopus() -> Any:
+    """An octopus with four arms that walks for 40 frames, its motion generated and live."""
+    armature = make_octopus()
+    give_route(armature)
+    settings = armature.octo_motion.locomotion
+    settings.timing, settings.frame_end = "RANGE", 40
+    generate(armature)
+    settings.live = True
+    settle()
+    return armature
+
+
+def settings_of(armature: Any) -> Any:
+    return armature.octo_motion.locomotion
+
+
+def settle() -> bool:
+    """Blender's update, and the timer if there is one; whether it has made a motion."""
+    for each in bpy.data.objects:
+        if each.type == "ARMATURE":
+            # A change in the panel is told by Blender; one by a script must be told.
+            each.update_tag(refresh={"OBJECT", "DATA"})
+    bpy.context.view_layer.update()
+    before = len(MADE)
+    if live.pending():
+        bpy.app.timers.unregister(live.run_pending)
+        assert live.run_pending() is None
+    bpy.context.view_layer.update()
+    return len(MADE) > before
+
+
+def action_of(armature: Any) -> Any:
+    return armature.animation_data.action
+
+
+def motion(armature: Any) -> dict[Any, Any]:
+    return {place: values.tolist() for place, values in keys(action_of(armature)).items()}
+
+
+def drag_route(armature: Any, along: float = 0.3) -> None:
+    """Move the route's end sideways."""
+    point = settings_of(armature).route.data.splines[0].bezier_points[-1]
+    point.co.x += along
+
+
+def test_the_motion_follows_a_point_of_the_route(octopus: Any) -> None:
+    before, action = motion(octopus), action_of(octopus)
+    drag_route(octopus)
+    assert motion(octopus) == before  # not within the update itself
+    assert settle()
+    assert action_of(octopus) == action
+    assert motion(octopus) != before
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed  # as Generate makes it
+
+
+def test_the_motion_follows_the_route_as_a_whole(octopus: Any) -> None:
+    before = motion(octopus)
+    settings_of(octopus).route.location.y -= 1.0
+    assert settle()
+    assert motion(octopus) != before
+
+
+SLIDERS: list[tuple[str, Any]] = [
+    ("contraction", 0.2),
+    ("softness", 0.1),
+    ("sway", 0.4),
+    ("phase_spread", 0.3),
+    ("turning", 0.0),
+    ("ease_in", 0.4),
+    ("heading_angle", 0.7),
+    ("stand", False),
+    ("gait", "crawl"),
+    ("frame_start", 5),
+]
+
+
+@pytest.mark.parametrize(("name", "value"), SLIDERS)
+def test_the_motion_follows_every_slider(octopus: Any, name: str, value: Any) -> None:
+    before = motion(octopus)
+    setattr(settings_of(octopus), name, value)
+    assert settle()
+    assert motion(octopus) != before
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed
+
+
+GROUND: list[Callable[[Any], None]] = [
+    lambda armature: setattr(settings_of(armature).ground, "duty", 0.7),
+    lambda armature: setattr(settings_of(armature).ground, "planted", 0.6),
+    lambda armature: setattr(settings_of(armature).ground, "lift", 0.3),
+    lambda armature: setattr(settings_of(armature).table, "stride", 0.9),
+    lambda _: setattr(bpy.context.scene.render, "fps", 30),
+    lambda armature: settings_of(armature).arms.clear(),
+    lambda armature: setattr(armature.pose.bones["Arm1_2.L"], "rotation_mode", "XYZ"),
+]
+
+
+@pytest.mark.parametrize("number", range(len(GROUND)))
+def test_what_is_made_live_is_what_the_button_makes(octopus: Any, number: int) -> None:
+    settings_of(octopus).timing = "CADENCE"
+    settle()
+    GROUND[number](octopus)
+    settle()
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed
+
+
+def test_the_motion_follows_its_ground(octopus: Any) -> None:
+    ground = make_square(20.0)
+    settings_of(octopus).ground.object = ground
+    settle()
+    level = motion(octopus)
+    ground.location.z = -0.1
+    assert settle()
+    lower = motion(octopus)
+    assert lower != level
+    for vertex in ground.data.vertices:
+        vertex.co.z += 0.05 * vertex.co.y
+    ground.data.update()
+    assert settle()
+    assert motion(octopus) not in (level, lower)
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed
+
+
+def ground_under(armature: Any) -> Any:
+    standing = workflow.prepare(armature, bpy.context).standing
+    assert standing is not None
+    return standing.ground
+
+
+def test_the_ground_is_read_anew_after_each_change() -> None:
+    """Of the same mesh under the same route, and with another one above it."""
+    armature = make_octopus()
+    give_route(armature)
+    settings = settings_of(armature)
+    settings.timing, settings.frame_end = "RANGE", 20
+    settings.ground.object = make_square(20.0)
+    heights = []
+    for lift in (0.0, 0.2, 0.0):
+        settings.ground.object.location.z = lift
+        bpy.context.view_layer.update()
+        ground = ground_under(armature)
+        heights.append(float(ground.height(np.array([0.0, -1.0]))))
+    assert heights == pytest.approx([0.0, 0.2, 0.0], abs=1e-6)
+    roof = [(-9, -9, 0.5), (9, -9, 0.5), (9, 9, 0.5), (-9, 9, 0.5)]
+    both = [*roof, *[(x, y, 0.1) for x, y, _ in roof]]
+    settings.ground.object = make_mesh(both, [(0, 1, 2, 3), (4, 5, 6, 7)])
+    bpy.context.view_layer.update()
+    ground = ground_under(armature)
+    assert float(ground.height(np.array([0.0, -1.0]))) == pytest.approx(0.5, abs=1e-6)
+
+
+def test_without_change_nothing_is_made_anew(octopus: Any) -> None:
+    before = motion(octopus)
+    octopus.pose.bones["Root"].location.x = 0.1
+    assert not settle()
+    bpy.context.scene.frame_set(10)
+    assert motion(octopus) == before
+    assert not settle()  # our own writing is no change to follow
+    octopus.select_set(state=False)
+    settle()
+    assert motion(octopus) == before
+    assert not settings_of(octopus).live_error
+
+
+def test_live_is_off_until_it_is_switched_on() -> None:
+    armature = make_octopus()
+    give_route(armature)
+    assert not settings_of(armature).live
+    assert not settle()
+    assert armature.animation_data is None
+    settings_of(armature).live = True
+    assert settle()
+    assert settings_of(armature).result == action_of(armature)
+    settings_of(armature).live = False
+    before = motion(armature)
+    drag_route(armature)
+    settle()
+    assert motion(armature) == before
+
+
+def test_what_is_wrong_is_told_in_the_panel_and_the_motion_stays(octopus: Any) -> None:
+    before = motion(octopus)
+    settings_of(octopus).frame_end = settings_of(octopus).frame_start
+    assert settle()
+    assert motion(octopus) == before
+    told = settings_of(octopus).live_error
+    assert told.startswith("The motion ends at frame 1")
+    assert settings_of(octopus).live
+    layout = Layout()
+    panel: Any = None
+    panels.OCTO_MOTION_PT_generate.show(panel, bpy.context, layout, settings_of(octopus))
+    assert any(told in str(each) for each in layout.drawn)
+    settings_of(octopus).frame_end = 30
+    assert settle()
+    assert not settings_of(octopus).live_error
+    assert motion(octopus) != before
+
+
+def test_an_action_that_was_edited_is_left_alone(octopus: Any) -> None:
+    action = action_of(octopus)
+    curve = next(iter(action.layers[0].strips[0].channelbags[0].fcurves))
+    curve.keyframe_points[3].co.y += 0.5
+    curve.update()
+    edited = motion(octopus)
+    drag_route(octopus)
+    settle()
+    assert action_of(octopus) == action
+    assert motion(octopus) == edited
+    assert not settings_of(octopus).live
+    assert settings_of(octopus).live_error == (
+        f"Live is off: '{action.name}' was edited and is yours."
+    )
+    settle()
+    drag_route(octopus)
+    assert not settle()
+
+
+def test_an_action_of_the_artists_own_is_left_alone(octopus: Any) -> None:
+    own = bpy.data.actions.new("Own")
+    octopus.animation_data.action = own
+    drag_route(octopus)
+    settle()
+    assert action_of(octopus) == own
+    assert not settings_of(octopus).live
+
+
+def test_few_keys_are_left_to_the_button(octopus: Any) -> None:
+    settings_of(octopus).keys = "REDUCED"
+    settle()
+    generate(octopus)
+    few = actions.key_count(action_of(octopus))
+    settle()
+    assert actions.key_count(action_of(octopus)) == few
+    drag_route(octopus)
+    assert settle()
+    now, dense = actions.key_counts(action_of(octopus))
+    assert now == dense > few
+
+
+def test_a_dragged_contact_is_followed(octopus: Any) -> None:
+    click("contacts_show")
+    settle()
+    before = motion(octopus)
+    marker = markers(octopus)[2]
+    marker.location.x += 0.05
+    assert settle()
+    assert motion(octopus) != before
+    assert not settle()
+
+
+def test_undo_leaves_route_and_motion_in_agreement(octopus: Any) -> None:
+    name, route = octopus.name, settings_of(octopus).route.name
+    bpy.ops.ed.undo_push(message="before")
+    before = motion(octopus)
+    place = bpy.data.objects[route].data.splines[0].bezier_points[-1].co.x
+    drag_route(octopus)
+    # The step is closed before the motion follows, as after a drag.
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="drag")
+    settle()
+    after = motion(octopus)
+    assert after != before
+    bpy.ops.ed.undo()
+    settle()
+    again: Any = bpy.data.objects[name]
+    assert bpy.data.objects[route].data.splines[0].bezier_points[-1].co.x == pytest.approx(place)
+    assert motion(again) == before
+    bpy.ops.ed.redo()
+    settle()
+    assert motion(bpy.data.objects[name]) == after
+
+
+def test_a_file_is_followed_after_it_is_opened(octopus: Any, tmp_path: Path) -> None:
+    name, before = octopus.name, motion(octopus)
+    drag_route(octopus)
+    bpy.context.view_layer.update()
+    assert live.pending()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "live.blend"))
+    assert not live.pending()
+    opened: Any = bpy.data.objects[name]
+    assert motion(opened) == before
+    drag_route(opened)
+    assert settle()
+    assert motion(opened) != before
+
+
+def test_two_octopuses_are_followed_each_for_itself(octopus: Any) -> None:
+    other = make_octopus("Other")
+    give_route(other)
+    settings_of(other).timing, settings_of(other).frame_end = "RANGE", 20
+    settings_of(other).live = True
+    settle()
+    here, there = motion(octopus), motion(other)
+    drag_route(other)
+    settle()
+    assert motion(octopus) == here
+    assert motion(other) != there
+
+
+def test_a_live_octopus_that_is_deleted_is_forgotten(octopus: Any) -> None:
+    drag_route(octopus)
+    bpy.context.view_layer.update()
+    bpy.data.objects.remove(octopus)
+    settle()
+    assert not settle()
+
+
+def test_while_a_tool_has_the_screen_the_motion_waits(
+    octopus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = motion(octopus)
+    drag_route(octopus)
+    bpy.context.view_layer.update()
+    monkeypatch.setattr(live, "_others_at_work", lambda: True)
+    assert live.run_pending() is not None
+    assert motion(octopus) == before
+    monkeypatch.undo()
+    assert live.run_pending() is None
+    assert motion(octopus) != before
+
+
+def test_nothing_is_left_of_it_when_the_add_on_is_switched_off() -> None:
+    script = (
+        "import bpy, octo_motion\n"
+        "known = [each for name in dir(bpy.app.handlers) "
+        "if isinstance(each := getattr(bpy.app.handlers, name), list)]\n"
+        "before = [len(each) for each in known]\n"
+        "octo_motion.register()\n"
+        "from octo_motion.ui.locomotion import live\n"
+        "assert [len(each) for each in known] != before\n"
+        "live._soon('nobody', certain=True)\n"
+        "assert live.pending()\n"
+        "octo_motion.unregister()\n"
+        "assert not live.pending()\n"
+        "assert [len(each) for each in known] == before, known\n"
+        "print('clean')\n"
+    )
+    root = str(Path(octo_motion.__file__).parent.parent)
+    finished = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=root, check=False
+    )
+    assert "clean" in finished.stdout, finished.stderr
