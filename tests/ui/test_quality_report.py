@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion import quality
-from octo_motion.core.locomotion.figures import KINDS, Figure
+from octo_motion.core.locomotion.figures import KINDS, Figure, Measured, Poses
+from octo_motion.core.rotations import rotate
 from octo_motion.ui.locomotion import quality_report
 from octo_motion.ui.locomotion.workflow import Shot, prepare
 from tests.blender.test_ground import make_mesh
@@ -24,7 +25,7 @@ OF_ARM = 0.01
 
 @pytest.fixture
 def octopus() -> Any:
-    """The default octopus without its skin, a route of some four arm lengths, and 80 frames."""
+    """The default octopus without its skin, a route of some four arm lengths: a hurry."""
     click("add_octopus", with_mesh=False)
     armature: Any = bpy.context.object
     click("detect_arms")
@@ -64,6 +65,7 @@ def bumpy() -> Any:
 
 
 def test_a_walk_on_a_plane_has_all_figures_and_keeps_to_its_limits(octopus: Any) -> None:
+    octopus.octo_motion.locomotion.frame_end = 200  # at the pace of a walk
     generate(octopus)
     found = figures(octopus)
     assert tuple(found) == KINDS
@@ -75,7 +77,7 @@ def test_a_walk_on_a_plane_has_all_figures_and_keeps_to_its_limits(octopus: Any)
     arms = {arm.name for arm in octopus.octo_motion.locomotion.arms}
     for kind in ("SLIP", "STRAIN", "TURN"):
         assert found[kind].arm in arms
-        assert 1 <= found[kind].frame <= 80
+        assert 1 <= found[kind].frame <= 200
 
 
 def test_the_figure_of_the_turn_is_what_blender_plays(octopus: Any) -> None:
@@ -189,7 +191,7 @@ class Drawn:
     def column(self, **_: Any) -> "Drawn":
         return self
 
-    def row(self, **_: Any) -> "Drawn":
+    def split(self, **_: Any) -> "Drawn":
         return self
 
     def label(self, *, text: str) -> None:
@@ -217,8 +219,8 @@ def test_rows_say_what_how_much_and_whose_with_a_button_to_the_frame(small: Any)
     assert drawn.labels == [
         "Slip: 0.12 %, Right",
         "Strain: 25.1 %, Left",
-        "Turn: 12.3° a frame, Left",
-        "Overlap: 0.0 radii",
+        "Turn: 12.3°, Left",
+        "Overlap: 0.00 radii",
     ]
     assert [(text, button.kind) for text, button in drawn.buttons] == [
         ("17", "SLIP"),
@@ -275,3 +277,89 @@ def test_an_override_forgets_what_its_linked_file_knew_of_another_motion(
     bpy.context.view_layer.objects.active = again
     with pytest.raises(RuntimeError, match="Nothing is known of slip"):
         click("quality_jump", kind="SLIP")
+
+
+def played_joints(armature: Any, shot: Shot, times: np.ndarray) -> np.ndarray:
+    """Joints of the arms (times, arms, joints, 3) as Blender plays them."""
+    names = [bone.name for bone in armature.pose.bones]
+    found = []
+    for time in times:
+        ends = joints_in_world(armature, time)
+        arms = [[names.index(name) for name in arm.bones] for arm in shot.arms]
+        found.append([np.concatenate([ends[own, 0], ends[own[-1:], 1]]) for own in arms])
+    return np.array(found)
+
+
+def measured_joints(measured: Measured, poses: Poses) -> np.ndarray:
+    """The same as they are measured."""
+    ends = np.cumsum([0, *(len(arm.bones) for arm in measured.arms)])
+    found = []
+    for number, arm in enumerate(measured.arms):
+        bones = slice(ends[number], ends[number + 1])
+        own = arm.joints(arm.from_bones(poses.rotations[:, bones]), poses.strains[:, bones])
+        turned = rotate(poses.orientations[:, None], measured.scale * own)
+        found.append(poses.locations[:, None] + turned)
+    return np.stack(found, axis=1)
+
+
+@pytest.mark.parametrize("travel_on", ["OBJECT", "BONE"])
+@pytest.mark.parametrize("mode", ["QUATERNION", "ZXY", "AXIS_ANGLE"])
+def test_few_keys_are_measured_as_blender_plays_them(travel_on: str, mode: str) -> None:
+    armature = make_octopus(length=0.5)
+    give_route(armature)
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.location, parent.rotation_euler = (1.0, 2.0, 3.0), (0.2, 0.3, 0.4)
+    armature.parent, armature.scale = parent, (2.0, 2.0, 2.0)
+    armature.rotation_mode = mode
+    armature.delta_location, armature.delta_rotation_euler = (0.3, 0.2, 0.1), (0.1, 0.2, 0.3)
+    for bone in armature.pose.bones:
+        bone.rotation_mode = mode
+    for bone in armature.data.bones:
+        bone.inherit_scale = "ALIGNED"
+    settings = armature.octo_motion.locomotion
+    settings.timing, settings.frame_end, settings.keys = "RANGE", 30, "REDUCED"
+    settings.travel_on, settings.root_bone = travel_on, "Root"
+    settings.key_angle, settings.key_distance = np.radians(5.0), 0.05
+    bpy.context.view_layer.update()
+
+    shot = computed(armature)
+    shot.write()
+    measured = shot.measured
+    assert measured is not None
+    assert measured.halfway is not None
+    assert shot.rotations is not None
+    # Few keys are something else than what was computed.
+    assert np.abs(measured.poses.rotations - shot.rotations).max() > 1e-3
+    times = shot.frames[::4]
+    # Single precision, along a chain of bones two metres out in the world.
+    np.testing.assert_allclose(
+        measured_joints(measured, measured.poses)[::4],
+        played_joints(armature, shot, times),
+        atol=1e-5,
+    )
+    np.testing.assert_allclose(
+        measured_joints(measured, measured.halfway)[::4],
+        played_joints(armature, shot, times[: len(measured.poses.strains[:-1:4])] + 0.5),
+        atol=1e-5,
+    )
+
+
+def test_few_keys_slip_by_what_they_leave_out(octopus: Any) -> None:
+    exact = {figure.kind: figure.value for figure in computed(octopus).figures}
+    octopus.octo_motion.locomotion.keys = "REDUCED"
+    octopus.octo_motion.locomotion.key_distance = 0.02
+    few = {figure.kind: figure.value for figure in computed(octopus).figures}
+    assert few["SLIP"] > exact["SLIP"]
+    # The tolerance, to either side.
+    assert few["SLIP"] < exact["SLIP"] + 2.5 * 0.02
+
+
+def test_a_walk_in_place_is_measured_against_the_ground_that_goes_by(octopus: Any) -> None:
+    settings = octopus.octo_motion.locomotion
+    settings.travel_on, settings.timing, settings.cycle_time = "NONE", "CADENCE", 3.0
+    for keys in ("DENSE", "REDUCED"):
+        settings.keys = keys
+        found = {figure.kind: figure.value for figure in computed(octopus).figures}
+        assert found["SLIP"] < 2.0 * OF_ARM
+        assert found["DEPTH"] < OF_ARM
