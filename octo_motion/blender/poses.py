@@ -22,17 +22,21 @@ def animated_bones(
     action: bpy.types.Action, channels: tuple[str, ...] = ("location", "rotation_")
 ) -> set[str]:
     """Names of the bones whose channels of these kinds the action keys."""
+    # The components of a property have the same path.
+    paths = {
+        curve.data_path
+        for layer in action.layers
+        for strip in layer.strips
+        if isinstance(strip, bpy.types.ActionKeyframeStrip)
+        for channelbag in strip.channelbags
+        for curve in channelbag.fcurves
+    }
     names: set[str] = set()
-    for layer in action.layers:
-        for strip in layer.strips:
-            if not isinstance(strip, bpy.types.ActionKeyframeStrip):
-                continue
-            for channelbag in strip.channelbags:
-                for curve in channelbag.fcurves:
-                    start, _, rest = curve.data_path.partition('pose.bones["')
-                    name, _, channel = rest.partition('"].')
-                    if not start and channel.startswith(channels):
-                        names.add(bpy.utils.unescape_identifier(name))
+    for path in paths:
+        start, _, rest = path.partition('pose.bones["')
+        name, _, channel = rest.partition('"].')
+        if not start and channel.startswith(channels):
+            names.add(bpy.utils.unescape_identifier(name))
     return names
 
 

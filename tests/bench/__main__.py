@@ -8,6 +8,7 @@ Blender's is the bake alone, without constraints and targets. Then how fast spli
 measurement has a process of its own.
 
 "splicing" as the first word measures the quality of splices instead; its own --help tells more.
+"live" measures only how fast a walk follows a change, and what holding a ground costs.
 "device" measures how well the loop at the devices keeps time, "posing" how long a step of the
 plastic puppet takes.
 """
@@ -24,7 +25,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from tests.bench import splice_speed
+from tests.bench import live_speed, splice_speed
 
 Measured = dict[str, Any]
 
@@ -44,6 +45,9 @@ def main() -> None:
 
         posing.main(sys.argv[2:])
         return
+    if sys.argv[1:2] == ["live"]:
+        live_speed.tables()
+        return
     if sys.argv[1:2] == ["device"]:
         from tests.bench import device_loop
 
@@ -61,6 +65,7 @@ def main() -> None:
         report["frames"] = _by_frames(arguments)
         report["arms"] = _by_arms(arguments)
         print()
+        report["live"] = live_speed.tables()
         report["splices"] = splice_speed.tables(arguments.repeat)
     if arguments.json:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)

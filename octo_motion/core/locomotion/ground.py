@@ -195,25 +195,19 @@ def passes_over_itself(path: Floats, apart: float, above: float) -> bool:
 
 
 def _near_path(grid: HeightField, path: Floats, reach: float) -> Callable[[Floats], Floats]:
-    """A function that spreads a value of each point of the path over the samples near it.
-
-    It reaches into the corners beside the path's ends, and NaN is what lies beyond.
-    """
+    """A function that spreads a value of each point of the path over the samples nearest to it."""
     factor = max(1, int(0.25 * reach / grid.spacing))
     nx, ny = (-(-each // factor) for each in grid.heights.shape)
     width = factor * grid.spacing
     x = grid.origin[0] + width * (np.arange(nx) + 0.5)
     y = grid.origin[1] + width * (np.arange(ny) + 0.5)
     nearest = np.empty((nx, ny), dtype=np.int64)
-    far = np.empty((nx, ny), dtype=bool)
     for column, place in enumerate(x):
         apart = (place - path[:, 0]) ** 2 + (y[:, None] - path[:, 1]) ** 2
         nearest[column] = apart.argmin(axis=1)
-        far[column] = apart.min(axis=1) > (1.5 * reach + width) ** 2
 
     def spread(values: Floats) -> Floats:
-        coarse = np.where(far, np.nan, values[nearest])
-        fine = np.repeat(np.repeat(coarse, factor, axis=0), factor, axis=1)
+        fine = np.repeat(np.repeat(values[nearest], factor, axis=0), factor, axis=1)
         return fine[: grid.heights.shape[0], : grid.heights.shape[1]]
 
     return spread
@@ -236,7 +230,7 @@ def _extent(triangles: Floats, grid: HeightField) -> tuple[Floats, Floats]:
 def _beneath(
     triangles: Floats, grid: HeightField, ceiling: Floats, lowest: Floats, highest: Floats
 ) -> Floats:
-    """Heights (nx, ny) of the faces at the samples; NaN where there is none, or no ceiling.
+    """Heights (nx, ny) of the faces at the samples; NaN where there is none.
 
     The highest below the ceiling; where there is none, the lowest above it.
     """
