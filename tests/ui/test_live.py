@@ -209,6 +209,17 @@ def test_without_change_nothing_is_made_anew(octopus: Any) -> None:
     assert not settings_of(octopus).live_error
 
 
+def test_a_change_that_comes_with_another_frame_is_followed(octopus: Any) -> None:
+    """As while the animation plays: Blender tells of both together."""
+    before = motion(octopus)
+    drag_route(octopus)
+    bpy.context.scene.frame_set(7)
+    assert settle()
+    assert motion(octopus) != before
+    bpy.context.scene.frame_set(8)
+    assert not settle()
+
+
 def test_live_is_off_until_it_is_switched_on() -> None:
     armature = make_octopus()
     give_route(armature)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
@@ -81,6 +81,7 @@ def _handlers() -> list[tuple[Any, Any]]:
     known = bpy.app.handlers
     return [
         (known.depsgraph_update_post, _after_update),
+        (known.frame_change_post, _after_frame),
         (known.undo_pre, _before_undo),
         (known.redo_pre, _before_undo),
         (known.undo_post, _after_undo),
@@ -124,19 +125,9 @@ def run_pending() -> float | None:
 
 @persistent
 def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if _state.busy:
+    if _state.busy or depsgraph.mode != "VIEWPORT":
         return
-    touched = {
-        update.id.original
-        for update in depsgraph.updates
-        # The rest of what happens to an object, a selection for one, moves nothing.
-        if update.id is not None
-        and (
-            not isinstance(update.id, bpy.types.Object)
-            or update.is_updated_geometry
-            or update.is_updated_transform
-        )
-    }
+    touched = _touched(depsgraph)
     for each in touched:
         if isinstance(each, bpy.types.Object) and each.type == "ARMATURE":
             _look_at(each)
@@ -153,6 +144,54 @@ def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             _soon(name, certain=True)
         elif name in marked:
             _soon(name, certain=False)
+
+
+@persistent
+def _after_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """A change that comes together with another frame, as while it plays, is told here alone."""
+    if _state.busy or depsgraph.mode != "VIEWPORT":
+        return
+    touched = _touched(depsgraph)
+    for each in touched:
+        if isinstance(each, bpy.types.Object) and each.type == "ARMATURE":
+            if each.name not in _state.seen:
+                _look_at(each)
+            elif not pending():
+                # It moves with every frame: now and then is enough to see whether it is set anew.
+                _soon(each.name, certain=False, wait=_LATER)
+    still = {each for each in touched if not _is_animated(each)}
+    for name in list(_state.seen):
+        armature = _armature(name)
+        if armature is not None and not still.isdisjoint(_sources(armature)):
+            _soon(name, certain=True)
+
+
+def _touched(depsgraph: bpy.types.Depsgraph) -> set[bpy.types.ID]:
+    """What has changed so that something may move; a selection, for one, moves nothing."""
+    return {
+        cast("bpy.types.ID", update.id.original)
+        for update in depsgraph.updates
+        if update.id is not None
+        and (
+            not isinstance(update.id, bpy.types.Object)
+            or update.is_updated_geometry
+            or update.is_updated_transform
+        )
+    }
+
+
+def _is_animated(each: bpy.types.ID) -> bool:
+    """Whether another frame may move it by itself."""
+    item: Any = each
+    while item is not None:
+        data = getattr(item, "data", item)
+        parts = (item, data, getattr(data, "shape_keys", None))
+        if any(getattr(part, "animation_data", None) is not None for part in parts):
+            return True
+        if isinstance(item, bpy.types.Object) and (item.constraints or item.modifiers):
+            return True
+        item = getattr(item, "parent", None)
+    return False
 
 
 def _look_at(armature: bpy.types.Object) -> None:
@@ -232,10 +271,10 @@ def _live_armatures() -> list[bpy.types.Object]:
 # --- The motion ----------------------------------------------------------------------------------
 
 
-def _soon(name: str, *, certain: bool) -> None:
+def _soon(name: str, *, certain: bool, wait: float = _SOON) -> None:
     _state.changed[name] = certain or _state.changed.get(name, False)
     if not pending():
-        bpy.app.timers.register(run_pending, first_interval=_SOON)
+        bpy.app.timers.register(run_pending, first_interval=wait)
 
 
 def _drop() -> None:
