@@ -95,6 +95,25 @@ def test_the_motion_follows_a_point_of_the_route(octopus: Any) -> None:
     assert motion(octopus) == followed  # as Generate makes it
 
 
+def test_a_route_in_edit_mode_is_followed_as_it_is(octopus: Any) -> None:
+    """A drag is applied to what is edited, which the rest of Blender does not see yet."""
+    route = settings_of(octopus).route
+    bpy.context.view_layer.objects.active = route
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.curve.select_all(action="SELECT")
+    settle()
+    for _ in range(2):
+        bpy.ops.transform.translate(value=(0.4, 0.0, 0.0))
+        assert settle()
+        seen = motion(octopus)["location", 0][-1][1]
+        place = (route.matrix_world @ route.data.splines[0].bezier_points[-1].co).x
+        assert seen == pytest.approx(place, abs=0.05)
+    followed = motion(octopus)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    generate(octopus)
+    assert motion(octopus) == followed
+
+
 def test_the_motion_follows_the_route_as_a_whole(octopus: Any) -> None:
     before = motion(octopus)
     settings_of(octopus).route.location.y -= 1.0

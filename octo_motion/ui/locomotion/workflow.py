@@ -563,6 +563,11 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     _check_route_stays(settings, armature)
     scene = context.scene
     assert scene is not None
+    for edited in (settings.route, settings.ground.object):
+        if edited is not None and edited.mode == "EDIT":
+            # What is evaluated is as it was when it was last written back, else one drag behind.
+            edited.update_from_editmode()
+            edited.data.update_tag()
     depsgraph = context.evaluated_depsgraph_get()
     skeleton = read_skeleton(armature)
     world = world_matrix(armature)
