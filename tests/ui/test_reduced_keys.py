@@ -205,3 +205,21 @@ def test_the_mantle_of_a_swimmer_has_two_keys() -> None:
     action = generate(octopus)
     groups = {group.name: group for group in action.layers[0].strips[0].channelbags[0].groups}
     assert {len(curve.keyframe_points) for curve in groups["Mantle"].channels} == {2}
+
+
+def test_finding_few_keys_shows_progress_and_can_be_stopped(octopus: Any) -> None:
+    settings_of(octopus).keys = "REDUCED"
+    before = scene_contents()
+    shares = []
+    for share in workflow.prepare(octopus, bpy.context).compute():
+        shares.append(share)
+        if len(shares) == 6:
+            break
+    assert scene_contents() == before
+    shot = workflow.prepare(octopus, bpy.context)
+    shares = list(shot.compute())
+    assert len(shares) > 6
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    # What is left to do is only to hand them to Blender.
+    assert shot.few is not None
