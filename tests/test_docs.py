@@ -98,7 +98,8 @@ def test_pose_script_that_is_shown_can_be_played(block: str, clean_blender: Path
     file.write_text(block, encoding="utf-8")
     bpy.ops.octo_motion.add_octopus(with_mesh=False)
     assert bpy.ops.octo_motion.pose_script(filepath=str(file)) == {"FINISHED"}
-    assert bpy.context.object.animation_data.action
+    octopus: Any = bpy.context.object
+    assert octopus.animation_data.action
 
 
 @pytest.mark.parametrize("block", files_shown("octo_motion.gait"))

@@ -60,7 +60,7 @@ def _row(heights: Heights, name: str) -> list[Pixels]:
     assert octopus is not None
     b0, b1, b2, b3 = _WAY
     bpy.ops.octo_motion.add_route(b0=b0, b1=b1, b2=b2, b3=b3)
-    settings = octopus.octo_motion.locomotion  # type: ignore[attr-defined]
+    settings = octopus.octo_motion.locomotion
     settings.ground.object = _ground(heights)
     settings.cycle_time = _CYCLE
     bpy.ops.octo_motion.generate_locomotion()
@@ -76,7 +76,7 @@ def _row(heights: Heights, name: str) -> list[Pixels]:
         stage.go_to(frame)
         middle = stage.skin_points(octopus, [frame]).reshape(-1, 3).mean(axis=0)
         stage.look(camera, _AWAY, _UP)
-        camera.location = Vector(middle - 4.0 * _AWAY)
+        camera.location = Vector((middle - 4.0 * _AWAY).tolist())
         pictures.append(stage.render_pixels(*_CELL, note=f"{name}, frame {frame:.0f}"))
     return pictures
 

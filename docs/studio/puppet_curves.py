@@ -33,7 +33,7 @@ def _experiment() -> plot.Panel:
     step, count = 0.02, 1500
     axis = np.array([[1.0, 0.0, 0.0]])
     law = PlasticLaw(Elements(1.0 * axis, 10.0 * axis, 100.0 * axis, np.zeros(1)), step)
-    times = step * np.arange(count + 1)
+    times = step * np.arange(float(count + 1))
     moved, springs = np.zeros(count + 1), np.zeros(count + 1)
     speed = spring = 0.0
     for number in range(count):
@@ -58,7 +58,7 @@ def _energy() -> plot.Panel:
     """An arm of wire, bent by a hand and let go: nothing of it grows by itself."""
     figure = _arm()
     pose = Pose(
-        np.stack([np.zeros(_BONES), _LENGTH * np.arange(_BONES), np.zeros(_BONES)], axis=1),
+        np.stack([np.zeros(_BONES), _LENGTH * np.arange(float(_BONES)), np.zeros(_BONES)], axis=1),
         np.tile([1.0, 0.0, 0.0, 0.0], (_BONES, 1)),
     )
     world = World(figure, pose, WorldSettings(pinned=frozenset({0})))
@@ -79,7 +79,7 @@ def _energy() -> plot.Panel:
         "an arm, let go after 0.8 s",
         "s",
         "mJ",
-        world.settings.step * np.arange(1, 2001),
+        world.settings.step * np.arange(1.0, 2001.0),
         {"kinetic": kinetic, "springs": elastic, "both": total},
     )
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A crawl as Levy, Flash & Hochner (2015) saw it: which arms hold, push and search."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -115,7 +117,7 @@ def test_same_seed_same_crawl_another_seed_another() -> None:
         ({"far": float("nan")}, "is not a number above 0"),
     ],
 )
-def test_senseless_settings_are_refused(change: dict[str, float], told: str) -> None:
+def test_senseless_settings_are_refused(change: dict[str, Any], told: str) -> None:
     with pytest.raises(SettingsError, match=told):
         CrawlSettings(**change)
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a creature walks on: planes, meshes sampled onto a grid, and the route itself."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -19,7 +21,7 @@ from octo_motion.core.rotations import Floats
 
 PATH = np.stack([np.zeros(41), -np.linspace(0.0, 4.0, 41), np.zeros(41)], axis=1)
 ALL = np.ones(len(PATH), dtype=bool)
-NEED = {"reach": 1.5, "spacing": 0.05, "headroom": 2.0}
+NEED: dict[str, Any] = {"reach": 1.5, "spacing": 0.05, "headroom": 2.0}
 
 
 def square(low: float, high: float, z: float = 0.0, rise: float = 0.0) -> Floats:
