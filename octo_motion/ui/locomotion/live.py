@@ -197,7 +197,7 @@ def _is_animated(each: bpy.types.ID) -> bool:
 def _look_at(armature: bpy.types.Object) -> None:
     """Begin or cease to follow an armature, or see whether its settings have changed."""
     name = armature.name
-    if armature.library is not None or not locomotion_settings(armature).live:
+    if not _is_live(armature):
         _state.seen.pop(name, None)
         _state.changed.pop(name, None)
     elif name in _state.seen:
@@ -207,9 +207,20 @@ def _look_at(armature: bpy.types.Object) -> None:
         _soon(name, certain=True)
 
 
+def _is_live(armature: bpy.types.Object) -> bool:
+    # Settings come into being when they are looked at: what has none is left without.
+    return (
+        armature.library is None
+        and armature.is_property_set("octo_motion")
+        and locomotion_settings(armature).live
+    )
+
+
 def _marked(item: bpy.types.Object) -> str:
     """Name of the armature whose contact an object marks."""
-    return item.octo_motion.contact.armature if item.type == "EMPTY" else ""  # type: ignore[attr-defined]
+    if item.type != "EMPTY" or not item.is_property_set("octo_motion"):
+        return ""
+    return item.octo_motion.contact.armature  # type: ignore[attr-defined]
 
 
 def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
@@ -261,11 +272,7 @@ def _after_loading(*_: object) -> None:
 
 
 def _live_armatures() -> list[bpy.types.Object]:
-    return [
-        each
-        for each in bpy.data.objects
-        if each.type == "ARMATURE" and each.library is None and locomotion_settings(each).live
-    ]
+    return [each for each in bpy.data.objects if each.type == "ARMATURE" and _is_live(each)]
 
 
 # --- The motion ----------------------------------------------------------------------------------
