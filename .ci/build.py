@@ -29,13 +29,17 @@ def fetch_wheel(name: str) -> Path:
     if wheel.exists() and f"sha256:{sha256(wheel.read_bytes()).hexdigest()}" in PINS.read_text():
         return wheel
     _distribution, _version, python_tag, abi, platforms = name.removesuffix(".whl").split("-")
-    run(
-        *(sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"),
-        *("--no-input", "--no-deps", "--only-binary", ":all:", "--require-hashes"),
-        *("--requirement", PINS, "--dest", WHEELS, "--implementation", "cp"),
-        *("--python-version", python_tag.removeprefix("cp"), "--abi", abi),
-        *(f"--platform={platform}" for platform in platforms.split(".")),
-    )
+    WHEELS.mkdir(parents=True, exist_ok=True)
+    # Put in its place as a whole: another build may be looking for it at the same time.
+    with TemporaryDirectory(dir=WHEELS) as scratch:
+        run(
+            *(sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check"),
+            *("--no-input", "--no-deps", "--only-binary", ":all:", "--require-hashes"),
+            *("--requirement", PINS, "--dest", scratch, "--implementation", "cp"),
+            *("--python-version", python_tag.removeprefix("cp"), "--abi", abi),
+            *(f"--platform={platform}" for platform in platforms.split(".")),
+        )
+        (Path(scratch) / name).replace(wheel)
     return wheel
 
 
