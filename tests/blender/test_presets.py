@@ -74,7 +74,8 @@ def test_names_that_cannot_be_are_refused(name: str, told: str) -> None:
 
 
 def test_loading_says_what_there_is() -> None:
-    with pytest.raises(GaitError, match=r"no gait 'hop'\. Choose one of crawl, .*swim, .*walk, walk_literal"):
+    told = r"no gait 'hop'\. Choose one of crawl, .*swim, .*walk, walk_literal"
+    with pytest.raises(GaitError, match=told):
         presets.load_gait("hop")
     with pytest.raises(GaitError, match="No gait is chosen"):
         presets.load_gait("")
