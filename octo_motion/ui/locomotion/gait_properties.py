@@ -268,7 +268,6 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         get=_text,
         set=_set_text,
         options={"HIDDEN", "SKIP_SAVE"},
-        override=OVERRIDE,
     )
 
 
