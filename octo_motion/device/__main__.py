@@ -60,6 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _list()
     if options.command == "descriptor":
         return _descriptor(table=options.table)
+    from .process import end_now  # noqa: PLC0415
+
     sources = _sources(parser, options)
     if not 50.0 <= options.rate <= 4000.0:
         parser.error("--rate must be from 50 to 4000")
@@ -68,10 +70,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "hands":
         from . import hand_process  # noqa: PLC0415
 
-        return hand_process.run(sources, options.rate)
+        end_now(hand_process.run(sources, options.rate))
     from . import bridge_process  # noqa: PLC0415
 
-    return bridge_process.run(given[1:])
+    end_now(bridge_process.run(given[1:]))
 
 
 def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Sources:

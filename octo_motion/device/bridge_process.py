@@ -45,7 +45,7 @@ from .messages import (
     Workspace,
     WorldMessage,
 )
-from .process import Child, Parent, end_after
+from .process import Child, Parent
 from .simulation import Hand, Simulation
 
 log = logging.getLogger(__name__)
@@ -310,7 +310,9 @@ class Bridge:
 def run(hand_arguments: Sequence[str]) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent()
-    end_after(0.5, lambda: parent.gone)
+    # Nothing here has to be tidied up: the lines to both sides end with the process, and whoever
+    # holds a device lets go of it when its line ends.
+    parent.end_with()
     listener = Listener(parent.secret)
     parent.announce(listener.port)
     blender = listener.accept(20.0)
@@ -320,7 +322,7 @@ def run(hand_arguments: Sequence[str]) -> int:
     bridge = Bridge(blender, hand_arguments)
     schedule = Schedule(bridge.period, sleep=time.sleep)
     try:
-        while not parent.gone:
+        while True:
             schedule.period = bridge.period
             now = schedule.begin()
             bridge.turn(now)

@@ -36,7 +36,7 @@ from .messages import (
     Settings,
     Workspace,
 )
-from .process import Parent, end_after
+from .process import Parent
 
 log = logging.getLogger(__name__)
 
@@ -46,6 +46,9 @@ MOST_POINTERS: Final = 8
 _TELL_EVERY: Final = 0.002
 """s between two words on where the hands are."""
 _TIMES_EVERY: Final = 1.0
+_LET_GO_SECONDS: Final = 0.2
+"""For taking all force away, once whoever started us is gone; a tick is enough, unless the system
+call of a driver does not return."""
 _LOOK_EVERY: Final = 0.1
 """s between two looks for devices; how costly one may be is the discovery's business."""
 
@@ -205,7 +208,7 @@ class HandLoop:
 def run(sources: Sources, rate: float = RATE) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent()
-    end_after(0.5, lambda: parent.gone)
+    parent.end_with(_LET_GO_SECONDS)
     listener = Listener(parent.secret)
     parent.announce(listener.port)
     channel = listener.accept(20.0)

@@ -11,9 +11,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, NoReturn
 
 from ..core.errors import DeviceError
 from .channel import Channel, ChannelClosedError, connect, new_secret
@@ -187,14 +187,28 @@ class Parent:
         if len(self.secret) != 32:
             raise ValueError("a secret has 32 bytes")
         self.gone = False
-        # Waiting for the end of standard input holds no lock; on Windows nothing else can.
-        threading.Thread(target=self._watch, daemon=True).start()
 
-    def _watch(self) -> None:
+    def end_with(self, seconds: float = 0.0) -> None:
+        """From now on, end this process when whoever started it is gone, whatever it is doing then.
+
+        Nobody has to ask for it: the end of standard input wakes a thread that waits for nothing
+        else. No step of a simulation, no system call that never returns and nothing that Python
+        would tidy up keeps the process.
+
+        Args:
+            seconds: That the process may take for what must be done before, once ``gone`` is set.
+        """
+        # Waiting for the end of standard input holds no lock; on Windows nothing else can.
+        threading.Thread(target=self._watch, args=(seconds,), daemon=True).start()
+
+    def _watch(self, seconds: float) -> None:
         with contextlib.suppress(OSError):
             while os.read(self._input, 4096):
                 pass
         self.gone = True
+        if seconds > 0.0:
+            time.sleep(seconds)
+        os._exit(0)
 
     @staticmethod
     def announce(port: int) -> None:
@@ -203,16 +217,9 @@ class Parent:
             os.write(sys.stdout.fileno(), f"{PORT_LINE}{port}\n".encode())
 
 
-def end_after(seconds: float, when: Callable[[], bool]) -> None:
-    """End this process so long after something became true, whatever it is doing then.
-
-    A last resort: a system call of a driver that never returns must not keep the process.
-    """
-
-    def watch() -> None:
-        while not when():
-            time.sleep(0.05)
-        time.sleep(seconds)
-        os._exit(3)
-
-    threading.Thread(target=watch, daemon=True).start()
+def end_now(status: int) -> NoReturn:
+    """End this process without what Python does at its end: on a busy machine that takes long."""
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(status)
