@@ -123,6 +123,7 @@ def walker(
     settings: StanceSettings = StanceSettings(),  # noqa: B008 - frozen
     wishes: Sequence[Wish] = (),
     rolls: np.random.Generator | None = None,
+    radii: tuple[float, float] = (0.045, 0.012),
     **options: Any,
 ) -> Walker:
     """A body with straight tapering arms of length 1 that walks at even speed."""
@@ -149,7 +150,7 @@ def walker(
         ground,
         settings=settings,
         scale=1.0,
-        radii=[np.linspace(0.045, 0.012, joints + 1)] * arms,
+        radii=[np.linspace(*radii, joints + 1)] * arms,
         may_stretch=[stretch] * arms,
         phases=(0.0, 2.0 * np.pi * route.length / travel.stride),
         wishes=wishes,

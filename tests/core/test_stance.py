@@ -91,6 +91,26 @@ def test_motion_is_continuous(rig: dict[str, Any]) -> None:
     assert turns[3] < 0.75 * turns[2]
 
 
+def test_a_tip_that_lies_down_does_not_twitch() -> None:
+    walk = walking("plane", stretch=True, radii=(0.12, 0.012))
+    cycle = walk.travel.stride / walk.route.length
+    count = 480
+    poses = walk.pose(np.linspace(0.4, 0.4 + 1.3 * cycle, int(1.3 * count)))
+    joints, lying = poses.joints[0], poses.lying[0][..., -1]
+    segments = np.diff(joints, axis=2)
+    segments /= np.linalg.norm(segments, axis=-1, keepdims=True)
+    cosines = np.sum(segments[:, :, 1:] * segments[:, :, :-1], axis=-1)
+    bends = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))[:, :, -3:]
+    landings = np.argwhere(lying[1:] & ~lying[:-1])
+    landed = landings[landings[:, 0] > count // 12]
+    assert len(landed) >= 6
+    for frame, arm in landed:
+        while_it_comes_down = bends[frame - count // 12 : frame + 1, arm]
+        again = while_it_comes_down - np.minimum.accumulate(while_it_comes_down, axis=0)
+        assert while_it_comes_down[0].max() > 10.0
+        assert again.max() < 1.0
+
+
 def test_a_frame_does_not_depend_on_others() -> None:
     walk = walking("bumps", stretch=True)
     times = np.linspace(0.2, 0.6, 40)
@@ -127,6 +147,30 @@ def test_arms_swing_clear_of_the_ground() -> None:
     poses = walk.pose(walk.times)
     heights = poses.joints[0][..., 1:, 2].min(axis=-1)
     assert heights[since[:, list(walk.walk.builds[0])] > 0.45].min() > 0.8 * lift
+
+
+@pytest.mark.parametrize("ground", ["plane", "bumps"])
+@pytest.mark.parametrize("gait", ["walk", "hurry"])
+def test_a_walk_starts_and_ends_at_rest(ground: str, gait: str) -> None:
+    walk = walking(ground, stretch=True, rest=1.0, gait=gait)
+    poses = walk.pose(walk.times)
+    (joints,), (lying,) = poses.joints, poses.lying
+    order = list(walk.walk.builds[0])
+    # All arms lie down at both ends, a third of what lies down at most is peeled off …
+    assert lying[[0, -1]].sum(axis=-1).min() >= 4
+    assert lying.any(axis=-1).sum(axis=1).min() >= 3
+    assert quality.slip(joints, lying, poses.cycles[:, order], ONE).value < 1e-6
+    assert quality.depth(joints, walk.ground, ONE).value < 0.005
+    heights = joints[[0, -1]][lying[[0, -1]]]
+    assert (heights[:, 2] - walk.ground.height(heights)).max() < 0.06
+    # … the body stops, and nothing is quicker there than half way.
+    speed = np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(axis=(1, 2))
+    assert speed[[0, -1]].max() < 0.01 * speed.max()
+    distance = walk.places(walk.times)[0].distance
+    stride = walk.travel.stride
+    ends = (distance < stride) | (distance > walk.route.length - stride)
+    assert speed[ends[1:]].max() < 1.1 * speed[~ends[1:]].max()
+    np.testing.assert_allclose(distance[-1], walk.route.length)
 
 
 @pytest.mark.parametrize("ground", ["plane", "bumps", "turn"])

@@ -141,6 +141,7 @@ def raised(
     loose: Floats,
     ground: Ground,
     rounds: int,
+    soft: Floats,
 ) -> Floats:
     """Directions (segments, 3, batch) of arms whose joints are not too near to the ground.
 
@@ -156,15 +157,16 @@ def raised(
         loose: (segments + 1, batch) how far each is to be raised, 0…1.
         ground: what they should be above of.
         rounds: how often the lowest of them are raised.
+        soft: (…, batch) how much above what is needed they begin to be raised.
     """
-    soft = 0.25 * np.max(needed, axis=0) + _TINY
+    least = 1e-4 * np.max(np.broadcast_to(soft, needed.shape), axis=0)
     for _ in range(rounds):
         joints = np.concatenate([roots[None], lengths[:, None] * directions]).cumsum(axis=0)
         below = ground.height(np.moveaxis(joints, 1, -1)) + needed - joints[:, 2]
         below = np.where(below > soft, below, np.maximum(below + soft, 0.0) ** 2 / (4.0 * soft))
         below *= loose
         weights = below * below
-        weights /= np.sum(weights, axis=0) + (1e-4 * soft) ** 2
+        weights /= np.sum(weights, axis=0) + least**2
         wanted = np.sum(weights * below, axis=0)
         # Share of the weights beyond each segment: what is raised by turning it.
         carried = weights[:0:-1].cumsum(axis=0)[::-1]

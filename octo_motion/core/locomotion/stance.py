@@ -62,6 +62,8 @@ _GENTLE: Final = 0.05
 """Strain over which stretching begins."""
 _GOING: Final = 0.12
 """Cycles within which an arm in the air comes to go along with its body."""
+_SOFT: Final = 0.25
+"""Share of the height that it needs within which a joint begins to be raised."""
 _AT_ONCE: Final = 20.0
 """How much faster than its hold an arm loses its stiffness against the ground."""
 _TINY: Final = 1e-12
@@ -223,15 +225,17 @@ def stand(
         away = 1.0 - own.weight
         let_go = smooth(_AT_ONCE * away)
         free = _freedom(part, own)
+        needed = part.radii + settings.lift * part.reach[-1] * away**2
         directions[..., swinging] = raised(
             directions[..., swinging],
             lengths[:, swinging],
             free=free + (1.0 - free) * let_go,
             roots=part.roots,
-            needed=part.radii + settings.lift * part.reach[-1] * away**2,
+            needed=needed,
             loose=let_go * _out(part.reach),
             ground=ground,
             rounds=_RAISES,
+            soft=_SOFT * np.max(needed, axis=0) + _TINY,
         )
     joints = np.concatenate([batch.roots[None], lengths[:, None] * directions]).cumsum(axis=0)
     goal = np.where(held.by_tip, held.joints[-1], held.joints[0])
@@ -269,8 +273,8 @@ def _held(
     before = np.arange(len(lengths))[:, None] < held.touching
     to_goal = (before | held.by_tip).astype(np.float64)
 
-    def clear(own: Floats, free: Floats) -> Floats:
-        return raised(
+    for steps in _STEPS:
+        own = raised(
             own,
             lengths,
             free=free,
@@ -279,11 +283,10 @@ def _held(
             loose=loose,
             ground=ground,
             rounds=_RAISES_BETWEEN,
+            soft=_SOFT * np.max(batch.radii, axis=0) + _TINY,
         )
-
-    for steps in _STEPS:
         own = drawn(
-            clear(own, free),
+            own,
             lengths,
             free=free,
             chosen=to_goal,
@@ -291,9 +294,22 @@ def _held(
             goal=goal,
             steps=steps,
         )
-    # What is beyond the joint that is held can be raised without letting go.
+    # What is beyond the joint that is held can be raised without letting go; where it comes to
+    # lie it needs no raising, or it would stay up until the last moment and then drop.
     beyond = (1.0 - to_goal) * smooth((batch.reach[1:] - held.lies_to) / batch.lengths)
-    strains[:, chosen], directions[..., chosen] = strain * held.weight, clear(own, beyond)
+    soft = _SOFT * batch.radii + _TINY
+    own = raised(
+        own,
+        lengths,
+        free=beyond,
+        roots=batch.roots,
+        needed=batch.radii - soft,
+        loose=loose,
+        ground=ground,
+        rounds=_RAISES_BETWEEN,
+        soft=soft,
+    )
+    strains[:, chosen], directions[..., chosen] = strain * held.weight, own
     return strains, directions
 
 
