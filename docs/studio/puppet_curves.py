@@ -14,7 +14,6 @@ from octo_motion.core.posing.figure import Elements, Figure, Limits, Pose
 from octo_motion.core.posing.plastic import PlasticLaw
 from octo_motion.core.posing.presets import elements_for
 from octo_motion.core.posing.world import World, WorldSettings
-from octo_motion.core.rotations import Floats
 
 _BONES: Final = 6
 _LENGTH: Final = 0.15
@@ -92,7 +91,6 @@ def _arm() -> Figure:
     mass = 1000.0 * np.pi * _RADIUS**2 * _LENGTH
     across = mass * (_LENGTH**2 / 12.0 + _RADIUS**2 / 4.0)
     zeros = np.zeros((_BONES, 3))
-    whole: Floats = np.full(_BONES, np.pi)
     figure = Figure(
         names=tuple(f"bone {number}" for number in range(_BONES)),
         parents=tuple(range(-1, _BONES - 1)),
@@ -104,7 +102,7 @@ def _arm() -> Figure:
         inertias=np.tile(np.diag([across, 0.5 * mass * _RADIUS**2, across]), (_BONES, 1, 1)),
         capsules=ends,
         radii=np.full(_BONES, _RADIUS),
-        limits=Limits(whole, np.stack([-whole, whole], axis=1)),
+        limits=Limits(np.tile([-np.pi, np.pi], (_BONES, 3, 1))),
         elements=Elements(zeros, zeros, zeros, np.zeros(_BONES)),
     )
     return replace(figure, elements=elements_for(figure, "wire"))

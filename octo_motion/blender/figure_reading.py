@@ -22,7 +22,14 @@ from ..core.posing.bone_roles import (
     find_roles,
 )
 from ..core.posing.figure import Figure, Pose
-from ..core.posing.figure_building import DENSITY, SIZE, JointLimits, PosedBones, build_figure
+from ..core.posing.figure_building import (
+    DENSITY,
+    FREE,
+    SIZE,
+    JointLimits,
+    PosedBones,
+    build_figure,
+)
 from ..core.rotations import Floats, from_matrix
 from ..core.skeleton import Skeleton
 from .armature import armature_data, read_skeleton
@@ -205,20 +212,16 @@ def mark_bones(armature: bpy.types.Object, names: list[str], mark: str) -> None:
 def joint_limits(armature: bpy.types.Object) -> dict[str, JointLimits]:
     """Limits of bones, from Limit Rotation constraints and limits of inverse kinematics.
 
-    A joint has a cone about the bone's rest direction, as wide as the widest of the ranges about
-    the axes across the bone (free if one of them is), and a range of twist about the bone.
+    A range that a constraint gives goes before that of inverse kinematics about the same axis.
     """
     assert armature.pose is not None
     found: dict[str, JointLimits] = {}
     for bone in armature.pose.bones:
-        ranges = _limit_constraint(bone) or _ik_limits(bone)
+        ranges = _ik_limits(bone) | _limit_constraint(bone)
         if ranges:
-            across = [ranges.get("x"), ranges.get("z")]
-            limited = [max(abs(low), abs(high)) for low, high in filter(None, across)]
-            swing = min(max(limited), np.pi) if len(limited) == 2 else np.pi
-            low, high = ranges.get("y", (-np.pi, np.pi))
-            twist = (max(min(low, 0.0), -np.pi), min(max(high, 0.0), np.pi))
-            found[bone.name] = JointLimits(float(swing), twist)
+            found[bone.name] = JointLimits(
+                ranges.get("x", FREE), ranges.get("y", FREE), ranges.get("z", FREE)
+            )
     return found
 
 
@@ -240,11 +243,12 @@ def _limit_constraint(bone: bpy.types.PoseBone) -> dict[str, tuple[float, float]
 
 def _ik_limits(bone: bpy.types.PoseBone) -> dict[str, tuple[float, float]]:
     own: Any = bone
-    return {
+    ranges = {
         axis: (getattr(own, f"ik_min_{axis}"), getattr(own, f"ik_max_{axis}"))
         for axis in "xyz"
         if getattr(own, f"use_ik_limit_{axis}")
     }
+    return ranges | {axis: (0.0, 0.0) for axis in "xyz" if getattr(own, f"lock_ik_{axis}")}
 
 
 def _locked_bones(armature: bpy.types.Object) -> frozenset[str]:

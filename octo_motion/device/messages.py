@@ -85,8 +85,7 @@ class FigureMessage(Message):
     inertias: Annotated[Floats, Table((3, 3))]
     capsules: Annotated[Floats, Table((2, 3))]
     radii: Annotated[Floats, Table()]
-    swing: Annotated[Floats, Table()]
-    twist: Annotated[Floats, Table((2,))]
+    limits: Annotated[Floats, Table((3, 2))]
     stiffness: Annotated[Floats, Table((3,))]
     damping: Annotated[Floats, Table((3,))]
     flow: Annotated[Floats, Table((3,))]
@@ -98,7 +97,7 @@ class FigureMessage(Message):
         return cls(
             *(figure.names, tuple(map(int, figure.parents)), figure.anchors, figure.rest),
             *(figure.lengths, figure.masses, figure.centres, figure.inertias),
-            *(figure.capsules, figure.radii, figure.limits.swing, figure.limits.twist),
+            *(figure.capsules, figure.radii, figure.limits.ranges),
             *(figure.elements.stiffness, figure.elements.damping, figure.elements.flow),
             figure.elements.yield_torque,
         )
@@ -125,7 +124,7 @@ class FigureMessage(Message):
         return Figure(
             *(self.names, self.parents, self.anchors, self.rest, self.lengths, self.masses),
             *(self.centres, self.inertias, self.capsules, self.radii),
-            Limits(self.swing, self.twist),
+            Limits(self.limits),
             Elements(self.stiffness, self.damping, self.flow, self.yield_torque),
         )
 

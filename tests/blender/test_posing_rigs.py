@@ -222,7 +222,7 @@ def test_bone_under_inverse_kinematics_only_follows() -> None:
     assert "arm1.10.L" in read_rig(armature).figure.names
 
 
-def test_limits_of_a_constraint_become_a_cone_and_a_range_of_twist() -> None:
+def test_limits_of_a_constraint_become_ranges_each_way_as_they_are() -> None:
     armature = octopus(with_mesh=False)
     limit = armature.pose.bones["arm1.03.L"].constraints.new("LIMIT_ROTATION")
     limit.owner_space = "LOCAL"
@@ -231,18 +231,28 @@ def test_limits_of_a_constraint_become_a_cone_and_a_range_of_twist() -> None:
     limit.min_y, limit.max_y = -0.1, 0.3
     figure = read_rig(armature).figure
     joint = figure.names.index("arm1.03.L")
-    assert figure.limits.swing[joint] == pytest.approx(0.6)
-    assert figure.limits.twist[joint] == pytest.approx([-0.1, 0.3])
-    assert figure.limits.swing[joint + 1] == pytest.approx(np.pi)
+    wanted = [[-0.2, 0.6], [-0.1, 0.3], [-0.5, 0.5]]
+    assert figure.limits.ranges[joint] == pytest.approx(np.array(wanted))
+    assert figure.limits.ranges[joint + 1] == pytest.approx(np.tile([-np.pi, np.pi], (3, 1)))
 
 
 def test_limits_of_inverse_kinematics_count_too() -> None:
     armature = octopus(with_mesh=False)
     bone = armature.pose.bones["arm1.03.L"]
-    bone.use_ik_limit_x = bone.use_ik_limit_z = True
-    bone.ik_min_x, bone.ik_max_x, bone.ik_min_z, bone.ik_max_z = -0.3, 0.1, -0.2, 0.2
+    bone.use_ik_limit_x, bone.ik_min_x, bone.ik_max_x = True, -0.3, 0.1
+    bone.lock_ik_z = True
     figure = read_rig(armature).figure
-    assert figure.limits.swing[figure.names.index("arm1.03.L")] == pytest.approx(0.3)
+    ranges = figure.limits.ranges[figure.names.index("arm1.03.L")]
+    assert ranges[0] == pytest.approx([-0.3, 0.1])
+    assert ranges[1] == pytest.approx([-np.pi, np.pi])
+    # Locked is a hair's breadth wide: the pose that is shown lies in it.
+    assert ranges[2] == pytest.approx([0.0, 0.0], abs=2e-3)
+    # What a constraint says about an axis goes before.
+    limit = bone.constraints.new("LIMIT_ROTATION")
+    limit.owner_space, limit.use_limit_x, limit.min_x, limit.max_x = "LOCAL", True, 0.0, 2.0
+    ranges = read_rig(armature).figure.limits.ranges[figure.names.index("arm1.03.L")]
+    assert ranges[0] == pytest.approx([0.0, 2.0], abs=2e-3)
+    assert ranges[2] == pytest.approx([0.0, 0.0], abs=2e-3)
 
 
 def test_muted_limit_limits_nothing() -> None:
@@ -251,7 +261,8 @@ def test_muted_limit_limits_nothing() -> None:
     limit.owner_space, limit.mute = "LOCAL", True
     limit.use_limit_y, limit.min_y, limit.max_y = True, -0.1, 0.3
     figure = read_rig(armature).figure
-    assert figure.limits.twist[figure.names.index("arm1.03.L")] == pytest.approx([-np.pi, np.pi])
+    ranges = figure.limits.ranges[figure.names.index("arm1.03.L")]
+    assert ranges[1] == pytest.approx([-np.pi, np.pi])
 
 
 def test_bone_whose_rotation_is_locked_follows() -> None:

@@ -67,7 +67,7 @@ def puppet(
         inertias=np.array([inertia for _, inertia in bodies]),
         capsules=ends,
         radii=np.array(radii, dtype=np.float64),
-        limits=limits or Limits(np.full(count, np.pi), np.tile([-np.pi, np.pi], (count, 1))),
+        limits=limits or Limits(np.tile([-np.pi, np.pi], (count, 3, 1))),
         elements=elements or free(count),
     )
 

@@ -12,7 +12,6 @@ from octo_motion.core.posing.figure_building import (
     JointLimits,
     PosedBones,
     build_figure,
-    swing_and_twist,
     turned_bodies,
 )
 from octo_motion.core.posing.kinematics import pose_of
@@ -144,23 +143,18 @@ def test_pose_beyond_a_limit_widens_it_so_that_nothing_snaps() -> None:
     basis = np.tile(IDENTITY, (len(BODY), 1))
     shin = BODY.index["shin.L"]
     basis[shin] = from_axis_angle([1.0, 0.0, 0.0], 1.2)
-    limits = {"shin.L": JointLimits(0.5, (-0.1, 0.1)), "shin.R": JointLimits(0.5, (-0.1, 0.1))}
-    figure, _ = built(BODY, posed(BODY, basis), limits=limits)
+    knee = JointLimits(x=(0.0, 0.5), twist=(-0.1, 0.1))
+    figure, _ = built(BODY, posed(BODY, basis), limits={"shin.L": knee, "shin.R": knee})
     left, right = figure.names.index("shin.L"), figure.names.index("shin.R")
-    assert 1.2 < figure.limits.swing[left] < 1.21
-    assert figure.limits.swing[right] == pytest.approx(0.5)
-    assert figure.limits.twist[right] == pytest.approx([-0.1, 0.1])
-    assert figure.limits.swing[figure.names.index("foot.L")] == pytest.approx(np.pi)
-
-
-@given(st.floats(0.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.0, 6.2))
-def test_swing_and_twist_are_what_a_turn_is_made_of(swing: float, twist: float, way: float) -> None:
-    axis = np.array([np.cos(way), 0.0, np.sin(way)])
-    turn = multiply(from_axis_angle(axis, swing), from_axis_angle([0.0, 1.0, 0.0], twist))
-    found = swing_and_twist(turn)
-    # Near the half turn the cosine is flat: there single angles are known less well.
-    assert found[0] == pytest.approx(swing, abs=2e-6)
-    assert found[1] == pytest.approx(twist, abs=1e-6)
+    ranges = figure.limits.ranges
+    # A pose at the very end of a range is given room as well.
+    assert ranges[left, 0] == pytest.approx([0.0, 1.2], abs=2e-3)
+    assert ranges[left, 0, 1] > 1.2
+    assert ranges[right, 0] == pytest.approx([0.0, 0.5], abs=2e-3)
+    assert ranges[right, 1] == pytest.approx([-0.1, 0.1])
+    free = [-np.pi, np.pi]
+    assert ranges[right, 2] == pytest.approx(free)
+    assert ranges[figure.names.index("foot.L")] == pytest.approx(np.tile(free, (3, 1)))
 
 
 def test_touched_is_what_was_turned_and_a_root_that_was_moved() -> None:

@@ -42,9 +42,8 @@ def busy_world(seed: int) -> World:
     )
     figure = tree(rng, count, elements)
     if seed % 2 == 0:
-        figure = replace(
-            figure, limits=Limits(np.full(count, 0.4), np.tile([-0.3, 0.3], (count, 1)))
-        )
+        ends = np.array([[-0.4, 0.2], [-0.3, 0.3], [-0.1, 0.4]])
+        figure = replace(figure, limits=Limits(np.tile(ends, (count, 1, 1))))
     return World(
         figure,
         posed(figure, 0.5 * rng.normal(size=(count, 3)), (0.0, 0.0, 0.12)),
@@ -64,7 +63,7 @@ def busy_world(seed: int) -> World:
 
 # Figures on which Gauss–Seidel arrives within some hundred sweeps; on others it takes thousands,
 # and comes as near to the fast solver as its own changes still are from nothing.
-@pytest.mark.parametrize("seed", [0, 1, 5, 12, 13, 14, 19])
+@pytest.mark.parametrize("seed", [0, 1, 5, 12, 13, 19, 30, 32])
 def test_fast_solver_gives_the_answer_of_gauss_seidel(seed: int):
     world = busy_world(seed)
     rng = np.random.default_rng(seed)

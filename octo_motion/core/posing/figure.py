@@ -49,12 +49,11 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """How far each joint turns from rest: a cone for the bone, a range for its twist."""
+    """How far each joint turns from rest, see ``limits``."""
 
-    swing: Floats
-    """(bodies,) half angle of the cone, π where there is none."""
-    twist: Floats
-    """(bodies, 2) least and greatest twist about the bone, −π and π where there is none."""
+    ranges: Floats
+    """(bodies, 3, 2) least and greatest bend about X, twist about Y (the bone) and bend about Z, in
+    the bone's axes at rest; −π and π where there is no end."""
 
 
 @dataclass(frozen=True, eq=False)

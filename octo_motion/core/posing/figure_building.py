@@ -13,6 +13,7 @@ from ..rotations import Floats, conjugate, multiply, rotate, to_rotation_vector
 from ..skeleton import Skeleton
 from .bone_roles import Roles
 from .figure import Elements, Figure, Limits, Pose
+from .limits import bends
 
 DENSITY: Final = 1000.0
 """kg/m³, of water and nearly of flesh."""
@@ -58,12 +59,18 @@ class PosedBones:
     """(4,) of the armature object itself."""
 
 
+FREE: Final = (-float(np.pi), float(np.pi))
+"""A range without ends."""
+
+
 @dataclass(frozen=True)
 class JointLimits:
-    """How far a bone may be turned from rest, radians; what is not given is free."""
+    """How far a bone may be turned from rest about each of its axes, least and most, radians."""
 
-    swing: float = float(np.pi)
-    twist: tuple[float, float] = (-float(np.pi), float(np.pi))
+    x: tuple[float, float] = FREE
+    twist: tuple[float, float] = FREE
+    """About the bone, its Y."""
+    z: tuple[float, float] = FREE
 
 
 def build_figure(
@@ -137,18 +144,6 @@ def build_figure(
         ),
     )
     return figure, Pose(heads.copy(), rotations.copy())
-
-
-def swing_and_twist(turns: Floats) -> tuple[Floats, Floats]:
-    """Angles (…,) by which a bone leans from rest and is twisted about itself.
-
-    Args:
-        turns: (…, 4) from rest, in the bone's own frame, whose +Y is the bone.
-    """
-    twist = 2.0 * np.arctan2(turns[..., 2], turns[..., 0])
-    twist = np.mod(twist + np.pi, 2.0 * np.pi) - np.pi
-    upright = 1.0 - 2.0 * (turns[..., 1] ** 2 + turns[..., 3] ** 2)
-    return np.arccos(np.clip(upright, -1.0, 1.0)), twist
 
 
 def _clouds(roles: Roles, skin: Mapping[int, Floats]) -> list[Floats]:
@@ -270,19 +265,12 @@ def _limits(
     skeleton: Skeleton, bones: list[int], limits: Mapping[str, JointLimits], turns: Floats
 ) -> Limits:
     given = [limits.get(skeleton.names[bone], JointLimits()) for bone in bones]
-    swing = np.array([each.swing for each in given])
-    twist = np.array([each.twist for each in given])
-    leaning, twisted = swing_and_twist(turns)
-    return Limits(
-        swing=np.minimum(np.maximum(swing, leaning + _SLACK), np.pi),
-        twist=np.stack(
-            [
-                np.maximum(np.minimum(twist[:, 0], twisted - _SLACK), -np.pi),
-                np.minimum(np.maximum(twist[:, 1], twisted + _SLACK), np.pi),
-            ],
-            axis=1,
-        ),
-    )
+    ranges = np.array([(each.x, each.twist, each.z) for each in given])
+    ranges = np.clip(np.sort(ranges, axis=2), *FREE)
+    now = bends(turns)
+    least = np.minimum(ranges[..., 0], now - _SLACK)
+    most = np.maximum(ranges[..., 1], now + _SLACK)
+    return Limits(np.clip(np.stack([least, most], axis=2), *FREE))
 
 
 def turned_bodies(figure: Figure, before: Pose, after: Pose, angle: float) -> list[int]:

@@ -155,7 +155,7 @@ class Newton:
             impulses = problem.step * (frames @ response.load[:, :, None])[:, :, 0]
             slopes = problem.step * (frames @ response.slope @ frames.transpose(0, 2, 1))
         for stops in problem.stops:
-            _add_stops(stops, problem.step, joint_speeds, impulses, slopes)
+            _add_stops(stops, joint_speeds, impulses, slopes)
         rows = problem.rows
         row_speeds, answer = _NO_ROWS, None
         if len(rows.bodies):
@@ -322,14 +322,16 @@ def _miss(end: _Point, joints: Floats, rows: Floats | None) -> float:
     return miss
 
 
-def _add_stops(stops: Stops, step: float, speeds: Floats, impulses: Floats, slopes: Floats) -> None:
+def _add_stops(stops: Stops, speeds: Floats, impulses: Floats, slopes: Floats) -> None:
     """Add a set of stops to the impulses and slopes of the joints."""
-    into = (speeds[stops.joints] * stops.axes).sum(axis=1)
-    push = -stops.gains * (into + np.maximum(stops.gaps, 0.0) / step)
-    stiff = np.where(push >= 0.0, stops.gains, 0.0)
-    np.maximum(push, 0.0, out=push)
-    impulses[stops.joints] += push[:, None] * stops.axes
-    slopes[stops.joints] += stiff[:, None, None] * (stops.axes[:, :, None] * stops.axes[:, None, :])
+    axes = stops.axes
+    push = -stops.gains * ((speeds[stops.joints] * axes).sum(axis=1) + stops.rates)
+    pressed = push >= 0.0
+    if pressed.any():
+        impulses += stops.spread @ (np.maximum(push, 0.0)[:, None] * axes)
+        stiff = np.where(pressed, stops.gains, 0.0)[:, None] * axes
+        blocks = stiff[:, :, None] * axes[:, None, :]
+        slopes += (stops.spread @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
 
 
 _LEAST = 1e-12

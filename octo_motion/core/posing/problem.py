@@ -20,19 +20,22 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Stops:
-    """Joints near the end of their range: one row each, ``axis · w ≥ −gap/h``.
+    """Ends of joints' ranges that are near: one row each, ``axis · w ≥ −rate``.
 
-    The impulse about the axis is max(0, −a (axis·w + gap/h)), gap not less than 0.
+    The impulse about the axis is max(0, −a (axis·w + rate)).
     """
 
     joints: Integers
-    """(stops,) bodies; none twice."""
+    """(stops,) bodies."""
     axes: Floats
     """(stops, 3) world, unit: the turn that leads back."""
-    gaps: Floats
-    """(stops,) radians left."""
+    rates: Floats
+    """(stops,) rad/s, gap/h: how fast the joint may turn towards the end; a little below zero
+    where it is beyond."""
     gains: Floats
     """(stops,) a, N·m·s per rad/s."""
+    spread: Floats
+    """(bodies, stops) 1 where the stop is the joint's: sums what a joint's stops do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +62,7 @@ class Problem:
     """(bodies, 3, 3) the elements' axes, as columns; None where all axes of an element are alike:
     then ``springs`` and loads are in world axes."""
     stops: tuple[Stops, ...]
-    """Cones and twists."""
+    """Ends of joints' ranges; empty or one set."""
     rows: Rows
     blow: float
     """Change of speed, m/s, that is great enough to solve again for the slip after it."""

@@ -166,10 +166,9 @@ def _elements(problem: Problem, parents: Sequence[int]) -> list[_Block]:
 def _stops(problem: Problem, parents: Sequence[int]) -> list[_Block]:
     blocks: list[_Block] = []
     for stops in problem.stops:
-        for joint, axis, gap, gain in zip(
-            stops.joints, stops.axes, stops.gaps, stops.gains, strict=True
+        for joint, axis, rate, gain in zip(
+            stops.joints, stops.axes, stops.rates.tolist(), stops.gains, strict=True
         ):
-            rate = max(float(gap), 0.0) / problem.step
 
             def holds(
                 w: Floats, own: Floats, impulse: Floats, *, rate: float = rate, gain: float = gain

@@ -36,10 +36,11 @@ from .kinematics import (
     product_inverse,
     skew,
 )
+from .limits import JointStops
 from .newton import Newton, Solution
 from .obstacles import Obstacle
 from .plastic import PlasticLaw
-from .problem import Problem, Stops, spatial_inertias
+from .problem import Problem, spatial_inertias
 from .rows import Holds, Rows
 from .tree import Tree
 
@@ -167,15 +168,7 @@ class World:
         self._centres = figure.centres[:, :, None].copy()
         self._anchors = figure.anchors[:, :, None].copy()
         self._is_root = self._tree.parents < 0
-        self._swinging = np.flatnonzero((figure.limits.swing < np.pi - 1e-9) & ~self._is_root)
-        self._twisting = np.flatnonzero(
-            (
-                (figure.limits.twist[:, 0] > -np.pi + 1e-9)
-                | (figure.limits.twist[:, 1] < np.pi - 1e-9)
-            )
-            & ~self._is_root
-        )
-        self._stop_gains = _STOP_GAIN * _carried_inertias(figure)
+        self._stops = JointStops(figure, _STOP_GAIN * _carried_inertias(figure))
         self._grabs: list[Grab] = []
         self._pins: dict[int, _Pin] = {}
         self._orientations = np.zeros((count, 4))
@@ -479,7 +472,7 @@ class World:
             self._law,
             springs,
             axes,
-            self._stops(turns),
+            self._stops.near(turns, self._parent_frames, self._speeds[self._tree.joint_slot], h),
             rows,
             _BLOW * h,
         )
@@ -520,51 +513,6 @@ class World:
                 bias = h * coupling.turning_stiffness * turn + gain * grab.target_velocity[3:]
                 builder.pull(grab.body, None, bias, gain, h * coupling.torque_limit)
         return builder.holds()
-
-    def _stops(self, turns: Floats) -> tuple[Stops, ...]:
-        """Joints that could reach the end of their range within a step or are near it."""
-        if not (len(self._swinging) or len(self._twisting)):
-            return ()
-        figure = self.figure
-        parents = self._parent_frames
-        found: list[Stops] = []
-        which = self._swinging
-        if len(which):
-            rest = rotate(figure.rest[which], _ALONG)
-            now = rotate(turns[which], _ALONG)
-            lean = np.cross(rest, now)
-            sine = np.sqrt((lean * lean).sum(axis=1))
-            gaps = figure.limits.swing[which] - np.arctan2(sine, (rest * now).sum(axis=1))
-            near = np.flatnonzero((gaps < _NEAR) & (sine > 1e-9))
-            if len(near):
-                joints = which[near]
-                axes = -lean[near] / sine[near, None]
-                found.append(self._stop(joints, axes, gaps[near], parents))
-        which = self._twisting
-        if len(which):
-            # Turn from rest, in the axes of the bone at rest.
-            own = inverse_product(figure.rest[which], turns[which])
-            twist = 2.0 * np.arctan2(own[:, 2], own[:, 0])
-            twist -= 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
-            least, most = figure.limits.twist[which].T
-            below = twist - least < most - twist
-            gaps = np.where(below, twist - least, most - twist)
-            # The twist's rate is w·(y₀ + y)/(1 + y₀·y), y the bone's axis and y₀ at rest.
-            rest = rotate(figure.rest[which], _ALONG)
-            now = rotate(turns[which], _ALONG)
-            open_enough = 1.0 + (rest * now).sum(axis=1)
-            near = np.flatnonzero((gaps < _NEAR) & (open_enough > 1e-3))
-            if len(near):
-                joints = which[near]
-                rate = (rest + now)[near] / open_enough[near, None]
-                length = np.sqrt((rate * rate).sum(axis=1))
-                axes = rate / length[:, None] * np.where(below[near], 1.0, -1.0)[:, None]
-                found.append(self._stop(joints, axes, gaps[near] / length, parents))
-        return tuple(found)
-
-    def _stop(self, joints: Integers, axes: Floats, gaps: Floats, parents: Floats) -> Stops:
-        turned = (parents[joints] @ axes[:, :, None])[:, :, 0]
-        return Stops(joints, turned, gaps, self._stop_gains[joints])
 
     def _take_velocities(self, problem: Problem, solution: Solution, inertias: Floats) -> None:
         velocities = solution.velocities
@@ -796,8 +744,5 @@ def _carried_inertias(figure: Figure) -> Floats:
 
 
 _NOBODY = np.zeros(0, np.int64)
-_ALONG = np.array([0.0, 1.0, 0.0])
 _UNIT = np.eye(3)
 _UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
-_NEAR = 0.1
-"""Radians from a stop at which it is watched."""
