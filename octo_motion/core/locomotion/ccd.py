@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .columns import cross, dot, product, smallest_arc, turned
+from .columns import smallest_arc, turned
 
 SWEEPS: Final = 4
 SOFTENINGS: Final = 4
@@ -45,6 +45,10 @@ _NEWTON_STEPS: Final = 6
 _NEWTON_STEPS_BETWEEN: Final = 2
 # Arm lengths within which a joint comes to rest on a floor.
 _FLOOR_ROUNDING: Final = 0.1
+_SHORT: Final = 1e-9
+_OPPOSITE: Final = 1e-4
+"""Where a group has to be turned with more care: a chord of hardly any length, of the unit that
+lengths are in, and one plus the cosine of what is nearly half a turn."""
 _TINY: Final = 1e-12
 
 
@@ -155,12 +159,28 @@ def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
 
 def chord(directions: Floats, lengths: Floats) -> Floats:
     """Vector (3, batch) from a group's root to its end."""
-    return np.tensordot(lengths, directions, axes=1)
+    count, _, batch = directions.shape
+    return (lengths @ directions.reshape(count, 3 * batch)).reshape(3, batch)
 
 
 def aimed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
     """A group turned as a whole about its root, its end towards the goal (3, batch)."""
-    return turned(smallest_arc(chord(directions, lengths), goal), directions)
+    end = chord(directions, lengths)
+    sizes = _size(end), _size(goal)
+    if min(float(each.min(initial=1.0)) for each in sizes) < _SHORT:
+        return turned(smallest_arc(end, goal), directions)
+    ends = np.stack([end / sizes[0], goal / sizes[1]])
+    facing = 1.0 + np.einsum("cb,cb->b", ends[0], ends[1])
+    if float(facing.min(initial=1.0)) < _OPPOSITE:
+        return turned(smallest_arc(end, goal), directions)
+    # Two reflections make the turn from one to the other: in the first, in what lies half way.
+    shares = np.einsum("xcb,scb->xsb", ends, directions)
+    half = (shares[0] + shares[1]) / facing
+    shares[1] = 2.0 * shares[0] - half
+    shares[0] = -half
+    result = np.einsum("xsb,xcb->scb", shares, ends)
+    result += directions
+    return result
 
 
 def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) -> Floats:
@@ -179,19 +199,23 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
     whole = float(np.sum(lengths))
     scale = min(1.0, _JOINTS_OF_A_WEIGHT / count)
     to_goal = goal - chord(directions, lengths)
-    turns: list[Floats] = []
+    turns: list[tuple[Floats, Floats]] = []
     end = np.zeros_like(goal)
     for joint in range(count - 1, -1, -1):
-        end = end + steps[joint]
-        to_goal = to_goal + steps[joint]
-        turns.append(_partial_arc(end, to_goal, weights[joint] * scale, whole))
-        end = turned(turns[-1], end)
+        end += steps[joint]
+        to_goal += steps[joint]
+        turns.append(_partial_turn(end, to_goal, weights[joint] * scale, whole))
     result = np.empty_like(directions)
-    turn = turns.pop()
-    result[0] = turned(turn, directions[0])
+    # A turn is 1 + p ⊗ q, p and q two vectors each in the plane that it turns.
+    planes, change = turns.pop()
+    carried = np.einsum("xib,xjb->ijb", planes, change)
+    for axis in range(3):
+        carried[axis, axis] += 1.0
+    result[0] = np.einsum("ijb,jb->ib", carried, directions[0])
     for joint in range(1, count):
-        turn = product(turn, turns.pop())
-        result[joint] = turned(turn, directions[joint])
+        planes, change = turns.pop()
+        carried += np.einsum("xib,xjb->ijb", np.einsum("ijb,xjb->xib", carried, planes), change)
+        result[joint] = np.einsum("ijb,jb->ib", carried, directions[joint])
     return result
 
 
@@ -204,7 +228,7 @@ def closed(directions: Floats, lengths: Floats, goal: Floats, steps: int = _NEWT
     """
     whole = float(np.sum(lengths))
     if len(lengths) > 1:
-        slack = 1.0 - np.sqrt(dot(goal, goal)) / whole
+        slack = 1.0 - _size(goal) / whole
         slack = 0.5 * (slack + np.sqrt(slack * slack + _ROUNDING**2))
         directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0), steps)
     return aimed(directions, lengths, goal)
@@ -215,14 +239,15 @@ def softened(directions: Floats, amount: float) -> Floats:
 
     Before the first segment stands the way in which the arm leaves the body, x.
     """
-    mean = (1.0 - 0.5 * amount) * directions
-    share = 0.25 * amount
-    mean[1:] += share * directions[:-1]
-    mean[:-1] += share * directions[1:]
-    mean[0, 0] += share
-    mean[-1] += share * directions[-1]
-    mean *= (1.0 / np.maximum(np.sqrt(dot(mean, mean)), _TINY))[:, None]
-    return mean
+    if amount < _TINY:
+        return directions
+    # In quarters of the amount: it is made of unit length in the end.
+    mean = (4.0 / amount - 2.0) * directions
+    mean[1:] += directions[:-1]
+    mean[:-1] += directions[1:]
+    mean[0, 0] += 1.0
+    mean[-1] += directions[-1]
+    return _made_unit(mean)
 
 
 def raised(heights: Floats, floor: Floats) -> Floats:
@@ -236,12 +261,13 @@ def raised(heights: Floats, floor: Floats) -> Floats:
 
 def lifted(directions: Floats, lengths: Floats, floor: Floats) -> Floats:
     """An arm whose joints below a floor are raised to it; lengths are kept, ends may move."""
-    heights = np.cumsum(lengths[:, None] * directions[:, 2], axis=0)
-    lift = raised(heights, floor) - heights
+    above = np.cumsum(lengths[:, None] * directions[:, 2], axis=0)
+    above -= floor
+    lift = 0.5 * (np.sqrt(above * above + _FLOOR_ROUNDING**2) - above)
+    lift[1:] -= lift[:-1].copy()
     result = directions.copy()
-    result[:, 2] += np.diff(lift, axis=0, prepend=0.0 * lift[:1]) / lengths[:, None]
-    result *= (1.0 / np.maximum(np.sqrt(dot(result, result)), _TINY))[:, None]
-    return result
+    result[:, 2] += lift / lengths[:, None]
+    return _made_unit(result)
 
 
 def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> Floats:
@@ -251,36 +277,50 @@ def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> 
     bend of cosine ``(1 − q k) / (1 + q k)``: the chord is a rational function of q, and its
     square is nearly linear where bends are slight. Newton's method finds q.
     """
+    count, _, batch = directions.shape
     whole = float(np.sum(lengths))
     axis = chord(directions, lengths)
-    found = np.sqrt(dot(axis, axis))
-    axis = axis / np.maximum(found, _TINY)
-    along = dot(directions, axis[None])
+    found = _size(axis)
+    axis /= np.maximum(found, _TINY)
+    along = np.einsum("scb,cb->sb", directions, axis)
     rest = np.maximum(1.0 + along, 1e-9)
     tangent = np.maximum(1.0 - along, 0.0) / rest
-    across = (directions - along[:, None] * axis) * (2.0 / rest)[:, None]
     limit = _MOST_FOLDED / np.maximum(np.max(tangent, axis=0), _TINY)
     square = _squared_arc(wanted / whole) / np.maximum(_squared_arc(found / whole), _TINY)
     square = np.minimum(square, limit)
-    weighted = lengths[:, None] * tangent
+    # Of each segment what is across the axis, and half of what makes its length along it.
+    parts = np.empty((count, 4, batch))
+    across = parts[:, :3]
+    np.multiply(along[:, None], axis, out=across)
+    np.subtract(directions, across, out=across)
+    np.multiply(rest, 0.5, out=parts[:, 3])
+    factor = 2.0 / rest
+    weighted = lengths[:, None] * factor
+    shares = np.empty((2, count, batch))
     goal = wanted * wanted
     for _ in range(steps):
-        share = 1.0 / (1.0 + square * tangent)
-        fading = weighted * share
-        # Along the axis Σ l (2 share − 1); across it the square root of q times Σ l share across.
-        inner = 2.0 * np.tensordot(lengths, share, axes=1) - whole
-        outer = np.einsum("s,sb,scb->cb", lengths, share, across)
-        slope_inner = -2.0 * np.add.reduce(fading * share, axis=0)
-        slope_outer = -np.einsum("sb,sb,scb->cb", fading, share, across)
-        spread = dot(outer, outer)
+        share = square * tangent
+        share += 1.0
+        np.reciprocal(share, out=share)
+        np.multiply(weighted, share, out=shares[0])
+        share *= tangent
+        np.multiply(shares[0], share, out=shares[1])
+        # Sums over the segments, and less their slopes against q. Along the axis the chord is
+        # Σ l (2 share − 1), across it the square root of q times Σ l share across.
+        sums = np.einsum("wsb,scb->wcb", shares, parts)
+        outer = sums[0, :3]
+        inner = 2.0 * sums[0, 3] - whole
+        spread, fading = np.einsum("wcb,cb->wb", sums[:, :3], outer)
         excess = inner * inner + square * spread - goal
-        slope = 2.0 * (inner * slope_inner + square * dot(outer, slope_outer)) + spread
+        slope = spread - 2.0 * (2.0 * inner * sums[1, 3] + square * fading)
         step = square - excess / np.minimum(slope, -_TINY)
-        square = np.minimum(np.clip(step, 0.25 * square, 4.0 * square), limit)
+        np.minimum(step, 4.0 * square, out=step)
+        np.maximum(step, 0.25 * square, out=step)
+        square = np.minimum(step, limit, out=step)
     share = 1.0 / (1.0 + square * tangent)
-    across *= (np.sqrt(square) * share)[:, None]
-    across += (2.0 * share - 1.0)[:, None] * axis
-    return across
+    result = across * (factor * np.sqrt(square) * share)[:, None]
+    result += (2.0 * share - 1.0)[:, None] * axis
+    return result
 
 
 def _squared_arc(ratio: Floats) -> Floats:
@@ -289,20 +329,51 @@ def _squared_arc(ratio: Floats) -> Floats:
     return missing * (6.0 + (np.pi**2 - 6.0) * missing)
 
 
-def _partial_arc(start: Floats, goal: Floats, share: float, whole: float) -> Floats:
-    """Quaternions (4, batch) of a share of the smallest turn from one vector to another.
+def _partial_turn(
+    end: Floats, to_goal: Floats, share: float, whole: float
+) -> tuple[Floats, Floats]:
+    """A share of the smallest turn from one vector (3, batch) to another; the first is turned.
 
     Where the turn has no definite axis it fades out: near half a turn, and where the vectors are
     short against the ``whole`` group.
+
+    Returns:
+        Two unit vectors that span the plane which is turned, (2, 3, batch), and the two whose
+        products with these make the turn, less one.
     """
-    normal = cross(start, goal)
-    sine = np.sqrt(dot(normal, normal))
-    cosine = dot(start, goal)
+    plane = np.empty((2, *end.shape))
+    size = _size(end)
+    np.divide(end, np.maximum(size, _TINY), out=plane[0])
+    cosine = np.einsum("cb,cb->b", plane[0], to_goal)
+    np.multiply(plane[0], cosine, out=plane[1])
+    np.subtract(to_goal, plane[1], out=plane[1])
+    square = np.einsum("cb,cb->b", plane[1], plane[1])
+    sine = np.sqrt(square)
+    plane[1] /= np.maximum(sine, _TINY)
     angle = np.arctan2(sine, cosine)
-    angle *= share * np.clip(4.0 * (1.0 - angle / np.pi), 0.0, 1.0)
-    size = np.sqrt(sine * sine + cosine * cosine)
-    angle *= 0.5 * size / (size + _SHORT_LEVER * whole * whole)
-    turn = np.empty((4, len(angle)))
-    turn[0] = np.cos(angle)
-    turn[1:] = normal * (np.sin(angle) / np.maximum(sine, _TINY))
-    return turn
+    lever = size * np.sqrt(square + cosine * cosine)
+    half = np.minimum(4.0 - angle * (4.0 / np.pi), 1.0)
+    half *= angle
+    half *= (0.5 * share) * lever / (lever + _SHORT_LEVER * whole * whole)
+    # By the tangent of half of it, which is quicker than its sine.
+    tangent = np.tan(half)
+    turn = 2.0 * tangent / (1.0 + tangent * tangent)
+    lost = turn * tangent
+    np.multiply(plane[0], size * (1.0 - lost), out=end)
+    end += (size * turn) * plane[1]
+    change = plane * -lost
+    change[0] -= turn * plane[1]
+    change[1] += turn * plane[0]
+    return plane, change
+
+
+def _size(vectors: Floats) -> Floats:
+    """Lengths (batch,) of vectors (3, batch)."""
+    return np.sqrt(np.einsum("cb,cb->b", vectors, vectors))
+
+
+def _made_unit(vectors: Floats) -> Floats:
+    """Vectors (segments, 3, batch), which are changed to unit length in place."""
+    size = np.sqrt(np.einsum("scb,scb->sb", vectors, vectors))
+    vectors *= (1.0 / np.maximum(size, _TINY))[:, None]
+    return vectors
