@@ -193,17 +193,32 @@ class Generator:
         return -float(self._cycle_depths().min())
 
     def _cycle_depths(self) -> Floats:
-        """Heights (phases, arms) over the body's centre of each arm's lowest joint."""
-        phase = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
-        angles = self._mirrored(evaluate(self._settings.gait, self.arm_phases(phase), self._pairs))
+        """Heights (phases, arms) over the body's centre of each arm's lowest joint.
+
+        At phases of the arms' own: arms that are built alike and have one curve go through the
+        same heights, whichever side they are on, so one of them is looked at.
+        """
+        phases = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
+        gait = self._settings.gait
+        heights = self._roots[:, 2] / self._lengths
         depths = np.empty((_CYCLE_SAMPLES, len(self._arms)))
         for build in self._builds:
-            columns = list(build.arms)
-            directions, _ = self.shapes(build, angles[:, columns], np.zeros((1, len(columns))))
+            alike: dict[tuple[int, float], list[int]] = {}
+            for arm in build.arms:
+                curve = self._pairs[arm] if self._pairs[arm] in gait.curves else 0
+                alike.setdefault((curve, round(float(heights[arm]), 6)), []).append(arm)
+            chosen = [arms[0] for arms in alike.values()]
+            part = Build(tuple(chosen), build.chain, build.widths)
+            own = np.repeat(phases[:, None], len(chosen), axis=1)
+            angles = evaluate(gait, own, tuple(self._pairs[arm] for arm in chosen))
+            angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
+            # Not from what is kept: that does not know the floor.
+            directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
             # Up is the same for the arm's frame and the body's.
             climbs = np.cumsum(build.chain.lengths[:, None, None] * directions[:, 2], axis=0)
             lowest = np.minimum(climbs.min(axis=0), 0.0)
-            depths[:, columns] = self._roots[columns, 2] + self._lengths[columns] * lowest
+            for arms, low in zip(alike.values(), lowest.T, strict=True):
+                depths[:, arms] = self._roots[arms, 2] + self._lengths[arms] * low[:, None]
         return depths
 
     def arm_phases(self, phase: Floats) -> Floats:

@@ -159,9 +159,9 @@ class GroundedWalk:
         phases = self._middle - generator.offsets[columns]
         phases = phases[:, None] + generator.offsets
         angles, _ = generator.asked_at(phases, np.zeros((len(columns), 2)))
-        own = angles[:, columns]
+        own = angles[np.arange(len(columns)), columns][None]
         shapes, _ = generator.shapes(build, own, np.zeros(own.shape[:2]))
-        steps = build.chain.lengths[:, None, None] * np.einsum("scaa->sca", shapes)
+        steps = build.chain.lengths[:, None, None] * shapes[:, :, 0]
         joint = limbs.touching(self._settings.planted)
         near, far = steps[:joint].sum(axis=0), steps[joint:].sum(axis=0)
         aims = np.arctan2([near[1], far[1]], [near[0], far[0]]).T
