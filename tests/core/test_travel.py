@@ -19,6 +19,7 @@ from octo_motion.core.locomotion.travel import (
     duration,
     plan_travel,
     strides,
+    unhurried,
 )
 from octo_motion.core.rotations import (
     Floats,
@@ -574,3 +575,23 @@ def test_settings_that_make_no_sense_are_refused_with_the_reason(
 ) -> None:
     with pytest.raises(SettingsError, match=says):
         replace(TravelSettings(), **wrong)
+
+
+def test_a_body_gets_more_time_to_stop_if_it_has_too_little() -> None:
+    route = Route.poly([[0.0, 0.0, 0.0], [0.0, -4.0, 0.0]])
+    hasty = TravelSettings(stride=0.8, ease_in=0.5, ease_out=0.05)
+    slow = unhurried(hasty, route.length, start=0.4, end=0.8)
+    assert slow.ease_in == 0.5
+    assert unhurried(hasty, route.length, end=0.01) == hasty
+    even = unhurried(TravelSettings(stride=0.8), route.length, start=0.4, end=0.8)
+    times = np.linspace(0.0, 1.0, 4001)
+    distance = plan_travel(route, even, times).distance
+    speed = np.diff(distance)
+    easing = speed < speed.max() * (1.0 - 1e-6)
+    # As far as was asked, from the way's start and from its end.
+    assert distance[np.argmin(easing)] == pytest.approx(0.4, abs=0.01)
+    assert route.length - distance[-1 - np.argmin(easing[::-1])] == pytest.approx(0.8, abs=0.01)
+    assert distance[-1] == route.length
+    for length in (0.1, 0.5, 1.0):
+        both = unhurried(TravelSettings(), length, start=1.0, end=2.0)
+        assert both.ease_in + both.ease_out == pytest.approx(1.0)

@@ -105,13 +105,15 @@ def test_the_mantle_breathes() -> None:
     assert tuple(octopus.pose.bones["mantle"].scale) == pytest.approx((1.0, 1.0, 1.0))
 
 
-def test_in_place_the_ground_goes_by_under_arms_that_hold_it() -> None:
+@pytest.mark.parametrize(("gait", "cycles"), [("walk", 1), ("crawl", 1), ("crawl", 3)])
+def test_in_place_the_ground_goes_by_under_arms_that_hold_it(gait: str, cycles: int) -> None:
     operators: Any = bpy.ops.octo_motion
     operators.add_octopus(with_mesh=False)
     armature: Any = bpy.context.object
     operators.detect_arms()
     settings = armature.octo_motion.locomotion
-    settings.travel_on, settings.cycles, settings.cycle_time = "NONE", 1, 2.0
+    settings.gait = gait
+    settings.travel_on, settings.cycles, settings.cycle_time = "NONE", cycles, 2.0
     generate(armature)
     shot = prepare(armature, bpy.context)
     standing = shot.standing
@@ -124,6 +126,12 @@ def test_in_place_the_ground_goes_by_under_arms_that_hold_it() -> None:
     played = np.array([joints_in_world(armature, frame)[:, 0] for frame in shot.frames])[:, heads]
     # As if the body had gone on.
     played = played - travel.distance[:, None, None, None] * np.array([0.0, 1.0, 0.0])
+    ends = joints_in_world(armature, shot.frames[0]), joints_in_world(armature, shot.frames[-1])
+    np.testing.assert_allclose(*ends, atol=1e-5)
+    # The motion goes on over the seam as anywhere else.
+    speed = np.linalg.norm(np.diff(played[:-1], axis=0), axis=-1).max(axis=(1, 2))
+    over = np.linalg.norm(played[-1] - played[-2], axis=-1).max()
+    assert over < 1.2 * speed.max()
     lying, lengths = poses.lying[0][:, :, :-1], shot.generator.lengths[list(arms)]
     worst = quality.slip(played, lying, poses.cycles[:, list(arms)], lengths)
     assert lying.any(axis=-1).sum(axis=1).min() >= 2

@@ -10,6 +10,7 @@ twists the arm about the link; it moves no target.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -127,7 +128,7 @@ def variation(
     limits: tuple[float, float],
     seed: int,
     *,
-    period: int = 0,
+    period: int | Sequence[int] = 0,
 ) -> Floats:
     """Random additions to the angles: R(j, k) of [Octopus, §3.4].
 
@@ -142,7 +143,7 @@ def variation(
         pairs: pair of each arm.
         limits: j and k, radians.
         seed: any whole number ≥ 0.
-        period: cycles after which the numbers come again, 0 for never.
+        period: cycles after which the numbers come again, 0 for never; or each arm's own.
 
     Returns:
         (frames, arms, links, angles) radians.
@@ -152,25 +153,30 @@ def variation(
     if low == 0.0 and high == 0.0:
         return result
     cycles = np.floor_divide(phases, CYCLE).astype(np.int64)
-    first, last = int(cycles.min()), int(cycles.max())
+    rounds = np.broadcast_to(np.asarray(period, dtype=np.int64), phases.shape[1:])
+    drawn, after = (
+        np.where(rounds > 0, each % np.maximum(rounds, 1), each) for each in (cycles, cycles + 1)
+    )
+    first, last = int(min(drawn.min(), after.min())), int(max(drawn.max(), after.max()))
     for pair, columns in _columns_by_curve(table, pairs).items():
         curve = table.curve(pair)
         knots = len(curve.phases) - 1
         draws = np.stack(
             [
-                _draw_cycle(seed, cycle % period if period else cycle, len(pairs), knots)[columns]
-                for cycle in range(first, last + 2)
+                _draw_cycle(seed, cycle, len(pairs), knots)[columns]
+                for cycle in range(first, last + 1)
             ]
         )
         draws = low + (high - low) * draws
         knot, share = curve.locate(phases[:, columns])
-        here = cycles[:, columns] - first
-        after = np.where(knot + 1 < len(curve.phases) - 1, here, here + 1)
+        here = drawn[:, columns]
+        then = np.where(knot + 1 < len(curve.phases) - 1, here, after[:, columns])
         arms = np.arange(len(columns))[None, :]
         share = share[..., None, None]
-        result[:, columns, :, :2] = (1.0 - share) * draws[here, arms, knot] + share * draws[
-            after, arms, (knot + 1) % (len(curve.phases) - 1)
-        ]
+        result[:, columns, :, :2] = (1.0 - share) * draws[here - first, arms, knot]
+        result[:, columns, :, :2] += (
+            share * draws[then - first, arms, (knot + 1) % (len(curve.phases) - 1)]
+        )
     return result
 
 

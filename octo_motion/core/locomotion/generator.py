@@ -251,8 +251,17 @@ class Generator:
         """
         return self.asked_at(self.arm_phases(np.asarray(phase, dtype=np.float64)), turn)
 
-    def asked_at(self, phases: Floats, turn: Floats) -> tuple[Floats, Floats]:
-        """The same for phases (frames, arms) of the arms themselves."""
+    def asked_at(
+        self, phases: Floats, turn: Floats, period: Sequence[int] | None = None
+    ) -> tuple[Floats, Floats]:
+        """The same for phases (frames, arms) of the arms themselves.
+
+        Args:
+            phases: radians.
+            turn: as of :meth:`pose`.
+            period: each arm's cycles after which random additions come again, if that is not the
+                same for all.
+        """
         settings = self._settings
         angles = evaluate(settings.gait, phases, self._pairs) + variation(
             settings.gait,
@@ -260,7 +269,7 @@ class Generator:
             self._pairs,
             settings.variation,
             settings.seed,
-            period=settings.period,
+            period=settings.period if period is None else period,
         )
         # Towards the goal: by the part of the turn that lies across the arm.
         across = rotate(self._outward, np.array([0.0, 1.0, 0.0]))[:, :2]

@@ -65,6 +65,8 @@ class Foothold:
     """Phase of the body, radians, at which the arm touches …"""
     off: float
     """… and at which it lets go."""
+    lasts: float
+    """Cycles of the arm in between, which a body at rest is slow to come through."""
     short: float
     """Arm lengths by which it is out of reach."""
 
@@ -111,7 +113,7 @@ class GroundedWalk:
         self._body_turn = from_matrix(body.rotation)
         self._stride = line.settings.stride
         self._rhythm = rhythm or Even(self._stride, generator.offsets)
-        ends, _ = cycles_at(self._arm_phases(np.array(phases)), self._middle)
+        ends, _ = cycles_at(self.arm_phases(np.array(phases)), self._middle)
         first, last = ends
         self._cycles = int(first.min()), int(last.max())
         self._last = first, last
@@ -167,7 +169,7 @@ class GroundedWalk:
         aims = np.arctan2([near[1], far[1]], [near[0], far[0]]).T
         return Limbs(**{**limbs.__dict__, "aims": _ASKEW * np.tanh(aims / _ASKEW)})
 
-    def _arm_phases(self, phase: Floats) -> Floats:
+    def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
         return self._rhythm.phases(self._stride * np.asarray(phase) / _CYCLE)
 
@@ -184,8 +186,8 @@ class GroundedWalk:
         """
         generator = self._generator
         frames, count = len(phase), len(generator.arms)
-        phases = self._arm_phases(phase)
-        angles, steering = generator.asked_at(phases, turn)
+        phases = self.arm_phases(phase)
+        angles, steering = generator.asked_at(phases, turn, self._rhythm.rounds)
         cycles, since = cycles_at(phases, self._middle)
         ends = np.cumsum([0] + [len(arm.bones) for arm in generator.arms])
         rotations = np.empty((frames, ends[-1], 4))
@@ -279,6 +281,7 @@ class GroundedWalk:
                             float(laid.headings[at]),
                             float(ends[0]),
                             float(ends[1]),
+                            float(laid.off[at] - laid.on[at]),
                             float(laid.short[at] / limbs.reach[-1, place]),
                         )
                     )

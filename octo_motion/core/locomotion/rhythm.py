@@ -9,7 +9,7 @@ of the distance travelled alone, so that any frame can be computed without those
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
@@ -22,12 +22,33 @@ from .crawl import CrawlSettings, Holds, Journey, plan_crawl
 _CYCLE: Final = 2.0 * np.pi
 _PER_REACH: Final = 32
 """Samples of a journey to the length of an arm."""
-_FINE: Final = 8
+_SPARE: Final = 6.0
+"""Reaches of crawl besides the loop that is cut from it."""
+_CUTS: Final = 24
+"""Places where it might be cut."""
+_LOOPS: Final = 3
+"""How often a loop comes again, in its table, before its start and after its end."""
+_FINE: Final = 16
 """Steps of the table of distances between two knots of an arm's cycle."""
+_STARTS: Final = (-0.1, 0.3)
+"""Where in its hold an arm may be as the body gets going, from the hold's middle, in holds: all of
+it lies down, and little of it is peeled off yet …"""
+_STOPS: Final = (-0.15, 0.15)
+"""… and as the body comes to rest."""
+_AT_ONCE: Final = 0.4
+"""Cycles since the middle of its last hold up to which an arm swings as the body gets going; one
+that would be further lies on the ground already. As the body comes to rest it is the other way."""
+_HASTE: Final = 2.0
+"""How much worse it is on a short way that an arm hurries than that it is late."""
 
 
 class Rhythm(Protocol):
     """Phases of the arms along the way."""
+
+    @property
+    def rounds(self) -> Sequence[int] | None:
+        """Each arm's cycles in a loop, where these are not the same for all."""
+        ...
 
     def phases(self, distance: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at distances (frames,), unwrapped, radians."""
@@ -46,6 +67,7 @@ class Even:
     """Metres."""
     offsets: Floats
     """(arms,) radians that each arm is ahead of the body."""
+    rounds: Sequence[int] | None = None
 
     def phases(self, distance: Floats) -> Floats:
         """(frames, arms)."""
@@ -57,29 +79,72 @@ class Even:
         return self.stride * (cycles - ahead.reshape(-1, *[1] * (cycles.ndim - 1)))
 
 
-class Free:
-    """Cycles that follow each arm's own holds.
+@dataclass(frozen=True, eq=False)
+class Tabled:
+    """Each arm by a table of its own."""
 
-    Hold k of an arm is where its phase goes from ``middle − π·duty`` to ``middle + π·duty`` of
-    cycle k; in between the arm swings. The phase is a cubic between these moments, with a slope
-    that neither jumps nor turns back (Fritsch & Carlson 1980).
-    """
-
-    def __init__(self, holds: Holds, arms: int, *, middle: float, duty: float) -> None:
-        self._middle = middle
-        self._tables = [_table(holds, arm, duty) for arm in range(arms)]
+    tables: Sequence[Table]
+    middle: float
+    """Phase of the gait, radians, half way through a hold."""
+    rounds: Sequence[int] | None = None
+    """Each arm's cycles in a loop, if it is one."""
 
     def phases(self, distance: Floats) -> Floats:
         """(frames, arms)."""
-        columns = [_CYCLE * table.cycles(distance) for table in self._tables]
-        return np.stack(columns, axis=1) + self._middle
+        columns = [_CYCLE * table.cycles(distance) for table in self.tables]
+        return np.stack(columns, axis=1) + self.middle
 
     def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
         """(arms, …)."""
-        since = cycles - self._middle / _CYCLE
+        since = cycles - self.middle / _CYCLE
         return np.stack(
-            [self._tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
+            [self.tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
         )
+
+
+def free(holds: Holds, arms: int, *, middle: float, duty: float) -> Tabled:
+    """The rhythm of arms whose cycles begin and end with their own holds.
+
+    Args:
+        holds: of all arms.
+        arms: how many there are.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes in the gait.
+    """
+    return Tabled([_table(holds, arm, duty) for arm in range(arms)], middle)
+
+
+def at_rest(
+    rhythm: Even | Tabled,
+    length: float,
+    *,
+    start: bool,
+    end: bool,
+    middle: float,
+    duty: float,
+) -> Tabled:
+    """The same rhythm of a body that starts from a standstill, comes to one, or both.
+
+    An arm that would hang in the air then swings in time, or not yet, or no more: whichever is
+    nearer. In between, and for all others, nothing changes.
+
+    Args:
+        rhythm: of the body that goes on before and after its route.
+        length: metres of the route.
+        start: whether the body stands at the start.
+        end: whether it stands at the end.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes.
+    """
+    if isinstance(rhythm, Even):
+        at = np.array([0.0, length])
+        values = (rhythm.phases(at) - middle) / _CYCLE
+        slopes = np.full(2, 1.0 / rhythm.stride)
+        tables: Sequence[Table] = [Table(at, column, slopes) for column in values.T]
+    else:
+        tables = rhythm.tables
+    rested = [_rested(table, length, duty, start=start, end=end) for table in tables]
+    return Tabled(rested, middle)
 
 
 def crawling(
@@ -91,7 +156,7 @@ def crawling(
     reach: float,
     middle: float,
     duty: float,
-) -> Free:
+) -> Tabled:
     """The rhythm of a body that crawls.
 
     Args:
@@ -117,12 +182,96 @@ def crawling(
         ahead=normalized(ahead),
         length=reach,
     )
-    return Free(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
+    return free(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
+
+
+def crawling_in_place(
+    line: BodyLine,
+    roots: Floats,
+    outward: Floats,
+    settings: CrawlSettings,
+    *,
+    reach: float,
+    middle: float,
+    duty: float,
+) -> Tabled:
+    """The rhythm of a body that crawls straight on, and is after its route's length as before.
+
+    Each arm's holds are cut from a longer crawl, as many as fill the loop best, and stretched or
+    shrunk to its length; the place where they are cut is the one where most arms hold on.
+
+    Args:
+        line: a straight way on level ground.
+        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
+        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
+        settings: how it crawls.
+        reach: metres that its arms are long.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes in the gait.
+    """
+    loop = line.route.length
+    centres, rotations = line.at(np.array([0.0, loop]))
+    ahead = normalized((centres[1] - centres[0])[:2])
+    whole = loop + _SPARE * reach
+    distance = np.linspace(0.0, whole, int(np.ceil(whole / reach * _PER_REACH)) + 1)
+    many = len(distance)
+    directions = rotate(multiply(rotations[0], outward), np.array([1.0, 0.0, 0.0]))[:, :2]
+    places = (centres[0] + rotate(rotations[0], roots))[:, :2]
+    journey = Journey(
+        distance=distance,
+        roots=places + distance[:, None, None] * ahead,
+        outward=np.tile(normalized(directions), (many, 1, 1)),
+        ahead=np.tile(ahead, (many, 1)),
+        length=reach,
+    )
+    holds = plan_crawl(journey, settings)
+    cuts = [
+        [_cut(holds, arm, loop, start) for arm in range(len(roots))]
+        for start in np.linspace(0.25, 0.5, _CUTS) * (whole - loop)
+    ]
+    best = max(cuts, key=lambda arms: _support(arms, loop))
+    tables = [_looped(start, end, loop, duty) for start, end in best]
+    return Tabled(tables, middle, rounds=[len(start) for start, _ in best])
+
+
+def _cut(holds: Holds, arm: int, loop: float, start: float) -> tuple[Floats, Floats]:
+    """Starts and ends of an arm's holds in a loop that is cut at a distance."""
+    own = np.flatnonzero(holds.arm == arm)
+    own = own[np.searchsorted(holds.start[own], start) :]
+    begins, ends = holds.start[own], holds.end[own]
+    lasts = begins[1:] - begins[0]
+    many = int(np.argmin(np.abs(np.log(lasts / loop)))) + 1
+    factor = loop / lasts[many - 1]
+    first = begins[0] - start
+    return (
+        first + factor * (begins[:many] - begins[0]),
+        first + factor * (ends[:many] - begins[0]),
+    )
+
+
+def _support(arms: Sequence[tuple[Floats, Floats]], loop: float) -> tuple[int, int]:
+    """How many arms hold on in a loop at least, and in all."""
+    at = np.linspace(0.0, loop, 96, endpoint=False)
+    holding = np.zeros(len(at), dtype=np.int64)
+    for start, end in arms:
+        since = np.mod(at[:, None] - start, loop)
+        holding += np.any(since < end - start, axis=1)
+    return int(holding.min()), int(holding.sum())
+
+
+def _looped(start: Floats, end: Floats, loop: float, duty: float) -> Table:
+    """The table of an arm whose holds come again after a loop."""
+    many = len(start)
+    turns = np.arange(-_LOOPS, _LOOPS + 2)
+    at = (loop * turns[:, None, None] + np.stack([start, end], axis=1)).ravel()
+    number = many * turns[:, None] + np.arange(many, dtype=np.float64)
+    values = (number[..., None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
+    return Table(at, values, _monotone(at, values))
 
 
 @dataclass(frozen=True, eq=False)
-class _Table:
-    """A rising curve through knots, straight on beyond them."""
+class Table:
+    """How far one arm is in its cycles: a rising curve through knots, straight on beyond them."""
 
     at: Floats
     """(knots,) distances"""
@@ -130,8 +279,15 @@ class _Table:
     """(knots,) cycles from the middle of hold 0"""
     slopes: Floats
     """(knots,)"""
+    starts: bool = False
+    """Whether there is nothing before its first knot: the body stands …"""
+    stops: bool = False
+    """… and nothing after its last one."""
 
     def cycles(self, distance: Floats) -> Floats:
+        """At distances (…,)."""
+        low = self.at[0] if self.starts else -np.inf
+        distance = np.clip(distance, low, self.at[-1] if self.stops else np.inf)
         knot = np.clip(np.searchsorted(self.at, distance, "right") - 1, 0, len(self.at) - 2)
         start, width = self.at[knot], self.at[knot + 1] - self.at[knot]
         t = (distance - start) / width
@@ -143,19 +299,33 @@ class _Table:
         after = self.values[-1] + (distance - self.at[-1]) * self.slopes[-1]
         return np.where(t < 0.0, before, np.where(t > 1.0, after, inside))
 
+    def slopes_at(self, distance: Floats) -> Floats:
+        """Cycles per metre at distances (…,)."""
+        knot = np.clip(np.searchsorted(self.at, distance, "right") - 1, 0, len(self.at) - 2)
+        start, width = self.at[knot], self.at[knot + 1] - self.at[knot]
+        t = np.clip((distance - start) / width, 0.0, 1.0)
+        secant = (self.values[knot + 1] - self.values[knot]) / width
+        first, last = self.slopes[knot], self.slopes[knot + 1]
+        bend = first + last - 2.0 * secant
+        return first + t * (2.0 * (secant - first - bend) + 3.0 * t * bend)
+
     def distances(self, cycles: Floats) -> Floats:
+        """At cycles (…,)."""
+        low = self.values[0] if self.starts else -np.inf
+        cycles = np.clip(cycles, low, self.values[-1] if self.stops else np.inf)
         fine = np.interp(
             np.arange((len(self.at) - 1) * _FINE + 1) / _FINE, np.arange(len(self.at)), self.at
         )
         values = self.cycles(fine)
         inside = np.interp(cycles, values, fine)
-        before = self.at[0] + (cycles - self.values[0]) / self.slopes[0]
-        after = self.at[-1] + (cycles - self.values[-1]) / self.slopes[-1]
+        steep = np.maximum(self.slopes[[0, -1]], 1e-12)
+        before = self.at[0] + (cycles - self.values[0]) / steep[0]
+        after = self.at[-1] + (cycles - self.values[-1]) / steep[1]
         low, high = cycles < self.values[0], cycles > self.values[-1]
         return np.where(low, before, np.where(high, after, inside))
 
 
-def _table(holds: Holds, arm: int, duty: float) -> _Table:
+def _table(holds: Holds, arm: int, duty: float) -> Table:
     own: NDArray[np.bool_] = holds.arm == arm
     start, end = holds.start[own], holds.end[own]
     number = np.arange(len(start), dtype=np.float64)
@@ -172,7 +342,78 @@ def _table(holds: Holds, arm: int, duty: float) -> _Table:
     values = np.concatenate(
         [values[0] - np.array([1.0, swing]), values, values[-1] + np.array([swing, 1.0])]
     )
-    return _Table(at, values, _monotone(at, values))
+    return Table(at, values, _monotone(at, values))
+
+
+def _rested(table: Table, length: float, duty: float, *, start: bool, end: bool) -> Table:
+    """The table of an arm that lies on the ground where the body stands."""
+    first, low = _going(table, duty) if start else (0.0, -np.inf)
+    last, high = _stopping(table, length, duty) if end else (0.0, np.inf)
+    if low < high:
+        own = table.at[(table.at > low) & (table.at < high)]
+        at = np.unique([*[0.0, low] * start, *own, *[high, length] * end])
+    else:
+        at = np.array([0.0, length])
+    values, slopes = table.cycles(at), table.slopes_at(at)
+    if start:
+        values[0] = first
+    if end:
+        values[-1] = last
+    if not low < high:
+        # Hardly a step on so short a way: none at all if it were a hasty one.
+        own = np.ptp(table.cycles(at))
+        values[-1] = first if last - first > _HASTE * own else max(first, last)
+    secants = np.diff(values) / np.diff(at)
+    if start and low > 0.0:
+        slopes[0] = secants[0]
+    if end and high < length:
+        slopes[-1] = secants[-1]
+    # No curve between two knots falls that is at most three times as steep as their chord.
+    slopes[1:] = np.minimum(slopes[1:], 3.0 * secants)
+    slopes[:-1] = np.minimum(slopes[:-1], 3.0 * secants)
+    return replace(table, at=at, values=values, slopes=slopes, starts=start, stops=end)
+
+
+def _going(table: Table, duty: float) -> tuple[float, float]:
+    """Where in its cycles an arm is at the start, and the distance at which it is as it would be.
+
+    It either swings at once, and then lands as it would, or later, and then lets go as it would.
+    """
+    own = float(table.cycles(np.zeros(1))[0])
+    first, middle = _nearest(own, _STARTS, duty, _AT_ONCE)
+    if first == own:
+        return own, 0.0
+    joint = middle + 1.0 - 0.5 * duty if own > first else middle + 0.5 * duty
+    return first, float(table.distances(np.array([joint]))[0])
+
+
+def _stopping(table: Table, length: float, duty: float) -> tuple[float, float]:
+    """Where in its cycles an arm is at the end, and the distance up to which it is as it would be.
+
+    It either takes no more step, or takes its last one in time.
+    """
+    own = float(table.cycles(np.array([length]))[0])
+    last, middle = _nearest(own, _STOPS, duty, 1.0 - _AT_ONCE)
+    if last == own:
+        return own, length
+    joint = middle - 0.5 * duty if own > last else middle - 1.0 + 0.5 * duty
+    return last, float(table.distances(np.array([joint]))[0])
+
+
+def _nearest(
+    cycles: float, around: tuple[float, float], duty: float, late: float
+) -> tuple[float, float]:
+    """Cycles nearby at which an arm lies on the ground, and the middle of that hold.
+
+    Args:
+        cycles: where the arm would be.
+        around: between which places in a hold it lies.
+        duty: share of a cycle that a hold takes.
+        late: cycles from a hold's middle from which on it is the next one's.
+    """
+    middle = np.floor(cycles - late) + 1.0
+    low, high = duty * np.array(around)
+    return float(np.clip(cycles, middle + low, middle + high)), float(middle)
 
 
 def _monotone(at: Floats, values: Floats) -> Floats:

@@ -200,6 +200,28 @@ def duration(route: Route, settings: TravelSettings, metres_per_second: float) -
     return route.length / (metres_per_second * _mean_speed(settings))
 
 
+def unhurried(
+    settings: TravelSettings, length: float, *, start: float = 0.0, end: float = 0.0
+) -> TravelSettings:
+    """The same travel, but with more time to get going and to stop, if it has too little.
+
+    Args:
+        settings: how the route is travelled.
+        length: metres of the route.
+        start: metres within which the body speeds up at least; 0 leaves that as it is.
+        end: metres within which it slows down at least.
+    """
+    # While the body eases it is half as fast on average, so m = 1 / (1 + a + b) of the time would
+    # do at full speed, a and b being the shares of the way.
+    shares = np.clip(np.array([start, end]) / max(length, 1e-12), 0.0, 1.0)
+    shares /= max(float(shares.sum()), 1.0)
+    own = np.array([settings.ease_in, settings.ease_out])
+    more = np.maximum(2.0 * shares / (1.0 + shares.sum()) - own, 0.0)
+    more *= min(1.0, max(1.0 - float(own.sum()), 0.0) / max(float(more.sum()), 1e-12))
+    ease_in, ease_out = (own + more).tolist()
+    return replace(settings, ease_in=ease_in, ease_out=ease_out)
+
+
 def strides(route: Route, settings: TravelSettings) -> float:
     """Gait cycles from the start of the route to its end."""
     return _last_phase(route, settings) / _CYCLE

@@ -14,6 +14,7 @@ from ...core.errors import SettingsError
 from ..operator_base import OctoOperator
 from .armature_operator import ArmatureOperator
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .standing import resting
 from .wishes import gathered, store
 from .workflow import prepare, show_contacts
 
@@ -117,6 +118,22 @@ def _activate(context: bpy.types.Context, armature: bpy.types.Object) -> None:
     layer = context.view_layer
     if layer is not None and layer.objects.active is None and armature in layer.objects.values():
         layer.objects.active = armature
+
+
+def draw_rest(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+    """Whether the creature stands at the ends of its way."""
+    ground = settings.ground
+    column = layout.column(heading="Rest")
+    for name, text, ease in (
+        ("start_at_rest", "At Start", settings.ease_in),
+        ("come_to_rest", "At End", settings.ease_out),
+    ):
+        row = column.row()
+        row.active = ease > 0.0
+        row.prop(ground, name, text=text)
+    column = layout.column()
+    column.active = any(resting(settings))
+    column.prop(ground, "rest_within")
 
 
 def draw_ground(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:

@@ -147,6 +147,31 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         step=5,
         override=OVERRIDE,
     )
+    start_at_rest: BoolProperty(
+        name="Start at Rest",
+        description="All arms lie on the ground at the start, and leave it as the body gets going. "
+        "Only with an Ease In: without one the creature comes walking",
+        default=True,
+        override=OVERRIDE,
+    )
+    come_to_rest: BoolProperty(
+        name="Come to Rest",
+        description="All arms lie on the ground at the end: each takes its last step in time. Only "
+        "with an Ease Out: without one the creature walks on",
+        default=True,
+        override=OVERRIDE,
+    )
+    rest_within: FloatProperty(
+        name="Within",
+        description="Cycles of the gait that the body takes at least to get going from its rest, "
+        "and to come to it, if that is more than Ease In and Out give it",
+        default=1.0,
+        min=0.0,
+        soft_max=4.0,
+        max=100.0,
+        step=10,
+        override=OVERRIDE,
+    )
     shown: StringProperty(
         name="Shown",
         description="Which contacts have markers",

@@ -15,7 +15,7 @@ from .add_octopus import OCTO_MOTION_OT_add_octopus
 from .add_route import OCTO_MOTION_OT_add_route
 from .arm_list import draw_arms
 from .change_list import draw_changes
-from .contacts import draw_ground
+from .contacts import draw_ground, draw_rest
 from .gait_properties import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table, used
 from .gait_table import (
     OCTO_MOTION_MT_gait,
@@ -135,6 +135,8 @@ class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "ease_in")
         column.prop(settings, "ease_out", text="Out")
+        if settings.table.manner != "SWIM" and settings.ground.use:
+            draw_rest(layout, settings)
 
 
 class OCTO_MOTION_PT_ground(_Panel, bpy.types.Panel):

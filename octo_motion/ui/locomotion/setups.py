@@ -54,6 +54,7 @@ APART: Final = frozenset(
             "height",
             "height_mode",
         ),
+        *("ground.start_at_rest", "ground.come_to_rest", "ground.rest_within"),
         *("heading", "heading_angle", "gait", "timing", "speed", "frame_start", "frame_end"),
         *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance"),
     }

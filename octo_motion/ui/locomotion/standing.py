@@ -21,13 +21,14 @@ from ...core.locomotion.footholds import Wish
 from ...core.locomotion.generator import Arm, Generator
 from ...core.locomotion.ground import Ground, Plane, along_path, passes_over_itself, sampled
 from ...core.locomotion.grounded import GroundedPoses, GroundedWalk
-from ...core.locomotion.rhythm import crawling
+from ...core.locomotion.rhythm import Even, at_rest, crawling, crawling_in_place
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, strides, walked_at
 from ...core.remembered import Remembered, key_of
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
 from .ground_properties import OCTO_MOTION_PG_ground, stance_settings
+from .properties import OCTO_MOTION_PG_locomotion
 
 _FINE: Final = 0.03
 """Arm lengths between the samples of a ground …"""
@@ -78,6 +79,17 @@ class Standing:
         )
 
 
+def resting(settings: OCTO_MOTION_PG_locomotion) -> tuple[bool, bool]:
+    """Whether all arms lie on the ground at the start of a walk, and at its end."""
+    ground = settings.ground
+    if not ground.use or settings.travel_on == "NONE":
+        return False, False
+    return (
+        ground.start_at_rest and settings.ease_in > 0.0,
+        ground.come_to_rest and settings.ease_out > 0.0,
+    )
+
+
 def read_standing(
     settings: OCTO_MOTION_PG_ground,
     armature: bpy.types.Object,
@@ -94,6 +106,7 @@ def read_standing(
     wishes: Sequence[Wish],
     plane: float | None = None,
     alike: bool = False,
+    rest: tuple[bool, bool] = (False, False),
 ) -> Standing:
     """Read the ground under a walk, and lay its footholds.
 
@@ -112,6 +125,7 @@ def read_standing(
         wishes: the artist's, for single contacts.
         plane: world Z of the level ground where no mesh is set, none to follow the route.
         alike: whether each cycle is like the one before, on level ground: for a loop in place.
+        rest: whether all arms lie on the ground at the start, and at the end.
 
     Raises:
         GroundError: the ground is no mesh, has no faces, or the route leaves it.
@@ -144,12 +158,22 @@ def read_standing(
     rhythm = None
     gait = generator.settings.gait
     if gait.manner == "CRAWL":
-        rhythm = crawling(
+        make = crawling_in_place if alike else crawling
+        rhythm = make(
             line,
             generator.roots * scale,
             generator.outward,
             CrawlSettings(seed=generator.settings.seed),
             reach=reach,
+            middle=gait.power_phase,
+            duty=stance.duty,
+        )
+    if any(rest):
+        rhythm = at_rest(
+            rhythm or Even(travel.stride, generator.offsets),
+            route.length,
+            start=rest[0],
+            end=rest[1],
             middle=gait.power_phase,
             duty=stance.duty,
         )

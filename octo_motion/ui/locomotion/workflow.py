@@ -47,7 +47,13 @@ from ...core.locomotion.loops import route_in_place, travel_in_place, whole_fram
 from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
-from ...core.locomotion.travel import TravelSettings, duration, plan_travel, strides
+from ...core.locomotion.travel import (
+    TravelSettings,
+    duration,
+    plan_travel,
+    strides,
+    unhurried,
+)
 from ...core.remembered import Remembered, key_of
 from ...core.rotations import IDENTITY, Floats, from_matrix, rotate
 from ...core.skeleton import Skeleton
@@ -62,7 +68,7 @@ from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gai
 from .quality_report import write_figures
 from .reach_motion import Carried, Reaching, Travelling, read_reaches, write_carried
 from .reduced import Body, Motion, Tolerances, reduced
-from .standing import Standing, read_standing
+from .standing import Standing, read_standing, resting
 from .wishes import Place, Wanted, as_wishes, gathered, note_shown, store
 
 MOST_FRAMES: Final = 100_000
@@ -510,7 +516,6 @@ def show_contacts(armature: bpy.types.Object, shot: Shot) -> int:
         name = shot.arms[each.arm].name
         wish = shot.wanted.get((name, each.cycle), Wanted())
         on, off = np.interp([each.on, each.off], phases, frames)
-        share = (each.off - each.on) / (2.0 * np.pi)
         contacts.append(
             Contact(
                 name,
@@ -521,7 +526,7 @@ def show_contacts(armature: bpy.types.Object, shot: Shot) -> int:
                 shift=wish.shift,
                 frame_on=float(on),
                 frame_off=float(off),
-                cycle_frames=float(off - on) / share,
+                cycle_frames=float(off - on) / each.lasts,
             )
         )
     write_markers(armature, contacts, shot.generator.arm_length * shot.scale)
@@ -587,6 +592,10 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     if gait.manner == "SWIM" and settings.streamline > 0.0:
         mantle = head
     travel = _travel_settings(settings, gait, stride)
+    rest = resting(settings)
+    if gait.on_ground and any(rest):
+        slow = settings.ground.rest_within * stride
+        travel = unhurried(travel, route.length, start=slow * rest[0], end=slow * rest[1])
     seconds, frames, times = _timing(settings, route, travel, scene.render)
     breath = breathing_channels(armature, settings, head[-1] if head else "", times * seconds)
     wanted = gathered(settings.ground, armature)
@@ -600,9 +609,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         """One way of moving along this route."""
         going = _travel_settings(settings, table, table.stride * own.arm_length * scale)
         holding = None
-        # In place each cycle has to be like the one before, which a crawl's are not.
-        repeating = in_place and table.manner != "CRAWL"
-        if table.on_ground and settings.ground.use and (repeating or not in_place):
+        if table.on_ground and settings.ground.use:
             holding = read_standing(
                 settings.ground,
                 armature,
@@ -619,6 +626,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
                 wishes=() if in_place else wished,
                 plane=plane,
                 alike=in_place,
+                rest=rest,
             )
         return Way(table, own, going, holding, _height(settings, table, own.clearance * scale))
 
