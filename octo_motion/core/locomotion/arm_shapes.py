@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .columns import dot, product, smallest_arc, turned
+from .columns import dot, smallest_arc, turned
 from .ground import Ground
 
 _WEAK: Final = 0.02
@@ -49,16 +49,31 @@ def curve(
         middles: (segments, 1, batch) where on it the segments' middles are, 0…1.
         parts: (segments, batch) how much of each segment is on it.
     """
-    t = middles
-    start, end = 1.0 - 4.0 * t + 3.0 * t * t, 3.0 * t * t - 2.0 * t
-    straight = 6.0 * t * (1.0 - t) * chord
-    handles = size * (start * leaving + end * arriving)
+    t, ways = middles[:, 0], np.stack([chord, leaving, arriving])
+    # All of it lies in the space of three vectors: how much of each, and their products.
+    amounts = np.stack(
+        [
+            6.0 * t * (1.0 - t),
+            size * (1.0 - 4.0 * t + 3.0 * t * t),
+            size * (3.0 * t * t - 2.0 * t),
+        ]
+    )
+    (cc, cl, ca), (_, ll, la), (_, _, aa) = np.einsum("xcb,ycb->xyb", ways, ways)
+    along, out, back = amounts
+    level = along * along * cc
+    slope = 2.0 * along * (out * cl + back * ca)
+    bend = out * (out * ll + 2.0 * back * la) + back * back * aa
     share = parts / np.maximum(np.sum(parts, axis=0), _TINY)
-    wanted = np.sqrt(dot(chord, chord)) / size
+    wanted = np.sqrt(cc) / size
 
     def excess(handle: Floats) -> Floats:
-        mean = np.sum(share[:, None] * unit(straight + handle * handles), axis=0)
-        return np.sqrt(dot(mean, mean)) - wanted
+        square = (bend * handle + slope) * handle + level
+        weights = share / np.sqrt(np.maximum(square, _TINY * _TINY))
+        along, out, back = np.einsum("sb,xsb->xb", weights, amounts)
+        out, back = handle * out, handle * back
+        square = along * (along * cc + 2.0 * (out * cl + back * ca))
+        square += out * (out * ll + 2.0 * back * la) + back * back * aa
+        return np.sqrt(np.maximum(square, 0.0)) - wanted
 
     # The longer the handles, the more of its length the curve spends on its way round.
     low, high = np.full(size.shape, _SHORTEST), np.full(size.shape, _LONGEST)
@@ -69,7 +84,8 @@ def curve(
     # Between the two, in proportion: so the curve does not change by steps.
     above, below = np.maximum(excess(low), 0.0), np.maximum(-excess(high), 0.0)
     handle = low + (high - low) * above / np.maximum(above + below, _TINY)
-    return unit(straight + handle * handles)
+    amounts[1:] *= handle
+    return unit(np.einsum("xsb,xcb->scb", amounts, ways))
 
 
 def blended(outward: Floats, start: Floats, end: Floats, share: Floats) -> Floats:
@@ -92,43 +108,52 @@ def blended(outward: Floats, start: Floats, end: Floats, share: Floats) -> Float
     first = np.broadcast_to(np.array([[1.0], [0.0], [0.0]]), (3, len(between)))
     rest = smallest_arc(first, outward[:, between])
     share = share[between]
-    frames = [rest, rest, rest]
+    # Frames along the two and along what is between them, carried from segment to segment
+    # without twist.
+    frames = np.empty((3, *np.eye(3).shape, len(between)))
+    frames[:] = [turned(rest, axis[:, None]) for axis in np.eye(3)]
     for number in range(len(start)):
-        bends = []
-        for which, shape in enumerate((start, end)):
-            local = turned(_conjugate(frames[which]), shape[number][:, between])
-            bends.append(_bend(local))
-            frames[which] = product(frames[which], _swing(bends[-1]))
-        bend = bends[0] + share * (bends[1] - bends[0])
-        frames[2] = product(frames[2], _swing(bend))
-        result[number][:, between] = _first_axis(frames[2])
+        ways = np.stack([start[number][:, between], end[number][:, between]])
+        seen = np.einsum("xicb,xcb->xib", frames[:2], ways)
+        bends = _bends(seen)
+        own = _bent(bends[0] + share * (bends[1] - bends[0]))
+        way = np.einsum("icb,ib->cb", frames[2], own)
+        _carry(frames, np.concatenate([ways, way[None]]), np.concatenate([seen, own[None]]))
+        result[number][:, between] = way
     return result
 
 
-def _conjugate(turns: Floats) -> Floats:
-    return turns * np.array([[1.0], [-1.0], [-1.0], [-1.0]])
+def _bends(seen: Floats) -> Floats:
+    """Which way, y and z, and how far (…, 2, batch) unit vectors (…, 3, batch) are bent from x."""
+    x, y, z = seen[..., 0, :], seen[..., 1, :], seen[..., 2, :]
+    across = np.sqrt(y * y + z * z)
+    factor = np.where(across > 1e-9, np.arctan2(across, x) / np.maximum(across, 1e-9), 1.0)
+    return seen[..., 1:, :] * factor[..., None, :]
 
 
-def _bend(direction: Floats) -> Floats:
-    """Rotation vector (2, batch: about y and z) of the smallest turn from x to a direction."""
-    across = np.hypot(direction[1], direction[2])
-    angle = np.arctan2(across, direction[0])
-    factor = np.where(across > 1e-9, angle / np.maximum(across, 1e-9), 1.0)
-    return np.stack([-direction[2] * factor, direction[1] * factor])
+def _bent(bend: Floats) -> Floats:
+    """Inverse of :func:`_bends`: unit vectors (3, batch)."""
+    angle = np.sqrt(bend[0] * bend[0] + bend[1] * bend[1])
+    # By the tangent of half of it, which is quicker than cosine and sine.
+    tangent = np.tan(0.5 * angle)
+    share = 2.0 / (1.0 + tangent * tangent)
+    result = np.empty((3, len(angle)))
+    result[0] = share - 1.0
+    result[1:] = bend * (share * tangent / np.maximum(angle, _TINY))
+    return result
 
 
-def _swing(bend: Floats) -> Floats:
-    """Quaternions (4, batch) of such rotation vectors."""
-    angle = np.hypot(bend[0], bend[1])
-    factor = 0.5 * np.sinc(angle * (0.5 / np.pi))
-    zero = np.zeros_like(angle)
-    return np.stack([np.cos(0.5 * angle), zero, bend[0] * factor, bend[1] * factor])
+def _carry(frames: Floats, ways: Floats, seen: Floats) -> None:
+    """Turn frames (…, axes, 3, batch) in place as little as it takes for x to point another way.
 
-
-def _first_axis(turns: Floats) -> Floats:
-    """Where quaternions (4, batch) carry x."""
-    w, x, y, z = turns
-    return np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)])
+    Args:
+        frames: unit vectors x, y, z.
+        ways: (…, 3, batch) unit vectors.
+        seen: (…, 3, batch) the same as they are seen from the frames.
+    """
+    lost = seen[..., 1:, :] / np.maximum(1.0 + seen[..., :1, :], _TINY)
+    frames[..., 1:, :, :] -= lost[..., None, :] * (frames[..., :1, :, :] + ways[..., None, :, :])
+    frames[..., 0, :, :] = ways
 
 
 def raised(
@@ -159,27 +184,48 @@ def raised(
         rounds: how often the lowest of them are raised.
         soft: (…, batch) how much above what is needed they begin to be raised.
     """
-    least = 1e-4 * np.max(np.broadcast_to(soft, needed.shape), axis=0)
+    least = (1e-4 * np.max(np.broadcast_to(soft, needed.shape), axis=0)) ** 2
+    gentle, loosened = 0.25 / soft, free * lengths
+    weak = _WEAK * lengths[0] ** 2
+    joints = np.empty((len(lengths) + 1, *roots.shape))
     for _ in range(rounds):
-        joints = np.concatenate([roots[None], lengths[:, None] * directions]).cumsum(axis=0)
-        below = ground.height(np.moveaxis(joints, 1, -1)) + needed - joints[:, 2]
-        below = np.where(below > soft, below, np.maximum(below + soft, 0.0) ** 2 / (4.0 * soft))
+        joints[0] = roots
+        np.multiply(lengths[:, None], directions, out=joints[1:])
+        np.cumsum(joints, axis=0, out=joints)
+        below = ground.height(np.moveaxis(joints, 1, -1)) - joints[:, 2]
+        below += needed
+        near = np.maximum(below + soft, 0.0)
+        below = np.where(below > soft, below, near * near * gentle)
         below *= loose
         weights = below * below
-        weights /= np.sum(weights, axis=0) + least**2
-        wanted = np.sum(weights * below, axis=0)
+        weights *= 1.0 / (np.sum(weights, axis=0) + least)
+        wanted = np.einsum("sb,sb->b", weights, below)
         # Share of the weights beyond each segment: what is raised by turning it.
         carried = weights[:0:-1].cumsum(axis=0)[::-1]
-        level = 1.0 - directions[:, 2] ** 2
-        lever = free * lengths * carried
-        lift = wanted / (
-            np.sum(lever * lengths * carried * level, axis=0) + _WEAK * lengths[0] ** 2
-        )
-        turn = -(lever * lift * directions[:, 2])[:, None] * directions
-        turn[:, 2] += lever * lift
-        most = np.sqrt(np.max(dot(turn, turn), axis=0))
-        directions = unit(directions + turn / np.sqrt(1.0 + (most / _BOLD) ** 2))
+        z = directions[:, 2]
+        level = 1.0 - z * z
+        turn = loosened * carried
+        carried = carried * lengths
+        carried *= level
+        turn *= wanted / (np.einsum("sb,sb->b", turn, carried) + weak)
+        directions = _turned_up(directions, turn, level)
     return directions
+
+
+def _turned_up(directions: Floats, turn: Floats, level: Floats) -> Floats:
+    """Directions (segments, 3, batch) turned towards z.
+
+    Args:
+        directions: unit.
+        turn: (segments, batch) how much of z is added to each; changed in place.
+        level: (segments, batch) square of what is level of each direction.
+    """
+    turn *= 1.0 / np.sqrt(1.0 + np.max(turn * turn * level, axis=0) / _BOLD**2)
+    # Only what of z is across a direction turns it.
+    size = 1.0 / np.sqrt(1.0 + turn * turn * level)
+    result = directions * (size * (1.0 - turn * directions[:, 2]))[:, None]
+    result[:, 2] += size * turn
+    return result
 
 
 def drawn(
@@ -206,28 +252,26 @@ def drawn(
         goal: (3, batch) world.
         steps: of Newton's method.
     """
-    turning = chosen * free * lengths
+    reach = chosen * lengths
+    turning = reach * free
     stiffness = turning * lengths
-    whole = np.sum(stiffness, axis=0) + _TINY
+    base = (1.0 + _FIRM) * (np.sum(stiffness, axis=0) + _TINY)
     for _ in range(steps):
-        ends = roots + np.sum(chosen[:, None] * (lengths[:, None] * directions), axis=0)
-        x, y, z = directions[:, 0], directions[:, 1], directions[:, 2]
-        wx, wy = stiffness * x, stiffness * y
-        base = whole * (1.0 + _FIRM)
-        matrix = (
-            base - np.sum(wx * x, axis=0),
-            -np.sum(wx * y, axis=0),
-            -np.sum(wx * z, axis=0),
-            base - np.sum(wy * y, axis=0),
-            -np.sum(wy * z, axis=0),
-            base - np.sum(stiffness * z * z, axis=0),
+        ends = roots + np.einsum("sb,scb->cb", reach, directions)
+        weighted = stiffness[:, None] * directions
+        xx, xy, xz, yy, yz, zz = (
+            np.einsum("sb,sb->b", weighted[:, one], directions[:, other])
+            for one, other in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
         )
-        multiplier = _solved(matrix, goal - ends)
-        turn = turning[:, None] * (
-            multiplier - dot(directions, multiplier[None])[:, None] * directions
-        )
-        most = np.sqrt(np.max(dot(turn, turn), axis=0))
-        directions = unit(directions + turn / np.sqrt(1.0 + (most / _BOLD) ** 2))
+        pull = _solved((base - xx, -xy, -xz, base - yy, -yz, base - zz), goal - ends)
+        # Only what of it is across a segment turns that.
+        along = np.einsum("scb,cb->sb", directions, pull)
+        across = np.maximum(np.einsum("cb,cb->b", pull, pull) - along * along, 0.0)
+        most = np.max(turning * turning * across, axis=0)
+        turn = turning * (1.0 / np.sqrt(1.0 + most / _BOLD**2))
+        size = 1.0 / np.sqrt(1.0 + turn * turn * across)
+        directions = directions * (size * (1.0 - turn * along))[:, None]
+        directions += (size * turn)[:, None] * pull
     return directions
 
 
