@@ -70,10 +70,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command == "hands":
         from . import hand_process  # noqa: PLC0415
 
-        end_now(hand_process.run(sources, options.rate))
+        return end_now(hand_process.run(sources, options.rate))
     from . import bridge_process  # noqa: PLC0415
 
-    end_now(bridge_process.run(given[1:]))
+    return end_now(bridge_process.run(given[1:]))
 
 
 def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Sources:

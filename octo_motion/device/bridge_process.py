@@ -25,6 +25,8 @@ from .haptics.schedule import Schedule
 from .messages import (
     Button,
     Buzz,
+    Calibrate,
+    CalibrationMessage,
     DeviceMessage,
     FigureMessage,
     Goodbye,
@@ -52,6 +54,8 @@ log = logging.getLogger(__name__)
 
 _TELL_EVERY: Final = 1.0 / 60.0
 _IDLE_PERIOD: Final = 2e-3
+_LAG_SHARE: Final = 0.05
+"""Of a new lag, in what is told of it: so it tells of the last third of a second."""
 _STARTS: Final = 4
 _SETTLED: Final = 60.0
 """s after which a process at the devices counts as one that runs."""
@@ -77,6 +81,7 @@ class Bridge:
         self._heard: dict[int, HandMessage] = {}
         self.simulation: Simulation | None = None
         self._told = 0.0
+        self._lag = 0.0
 
     @property
     def period(self) -> float:
@@ -116,7 +121,9 @@ class Bridge:
                 space = self._workspaces.get(message.pointer)
                 simulation.hear(message, device, space.scale if space else 1.0)
             simulation.step(now)
-            for held in list(simulation.held(now)):  # saying may lose the devices
+            # A step that kept up leads to a moment to come; one that did not is over only now.
+            true = max(now, time.perf_counter() - simulation.step_seconds)
+            for held in list(simulation.held(true)):  # saying may lose the devices
                 self._say_to_hands(held)
         if now - self._told >= _TELL_EVERY:
             self._told = now
@@ -165,7 +172,10 @@ class Bridge:
                     raise MessageError("a workspace without size")
                 self._workspaces[message.pointer] = message
                 self._pass_on(message, message.pointer)
-            case Grab() | Buzz():
+            case Grab() | Buzz() | Calibrate():
+                self._say_to_hands(message)
+            case CalibrationMessage():
+                message.calibration()  # refused here if it is none
                 self._say_to_hands(message)
             case Goodbye():
                 raise ChannelClosedError("goodbye")
@@ -205,6 +215,8 @@ class Bridge:
             )
         for pointer, told in self._heard.items():
             hand = simulation.hands.get(pointer) if simulation else None
+            if hand is not None and hand.handle is not None:
+                self._lag += _LAG_SHARE * (time.perf_counter() - told.time - self._lag)
             self._blender.send(self._pointer(told, hand), droppable=True)
 
     def _pointer(self, told: HandMessage, hand: Hand | None) -> PointerMessage:
@@ -244,7 +256,7 @@ class Bridge:
                     self._tell_times(message)
                 case Hello():
                     self._tell_hello(message)
-                case Button() | Notice():
+                case Button() | Notice() | CalibrationMessage():
                     self._blender.send(message)
                 case _:
                     log.warning("The devices' process says %s", type(message).__name__)
@@ -268,10 +280,12 @@ class Bridge:
         if time.monotonic() - self._started > _SETTLED:
             self._starts = 1  # what was long ago does not count
         simulation = self.simulation
-        cost = simulation.cost if simulation else 0.0
-        behind = max(0.0, cost - simulation.step_seconds) if simulation else 0.0
+        cost, pace = (simulation.cost, simulation.pace) if simulation else (0.0, 1.0)
         self._blender.send(
-            Times(message.rate, message.late, message.computing, message.missed, cost, behind),
+            Times(
+                *(message.rate, message.late, message.computing, message.missed),
+                *(cost, pace, self._lag),
+            ),
             droppable=True,
         )
 
@@ -282,7 +296,8 @@ class Bridge:
         self._hands = None
         for pointer, device in list(self._devices.items()):
             gone = DeviceMessage(
-                *(pointer, False, device.kind, 0.0, 0.0, 0.0, 0.0, device.name, ())
+                *(pointer, False, device.kind, 0.0, 0.0, 0.0, 0.0),
+                *(device.name, device.identity, ()),
             )
             self._hear_device(gone)
         log.warning("The process at the devices ended")

@@ -17,9 +17,12 @@ from typing import IO
 
 from ..core.posing.figure import Figure, Pose
 from ..core.posing.obstacles import Obstacle
+from .calibration import Phase
 from .channel import ChannelClosedError
 from .messages import (
     Button,
+    Calibrate,
+    CalibrationMessage,
     DeviceMessage,
     FigureMessage,
     Goodbye,
@@ -27,6 +30,7 @@ from .messages import (
     Message,
     Notice,
     ObstacleMessage,
+    Order,
     Pins,
     Place,
     PointerMessage,
@@ -59,6 +63,12 @@ class Client:
     lost_devices: int = 0
     """How often a device has gone since the start; what it held was let go."""
     pointers: dict[int, PointerMessage] = field(default_factory=dict[int, PointerMessage])
+    calibrating: dict[int, CalibrationMessage] = field(
+        default_factory=dict[int, CalibrationMessage]
+    )
+    """By pointer: what has been learned so far, of devices that are being calibrated."""
+    calibrated: dict[int, CalibrationMessage] = field(default_factory=dict[int, CalibrationMessage])
+    """By pointer: what was learned, to be kept, then cleared, by the caller."""
     times: Times | None = None
     hello: Hello | None = None
     notices: list[Notice] = field(default_factory=list[Notice])
@@ -89,8 +99,7 @@ class Client:
         """
         self.stop()
         self._arguments, self._python = tuple(arguments), python
-        self.devices.clear()
-        self.pointers.clear()
+        self._forget_devices()
         self.times = self.hello = None
         self.lost_devices = 0
         self._child = Child.start(("bridge", *arguments), python, log_to)
@@ -183,6 +192,8 @@ class Client:
                     buttons.append(message)
                 case Times():
                     self.times = message
+                case CalibrationMessage():
+                    self._hear_calibration(message)
                 case Hello():
                     self.hello = message
                 case Notice():
@@ -191,6 +202,18 @@ class Client:
                     pass
         return buttons
 
+    def calibrate(self, pointer: int, order: Order) -> None:
+        """Begin to learn a device's zero and range, finish, or give it up."""
+        self.send(Calibrate(pointer, order))
+
+    def _hear_calibration(self, message: CalibrationMessage) -> None:
+        if message.phase in {Phase.REST, Phase.REACH}:
+            self.calibrating[message.pointer] = message
+            return
+        self.calibrating.pop(message.pointer, None)  # finished, or given up
+        if message.phase == Phase.DONE:
+            self.calibrated[message.pointer] = message
+
     def _hear_device(self, message: DeviceMessage) -> None:
         if message.present:
             self.devices[message.pointer] = message
@@ -198,6 +221,11 @@ class Client:
             self.lost_devices += 1
             self.devices.pop(message.pointer, None)
             self.pointers.pop(message.pointer, None)
+            self.calibrating.pop(message.pointer, None)
+
+    def _forget_devices(self) -> None:
+        for each in (self.devices, self.pointers, self.calibrating, self.calibrated):
+            each.clear()
 
     def _lose(self) -> None:
         """The bridge is gone: say so, and keep what it last said."""
@@ -205,8 +233,7 @@ class Client:
         if child is not None:
             child.stop(0.0)
         self.state = State.LOST
-        self.devices.clear()
-        self.pointers.clear()
+        self._forget_devices()
         self.notices.append(
             Notice(
                 "The program between Blender and the device has ended.",

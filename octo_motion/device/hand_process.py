@@ -15,6 +15,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from ..core.errors import DeviceError
+from .calibration import Phase
 from .channel import Channel, ChannelClosedError, Listener
 from .discovery import Discovery, Sources
 from .driver import DeviceLostError, Driver
@@ -24,6 +25,8 @@ from .hid.space_mouse import SpaceMouse
 from .messages import (
     Button,
     Buzz,
+    Calibrate,
+    CalibrationMessage,
     DeviceMessage,
     Goodbye,
     Grab,
@@ -33,6 +36,7 @@ from .messages import (
     Message,
     MessageError,
     Notice,
+    Order,
     Settings,
     Workspace,
 )
@@ -101,8 +105,14 @@ class HandLoop:
         match message:
             case HeldMessage():
                 pointer = self._pointers.get(message.pointer)
-                if pointer is not None:
-                    pointer.hold(message.grab, message.held(), message.time, now)
+                if pointer is not None and message.held:
+                    pointer.hold(message.grab, message.body(), message.time, now, message.holds)
+                elif pointer is not None:
+                    pointer.refuse(message.grab)
+            case Calibrate():
+                self._calibrate(message)
+            case CalibrationMessage():
+                self._correct(message)
             case Settings():
                 self._take_settings(message)
             case Workspace():
@@ -122,6 +132,33 @@ class HandLoop:
                 raise ChannelClosedError("goodbye")
             case _:
                 log.warning("A message that is not for here: %s", type(message).__name__)
+
+    def _calibrate(self, order: Calibrate) -> None:
+        pointer = self._pointers.get(order.pointer)
+        if pointer is None:
+            return
+        learner = pointer.calibrator
+        if order.order == Order.FINISH and learner is not None:
+            try:
+                pointer.correct(learner.finish())
+            except DeviceError as error:
+                self._channel.send(Notice(error.problem, error.remedy))
+            phase, learned = learner.phase, pointer.calibration
+            pointer.calibrate(begin=False)
+            self._channel.send(CalibrationMessage.of(order.pointer, learned, phase))
+        elif order.order == Order.BEGIN:
+            pointer.calibrate(begin=True)
+        elif learner is not None:
+            pointer.calibrate(begin=False)
+            self._channel.send(
+                CalibrationMessage.of(order.pointer, pointer.calibration, Phase.FAILED)
+            )
+
+    def _correct(self, message: CalibrationMessage) -> None:
+        pointer = self._pointers.get(message.pointer)
+        if pointer is not None:
+            with contextlib.suppress(MessageError):  # as without one, then
+                pointer.correct(message.calibration())
 
     def _take_settings(self, settings: Settings) -> None:
         try:
@@ -146,6 +183,12 @@ class HandLoop:
             pointer.presses.clear()
             if changed or due:
                 self._channel.send(pointer.message(now), droppable=not changed)
+            learner = pointer.calibrator
+            if learner is not None and due:
+                self._channel.send(
+                    CalibrationMessage.of(pointer.number, learner.so_far, learner.phase),
+                    droppable=True,
+                )
         if now - self._told_times > _TIMES_EVERY:
             self._told_times = now
             times = self._schedule.times()
@@ -193,7 +236,7 @@ class HandLoop:
         self._channel.send(
             DeviceMessage(
                 *(pointer.number, present, who.kind, force, torque),
-                *(gains.stiffness, gains.angular_stiffness, who.name, who.buttons),
+                *(gains.stiffness, gains.angular_stiffness, who.name, who.identity, who.buttons),
             )
         )
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, fields
-from typing import Annotated, ClassVar, Final, TypedDict, get_args, get_type_hints
+from enum import IntEnum
+from typing import Annotated, ClassVar, Final, Self, TypedDict, get_args, get_type_hints
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from ..core.posing.figure import Elements, Figure, Limits
 from ..core.posing.obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from ..core.posing.world import WorldSettings
 from ..core.rotations import Floats
+from .calibration import Calibration, Phase
 from .codec import (
     F64,
     FLAG,
@@ -39,7 +41,7 @@ from .haptics.local_model import Held, Pull
 from .hid.response import Axes, Response
 from .spatial import IDENTITY, ZERO, Quaternion, Vector, unit
 
-VERSION: Final = 1
+VERSION: Final = 2
 MAGIC: Final = b"OMDV"
 HEADER: Final = struct.Struct("<4sHHI")
 MOST_BYTES: Final = 4_000_000
@@ -236,6 +238,8 @@ class DeviceMessage(Message):
     angular_stiffness: Annotated[float, F64]
     """N·m/rad of the coupling."""
     name: Annotated[str, Text(128)]
+    identity: Annotated[str, Text(400)]
+    """The same for the same device plugged in again."""
     buttons: Annotated[tuple[str, ...], Many(Text(64), 64)]
 
 
@@ -282,8 +286,10 @@ class Times(Message):
     missed: Annotated[int, U32]
     step: Annotated[float, F64]
     """s that a step of the simulation takes to compute."""
+    pace: Annotated[float, F64]
+    """Simulated against real time; 1 keeps up."""
     lag: Annotated[float, F64]
-    """s that the simulation is behind the clock."""
+    """s from what a hand that holds something does to the pose that follows from it."""
 
 
 @dataclass(frozen=True)
@@ -438,6 +444,53 @@ class _Placed(TypedDict):
     friction: float | None
 
 
+class Order(IntEnum):
+    """What is to be done about a device's calibration."""
+
+    CANCEL = 0
+    BEGIN = 1
+    FINISH = 2
+
+
+@dataclass(frozen=True)
+class Calibrate(Message):
+    """Blender to bridge: learn a device's zero and range, or stop learning."""
+
+    KIND = 18
+    pointer: Annotated[int, U8]
+    order: Annotated[int, U8]
+    """As ``Order``."""
+
+
+@dataclass(frozen=True)
+class CalibrationMessage(Message):
+    """Either way: a device's zero and range, to be used or as far as they are learned."""
+
+    KIND = 19
+    pointer: Annotated[int, U8]
+    phase: Annotated[int, U8]
+    """As ``calibration.Phase``; to the bridge: done."""
+    rest: Annotated[Axes, SIX]
+    least: Annotated[Axes, SIX]
+    most: Annotated[Axes, SIX]
+
+    @classmethod
+    def of(cls, pointer: int, calibration: Calibration, phase: Phase = Phase.DONE) -> Self:
+        """The message that carries a calibration."""
+        return cls(pointer, phase, calibration.rest, calibration.least, calibration.most)
+
+    def calibration(self) -> Calibration:
+        """The calibration that came.
+
+        Raises:
+            MessageError: it makes no sense.
+        """
+        try:
+            return Calibration(self.rest, self.least, self.most)
+        except DeviceError as error:
+            raise MessageError(error.problem) from error
+
+
 # --- The bridge and the loop at the device -------------------------------------------------------
 
 
@@ -466,9 +519,13 @@ class HeldMessage(Message):
     KIND = 21
     pointer: Annotated[int, U8]
     grab: Annotated[int, U32]
-    """Which grab this answers; 0: nothing is held."""
+    """Which grab this answers."""
+    held: Annotated[bool, FLAG]
+    """False: there was nothing near, or it was let go."""
     time: Annotated[float, F64]
     """When this was true, by ``time.perf_counter``."""
+    holds: Annotated[float, F64]
+    """s for which the next word is not expected: so long does the local model do instead."""
     position: Annotated[Vector, VECTOR]
     orientation: Annotated[Quaternion, QUATERNION]
     velocity: Annotated[Vector, VECTOR]
@@ -477,7 +534,7 @@ class HeldMessage(Message):
     force: Annotated[Vector, VECTOR]
     torque: Annotated[Vector, VECTOR]
 
-    def held(self) -> Held:
+    def body(self) -> Held:
         """As the local model takes it."""
         return Held(
             *(self.position, self.orientation, self.velocity, self.angular_velocity),

@@ -38,8 +38,14 @@ _STILL: Final = 2e-3
 _REST_SECONDS: Final = 0.3
 _PROBE: Final = 1e-3
 """Of the puppet's weight: the push with which a held body's mobility is measured."""
-_TOO_SLOW: Final = 3e-3
+_TOO_SLOW: Final = 0.05
 """s for a step, with which seven more at a grab would be noticed."""
+_PROMPT: Final = 0.01
+"""s from one step to the next, up to which the hand waits for the next and nothing else."""
+_EXPECTED: Final = 0.1
+"""Of one more turn, in what is expected of the next: one late turn alone is no slow simulation."""
+_LATE: Final = 1.5
+"""Times the expected turn, before the next one counts as late."""
 _STALE: Final = 0.25
 """s without a word from a hand: it has let go."""
 _PAUSE: Final = 0.05
@@ -86,6 +92,10 @@ class Simulation:
         """Whether something may have moved since the last time that the pose was told."""
         self._nominal = settings.step
         self._clock = clock
+        self.pace = 1.0
+        """Simulated against real time, of late; 1 keeps up."""
+        self._turn = 0.0
+        self._turns = 0
         self._calm = 0.0
         self._now = -math.inf
         self._obstacles: dict[int, Obstacle] = {}
@@ -106,6 +116,7 @@ class Simulation:
     def place(self, pose: Pose) -> None:
         """Put the puppet into a pose, at rest; hands let go."""
         for hand in self.hands.values():
+            hand.refused = hand.told.grab  # let go is let go, until it grabs anew
             self._release(hand)
         self.world.set_pose(pose)
         self._pin_again()
@@ -275,9 +286,10 @@ class Simulation:
                 np.array(told.orientation),
                 np.array((*told.velocity, *told.angular_velocity)),
             )
-        self._now = now
+        passed, self._now = now - self._now, now
         if self.resting:
             return
+        self._time(passed)
         before = self._clock()
         self.world.step()
         spent = self._clock() - before
@@ -289,6 +301,21 @@ class Simulation:
         self._calm = self._calm + h if calm else 0.0
         self.cost += 0.05 * (spent - self.cost)
         self._keep_up()
+
+    def _time(self, passed: float) -> None:
+        """Learn from one more turn how long they take, and how much of that is simulated."""
+        if not 0.0 < passed < _STALE:
+            return
+        self._turns += 1
+        self._turn += max(_EXPECTED, 1.0 / self._turns) * (passed - self._turn)
+        h = self.step_seconds
+        pace = 1.0 if passed < 1.5 * h else h / passed
+        self.pace += 0.2 * (pace - self.pace)
+
+    @property
+    def holds(self) -> float:
+        """For how many seconds hands need not expect the next step; 0 where they come promptly."""
+        return _LATE * self._turn if self._turn > _PROMPT else 0.0
 
     def _keep_up(self) -> None:
         """Lengthen steps that take too long, shorten them when there is time again."""
@@ -322,7 +349,7 @@ class Simulation:
     # --- What is told back -----------------------------------------------------------------------
 
     def held(self, now: float) -> Iterator[HeldMessage]:
-        """For each hand that wants something: where what it holds is."""
+        """For each hand that wants something: where what it holds is, which was true at ``now``."""
         for pointer, hand in self.hands.items():
             if hand.told.grab:
                 yield self._held(pointer, hand, now)
@@ -330,9 +357,18 @@ class Simulation:
     def _held(self, pointer: int, hand: Hand, now: float) -> HeldMessage:
         grab = hand.handle
         if grab is None:
-            return HeldMessage(pointer, 0, now, ZERO, IDENTITY, ZERO, ZERO, Pull(), ZERO, ZERO)
+            return HeldMessage(
+                *(pointer, hand.told.grab, False, now, 0.0),
+                *(ZERO, IDENTITY, ZERO, ZERO, Pull(), ZERO, ZERO),
+            )
         place, turn = self.coupled(grab)
-        velocity = self.world.velocities()[grab.body]
+        # What the hand sees: where simulated time is slow, all moves slowly and is hard to move.
+        pace = self.pace
+        velocity = pace * self.world.velocities()[grab.body]
+        pull = hand.pull._replace(
+            mobility=pace * pace * hand.pull.mobility,
+            angular_mobility=pace * pace * hand.pull.angular_mobility,
+        )
         pose = self.world.pose()
         centre = pose.positions[grab.body] + rotate(
             pose.orientations[grab.body], self.world.figure.centres[grab.body]
@@ -340,8 +376,8 @@ class Simulation:
         at_point = velocity[:3] + np.cross(velocity[3:], place - centre)
         w, x, y, z = map(float, turn)
         return HeldMessage(
-            *(pointer, hand.grab, now, _tuple(place), (w, x, y, z)),
-            *(_tuple(at_point), _tuple(velocity[3:]), hand.pull),
+            *(pointer, hand.grab, True, now, self.holds, _tuple(place), (w, x, y, z)),
+            *(_tuple(at_point), _tuple(velocity[3:]), pull),
             *(_tuple(grab.wrench[:3]), _tuple(grab.wrench[3:])),
         )
 

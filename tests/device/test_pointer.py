@@ -136,6 +136,23 @@ def test_silent_simulation_takes_the_force_away_in_twenty_milliseconds() -> None
     assert max(a - b for a, b in itertools.pairwise(sizes)) <= 0.11 * 8.0
 
 
+def test_slow_simulation_may_be_silent_for_as_long_as_a_step_takes_and_no_longer() -> None:
+    table = grabbed()
+    table.pointer.hold(table.pointer.grab, ROCK, table.now, table.now, holds=0.05)
+    before = table.force
+    table.ticks(55, answer=False)
+    assert table.force == pytest.approx(before)
+    table.ticks(16, answer=False)
+    assert table.force == 0.0
+
+
+def test_no_simulation_is_trusted_for_longer_than_a_tenth_of_a_second() -> None:
+    table = grabbed()
+    table.pointer.hold(table.pointer.grab, ROCK, table.now, table.now, holds=10.0)
+    table.ticks(121, answer=False)
+    assert table.force == 0.0
+
+
 def test_silent_device_takes_the_force_away_in_twenty_milliseconds() -> None:
     table = grabbed()
     table.silent = True
@@ -181,6 +198,24 @@ def test_lost_device_is_told_to_whoever_runs_the_loop() -> None:
         table.ticks(1, ROCK)
     table.pointer.close()
     assert table.driver.sent[-1] == (ZERO, ZERO)
+
+
+def test_grab_that_is_refused_is_over_until_the_next_one() -> None:
+    table = Table()
+    table.buttons = 1
+    table.ticks(5)
+    grab = table.pointer.grab
+    table.pointer.refuse(grab)
+    assert table.pointer.grab == 0
+    table.ticks(5)
+    assert table.pointer.grab == 0
+    table.buttons = 0
+    table.ticks(1)
+    table.buttons = 1
+    table.ticks(1)
+    assert table.pointer.grab == grab + 1
+    table.pointer.refuse(grab)
+    assert table.pointer.grab == grab + 1
 
 
 def test_answer_to_an_older_grab_is_not_felt() -> None:
@@ -250,13 +285,13 @@ def test_test_of_a_device_is_a_gentle_push_each_way() -> None:
 
 
 class Bench:
-    """A puppet in the simulation, a simulated hand, and a clock; sim every `every` ticks."""
+    """A puppet in the simulation, a simulated hand, and a clock; a step every so many ticks."""
 
-    def __init__(self, every: int = 4, yielding: float = 1.0) -> None:
+    def __init__(self, every: int = 4, yielding: float = 1.0, step: float = 0.0) -> None:
         self.figure = chain(3, elements=soft(3, 40.0, 2.0, 100.0, yielding))
         self.simulation = Simulation(
             *(self.figure, posed(self.figure)),
-            settings=WorldSettings(step=every * PERIOD),
+            settings=WorldSettings(step=step or every * PERIOD),
             clock=lambda: 0.0,
         )
         self.simulation.pin({0: False})
@@ -283,7 +318,7 @@ class Bench:
                 self.simulation.hear(self.pointer.message(self.now))
                 self.simulation.step(self.now)
                 for held in self.simulation.held(self.now):
-                    self.pointer.hold(held.grab, held.held(), held.time, self.now)
+                    self.pointer.hold(held.grab, held.body(), held.time, self.now, held.holds)
             self.log.append((self.pointer.force, self.pointer.torque))
 
 
@@ -307,6 +342,36 @@ def test_puppet_follows_the_hand_and_the_hand_feels_it(every: int) -> None:
     assert length(bench.hand.velocity) < 0.02
 
 
+@pytest.mark.parametrize("every", [15, 34, 60])
+def test_simulation_slower_than_the_loop_is_felt_through_the_local_model(every: int) -> None:
+    """Steps of 8 ms that take longer: the loop goes on without them, and the force with it."""
+    bench = Bench(every, step=8e-3)
+    bench.run(0.1)
+    bench.driver.buttons = 1
+    bench.run(1.0)
+    assert bench.simulation.pace == pytest.approx(8.0 / every, rel=0.2)
+    assert bench.simulation.holds == pytest.approx(1.5e-3 * every, rel=0.02)
+    bench.hand.wish = lambda t: ((0.02 * math.sin(6.0 * t), 0.0, 0.04), IDENTITY)
+    bench.run(1.0)
+    bench.log.clear()
+    bench.run(2.0)
+    sizes = [length(force) for force, _ in bench.log]
+    assert min(sizes) > 0.01, "force at every tick"
+    assert 0.05 < max(sizes) < 8.0
+    changes = [length(tuple(np.subtract(b[0], a[0]))) for a, b in itertools.pairwise(bench.log)]
+    assert max(changes) < 0.25 * max(sizes), "no click when the simulation speaks"
+    assert bench.work <= 0.02 + 1e-3, "no more than the store holds came out"
+
+
+def test_one_late_step_does_not_make_a_slow_simulation() -> None:
+    bench = Bench(2)
+    bench.driver.buttons = 1
+    bench.run(0.2)
+    assert bench.simulation.holds == 0.0
+    bench.simulation.step(bench.now + 0.06)
+    assert bench.simulation.holds == 0.0
+
+
 @pytest.mark.parametrize("stiffness", [5.0, 640.0, 1e6])
 @pytest.mark.parametrize("scale", [0.1, 1.0, 30.0])
 def test_softest_device_moves_the_puppet_and_the_stiffest_does_not_shake_it(
@@ -314,7 +379,7 @@ def test_softest_device_moves_the_puppet_and_the_stiffest_does_not_shake_it(
 ) -> None:
     bench = Bench(4)
     told = bench.pointer.message(0.0)
-    device = DeviceMessage(*(0, True, 1, 8.0, 0.4, stiffness, 1.0, "Device", ()))
+    device = DeviceMessage(*(0, True, 1, 8.0, 0.4, stiffness, 1.0, "Device", "1:2", ()))
     coupling = bench.simulation._coupling(HandInWorld(told, device, scale))
     weight = 9.81 * float(bench.figure.masses.sum())
     assert 0.1 * 0.7 * coupling.stiffness > 0.9 * weight  # drawn out by a tenth, it lifts all

@@ -7,7 +7,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
+from ..calibration import NONE, Calibration, Calibrator
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
+from ..hid.space_mouse import SpaceMouse
 from ..messages import HandMessage, Settings, Workspace
 from ..spatial import (
     IDENTITY,
@@ -34,6 +36,8 @@ _FULL_PUSH: Final = 0.1
 """s: a rate device that has not been read for so long stands still."""
 _GIVE_UP: Final = 0.25
 """s of ticks without a word from the simulation, after which the hand has let go for good."""
+MOST_HOLDS: Final = 0.1
+"""s for which a local model is trusted at most, however long the simulation's steps take."""
 _TEST_SECONDS: Final = 0.6
 _TEST_SHARE: Final = 0.15
 """Of the device's force, for the test of a device."""
@@ -69,7 +73,12 @@ class Pointer:
         self._model = LocalModel()
         self._answered = 0
         self._heard = -math.inf
+        self._holds = 0.0
         self._silence = 0.0
+        self.calibration = NONE
+        """The device's own zero and range."""
+        self.calibrator: Calibrator | None = None
+        """While the device's zero and range are learned: then it neither points nor grabs."""
         self._grabs = 0
         self._told_place = False
         self._test_until = -math.inf
@@ -116,24 +125,27 @@ class Pointer:
 
     def want(self, *, grab: bool) -> None:
         """Grab what is near, or let go."""
-        if grab and not self.grab:
+        if grab and not self.grab and self.calibrator is None:
             self._grabs += 1
             self.grab = self._grabs
         elif not grab:
             self.grab = 0
 
-    def hold(self, grab: int, held: Held, time: float, now: float) -> None:
+    def hold(self, grab: int, held: Held, time: float, now: float, holds: float = 0.0) -> None:
         """Take over where the simulation says that the held body is.
 
         Args:
-            grab: The grab that this answers; 0: nothing is held.
+            grab: The grab that this answers.
             held: The body at the point where it is held.
             time: When that was true.
             now: Now.
+            holds: s for which the simulation will say no more, since its steps take so long. The
+                local model goes on alone until then, and counts as fresh.
         """
         if not grab or grab != self.grab:
             self._answered = 0
             return
+        self._holds = max(0.0, min(MOST_HOLDS, holds))
         if self._answered == grab:
             self._model.correct(held, max(0.0, min(FRESH_SECONDS, now - time)))
         else:
@@ -143,6 +155,12 @@ class Pointer:
             self._turn.forget()
         self._heard = now
         self._silence = 0.0
+
+    def refuse(self, grab: int) -> None:
+        """The simulation has let go, or found nothing to hold: only another grab tries anew."""
+        if grab == self.grab:
+            self.want(grab=False)
+        self._answered = 0
 
     def test(self, now: float) -> None:
         """Let the hand feel that the device works: gently to the right, then to the left."""
@@ -157,9 +175,11 @@ class Pointer:
             DeviceLostError: the device is gone.
         """
         sample = self.driver.read()
-        if sample is not None:
+        if sample is not None and self.calibrator is not None:
+            self._learn(now, sample)
+        elif sample is not None:
             self._press(sample.buttons)
-            self.sample = sample
+            self.sample = self._centred(sample)
             self._move(now)
         if not self.has_force:
             return
@@ -177,6 +197,39 @@ class Pointer:
         holding = alive and (bool(self._answered and self.grab) or now < self._test_until)
         self._shaper.shape(force, torque, self.period, holding=holding, age=age)
         self.driver.send(self._shaper.force, self._shaper.torque)
+
+    # --- Calibration -----------------------------------------------------------------------------
+
+    def calibrate(self, *, begin: bool) -> None:
+        """Begin to learn the device's zero and range, or stop without having learned any."""
+        self.want(grab=False)
+        self.velocity = self.angular_velocity = ZERO
+        self._last = None
+        self.calibrator = Calibrator(self.driver.description.kind) if begin else None
+
+    def correct(self, calibration: Calibration) -> None:
+        """Take over the device's zero and range; lets go, for nothing may jump."""
+        self.want(grab=False)
+        self.calibration = calibration
+        self._last = None
+        if isinstance(self.driver, SpaceMouse):
+            self.driver.calibration = calibration
+
+    def _learn(self, now: float, sample: Sample) -> None:
+        assert self.calibrator is not None
+        self.sample = sample._replace(
+            velocity=ZERO, angular_velocity=ZERO, buttons=self.sample.buttons
+        )
+        push = (*sample.position, 0.0, 0.0, 0.0)
+        self.calibrator.feed(now, self.driver.push if isinstance(self.driver, SpaceMouse) else push)
+
+    def _centred(self, sample: Sample) -> Sample:
+        if self.driver.description.kind is Kind.RATE:
+            return sample
+        x, y, z = self.calibration.rest[:3]
+        return sample._replace(position=subtract(sample.position, (x, y, z)))
+
+    # --- What a tick is made of ------------------------------------------------------------------
 
     def _press(self, buttons: int) -> None:
         changed = buttons ^ self.sample.buttons
@@ -235,7 +288,7 @@ class Pointer:
             *(self.gains, apart, scale(rotate(back, twist), share), drift),
             scale(rotate(back, spin), share),
         )
-        return force, torque, max(age, now - self._heard)
+        return force, torque, max(age, now - self._heard - self._holds)
 
     def _observe(self) -> None:
         """Account for the force of the last period, over the way that the hand went in it."""

@@ -6,14 +6,16 @@ from __future__ import annotations
 import time
 from typing import Final
 
+from ..calibration import NONE
 from ..driver import Description, DeviceLostError, Kind, Sample
 from ..spatial import Vector
 from .descriptor import DescriptorError, Layout, parse
 from .models import USAGE, USAGE_PAGE, model_of
 from .multi_axis import MultiAxis, classic_layout
-from .response import Response
+from .response import Axes, Response
 from .system import Found, Handle, descriptor_of, drain, open_device
 
+_STILL: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _SILENCE: Final = 0.5
 """s: a pushed cap reports every 8 to 16 ms; after so long it is out of reach, not held still."""
 
@@ -38,6 +40,9 @@ class SpaceMouse:
         self._axes = MultiAxis(layout)
         self._heard = 0.0
         self.response = response
+        self.calibration = NONE
+        self.push: Axes = self._axes.push
+        """As the maker's range says, −1…1; zeros while it is silent."""
         self._description = Description(
             name=model.name if model else found.name or "Space mouse",
             identity=found.identity,
@@ -88,10 +93,12 @@ class SpaceMouse:
         known = [self._axes.feed(report) for report in reports]
         if any(known):
             self._heard = now
-        x, y, z, a, b, c = self.response.speeds(self._axes.push)
-        if now - self._heard > _SILENCE:
-            # At rest a device is silent; a push that nobody repeats is one that got lost.
-            x = y = z = a = b = c = 0.0
+        # At rest a device is silent; a push that nobody repeats is one that got lost.
+        silent = now - self._heard > _SILENCE
+        self.push = _STILL if silent else self._axes.push
+        x, y, z, a, b, c = (
+            _STILL if silent else self.response.speeds(self.calibration.push(self.push))
+        )
         return Sample(
             now, velocity=(x, y, z), angular_velocity=(a, b, c), buttons=self._axes.buttons
         )

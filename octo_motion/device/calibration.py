@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A device's own zero and range, and learning them while an artist moves it.
+
+The cap of an old space mouse does not come back quite to its middle, and does not reach as far as
+its maker says; the middle of a force device's room is not always where its firmware counts from.
+Both are learned: what the axes say at rest, and the least and the most that they ever say.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from math import isfinite
+from typing import Final
+
+from ..core.errors import DeviceError
+from .driver import Kind
+from .hid.response import Axes
+
+_NOTHING: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_FULL: Final[Axes] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+_REST_SECONDS: Final = 1.0
+"""For so long the device must be left alone."""
+_TREMBLES: Final = 0.05
+"""Of the full push: by which a cap at rest changes at most."""
+_FARTHEST_REST: Final = 0.5
+"""Of the full push: a cap farther away is not at rest, but pushed."""
+_LEAST_PUSH: Final = 0.2
+"""Of the full push: an axis that got less far was not meant to be calibrated."""
+_LEAST_WAY: Final = 0.01
+"""m, likewise of a device that tells where the hand is."""
+_EVERY: Final = 0.01
+"""s between two values that are kept while the device is left alone."""
+
+
+class Phase(IntEnum):
+    """How far a calibration has come."""
+
+    DONE = 0
+    REST = 1
+    """The device must be left alone."""
+    REACH = 2
+    """It is to be moved as far as it goes, each way."""
+    FAILED = 3
+    """It was not moved; what held before goes on."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a device says at rest, and at the ends of each axis.
+
+    Of space mice pushes as their drivers know them, −1…1 by the maker's range; of others the
+    position in metres, and zeros for turning.
+
+    Raises:
+        DeviceError: an axis has no range, or a number is not finite.
+    """
+
+    rest: Axes = _NOTHING
+    least: Axes = (-1.0, -1.0, -1.0, -1.0, -1.0, -1.0)
+    most: Axes = _FULL
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense."""
+        numbers = [each for field in fields(self) for each in getattr(self, field.name)]
+        ends = zip(self.least, self.rest, self.most, strict=True)
+        if not all(map(isfinite, numbers)) or not all(a <= b <= c for a, b, c in ends):
+            raise DeviceError("The device's calibration is damaged.", "Calibrate it again.")
+
+    def push(self, told: Axes) -> Axes:
+        """−1…1 along each axis of a space mouse, 0 at its own rest and 1 at its own end."""
+        return _axes(map(_share, told, self.rest, self.least, self.most))
+
+    @property
+    def width(self) -> float:
+        """The longest way, in metres, of a device that tells where the hand is."""
+        return max(most - least for least, most in zip(self.least[:3], self.most[:3], strict=True))
+
+
+NONE: Final = Calibration()
+"""Of a device that is as its maker says."""
+
+
+def _share(told: float, rest: float, least: float, most: float) -> float:
+    end = most - rest if told > rest else rest - least
+    return max(-1.0, min(1.0, (told - rest) / end)) if end > 0.0 else 0.0
+
+
+class Calibrator:
+    """Learns a device's zero and range from what it says.
+
+    Args:
+        kind: Of the device. A space mouse must first be left alone; of a device that tells where
+            the hand is, the middle of its way is the zero.
+    """
+
+    def __init__(self, kind: Kind) -> None:
+        self.phase = Phase.REST if kind is Kind.RATE else Phase.REACH
+        self._kind = kind
+        self._quiet: deque[tuple[float, Axes]] = deque()
+        self._rest = _NOTHING
+        self._least: Axes | None = None
+        self._most: Axes = _NOTHING
+
+    def feed(self, now: float, told: Axes) -> None:
+        """Take what the device says now: pushes of a space mouse, else position and zeros."""
+        if self.phase is Phase.REST:
+            self._wait(now, told)
+        elif self.phase is Phase.REACH:
+            if self._least is None:
+                self._least = self._most = told
+            self._least = _each(min, self._least, told)
+            self._most = _each(max, self._most, told)
+
+    def _wait(self, now: float, told: Axes) -> None:
+        quiet = self._quiet
+        if quiet and now - quiet[-1][0] < _EVERY:
+            return
+        quiet.append((now, told))
+        values = [each for _, each in quiet]
+        least, most = (tuple(map(end, zip(*values, strict=True))) for end in (min, max))
+        if max(b - a for a, b in zip(least, most, strict=True)) > _TREMBLES or any(
+            abs(each) > _FARTHEST_REST for each in told
+        ):
+            quiet.clear()
+            return
+        if now - quiet[0][0] >= _REST_SECONDS:
+            self._rest = _axes(sum(each) / len(values) for each in zip(*values, strict=True))
+            self.phase = Phase.REACH
+
+    @property
+    def so_far(self) -> Calibration:
+        """What the device has said by now."""
+        least, most = (self._least, self._most) if self._least else (self._rest, self._rest)
+        if self._kind is Kind.POSE:
+            return Calibration(_each(lambda a, b: 0.5 * (a + b), least, most), least, most)
+        rest = self._rest
+        return Calibration(rest, _each(min, rest, least), _each(max, rest, most))
+
+    def finish(self) -> Calibration:
+        """What was learned; ends that were not reached are as on the other side, or as made.
+
+        Raises:
+            DeviceError: the device was not moved, or not left alone before.
+        """
+        learned = self.so_far
+        if not reached(learned, self._kind)[0]:
+            self.phase = Phase.FAILED
+            raise DeviceError(
+                "The device was not moved, so it was not calibrated.",
+                "Leave it alone for a second, then move it as far as it goes, each way.",
+            )
+        self.phase = Phase.DONE
+        if self._kind is Kind.POSE:
+            return learned
+        ends = [
+            _ends(*each) for each in zip(learned.rest, learned.least, learned.most, strict=True)
+        ]
+        least, most = (_axes(each) for each in zip(*ends, strict=True))
+        return Calibration(learned.rest, least, most)
+
+
+def reached(learned: Calibration, kind: Kind) -> tuple[int, int]:
+    """How many ends have been reached, and how many there are; of a room, how many of its ways."""
+    ends = list(zip(learned.rest, learned.least, learned.most, strict=True))
+    if kind is Kind.POSE:
+        return sum(most - least >= _LEAST_WAY for _, least, most in ends[:3]), 3
+    ways = [each for rest, least, most in ends for each in (rest - least, most - rest)]
+    return sum(each >= _LEAST_PUSH for each in ways), len(ways)
+
+
+def _ends(rest: float, least: float, most: float) -> tuple[float, float]:
+    """The ends of one axis; one that was not moved goes as far as its maker says."""
+    down, up = rest - least, most - rest
+    if max(down, up) < _LEAST_PUSH:
+        return -1.0, 1.0
+    if down < _LEAST_PUSH:
+        down = up
+    if up < _LEAST_PUSH:
+        up = down
+    return rest - down, rest + up
+
+
+def _each(choose: Callable[[float, float], float], first: Axes, second: Axes) -> Axes:
+    return _axes(map(choose, first, second))
+
+
+def _axes(values: Iterable[float]) -> Axes:
+    a, b, c, d, e, f = values
+    return (a, b, c, d, e, f)
