@@ -3,18 +3,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-import secrets
 from pathlib import Path
 from typing import Final
 
-import bpy
-
-from ..core.errors import GaitError, WriteError
+from ..core.errors import GaitError
 from ..core.locomotion import gait
 from ..core.locomotion.gait import GaitTable
+from .user_files import own_folder, unwritable, write_whole
 
 SUFFIX: Final = ".json"
 LONGEST_NAME: Final = 60
@@ -31,16 +27,7 @@ def user_folder(*, create: bool = False) -> Path:
     Raises:
         WriteError: it is to be made and cannot be.
     """
-    package = __name__.rpartition(".blender.")[0]
-    try:
-        if package.startswith("bl_ext."):
-            path = bpy.utils.extension_path_user(package, path="gaits", create=create)
-        else:
-            folder = os.path.join("presets", "octo_motion", "gaits")  # noqa: PTH118 - Blender's way
-            path = bpy.utils.user_resource("SCRIPTS", path=folder, create=create)
-    except OSError as error:
-        raise _unwritable("the folder for gaits", error) from error
-    return Path(path)
+    return own_folder("gaits", create=create)
 
 
 def gait_names() -> list[str]:
@@ -109,7 +96,7 @@ def remove_gait(name: str) -> None:
     try:
         path.unlink()
     except OSError as error:
-        raise _unwritable(f"'{path}'", error) from error
+        raise unwritable(f"'{path}'", error) from error
 
 
 def read_gait(path: Path) -> GaitTable:
@@ -134,16 +121,7 @@ def write_gait(table: GaitTable, path: Path) -> None:
     Raises:
         WriteError: it cannot be written.
     """
-    # Not tempfile's: those are for their owner's eyes alone, and this one becomes the result.
-    scratch = path.with_name(f".{secrets.token_hex(4)}.part")
-    try:
-        with scratch.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(gait.to_json(table))
-        scratch.replace(path)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            scratch.unlink(missing_ok=True)
-        raise _unwritable(f"'{path}'", error) from error
+    write_whole(path, gait.to_json(table))
 
 
 def _path_of(name: str) -> Path:
@@ -155,8 +133,3 @@ def _path_of(name: str) -> Path:
 
 def _name_of(path: Path) -> str:
     return _ESCAPE.sub(lambda found: chr(int(found.group(1), 16)), path.stem)
-
-
-def _unwritable(what: str, error: OSError) -> WriteError:
-    reason = error.strerror or type(error).__name__
-    return WriteError(f"Octo Motion cannot write {what}: {reason}.", "Choose another place.")

@@ -20,6 +20,7 @@ from typing import Final
 from ..core.errors import DeviceError, OctoMotionError
 from ..core.posing.figure import Pose
 from ..core.posing.world import WorldSettings
+from .calibration import Phase
 from .channel import Channel, ChannelClosedError, Listener
 from .haptics.schedule import Schedule
 from .messages import (
@@ -176,7 +177,7 @@ class Bridge:
                 self._say_to_hands(message)
             case CalibrationMessage():
                 message.calibration()  # refused here if it is none
-                self._say_to_hands(message)
+                self._pass_on(message, message.pointer)
             case Goodbye():
                 raise ChannelClosedError("goodbye")
             case _:
@@ -256,10 +257,17 @@ class Bridge:
                     self._tell_times(message)
                 case Hello():
                     self._tell_hello(message)
-                case Button() | Notice() | CalibrationMessage():
+                case Button() | Notice():
                     self._blender.send(message)
+                case CalibrationMessage():
+                    self._hear_calibration(message)
                 case _:
                     log.warning("The devices' process says %s", type(message).__name__)
+
+    def _hear_calibration(self, message: CalibrationMessage) -> None:
+        if message.phase == Phase.DONE:  # for a process at the devices that is started anew
+            self._remembered[CalibrationMessage, message.pointer] = message
+        self._blender.send(message)
 
     def _hear_device(self, message: DeviceMessage) -> None:
         if message.present:

@@ -77,6 +77,9 @@ class Description:
     buttons: tuple[str, ...]
     dynamics: Dynamics | None = None
     """None for a device without force."""
+    lasting: str = ""
+    """What it is known by next time, wherever it is plugged in; its identity where empty. Two
+    devices of one model without serial numbers share it."""
 
 
 class Driver(Protocol):

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from ..core.errors import DeviceError
-from .calibration import Phase
+from .calibration import Calibration, Phase
 from .channel import Channel, ChannelClosedError, Listener
 from .discovery import Discovery, Sources
 from .driver import DeviceLostError, Driver
@@ -70,6 +70,8 @@ class HandLoop:
         self._pointers: dict[int, Pointer] = {}
         self._numbers: dict[str, int] = {}
         self._workspaces: dict[int, Workspace] = {}
+        self._corrections: dict[int, Calibration] = {}
+        """By pointer: zeros and ranges that were told or learned."""
         self._settings = Settings()
         self._told = self._told_times = self._looked = 0.0
         self._held = False
@@ -141,6 +143,7 @@ class HandLoop:
         if order.order == Order.FINISH and learner is not None:
             try:
                 pointer.correct(learner.finish())
+                self._corrections[order.pointer] = pointer.calibration
             except DeviceError as error:
                 self._channel.send(Notice(error.problem, error.remedy))
             phase, learned = learner.phase, pointer.calibration
@@ -156,9 +159,12 @@ class HandLoop:
 
     def _correct(self, message: CalibrationMessage) -> None:
         pointer = self._pointers.get(message.pointer)
-        if pointer is not None:
-            with contextlib.suppress(MessageError):  # as without one, then
-                pointer.correct(message.calibration())
+        with contextlib.suppress(MessageError):  # as without one, then
+            calibration = message.calibration()
+            if message.pointer < MOST_POINTERS:
+                self._corrections[message.pointer] = calibration
+            if pointer is not None:
+                pointer.correct(calibration)
 
     def _take_settings(self, settings: Settings) -> None:
         try:
@@ -214,6 +220,8 @@ class HandLoop:
         if isinstance(driver, SpaceMouse):
             with contextlib.suppress(MessageError):
                 driver.response = self._settings.response()
+        if number in self._corrections:
+            pointer.correct(self._corrections[number])
         if number in self._workspaces:
             pointer.place(self._workspaces[number])
         self._pointers[number] = pointer
@@ -236,7 +244,8 @@ class HandLoop:
         self._channel.send(
             DeviceMessage(
                 *(pointer.number, present, who.kind, force, torque),
-                *(gains.stiffness, gains.angular_stiffness, who.name, who.identity, who.buttons),
+                *(gains.stiffness, gains.angular_stiffness, who.name),
+                *(who.lasting or who.identity, who.buttons),
             )
         )
 

@@ -239,7 +239,7 @@ class DeviceMessage(Message):
     """N·m/rad of the coupling."""
     name: Annotated[str, Text(128)]
     identity: Annotated[str, Text(400)]
-    """The same for the same device plugged in again."""
+    """The same for the same device next time."""
     buttons: Annotated[tuple[str, ...], Many(Text(64), 64)]
 
 

@@ -29,7 +29,15 @@ from .locomotion import (
     reach_properties,
     setups,
 )
-from .posing import device_panel, device_pose, device_settings, marks, pose_script, pose_start
+from .posing import (
+    device_calibrate,
+    device_panel,
+    device_pose,
+    device_settings,
+    marks,
+    pose_script,
+    pose_start,
+)
 from .posing import panels as posing_panels
 from .posing import properties as posing_properties
 from .posing import registration as posing
@@ -86,6 +94,7 @@ CLASSES: tuple[type, ...] = (
     *marks.CLASSES,
     *posing_panels.CLASSES,
     *device_pose.CLASSES,
+    *device_calibrate.CLASSES,
     *device_panel.CLASSES,
 )
 

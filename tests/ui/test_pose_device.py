@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -11,9 +12,13 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.blender import device_store
+from octo_motion.blender.device_store import load_calibrations
 from octo_motion.device import messages as say
+from octo_motion.device.calibration import Calibration
 from octo_motion.device.client import Client, State
 from octo_motion.ui.posing import device_pose
+from octo_motion.ui.posing.controls import Outcome
 from octo_motion.ui.posing.device_hands import DeviceHands, Room
 from octo_motion.ui.posing.device_ndof import NdofHands
 from octo_motion.ui.posing.device_overlay import device_lines
@@ -241,6 +246,181 @@ def test_space_mouse_that_blender_has_poses_without_a_bridge() -> None:
         session.cancel()
 
 
+# --- Undo ----------------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass
+class Key:
+    """An event of the keyboard."""
+
+    type: str
+    value: str = "PRESS"
+    ctrl: bool = False
+    shift: bool = False
+    alt: bool = False
+    oskey: bool = False
+
+
+def press(hands: DeviceHands | NdofHands, key: Key) -> Outcome:
+    operator: Any = device_pose.OCTO_MOTION_OT_pose_device
+    return operator._handle(operator, hands, key)
+
+
+def test_step_back_leads_to_before_the_last_grab(hands: DeviceHands) -> None:
+    undo = Key("Z", ctrl=True)
+    assert press(hands, Key("Z")) is Outcome.PASSED
+    assert press(hands, Key("Z", ctrl=True, shift=True)) is Outcome.PASSED
+    assert press(hands, undo) is Outcome.TAKEN
+    assert hands.said == "Nothing to take back"
+    grabbed(hands)
+    wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
+    hands.grab()
+    wait(hands, lambda: not hands.holding, "it lets go")
+    bent = turn_of("bone2")
+    grabbed(hands)
+    wait(hands, lambda: np.abs(turn_of("bone2") - bent).max() > 0.01, "it bends further")
+    assert press(hands, undo) is Outcome.TAKEN
+    hands.tick(TOLD, room())
+    assert np.abs(turn_of("bone2") - bent).max() < 0.01
+    wait(hands, lambda: not hands.holding, "the hand lets go")
+    assert press(hands, Key("R")) is Outcome.TAKEN
+    hands.tick(TOLD, room())
+    assert abs(turn_of("bone2")[1:]).max() < 1e-5
+    press(hands, undo)
+    hands.tick(TOLD, room())
+    assert np.abs(turn_of("bone2") - bent).max() < 0.01
+    press(hands, undo)
+    hands.tick(TOLD, room())
+    assert abs(turn_of("bone2")[1:]).max() < 1e-5
+    press(hands, undo)
+    assert hands.said == "Nothing to take back"
+    # What was let go can be grabbed anew, by the same key.
+    grabbed(hands)
+
+
+def test_step_back_with_blenders_own_space_mouse() -> None:
+    session = PuppetSession(arm(), bpy.context.scene, clock=None)
+    now = 0.0
+    hands = NdofHands(session, clock=lambda: now)
+    try:
+        hands.tick(TOLD)
+        hands.move((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, room(), TOLD)
+        hands.grab()
+        for _ in range(30):
+            now += 1.0 / 60.0
+            hands.move((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0 / 60.0, room(), TOLD)
+            hands.tick(TOLD)
+        assert abs(turn_of("bone2")[1:]).max() > 0.01
+        press(hands, Key("Z", ctrl=True))
+        assert hands.said == "Back"
+        assert not hands.holding
+        hands.tick(TOLD)
+        assert abs(turn_of("bone2")[1:]).max() < 1e-5
+    finally:
+        hands.stop()
+        session.cancel()
+
+
+# --- Calibration ---------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def on_stage(hands: DeviceHands, monkeypatch: pytest.MonkeyPatch) -> Iterator[DeviceHands]:
+    """Devices as the operators find them."""
+    monkeypatch.setattr(device_pose, "_going_on", [hands])
+    yield hands
+    device_store._path().unlink(missing_ok=True)
+
+
+def calibrate(step: str) -> None:
+    bpy.ops.octo_motion.device_calibrate(number=0, step=step)
+
+
+def test_room_of_a_device_is_learned_used_kept_and_forgotten(on_stage: DeviceHands) -> None:
+    hands = on_stage
+    wait(hands, lambda: 0 in hands._spaces, "the hand is there")
+    before = hands._spaces[0].scale
+    calibrate("BEGIN")
+    wait(hands, lambda: 0 in hands.client.calibrating, "it has begun")
+    assert "Simulated hand: is being calibrated" in device_pose.line(hands)
+
+    def has_gone_round() -> bool:
+        learned = hands.client.calibrating[0].calibration()
+        return learned.most[2] - learned.least[2] > 0.05
+
+    wait(hands, has_gone_round, "the hand draws its circle")
+    assert hands.client.pointers[0].body == -1
+    calibrate("FINISH")
+    wait(hands, lambda: "simulated" in hands.calibrations, "it is learned")
+    assert hands.said == "Calibrated: Simulated hand"
+    learned = hands.calibrations["simulated"]
+    assert 0.05 < learned.width < 0.2
+    assert load_calibrations() == {"simulated": learned}
+    wait(hands, lambda: 0 in hands._spaces, "its room is laid anew")
+    # As wide as the view is now what the hand has shown, not a desktop device's quarter metre.
+    assert hands._spaces[0].scale == pytest.approx(before * 0.25 / learned.width, rel=1e-6)
+    assert DeviceHands(hands.session, Client(), TOLD).calibrations == {"simulated": learned}
+
+    calibrate("RESET")
+    assert load_calibrations() == {}
+    wait(hands, lambda: 0 in hands._spaces, "its room is the maker's again")
+    assert hands._spaces[0].scale == pytest.approx(before)
+    with pytest.raises(RuntimeError, match="was not calibrated"):
+        calibrate("RESET")
+    assert hands.notices() == []
+
+
+def test_calibration_that_was_kept_is_told_to_a_device_that_comes_again(
+    on_stage: DeviceHands, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hands = on_stage
+    wait(hands, hands.shown, "the hand is there")
+    kept = Calibration(least=(-0.1,) * 6, most=(0.1,) * 6)  # pyright: ignore[reportArgumentType]
+    hands.calibrations = {"simulated": kept}
+    sent: list[say.Message] = []
+    send = hands.client.send
+    monkeypatch.setattr(hands.client, "send", lambda each: (sent.append(each), send(each)))
+    hands.client.restart()
+    wait(hands, hands.shown, "the hand is back")
+    hands.tick(TOLD, room())
+    told = [each for each in sent if isinstance(each, say.CalibrationMessage)]
+    assert [each.calibration() for each in told] == [kept]
+
+
+def test_calibration_that_is_given_up_or_learned_nothing_changes_nothing(
+    on_stage: DeviceHands,
+) -> None:
+    hands = on_stage
+    with pytest.raises(RuntimeError, match="No device has the number 0"):
+        calibrate("BEGIN")
+    wait(hands, hands.shown, "the hand is there")
+    with pytest.raises(RuntimeError, match="is not being calibrated"):
+        calibrate("FINISH")
+    calibrate("BEGIN")
+    wait(hands, lambda: 0 in hands.client.calibrating, "it has begun")
+    calibrate("CANCEL")
+    wait(hands, lambda: 0 not in hands.client.calibrating, "it is over")
+    assert hands.calibrations == {}
+    hands.client.calibrate(0, say.Order.BEGIN)
+    hands.client.calibrate(0, say.Order.FINISH)
+    wait(hands, lambda: hands.client.notices, "it says that nothing moved")
+    assert "was not moved" in hands.notices()[0].problem
+    assert hands.calibrations == {}
+    grabbed(hands)
+
+
+def test_blenders_own_space_mouse_is_calibrated_by_its_driver(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    session = PuppetSession(arm(), bpy.context.scene, clock=None)
+    try:
+        monkeypatch.setattr(device_pose, "_going_on", [NdofHands(session)])
+        with pytest.raises(RuntimeError, match="with its own driver"):
+            calibrate("BEGIN")
+    finally:
+        session.cancel()
+
+
 def test_settings_of_the_panel_are_told_in_the_bridges_units() -> None:
     settings = device_settings(bpy.context.window_manager)
     settings.force, settings.toggle, settings.speed, settings.reach = 0.5, True, 2.0, 0.1
@@ -256,5 +436,6 @@ def test_without_a_window_scripts_are_told_what_else_there_is() -> None:
     arm()
     with pytest.raises(RuntimeError, match="needs a 3D viewport"):
         bpy.ops.octo_motion.pose_device()
-    with pytest.raises(RuntimeError, match="Start Pose with Device first"):
-        bpy.ops.octo_motion.device_test()
+    for operator in (bpy.ops.octo_motion.device_test, bpy.ops.octo_motion.device_calibrate):
+        with pytest.raises(RuntimeError, match="Start Pose with Device first"):
+            operator()

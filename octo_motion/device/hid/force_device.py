@@ -27,6 +27,7 @@ class ForceDevice:
         self._description = Description(
             name=found.name or "Force device",
             identity=found.identity,
+            lasting=found.lasting,
             kind=Kind.POSE,
             buttons=tuple(f"Button {index + 1}" for index in range(features.buttons)),
             dynamics=features.dynamics,

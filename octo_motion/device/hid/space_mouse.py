@@ -46,6 +46,7 @@ class SpaceMouse:
         self._description = Description(
             name=model.name if model else found.name or "Space mouse",
             identity=found.identity,
+            lasting=found.lasting,
             kind=Kind.RATE,
             buttons=tuple(
                 names.get(bit, f"Button {bit + 1}") for bit in range(max(names, default=1) + 1)

@@ -58,6 +58,11 @@ class Found:
         """The same when the device is plugged in again, as far as it has a serial number."""
         return f"{self.vendor:04x}:{self.product:04x}:{self.serial or self.path.hex()}"
 
+    @property
+    def lasting(self) -> str:
+        """The same wherever it is plugged in; without serial numbers all of a model share it."""
+        return f"{self.vendor:04x}:{self.product:04x}:{self.serial}"
+
 
 def hidapi() -> Any:
     """The module that reads HID devices on this system.

@@ -12,16 +12,23 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...blender.device_store import load_calibrations, save_calibrations
+from ...core.errors import SettingsError, WriteError
 from ...core.posing.figure import Pose
 from ...core.posing.picking import Hit
+from ...core.posing.session import MOST_STEPS_BACK
 from ...core.rotations import Floats, from_matrix
+from ...device.calibration import NONE, Calibration
 from ...device.client import Client, State
 from ...device.driver import Kind
 from ...device.messages import (
     Button,
     Buzz,
+    CalibrationMessage,
+    DeviceMessage,
     Grab,
     Notice,
+    Order,
     PointerMessage,
     Workspace,
     WorldMessage,
@@ -31,6 +38,8 @@ from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25
 """m: the room of a desktop device, which is as wide as the view."""
+_NARROWEST: Final = 0.01
+"""m: of a room that was learned."""
 RATE_WIDTH: Final = 1.0
 """m: full push of a space mouse crosses the view in 2.5 s."""
 _ANSWER: Final = 0.4
@@ -90,6 +99,11 @@ class DeviceHands:
         self._settings: DeviceSettings | None = None
         self._spaces: dict[int, Workspace] = {}
         self._ours: Pose = self._start
+        self._before: list[Pose] = []
+        self._held: set[int] = set()
+        self.calibrations = load_calibrations()
+        """By a device's identity: what was learned of it, on this computer."""
+        self._corrected: dict[int, str] = {}
         self._tell(settings)
 
     # --- What is there --------------------------------------------------------------------------
@@ -145,8 +159,25 @@ class DeviceHands:
 
     def restore(self) -> None:
         """Back to the pose at the start; hands let go."""
-        self.session.core.world.set_pose(self._start)
+        self._remember(self.session.core.pose)
+        self._put(self._start)
+
+    def step_back(self) -> bool:
+        """Back to before the last grab or restoring, hands let go; whether there was one."""
+        if not self._before:
+            return False
+        self._put(self._before.pop())
+        return True
+
+    def _put(self, pose: Pose) -> None:
+        self.session.core.world.set_pose(pose)
         self._give(self.session.core.pose)
+        # A hand that still holds is told to let go: that is no grab of its own.
+        self._held = set(self.client.pointers)
+
+    def _remember(self, pose: Pose) -> None:
+        self._before.append(pose)
+        del self._before[:-MOST_STEPS_BACK]
 
     def test(self, number: int) -> None:
         """Let a device push gently each way."""
@@ -155,6 +186,33 @@ class DeviceHands:
     def recentre(self) -> None:
         """Bring all pointers to the middle of the view."""
         self._spaces.clear()
+
+    def begin_calibration(self, number: int) -> None:
+        """Begin to learn a device's zero and range."""
+        self.client.calibrate(number, Order.BEGIN)
+        self.said = f"Calibrating: {self.client.devices[number].name}"
+
+    def end_calibration(self, number: int, *, keep: bool) -> None:
+        """Use what was learned, or go on as before."""
+        self.client.calibrate(number, Order.FINISH if keep else Order.CANCEL)
+        self.said = ""
+
+    def reset_calibration(self, number: int) -> None:
+        """Forget what was learned of a device.
+
+        Raises:
+            SettingsError: nothing was.
+            WriteError: the file of calibrations cannot be written.
+        """
+        identity = self.client.devices[number].identity
+        if identity not in self.calibrations:
+            raise SettingsError("This device was not calibrated.", "It is as its maker says.")
+        left = {name: each for name, each in self.calibrations.items() if name != identity}
+        save_calibrations(left)
+        self.calibrations = left
+        self.client.send(CalibrationMessage.of(number, NONE))
+        self._fit(number, self.client.devices[number])
+        self.said = "As its maker says"
 
     # --- Time -----------------------------------------------------------------------------------
 
@@ -173,14 +231,17 @@ class DeviceHands:
         """
         buttons = self.client.poll()
         core = self.session.core
+        self._note_grabs()
         if not _same(core.pose, self._ours):
             # A change of frame, or a script, has posed the armature: that counts.
+            self._before.clear()
             self._give(core.pose)
         elif self.client.pose is not None and self.client.steps > 0:
             core.world.set_pose(self.client.pose)
             self._ours = core.pose
         self.session.tick(0.0)
         self._tell(settings)
+        self._correct()
         if room is not None:
             self._place(room)
         self._look_at_held()
@@ -198,6 +259,44 @@ class DeviceHands:
         """What the user should be told, each once."""
         notices, self.client.notices = self.client.notices, []
         return notices
+
+    def _note_grabs(self) -> None:
+        """Before the first pose that follows from a grab: that is what a step back leads to."""
+        held = {number for number, each in self.client.pointers.items() if each.body >= 0}
+        if held - self._held:
+            self._remember(self._ours)
+        self._held = held
+
+    def _correct(self) -> None:
+        """Tell devices their own zero and range, and keep what was learned."""
+        client = self.client
+        for number, learned in client.calibrated.items():
+            device = client.devices.get(number)
+            if device is not None:
+                self._keep(device, learned.calibration())
+                self._fit(number, device)
+        client.calibrated.clear()
+        present = {number: device.identity for number, device in client.devices.items()}
+        for number, identity in present.items():
+            if self._corrected.get(number) != identity:
+                wanted = self.calibrations.get(identity)
+                if wanted is not None or number in self._corrected:
+                    client.send(CalibrationMessage.of(number, wanted or NONE))
+        self._corrected = present
+
+    def _fit(self, number: int, device: DeviceMessage) -> None:
+        """Lay the room of a device anew, whose own is another one now."""
+        if device.kind == Kind.POSE:
+            self._spaces.pop(number, None)
+
+    def _keep(self, device: DeviceMessage, calibration: Calibration) -> None:
+        self.calibrations = {**self.calibrations, device.identity: calibration}
+        self.said = f"Calibrated: {device.name}"
+        try:
+            save_calibrations(self.calibrations)
+        except WriteError as error:
+            # It holds for now all the same.
+            self.client.notices.append(Notice(error.problem, error.remedy))
 
     def _look_at_held(self) -> None:
         held = [each.body for each in self.client.pointers.values() if each.body >= 0]
@@ -265,7 +364,8 @@ class DeviceHands:
             if rate and before is not None:
                 # A space mouse has its pointer where it was pushed to, whatever the view does.
                 middle = np.array(before.origin)
-            own = RATE_WIDTH if rate else _WIDTH
+            learned = self.calibrations.get(device.identity)
+            own = RATE_WIDTH if rate else max(learned.width, _NARROWEST) if learned else _WIDTH
             scale = room.width * unit / own
             a, b, c = (float(each) for each in middle)
             space = Workspace(number, (a, b, c), (w, x, y, z), scale)

@@ -124,6 +124,10 @@ class NdofHands:
         """Back to the pose at the start; the pointer lets go."""
         self.session.restore()
 
+    def step_back(self) -> bool:
+        """Back to before the last grab or restoring, and let go; whether there was one."""
+        return self.session.step_back()
+
     def test(self, number: int) -> None:
         """Nothing: a space mouse has no motors."""
 

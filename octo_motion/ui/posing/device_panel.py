@@ -8,6 +8,7 @@ from typing import Any, Final
 import bpy
 
 from ...device.client import State
+from .device_calibrate import draw_calibration
 from .device_ndof import NAME, NdofHands
 from .device_pose import (
     Hands,
@@ -20,6 +21,10 @@ from .panels import OCTO_MOTION_PT_posing, _Panel
 
 _LATE: Final = 0.002
 """s: a loop that is off its period by more, in one of a hundred ticks, is felt."""
+_SLOW: Final = 0.9
+"""Simulated against real time, below which the panel says so."""
+_LAGS: Final = 0.05
+"""s: a puppet that follows later is felt to lag."""
 
 
 class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
@@ -76,6 +81,7 @@ class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
                 column.progress(factor=share, text=f"{share * device.force:.1f} N")
             else:
                 column.label(text="Leads, without force")
+            draw_calibration(column, hands, number, device)
         times = client.times
         if times is not None:
             column = box.column(align=True)
@@ -83,8 +89,13 @@ class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
             row.alert = times.late[1] > _LATE
             row.label(text=f"{times.rate:.0f} Hz, {1e3 * times.late[1]:.2f} ms off at most")
             row = column.row()
-            row.alert = times.lag > 0.0
-            row.label(text=f"A step takes {1e3 * times.step:.1f} ms")
+            row.alert = times.pace < _SLOW
+            slow = f", {100.0 * times.pace:.0f} % of real time" if times.pace < _SLOW else ""
+            row.label(text=f"A step takes {1e3 * times.step:.1f} ms{slow}")
+            if times.lag > 0.0:
+                row = column.row()
+                row.alert = times.lag > _LAGS
+                row.label(text=f"{1e3 * times.lag:.0f} ms from hand to pose")
 
 
 CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PT_posing_device,)

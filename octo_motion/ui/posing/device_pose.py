@@ -33,12 +33,13 @@ HELP: Final = (
     ("P", "pin"),
     ("O", "record"),
     ("R", "restore"),
+    ("Ctrl Z", "back"),
     ("Home", "pointer to the middle"),
     ("B", "start the device's program again"),
     ("Enter", "keep"),
     ("Esc", "as it was"),
 )
-_KEYS: Final = frozenset({"ESC", "RET", "NUMPAD_ENTER", "G", "K", "P", "O", "R", "HOME", "B"})
+_KEYS: Final = frozenset({"ESC", "RET", "NUMPAD_ENTER", "G", "K", "P", "O", "R", "HOME", "B", "Z"})
 
 Hands = DeviceHands | NdofHands
 
@@ -233,7 +234,7 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
         return new
 
     def _handle(self, hands: Hands, event: Any) -> Outcome:
-        if event.type not in _KEYS:
+        if event.type not in _KEYS or (event.type == "Z" and not _is_undo(event)):
             return Outcome.PASSED
         if event.value != "PRESS":
             return Outcome.TAKEN
@@ -253,6 +254,8 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
             case "R":
                 hands.restore()
                 hands.said = "As at the start"
+            case "Z":
+                hands.said = "Back" if hands.step_back() else "Nothing to take back"
             case "HOME":
                 hands.recentre()
             case _ if isinstance(hands, DeviceHands):
@@ -311,6 +314,11 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
                 context.workspace.status_text_set(None)
 
 
+def _is_undo(event: Any) -> bool:
+    """Whether Ctrl Z, or Cmd Z on a Mac, is pressed; Z alone and Ctrl Shift Z are Blender's."""
+    return (event.ctrl or event.oskey) and not event.shift
+
+
 def line(hands: Hands) -> str:
     """One line about devices, for the header."""
     parts = [f"Posing {hands.session.puppet.name}"]
@@ -322,6 +330,8 @@ def line(hands: Hands) -> str:
         parts.append(NAME if is_blenders else "No device yet: plug one in")
     for each in shown:
         what = hands.session.bone(each.body) if each.body >= 0 else "free"
+        if each.number in hands.client.calibrating:
+            what = "is being calibrated"
         parts.append(f"{each.name}: {what}")
     if hands.session.recording:
         parts.append("● Recording")
