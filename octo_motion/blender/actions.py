@@ -583,7 +583,18 @@ def _channelbags(action: bpy.types.Action) -> Iterator[bpy.types.ActionChannelba
     for layer in action.layers:
         for strip in layer.strips:
             if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                yield from strip.channelbags
+                yield from channelbags_of(strip)
+
+
+def channelbags_of(strip: bpy.types.ActionKeyframeStrip) -> Iterator[bpy.types.ActionChannelbag]:
+    """Its channelbags, such that their curves' keys can be read quickly.
+
+    What is reached from one property to the next carries all that it was reached through, and so
+    does each of its keys while they are read: that takes four times as long as the reading.
+    """
+    for each in strip.channelbags:
+        slot = each.slot
+        yield (strip.channelbag(slot) if slot is not None else None) or each
 
 
 def _pose_bones(armature: bpy.types.Object, bones: Sequence[str]) -> list[bpy.types.PoseBone]:

@@ -22,6 +22,7 @@ from ..core.errors import ClipError, WriteError
 from ..core.rotations import normalized
 from ..core.splicing.bvh_check import check_bvh
 from ..core.splicing.mapping import map_skeleton
+from .actions import channelbags_of
 from .armature import read_skeleton
 from .clips import read_clip
 
@@ -346,7 +347,7 @@ def _curves(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
     for layer in action.layers:
         for strip in layer.strips:
             if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                for channelbag in strip.channelbags:
+                for channelbag in channelbags_of(strip):
                     yield from channelbag.fcurves
 
 
