@@ -24,12 +24,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from octo_motion.core.posing.figure import Figure
+from octo_motion.core.posing.figure import Figure, Limits
 from octo_motion.core.posing.obstacles import Box, Plane, Sphere
 from octo_motion.core.posing.presets import elements_for
 from octo_motion.core.posing.world import World, WorldSettings
 from octo_motion.core.rotations import Floats
-from tests.core.puppets import doll, octopus, posed, soft, torn, tree
+from tests.core.puppets import Torn, doll, octopus, posed, soft, torn, tree
 
 _HIGH: Final = 0.12
 """Metres from which a figure falls."""
@@ -60,18 +60,23 @@ def main(words: Sequence[str]) -> None:
         sys.exit(subprocess.run(again, env=os.environ | _ONE_CORE, check=False).returncode)
     parser = argparse.ArgumentParser(prog="python -m tests.bench posing", description=__doc__)
     parser.add_argument("--steps", type=int, default=3000, help="measured, of each figure")
-    parser.add_argument("--random", type=int, default=0, help="steps of random tearing as well")
+    parser.add_argument(
+        "--random", type=int, default=0, help="steps of random tearing instead, of each figure"
+    )
+    parser.add_argument("--only", default="", help="of these, figures with this word in their name")
     parser.add_argument("--json", type=Path, help="file to write all numbers to")
     arguments = parser.parse_args(words)
-    figures = {"doll": _doll(), "octopus": _octopus()}
-    rows: list[Measured] = []
-    for name, figure in figures.items():
-        rows += _ours(name, figure, arguments.steps)
-    rows += _mujoco(figures, arguments.steps)
-    _table(rows)
-    report: dict[str, Any] = {"rows": [asdict(row) for row in rows]}
+    report: dict[str, Any] = {}
     if arguments.random:
-        report["random"] = _random(arguments.random)
+        report["random"] = _random(arguments.random, arguments.only)
+    else:
+        figures = {"doll": _doll(), "octopus": _octopus()}
+        rows: list[Measured] = []
+        for name, figure in figures.items():
+            rows += _ours(name, figure, arguments.steps)
+        rows += _mujoco(figures, arguments.steps)
+        _table(rows)
+        report["rows"] = [asdict(row) for row in rows]
     if arguments.json:
         arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
@@ -194,21 +199,19 @@ def _table(rows: list[Measured]) -> None:
     print("\nµs a step; contacts: carried, in the mean; processor: median of its time\n")
 
 
-def _random(steps: int) -> list[dict[str, Any]]:
-    """Grabs, pulls and pins at random, among a floor, a box and a ball.
-
-    The octopus, whose steps take ten times as long, has a tenth of them.
-    """
+def _random(steps: int, only: str) -> list[dict[str, Any]]:
+    """Grabs, pulls and pins at random, among a floor, a box and a ball."""
     rng = np.random.default_rng(0)
     kinds = {
-        "doll of clay": replace(_doll(), elements=elements_for(_doll(), "clay")),
-        "octopus of wire": replace(_octopus(), elements=elements_for(_octopus(), "wire")),
-        "random tree of rubber": tree(rng, 12),
+        "doll of clay": (_limited(_doll()), "clay"),
+        "octopus of wire": (_octopus(), "wire"),
+        "random tree of rubber": (tree(rng, 12), "rubber"),
     }
-    last = kinds["random tree of rubber"]
-    kinds["random tree of rubber"] = replace(last, elements=elements_for(last, "rubber"))
     results: list[dict[str, Any]] = []
-    for name, figure in kinds.items():
+    for name, (bare, material) in kinds.items():
+        if only not in name:
+            continue
+        figure = replace(bare, elements=elements_for(bare, material))
         world = World(
             figure,
             posed(figure, at=(0.0, 0.0, 0.5)),
@@ -219,15 +222,42 @@ def _random(steps: int) -> list[dict[str, Any]]:
                 Sphere(position=np.array([-0.4, 0.4, 0.1]), radius=0.2),
             ],
         )
-        count = steps if len(figure) < 50 else steps // 10
-        widest, fastest = torn(world, rng, count)
+        start = time.perf_counter()
+        found = Torn()
+        for found in torn(world, rng, steps):
+            if found.steps % max(steps // 20, 1) == 0:
+                _tell(name, found, time.perf_counter() - start)
+        seconds = time.perf_counter() - start
+        results.append({"name": name, "seconds": seconds, **asdict(found)})
+    print(
+        "\nfigure                      steps  opening  broken  m/s  energy J  gain J  limits °    s"
+    )
+    for row in results:
         print(
-            f"{count} random steps, {name}: joints open by at most {widest:.1e} of a bone,"
-            f" speeds up to {fastest:.0f} m/s",
-            flush=True,
+            f"{row['name']:<24} {row['steps']:>8} {row['widest']:>8.0e} {row['broken']:>7}"
+            f" {row['fastest']:>4.0f} {row['energy']:>9.0f} {row['gain']:>7.0e}"
+            f" {np.degrees(row['overrun']):>9.1f} {row['seconds']:>5.0f}"
         )
-        results.append({"name": name, "steps": count, "widest": widest, "fastest": fastest})
+    print(
+        "\nopening: of a joint, against its bone; broken: steps with a number that is not finite;"
+        "\ngain: of energy in a step in which no hand held it; limits: how far beyond its range\n"
+    )
     return results
+
+
+def _tell(name: str, found: Torn, seconds: float) -> None:
+    print(
+        f"{seconds:>6.0f} s  {name}: {found.steps} steps, {found.unsettled} unsettled,"
+        f" opening {found.widest:.0e}, {found.broken} broken, {found.fastest:.0f} m/s,"
+        f" {found.energy:.0f} J, gained {found.gain:.0e} J in {found.alone} steps alone",
+        flush=True,
+    )
+
+
+def _limited(figure: Figure) -> Figure:
+    """With ends to the range of every joint."""
+    ends = np.radians([[-10.0, 130.0], [-30.0, 60.0], [-40.0, 40.0]])
+    return replace(figure, limits=Limits(np.tile(ends, (len(figure), 1, 1))))
 
 
 if __name__ == "__main__":

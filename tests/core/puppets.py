@@ -3,16 +3,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from octo_motion.core.posing.figure import Elements, Figure, Limits, Pose
 from octo_motion.core.posing.kinematics import pose_of, product
+from octo_motion.core.posing.limits import bends
 from octo_motion.core.posing.world import World
-from octo_motion.core.rotations import Floats, from_rotation_vector, normalized, rotate
+from octo_motion.core.rotations import (
+    Floats,
+    from_rotation_vector,
+    normalized,
+    rotate,
+)
 
 DENSITY = 1000.0
+HANDS = 2
+"""At most so many tear at a figure at a time."""
 
 
 def capsule_inertia(length: float, radius: float) -> tuple[float, Floats]:
@@ -145,24 +154,49 @@ def posed(
 
 def opening(figure: Figure, pose: Pose) -> float:
     """Greatest gap of a joint, against the length of its bone."""
-    worst = 0.0
-    for body, parent in enumerate(figure.parents):
-        if parent >= 0:
-            at = pose.positions[parent] + rotate(pose.orientations[parent], figure.anchors[body])
-            gap = float(np.linalg.norm(at - pose.positions[body]))
-            worst = max(worst, gap / float(figure.lengths[body]))
-    return worst
+    parents = np.array(figure.parents)
+    hanging = parents >= 0
+    above = parents[hanging]
+    if not len(above):
+        return 0.0
+    arms = rotate(pose.orientations[above], figure.anchors[hanging])
+    gaps = pose.positions[above] + arms - pose.positions[hanging]
+    return float((np.linalg.norm(gaps, axis=1) / figure.lengths[hanging]).max())
 
 
-def torn(world: World, rng: np.random.Generator, steps: int) -> tuple[float, float]:
-    """Random grabs, pulls and pins; joints closed and numbers finite all along.
+@dataclass
+class Torn:
+    """What came of tearing at a figure."""
 
-    Returns the widest opening of a joint against its bone's length, and the highest speed, m/s.
-    """
+    steps: int = 0
+    widest: float = 0.0
+    """Opening of a joint, against its bone's length."""
+    fastest: float = 0.0
+    """m/s"""
+    broken: int = 0
+    """Steps after which some number was not finite."""
+    unsettled: int = 0
+    """Steps for which the solver took the best answer so far."""
+    energy: float = 0.0
+    """Joules, the most that the figure held."""
+    alone: int = 0
+    """Steps in which no hand held it."""
+    gain: float = 0.0
+    """Joules, the most that the energy grew by in one of these."""
+    overrun: float = 0.0
+    """Radians by which a joint was beyond the end of its range."""
+
+
+def torn(world: World, rng: np.random.Generator, steps: int) -> Iterator[Torn]:
+    """Random grabs, pulls and pins; what came of them so far, after each step."""
     figure = world.figure
-    widest = fastest = 0.0
+    found = Torn()
+    unrest = figure.rest * [1.0, -1.0, -1.0, -1.0]
+    limited = np.array(figure.parents) >= 0
+    least, most = np.moveaxis(figure.limits.ranges, -1, 0)
+    energy = world.energy().total
     for _ in range(steps):
-        if rng.random() < 0.03:
+        if len(world.grabs) < HANDS and rng.random() < 0.03:
             body = int(rng.integers(len(figure)))
             at = world.pose().positions[body]
             hand = np.array([1.0, 0.0, 0.0, 0.0]) if rng.random() < 0.5 else None
@@ -178,13 +212,19 @@ def torn(world: World, rng: np.random.Generator, steps: int) -> tuple[float, flo
         if len(world.pinned) > 2:
             world.unpin(min(world.pinned))
         world.step()
-        pose = world.pose()
-        assert np.isfinite(pose.positions).all()
-        assert np.isfinite(world.velocities()).all()
-        widest = max(widest, opening(figure, pose))
-        fastest = max(fastest, float(np.abs(world.velocities()[:, :3]).max()))
-        # A hand moves at 50 m/s here; nothing may be faster than that by orders.
-        assert fastest < 1e4
-        # The bound is 1 %; joints that are coordinates stay closed to rounding.
-        assert widest < 1e-9
-    return widest, fastest
+        pose, velocities = world.pose(), world.velocities()
+        before, energy = energy, world.energy().total
+        assert world.last is not None
+        bent = bends(product(unrest, world.joint_turns()))
+        over = np.maximum(least - bent, bent - most)[limited]
+        found.steps += 1
+        found.widest = max(found.widest, opening(figure, pose))
+        found.fastest = max(found.fastest, float(np.abs(velocities[:, :3]).max()))
+        found.broken += not (np.isfinite(pose.positions).all() and np.isfinite(velocities).all())
+        found.unsettled += world.last.miss > world.settings.tolerance
+        found.overrun = max(found.overrun, float(over.max(initial=0.0)))
+        found.energy = max(found.energy, energy)
+        if not world.grabs:
+            found.alone += 1
+            found.gain = max(found.gain, energy - before)
+        yield found

@@ -105,7 +105,7 @@ class Newton:
         composite = (tree.beyond @ inertias.reshape(-1, 36)).reshape(slots, 6, 6)
         rows = problem.rows
         point = self._at(problem, start)
-        moving = start
+        shift: Floats | None = None
         miss = np.inf
         count = rounds = 0
         while count < self._iterations:
@@ -121,7 +121,8 @@ class Newton:
             count += 1
             slopes = None if point.rows is None else problem.rows.slopes(point.rows)
             solved = self._linear(problem, composite, point, slopes, corrections)
-            moving = solved[..., -1]
+            if corrections is not None:
+                shift = solved[..., 1] - solved[..., 0]
             end = self._at(problem, np.ascontiguousarray(solved[..., 0]))
             joints, pushes = _predicted(point, end, slopes)
             miss = _miss(end, joints, pushes)
@@ -131,7 +132,8 @@ class Newton:
         return Solution(
             point.speeds,
             point.velocities,
-            point.speeds if corrections is None else moving,
+            # Added to what was settled on, which need not be where the last system led.
+            point.speeds if shift is None else point.speeds + shift,
             point.loads,
             point.flow,
             _NO_ROWS if point.rows is None else point.rows.impulses,

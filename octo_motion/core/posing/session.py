@@ -283,8 +283,8 @@ class Session:
     def _rebuild(self, settings: WorldSettings) -> None:
         old, grip = self.world, self.grip
         self.world = World(self.figure, old.pose(), settings, old.obstacles)
-        self.world.restore(old.state())
         self._pin_again()
+        self.world.restore(old.state())
         if grip is not None:
             held = grip.handle
             grip.handle = self.world.grab(

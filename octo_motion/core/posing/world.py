@@ -281,6 +281,9 @@ class World:
             raise IndexError(body)
         if firm is None:
             firm = not self._is_root[body]
+        if body not in self._pins and self._is_root[body]:
+            # The element of a root bears nothing while the root is free: it is bent from here on.
+            self._plastic_rest[body] = self._orientations[body]
         self._pins[body] = _Pin(
             self._positions[body].copy(), self._orientations[body].copy(), firm=bool(firm)
         )
