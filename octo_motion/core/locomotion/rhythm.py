@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -299,6 +300,13 @@ class Table:
         after = self.values[-1] + (distance - self.at[-1]) * self.slopes[-1]
         return np.where(t < 0.0, before, np.where(t > 1.0, after, inside))
 
+    @cached_property
+    def _steps(self) -> tuple[Floats, Floats]:
+        """Distances (steps,) close to each other, and cycles there."""
+        number = np.arange((len(self.at) - 1) * _FINE + 1) / _FINE
+        fine = np.interp(number, np.arange(len(self.at)), self.at)
+        return fine, self.cycles(fine)
+
     def slopes_at(self, distance: Floats) -> Floats:
         """Cycles per metre at distances (…,)."""
         knot = np.clip(np.searchsorted(self.at, distance, "right") - 1, 0, len(self.at) - 2)
@@ -313,10 +321,7 @@ class Table:
         """At cycles (…,)."""
         low = self.values[0] if self.starts else -np.inf
         cycles = np.clip(cycles, low, self.values[-1] if self.stops else np.inf)
-        fine = np.interp(
-            np.arange((len(self.at) - 1) * _FINE + 1) / _FINE, np.arange(len(self.at)), self.at
-        )
-        values = self.cycles(fine)
+        fine, values = self._steps
         inside = np.interp(cycles, values, fine)
         steep = np.maximum(self.slopes[[0, -1]], 1e-12)
         before = self.at[0] + (cycles - self.values[0]) / steep[0]

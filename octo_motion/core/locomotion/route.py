@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from math import comb
 from typing import Final
 
 import numpy as np
@@ -251,18 +252,24 @@ class Route:
         """Speeds at parameters within the segments that the parameters ``middle`` lie in."""
         if np.any(self.controls[..., 3] != 1.0):
             return lambda s: _norm(self.velocity(s))
-        # Quadrature asks for little else: without weights, the derivative is a Bézier curve of
-        # one degree less, whose control points are gathered once for all nodes.
+        # Quadrature asks for little else: without weights, the derivative is a polynomial, whose
+        # coefficients are gathered once for all nodes, components first: long rows are quick.
         segment, share = self._segment(middle)
         start, hodograph = self.breaks[segment], np.diff(self.controls[..., :3], axis=1)
-        corners = [hodograph[segment, corner] for corner in range(hodograph.shape[1])]
+        degree = hodograph.shape[1] - 1
+        powers = [
+            np.moveaxis(comb(degree, power) * np.diff(hodograph, power, axis=1)[segment, 0], -1, 0)
+            for power in range(degree, -1, -1)
+        ]
+        powers = [np.ascontiguousarray(each) for each in powers]
 
         def speed(s: Floats) -> Floats:
-            t = ((s - start) / share)[..., None]
-            values = corners
-            while len(values) > 1:
-                values = [a + t * (b - a) for a, b in pairwise(values)]
-            return len(corners) / share * _norm(values[0])
+            t = (s - start) / share
+            value = powers[0]
+            for power in powers[1:]:
+                value = t * value + power
+            x, y, z = value
+            return (degree + 1) / share * np.sqrt(x * x + y * y + z * z)
 
         return speed
 

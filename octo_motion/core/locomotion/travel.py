@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import SettingsError
+from ..remembered import Remembered, key_of
 from ..rotations import Floats, from_axis_angle, multiply
 from .bearings import Bearings, bearings, turned
 from .route import Route
@@ -34,6 +35,9 @@ _SETTLE: Final = 1.0
 """Strides within which a body that is not upright after a loop comes most of the way."""
 _LAID_FORWARD: Final = np.array([0.0, 0.0, np.sqrt(0.5), -np.sqrt(0.5)])
 """From a body whose +Z travels and −Y faces up to one whose −Y travels and +Z faces up."""
+
+
+_tables: Final[Remembered[Bearings]] = Remembered(4)
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,8 @@ class Travel:
 
 def bearings_of(route: Route, settings: TravelSettings) -> Bearings:
     """The table of directions that the functions here ask; made once for several of them."""
-    return bearings(route, settings.corner * settings.stride, _SETTLE * settings.stride)
+    corner, settle = settings.corner * settings.stride, _SETTLE * settings.stride
+    return _tables.get(key_of(route, corner, settle), lambda: bearings(route, corner, settle))
 
 
 def plan_travel(
