@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Driver of Haply's Inverse3 through the maker's service on this computer.
 
-After the service's published messages (docs.haply.co, Inverse SDK 3.5: "WebSocket protocol",
-"Simulation channel", "HTTP"): a WebSocket at port 10001; the service sends one inventory, then
-exactly one state for each message that it gets. So a message is sent for each state that came. Its
-default axes are Blender's: X right, Y forward, Z up; metres and newtons.
+After the service's published messages (docs.haply.co, Inverse SDK 3.5: "WebSocket Protocol",
+"Simulation Channel", "Device Configuration", "HTTP"): a WebSocket at port 10001; the service sends
+one inventory, then exactly one state for each message that it gets. So a message is sent for each
+state that came. Its default axes are Blender's: X right, Y forward, Z up; metres and newtons. The
+first message names the session and its axes, the first one to a device says where to count from.
+What its version is, the service says by HTTP: at the same port, before 3.5 at the one below.
 
 The Inverse3 gives force alone. Orientation and buttons are those of the grip.
 """
@@ -48,18 +50,8 @@ def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] |
     Raises:
         DeviceError: it is too old or too new.
     """
-    connection = http.client.HTTPConnection(HOST, port, timeout=seconds)
-    try:
-        connection.request("GET", "/version")
-        answer = connection.getresponse()
-        data: Any = json.loads(answer.read(65536)) if answer.status == 200 else None
-    except (OSError, http.client.HTTPException, ValueError):
-        return None
-    finally:
-        connection.close()
-    data = data.get("data", data) if isinstance(data, dict) else {}
-    text = str(data.get("git_tag") or data.get("git_describe") or data.get("version") or "")
-    found = re.search(r"(\d+)\.(\d+)", text)
+    told = (_told_version(each, seconds) for each in (port, port - 1))
+    found = next((each for each in told if each is not None), None)
     if found is None:
         return None
     version = (int(found[1]), int(found[2]))
@@ -71,6 +63,23 @@ def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] |
     return version
 
 
+def _told_version(port: int, seconds: float) -> re.Match[str] | None:
+    """What whoever listens at a port says of its version."""
+    connection = http.client.HTTPConnection(HOST, port, timeout=seconds)
+    try:
+        connection.request("GET", "/version")
+        answer = connection.getresponse()
+        data: Any = json.loads(answer.read(65536)) if answer.status == 200 else None
+    except (OSError, http.client.HTTPException, ValueError, OverflowError):
+        return None
+    finally:
+        connection.close()
+    data = data.get("data", data) if isinstance(data, dict) else {}
+    if not isinstance(data, dict):
+        return None
+    return re.search(r"(\d+)\.(\d+)", str(data.get("git_tag") or data.get("git_describe") or ""))
+
+
 class Haply:
     """One Inverse3, and the grip on it where there is one."""
 
@@ -78,7 +87,7 @@ class Haply:
         self._socket: WebSocket | None = socket
         self._version = version
         self._device = ""
-        self._greeted = False
+        self._greeted = self._centred = version < _CONFIGURABLE
         self._asked = 0.0
         self._answered = time.perf_counter()
         self._force: Vector = ZERO
@@ -150,16 +159,20 @@ class Haply:
         if self._asked and time.perf_counter() - self._asked < _ANSWER_SECONDS:
             return
         x, y, z = force
-        command = {"set_cursor_force": {"values": {"x": x, "y": y, "z": z}}}
-        self._say({"inverse3": [{"device_id": self._device, "commands": command}]})
+        device: dict[str, Any] = {
+            "device_id": self._device,
+            "commands": {"set_cursor_force": {"values": {"x": x, "y": y, "z": z}}},
+        }
+        if self._device and not self._centred:
+            self._centred = True
+            device["configure"] = {"preset": {"preset": "arm_front_centered"}}
+        self._say({"inverse3": [device]})
 
     def _say(self, message: dict[str, Any]) -> None:
-        if not self._greeted and self._version >= _CONFIGURABLE:
-            profile = {"name": "octo-motion:posing"}
+        if not self._greeted:
             configure = {
-                "profile": profile,
+                "profile": {"name": "octo-motion:posing"},
                 "basis": {"permutation": "XYZ"},
-                "preset": "arm_front_centered",
             }
             message = {**message, "session": {"configure": configure}}
         self._greeted = True
@@ -196,11 +209,14 @@ def parse(text: str, device: str = "") -> tuple[str, Sample] | None:
         found = next(each for each in entries if not device or each["device_id"] == device)
         state = found["state"]
         position, velocity = _vector(state["cursor_position"]), _vector(state["cursor_velocity"])
+        status = found.get("status") or {}
         if max(map(abs, position)) > _FARTHEST:
             return None
         orientation, buttons = _grip(message)
         return str(found["device_id"])[:64], Sample(
-            0.0, position, orientation, velocity, ZERO, buttons
+            *(0.0, position, orientation, velocity, ZERO, buttons),
+            # An arm that does not know where it is, or has no power, is given no force.
+            held=bool(status.get("calibrated", True) and status.get("power_supply", True)),
         )
     except (ValueError, KeyError, StopIteration, TypeError, AttributeError, RecursionError):
         return None

@@ -99,13 +99,20 @@ class HaplyService:
     def __init__(self, version: str = "3.5.0", *, with_device: bool = True) -> None:
         self.version = version
         self.with_device = with_device
+        self.status = {"calibrated": True, "power_supply": True, "ready": True, "started": True}
+        self.older: socket.socket | None = None
         self.received: list[dict[str, Any]] = []
         self.position = {"x": 0.01, "y": 0.02, "z": 0.03}
         self.buttons = {"a": False, "b": False, "c": False}
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._server.getsockname()[1]
         self._clients: list[socket.socket] = []
-        threading.Thread(target=self._serve, daemon=True).start()
+        threading.Thread(target=self._serve, args=(self._server,), daemon=True).start()
+
+    def tell_version_below(self) -> None:
+        """As before 3.5: HTTP at a port of its own, the one below."""
+        self.older = socket.create_server(("127.0.0.1", self.port - 1))
+        threading.Thread(target=self._serve, args=(self.older,), daemon=True).start()
 
     def state(self) -> dict[str, Any]:
         inverse3 = {
@@ -117,7 +124,7 @@ class HaplyService:
                 "current_cursor_force": {"x": 0.0, "y": 0.0, "z": 0.0},
                 "control_mode": "idle",
             },
-            "status": {"calibrated": True, "ready": True},
+            "status": self.status,
         }
         grip = {
             "device_id": "61548",
@@ -135,23 +142,29 @@ class HaplyService:
 
     def close(self) -> None:
         self._server.close()
+        if self.older is not None:
+            self.older.close()
         for client in self._clients:
             client.close()
 
-    def _serve(self) -> None:
+    def _serve(self, server: socket.socket) -> None:
         while True:
             try:
-                client, _ = self._server.accept()
+                client, _ = server.accept()
             except OSError:
                 return
             self._clients.append(client)
-            threading.Thread(target=self._talk, args=(client,), daemon=True).start()
+            threading.Thread(target=self._talk, args=(client, server), daemon=True).start()
 
-    def _talk(self, client: socket.socket) -> None:
+    def _talk(self, client: socket.socket, server: socket.socket) -> None:
         try:
             request = b""
             while b"\r\n\r\n" not in request:
                 request += client.recv(4096)
+            if request.startswith(b"GET /version ") and self.older not in {None, server}:
+                client.sendall(b"HTTP/1.1 426 Upgrade Required\r\nContent-Length: 0\r\n\r\n")
+                client.close()
+                return
             if request.startswith(b"GET /version "):
                 body = json.dumps({"git_tag": self.version, "git_describe": self.version}).encode()
                 client.sendall(

@@ -238,6 +238,7 @@ def test_haply_tells_pose_buttons_and_gets_force(service: HaplyService) -> None:
     assert first["inverse3"] == [
         {
             "device_id": "049D",
+            "configure": {"preset": {"preset": "arm_front_centered"}},
             "commands": {"set_cursor_force": {"values": {"x": 1.0, "y": -2.0, "z": 3.0}}},
         }
     ]
@@ -245,6 +246,7 @@ def test_haply_tells_pose_buttons_and_gets_force(service: HaplyService) -> None:
     device.send((0.5, 0.0, 0.0), (0.0, 0.0, 0.0))
     wait_for(lambda: len(service.received) == 2)
     assert "session" not in service.received[1], "a session is configured once"
+    assert "configure" not in service.received[1]["inverse3"][0], "and so is a device"
     device.close()
     device.close()
 
@@ -274,8 +276,35 @@ def test_older_haply_service_is_not_asked_for_what_it_does_not_know() -> None:
     device.send((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     wait_for(lambda: service.received)
     assert "session" not in service.received[0]
+    assert "configure" not in service.received[0]["inverse3"][0]
     device.close()
     service.close()
+
+
+def test_older_haply_service_tells_its_version_at_the_port_below() -> None:
+    service = HaplyService("3.3.0")
+    try:
+        service.tell_version_below()
+    except OSError:
+        pytest.skip("the port below is taken")
+    device = open_haply(service)
+    assert wait_for(device.read)
+    device.close()
+    service.close()
+
+
+@pytest.mark.parametrize("lacking", ["calibrated", "power_supply"])
+def test_haply_that_is_not_ready_is_given_no_force(service: HaplyService, lacking: str) -> None:
+    device = open_haply(service)
+    sample = wait_for(device.read)
+    assert isinstance(sample, Sample)
+    assert sample.held
+    service.status[lacking] = False
+    device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    sample = wait_for(device.read)
+    assert isinstance(sample, Sample)
+    assert not sample.held
+    device.close()
 
 
 @pytest.mark.parametrize("version", ["3.0.8", "4.0.0", "2.9"])
@@ -319,6 +348,11 @@ def test_device_plugged_in_after_the_service_was_opened_is_found(service: HaplyS
         assert device.read() is None
     service.with_device = True
     assert wait_for(device.read)
+    before = len(service.received)
+    assert "session" in service.received[0]
+    device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    wait_for(lambda: len(service.received) > before)
+    assert "configure" in service.received[-1]["inverse3"][0], "centred once it is known"
     device.close()
 
 
