@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from octo_motion.core.posing import kinematics, reference
 from octo_motion.core.posing.contacts import Contacts
 from octo_motion.core.posing.figure import Elements, Limits
+from octo_motion.core.posing.newton import Start
 from octo_motion.core.posing.obstacles import Box, Plane
 from octo_motion.core.posing.rows import Holds, Rows
 from octo_motion.core.posing.tree import Layout, Tree, plan
@@ -78,8 +79,8 @@ def test_fast_solver_gives_the_answer_of_gauss_seidel(seed: int):
         if number == 40:
             world.pin(0)
         if number % 20 == 0:
-            problem, inertias, _ = world.problem()
-            fast = world._newton.solve(problem, inertias, world.state().speeds)
+            problem, start = world.problem()
+            fast = world._newton.solve(problem, start)
             slow = reference.solve(problem, world.figure.parents, sweeps=600, tolerance=1e-11)
             assert fast.miss < 1e-9
             if slow.change <= 1e-11:
@@ -98,11 +99,11 @@ def test_answer_does_not_hang_on_where_the_solver_begins():
     world = busy_world(1)
     for _ in range(60):
         world.step()
-    problem, inertias, _ = world.problem()
+    problem, start = world.problem()
     solver = world._newton
-    warm = solver.solve(problem, inertias, world.state().speeds)
-    problem, inertias, _ = world.problem()
-    cold = solver.solve(problem, inertias, np.zeros_like(world.state().speeds))
+    warm = solver.solve(problem, start)
+    problem, _ = world.problem()
+    cold = solver.solve(problem, Start(np.zeros_like(start.speeds)))
     np.testing.assert_allclose(warm.velocities, cold.velocities, atol=1e-7)
 
 
@@ -132,7 +133,7 @@ def test_trunk_and_branches_solve_what_the_whole_matrix_does(seed: int, count: i
         blocks = np.zeros((slots, 3, 3))
         blocks[one.joint_slot] = 0.5 * np.eye(3)
         composite = (one.beyond @ inertias.reshape(-1, 36)).reshape(slots, 6, 6)
-        one.assemble(composite, blocks)
+        one.assemble(one.motion @ composite, blocks)
         speeds = one.solve(one.along(momenta))
         answers.append(
             np.stack([one.velocities(speeds[..., column].copy()) for column in range(2)])

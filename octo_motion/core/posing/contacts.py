@@ -8,7 +8,7 @@ nearest one to the obstacle, found on samples no further apart than the radius a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -64,26 +64,41 @@ _NONE: Final = Contacts(
 )
 
 
+@dataclass(eq=False)
+class _Touched:
+    """A plane, and what touched it in the last step: often the same ends again."""
+
+    plane: Plane
+    normal: Floats
+    """(3,)"""
+    reach: Floats
+    """(ends,) how far along the normal an end touches it."""
+    key: tuple[int, bytes] = (0, b"")
+    """First label, and which ends were near."""
+    found: Contacts | None = None
+    """Their contacts, of which places and gaps are old."""
+    inward: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """(contacts, 3) from the surface to the end's middle."""
+
+
 class Detector:
     """Finds the contacts of one figure; what hangs on the figure alone is worked out once."""
 
     def __init__(self, figure: Figure, *, self_collision: bool, friction: float) -> None:
         self._radii = figure.radii
         self._friction = friction
-        self._ends = figure.capsules.transpose(0, 2, 1).copy()
-        keep = _separate_ends(figure)
-        bodies, ends = np.nonzero(keep)
-        self._end_bodies, self._end_flat = bodies, 2 * bodies + ends
-        self._end_labels = 3 * bodies + ends
+        self._ends = figure.capsules.copy()
         self._first_label = len(figure) ** 2
-        self._end_radii = figure.radii[bodies]
+        keep = _separate_ends(figure)
         self._keep = keep
+        # (2 bodies,) how far from a plane both ends of each capsule touch it; never some.
+        self._end_radii = np.where(keep, figure.radii[:, None], -np.inf).ravel()
         lengths = np.linalg.norm(figure.capsules[:, 1] - figure.capsules[:, 0], axis=-1)
         self._long = lengths > 1e-6 * figure.radii + _TINY
         most = float(np.max(lengths / np.maximum(figure.radii, _TINY), initial=1.0))
         self._samples = int(min(max(np.ceil(most) + 1, 3), _MOST_SAMPLES))
         self._pairs = _pairs(figure) if self_collision else None
-        self._planes: dict[int, tuple[Plane, Floats, float]] = {}
+        self._planes: dict[int, _Touched] = {}
         self._corner_cache: dict[int, tuple[Obstacle, Floats | None]] = {}
         self._reach = float(figure.radii.max(initial=0.0))
 
@@ -100,7 +115,7 @@ class Detector:
         """
         if not obstacles and self._pairs is None:
             return _NONE
-        ends = (matrices @ self._ends).transpose(0, 2, 1)
+        ends = self._ends @ matrices.transpose(0, 2, 1)
         ends += positions[:, None]
         found: list[Contacts] = []
         boxes: tuple[Floats, Floats] | None = None
@@ -128,20 +143,36 @@ class Detector:
         return np.minimum(first, second) - around, np.maximum(first, second) + around
 
     def _on_plane(self, ends: Floats, plane: Plane, margin: float, label: int) -> Contacts | None:
-        normal, height = self._plane(plane)
-        centres = ends.reshape(-1, 3)[self._end_flat]
-        gaps = centres @ normal
-        gaps -= self._end_radii
-        gaps -= height
-        near = np.flatnonzero(gaps < margin)
+        touched = self._touched(plane)
+        centres = ends.reshape(-1, 3)
+        gaps = centres @ touched.normal
+        gaps -= touched.reach
+        near = (gaps < margin).nonzero()[0]
         if not len(near):
             return None
-        normals = np.empty((len(near), 3))
-        normals[:] = normal
-        points = centres[near] - self._end_radii[near, None] * normal
-        bodies = self._end_bodies[near]
-        labels = self._end_labels[near] + label
-        return self._contacts(bodies, points, normals, gaps[near], plane, labels)
+        gaps = gaps.take(near)
+        found = touched.found
+        if found is None or touched.key != (label, near.tobytes()):
+            bodies = near >> 1
+            normals = np.tile(touched.normal, (len(near), 1))
+            labels = 3 * bodies + (near & 1) + label
+            touched.inward = self._radii[bodies, None] * normals
+            points = centres.take(near, 0) - touched.inward
+            found = self._contacts(bodies, points, normals, gaps, plane, labels)
+            touched.key = label, near.tobytes()
+            touched.found = None if plane.angular_velocity.any() else found
+            return found
+        points = centres.take(near, 0) - touched.inward
+        return Contacts(
+            found.bodies,
+            found.others,
+            points,
+            found.normals,
+            gaps,
+            found.speeds,
+            found.friction,
+            found.labels,
+        )
 
     def _on_solid(
         self,
@@ -268,16 +299,16 @@ class Detector:
         friction.fill(self._friction if obstacle.friction is None else obstacle.friction)
         return Contacts(bodies, others, points, normals, gaps, speeds, friction, labels)
 
-    def _plane(self, plane: Plane) -> tuple[Floats, float]:
-        """Its normal and how high it lies along that; kept as long as it stays the same."""
+    def _touched(self, plane: Plane) -> _Touched:
+        """What is known of a plane; kept as long as it stays the same."""
         known = self._planes.get(id(plane))
-        if known is None or known[0] is not plane:
+        if known is None or known.plane is not plane:
             normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
-            known = (plane, normal, float(normal @ plane.position))
+            known = _Touched(plane, normal, self._end_radii + float(normal @ plane.position))
             if len(self._planes) > _MOST_KEPT:
                 self._planes.clear()
             self._planes[id(plane)] = known
-        return known[1], known[2]
+        return known
 
     def _world_box(self, obstacle: Obstacle) -> Floats | None:
         """Lower and upper corner in the world; kept as long as the obstacle stays the same."""

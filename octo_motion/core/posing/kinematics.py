@@ -36,50 +36,52 @@ def pose_of(figure: Figure, turns: Floats, roots: Floats) -> Pose:
 
 def product(first: Floats, second: Floats) -> Floats:
     """Hamilton products of (count, 4), as one linear map of all pairs of components."""
-    pairs = first[:, :, None] * second[:, None, :]
-    return pairs.reshape(-1, 16) @ _PRODUCT
+    return ((first @ _EACH) * (second @ _ALL)) @ _PRODUCT
 
 
 def product_inverse(first: Floats, second: Floats) -> Floats:
     """``first ∘ second⁻¹`` of unit quaternions (count, 4)."""
-    pairs = first[:, :, None] * second[:, None, :]
-    return pairs.reshape(-1, 16) @ _PRODUCT_INVERSE
+    return ((first @ _EACH) * (second @ _ALL)) @ _PRODUCT_INVERSE
 
 
 def inverse_product(first: Floats, second: Floats) -> Floats:
     """``first⁻¹ ∘ second`` of unit quaternions (count, 4)."""
-    pairs = first[:, :, None] * second[:, None, :]
-    return pairs.reshape(-1, 16) @ _INVERSE_PRODUCT
+    return ((first @ _EACH) * (second @ _ALL)) @ _INVERSE_PRODUCT
 
 
 def matrices(quaternions: Floats) -> Floats:
     """Rotation matrices (count, 3, 3) of unit quaternions (count, 4)."""
-    pairs = quaternions[:, :, None] * quaternions[:, None, :]
-    return (pairs.reshape(-1, 16) @ _MATRIX).reshape(-1, 3, 3)
+    pairs = (quaternions @ _EACH) * (quaternions @ _ALL)
+    return (pairs @ _MATRIX).reshape(-1, 3, 3)
+
+
+def transforms(quaternions: Floats) -> tuple[Floats, Floats]:
+    """Homogeneous matrices of rotations (count, 4, 4), and their transposes, both contiguous."""
+    pairs = (quaternions @ _EACH) * (quaternions @ _ALL)
+    return (pairs @ _TRANSFORM).reshape(-1, 4, 4), (pairs @ _TRANSPOSED).reshape(-1, 4, 4)
 
 
 def exponential(vectors: Floats) -> Floats:
     """Unit quaternions (count, 4) of rotation vectors (count, 3)."""
-    half = np.sqrt((vectors * vectors).sum(axis=-1))
+    half = np.sqrt((vectors * vectors) @ _ONES)
     half *= 0.5
     result = np.empty((len(vectors), 4))
     result[:, 0] = np.cos(half)
     # sin(x)/2x, with a floor under x that changes no digit.
     np.maximum(half, 1e-9, out=half)
-    result[:, 1:] = vectors * (np.sin(half) / half * 0.5)[:, None]
+    np.multiply(vectors, (np.sin(half) / half * 0.5)[:, None], out=result[:, 1:])
     return result
 
 
 def logarithm(quaternions: Floats) -> Floats:
     """Rotation vectors (count, 3), at most π long, of unit quaternions (count, 4)."""
     imaginary = quaternions[:, 1:]
-    sine = np.sqrt((imaginary * imaginary).sum(axis=-1))
+    sine = np.sqrt((imaginary * imaginary) @ _ONES)
     real = quaternions[:, 0]
     factor = np.arctan2(sine, np.abs(real))
-    np.maximum(sine, 1e-150, out=sine)
-    factor /= sine
     # Where sine is 0 the vector is as well.
-    factor *= np.where(real < 0.0, -2.0, 2.0)
+    factor /= sine + 1e-150
+    factor *= np.copysign(2.0, real)
     return imaginary * factor[:, None]
 
 
@@ -110,10 +112,20 @@ def _matrix_map() -> Floats:
     return result
 
 
+_ONES: Final = np.ones(3)
+# All pairs of components of two quaternions, one after another: matrix products of so few numbers
+# take less time than numpy's broadcasting along short axes.
+_EACH: Final = np.repeat(np.eye(4), 4, axis=1)
+_ALL: Final = np.tile(np.eye(4), 4)
 _PRODUCT: Final = _basis_products(first=1.0, second=1.0)
 _PRODUCT_INVERSE: Final = _basis_products(first=1.0, second=-1.0)
 _INVERSE_PRODUCT: Final = _basis_products(first=-1.0, second=1.0)
 _MATRIX: Final = _matrix_map()
+_TRANSFORM: Final = np.zeros((16, 16))
+_TRANSFORM.reshape(16, 4, 4)[:, :3, :3] = _MATRIX.reshape(16, 3, 3)
+# The last entry is the quaternion's length, squared: 1.
+_TRANSFORM[:, 15] = np.eye(4).ravel()
+_TRANSPOSED: Final = _TRANSFORM.reshape(16, 4, 4).transpose(0, 2, 1).reshape(16, 16).copy()
 _SKEW: Final = np.zeros((3, 9))
 for _row, _column, _axis, _sign in (
     (0, 1, 2, -1.0),

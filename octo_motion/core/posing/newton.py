@@ -8,9 +8,13 @@ grows, the slope of a convex function ℓ. The velocities at the step's end are 
 
 With impulses replaced by their tangents, p ≈ p_k − W (w − w_k), that is one linear system of the
 tree, for a row at a body adds Xᵀ W X to that body's inertia and nothing else. Where the laws are
-linear (sticking, resting, apart, below yield) a single solution is exact, begun with the velocities
-of the step before; a few more are needed where something starts to touch, to slip or to flow. No
-step goes beyond the lowest point on its way, so that it always arrives.
+linear (sticking, resting, apart, below yield) a single solution is exact; a few more are needed
+where something starts to touch, to slip or to flow. No step goes beyond the lowest point on its
+way, so that it always arrives.
+
+It begins with the tangents of contacts where the step before ended, and not at its velocities: a
+contact is stiff, and the little that a velocity means in another direction when the figure has
+turned by a thousandth would already lift it. What slides slides on in a single solution.
 
 Contacts between two bodies of the figure would tie branches together; they are brought in after
 the solution, by the Woodbury identity.
@@ -23,8 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..rotations import Floats
-from .problem import Problem, Stops
-from .rows import Answer
+from .plastic import Response
+from .problem import SPATIAL, Problem, Stops
+from .rows import Answer, Pattern, Rows, Tangent
 from .tree import Tree
 
 
@@ -36,18 +41,36 @@ class Solution:
     """(slots, 3) u."""
     velocities: Floats
     """(bodies, 6) V."""
-    moving: Floats
-    """(slots, 3) u with which positions move: with corrections that are not kept."""
+    moving: Floats | None
+    """(slots, 3) u with which positions move, with corrections that are not kept; None where there
+    are none."""
     loads: Floats
     """(bodies, 3) λ of the elements, in the problem's axes."""
     flow: Floats | None
     """(bodies, 3) w_d, in the problem's axes; None where nothing flows."""
-    impulses: Floats
-    """(rows, 3)"""
+    rows: Answer | None
+    """What the rows do; None where there are none."""
     iterations: int
     """Linear systems solved."""
     miss: float
     """Largest difference of an impulse from its law, against the largest impulse of its kind."""
+
+    @property
+    def impulses(self) -> Floats:
+        """(rows, 3) of the rows."""
+        return _NO_ROWS if self.rows is None else self.rows.impulses
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where the step before ended."""
+
+    speeds: Floats
+    """(slots, 3) u."""
+    rows: Answer | None = None
+    """What the rows did then, as they are now; None begins at ``speeds`` and nothing else."""
+    flows: bool = True
+    """Whether any element did; where none did, it begins as if none will."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +85,21 @@ class _Point:
     """(bodies, 3) relative angular velocities, world axes."""
     joint_impulses: Floats
     """(bodies, 3) of elements and stops, world axes."""
-    joint_slopes: Floats
-    """(bodies, 3, 3)"""
-    loads: Floats
-    flow: Floats | None
-    linear: bool
-    """Whether no element flows and no stop is near: then the joints' tangent is their law."""
-    row_speeds: Floats
-    """(rows, 3)"""
+    response: Response
     rows: Answer | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Tangents:
+    """All laws of a step as planes."""
+
+    slopes: Floats
+    """(bodies, 3, 3) of the joints."""
+    right: Floats
+    """(bodies, 3) impulses of the joints at rest."""
+    linear: bool
+    """Whether the joints' laws are these planes: no element flows and no stop is near."""
+    rows: Tangent | None
 
 
 class Newton:
@@ -83,149 +112,164 @@ class Newton:
         slots = len(tree.layout.bodies)
         self._joint_blocks = np.zeros((slots, 3, 3))
         self._joint_right = np.zeros((slots, 3))
+        self._slopes: Floats | None = None
+        self._pattern: Pattern | None = None
+        self._wide = tree.beyond
+        self._maps = tuple(_with_columns(columns) for columns in (1, 2))
 
-    def solve(
-        self,
-        problem: Problem,
-        inertias: Floats,
-        start: Floats,
-        corrections: Floats | None = None,
-    ) -> Solution:
+    def solve(self, problem: Problem, start: Start, corrections: Floats | None = None) -> Solution:
         """Velocities at the end of the step.
 
         Args:
             problem: the step.
-            inertias: (bodies, 6, 6) spatial, about the problem's origin.
-            start: (slots, 3) velocities to begin with.
+            start: the end of the step before.
             corrections: (rows, 3) velocities for positions alone, or None.
         """
-        tree = self._tree
-        tree.place(problem.joints)
-        slots = len(tree.layout.bodies)
-        composite = (tree.beyond @ inertias.reshape(-1, 36)).reshape(slots, 6, 6)
-        rows = problem.rows
-        point = self._at(problem, start)
+        self._tree.place(problem.joints)
+        self._base = problem.law.at_rest(problem.springs)
+        stack = self._stack(problem, 1 if corrections is None else 2)
+        point, tangents = self._begin(problem, start)
         shift: Floats | None = None
         miss = np.inf
         count = rounds = 0
-        while count < self._iterations:
-            if miss <= self._tolerance:
-                # Where slipping began or ended in a blow, once more with the speed that is left.
-                rounds += 1
-                none = point.rows is None or point.rows.slips is None
-                if rounds > _ROUNDS or not rows.follow(
-                    point.row_speeds, problem.blow, slips_none=none
-                ):
-                    break
-                point = self._at(problem, point.speeds)
+        while True:
             count += 1
-            slopes = None if point.rows is None else problem.rows.slopes(point.rows)
-            solved = self._linear(problem, composite, point, slopes, corrections)
+            solved = self._linear(problem, stack, tangents, corrections)
             if corrections is not None:
                 shift = solved[..., 1] - solved[..., 0]
             end = self._at(problem, np.ascontiguousarray(solved[..., 0]))
-            joints, pushes = _predicted(point, end, slopes)
+            joints, pushes = _predicted(tangents, end)
             miss = _miss(end, joints, pushes)
-            if miss > self._tolerance:
-                end = self._lowest(problem, inertias, point, end, joints, pushes)
+            if miss > self._tolerance and point is not None:
+                end = self._lowest(problem, point, end, joints, pushes)
             point = end
+            if count >= self._iterations:
+                break
+            if miss <= self._tolerance:
+                # Where slipping began or ended in a blow, once more with the speed that is left.
+                rounds += 1
+                if rounds > _ROUNDS or not self._follow(problem, point):
+                    break
+                point = self._at(problem, point.speeds)
+            tangents = self._tangents(problem, point)
         return Solution(
             point.speeds,
             point.velocities,
             # Added to what was settled on, which need not be where the last system led.
-            point.speeds if shift is None else point.speeds + shift,
-            point.loads,
-            point.flow,
-            _NO_ROWS if point.rows is None else point.rows.impulses,
+            None if shift is None else point.speeds + shift,
+            point.response.load,
+            point.response.flow,
+            point.rows,
             count,
             miss,
         )
+
+    def _begin(self, problem: Problem, start: Start) -> tuple[_Point | None, _Tangents]:
+        """The first tangents, and the velocities where they touch if all do at the same."""
+        if start.rows is None:
+            point = self._at(problem, start.speeds)
+            return point, self._tangents(problem, point)
+        if not (start.flows or problem.stops or problem.frames is not None):
+            return None, self._linear_tangents(problem, problem.rows.tangent(start.rows))
+        speeds = start.speeds.take(self._tree.joint_slot, 0)
+        response, impulses = self._joints(problem, speeds)
+        point = _Point(start.speeds, _NO_ROWS, speeds, impulses, response, start.rows)
+        return None, self._tangents(problem, point)
+
+    def _follow(self, problem: Problem, point: _Point) -> bool:
+        rows = problem.rows
+        if point.rows is None or (point.rows.slips is None and rows.fastest <= problem.blow):
+            return False
+        return rows.follow(rows.speeds(point.velocities), problem.blow)
 
     def _at(self, problem: Problem, speeds: Floats) -> _Point:
         """All laws at u (slots, 3)."""
         tree = self._tree
         velocities = tree.velocities(speeds)
-        joint_speeds = speeds[tree.joint_slot]
-        frames = problem.frames
-        if frames is None:
-            response = problem.law.respond(problem.springs, joint_speeds)
-            impulses = problem.step * response.load
-            slopes = problem.step * response.slope
-        else:
-            seen = (joint_speeds[:, None, :] @ frames)[:, 0]
-            response = problem.law.respond(problem.springs, seen)
-            impulses = problem.step * (frames @ response.load[:, :, None])[:, :, 0]
-            slopes = problem.step * (frames @ response.slope @ frames.transpose(0, 2, 1))
-        for stops in problem.stops:
-            _add_stops(stops, joint_speeds, impulses, slopes)
+        joint_speeds = speeds.take(tree.joint_slot, 0)
+        response, impulses = self._joints(problem, joint_speeds)
         rows = problem.rows
-        row_speeds, answer = _NO_ROWS, None
-        if len(rows.bodies):
-            row_speeds = rows.speeds(velocities)
-            answer = rows.answer(row_speeds)
-        return _Point(
-            speeds,
-            velocities,
-            joint_speeds,
-            impulses,
-            slopes,
-            response.load,
-            response.flow,
-            response.flow is None and not problem.stops,
-            row_speeds,
-            answer,
-        )
+        answer = rows.respond(rows.wanted(velocities)) if len(rows.bodies) else None
+        return _Point(speeds, velocities, joint_speeds, impulses, response, answer)
+
+    def _joints(self, problem: Problem, speeds: Floats) -> tuple[Response, Floats]:
+        """Elements, and impulses (bodies, 3) of elements and stops, at relative turns of joints."""
+        frames, law = problem.frames, problem.law
+        if frames is None:
+            response = law.answer(self._base - law.backward * speeds)
+            impulses = problem.step * response.load
+        else:
+            seen = (speeds[:, None, :] @ frames)[:, 0]
+            response = law.answer(self._base - law.backward * seen)
+            impulses = problem.step * (frames @ response.load[:, :, None])[:, :, 0]
+        for stops in problem.stops:
+            push = _stop_pushes(stops, speeds)
+            impulses += stops.spread @ (np.maximum(push, 0.0)[:, None] * stops.axes)
+        return response, impulses
+
+    def _tangents(self, problem: Problem, point: _Point) -> _Tangents:
+        rows = None if point.rows is None else problem.rows.tangent(point.rows)
+        frames, response = problem.frames, point.response
+        linear = response.flows is None and not problem.stops
+        if linear and frames is None:
+            return self._linear_tangents(problem, rows)
+        slopes = problem.step * response.slope
+        if frames is not None:
+            slopes = frames @ slopes @ frames.transpose(0, 2, 1)
+        for stops in problem.stops:
+            pressed = _stop_pushes(stops, point.joint_speeds) >= 0.0
+            stiff = np.where(pressed, stops.gains, 0.0)[:, None] * stops.axes
+            blocks = stiff[:, :, None] * stops.axes[:, None, :]
+            slopes = slopes + (stops.spread @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
+        right = point.joint_impulses + (slopes @ point.joint_speeds[:, :, None])[:, :, 0]
+        return _Tangents(slopes, right, linear, rows)
+
+    def _linear_tangents(self, problem: Problem, rows: Tangent | None) -> _Tangents:
+        """Those of joints that hold, whatever their velocities are."""
+        return _Tangents(problem.law.held, problem.step * self._base, linear=True, rows=rows)
+
+    def _stack(self, problem: Problem, columns: int) -> Floats:
+        """(bodies and rows, 6, 6 + columns) inertias and momenta; those of rows are left open."""
+        rows, bodies = problem.rows, len(problem.masses)
+        stack = np.empty((bodies + len(rows.bodies), 6, 6 + columns))
+        flat = stack.reshape(len(stack), -1)
+        np.matmul(problem.moments, self._maps[columns - 1], out=flat[:bodies])
+        stack[:bodies, :, 6:] = problem.momenta[:, :, None]
+        if rows.pattern is not self._pattern:
+            beyond = self._tree.beyond
+            chain = beyond[:, rows.bodies]
+            # A push between two bodies of the figure is taken from the other one. Its stiffness is
+            # not here, see ``_with_pairs``.
+            chain[:, rows.paired] -= beyond[:, rows.others[rows.paired]]
+            self._wide = np.concatenate([beyond, chain], axis=1)
+            self._pattern = rows.pattern
+        return stack
 
     def _linear(
-        self,
-        problem: Problem,
-        composite: Floats,
-        point: _Point,
-        slopes: Floats | None,
-        corrections: Floats | None,
+        self, problem: Problem, stack: Floats, tangents: _Tangents, corrections: Floats | None
     ) -> Floats:
         """(slots, 3, columns) solution with all laws replaced by their tangents."""
-        tree = self._tree
-        rows = problem.rows
-        paired = rows.paired
-        columns = 1 if corrections is None else 2
-        momenta = np.empty((len(problem.momenta), 6, columns))
-        momenta[:] = problem.momenta[:, :, None]
-        right = tree.along(momenta)
-        if slopes is not None:
-            assert point.rows is not None
-            # p_k + W w_k − W w, with w the velocity less the target.
-            at = point.row_speeds if rows.still else point.row_speeds + rows.targets
-            pulls = np.empty((len(slopes), 3, columns))
-            pulls[:, :, 0] = point.rows.impulses + (slopes @ at[:, :, None])[:, :, 0]
-            if corrections is not None:
-                pulls[:, :, 1] = pulls[:, :, 0] + (slopes @ corrections[:, :, None])[:, :, 0]
-            alone = slopes
-            if len(paired):
-                alone = slopes.copy()
-                alone[paired] = 0.0
-            turned = rows.reach.transpose(0, 2, 1)
-            blocks = turned @ alone @ rows.reach
-            chain = tree.beyond[:, rows.bodies]
-            composite = composite + (chain @ blocks.reshape(-1, 36)).reshape(-1, 6, 6)
-            pushes = turned @ pulls
-            right += tree.motion @ (chain @ pushes.reshape(len(slopes), -1)).reshape(-1, 6, columns)
-            if len(paired):
-                chain = tree.beyond[:, rows.others[paired]]
-                against = chain @ pushes[paired].reshape(len(paired), -1)
-                right -= tree.motion @ against.reshape(-1, 6, columns)
-        stiff = point.joint_slopes
-        self._joint_blocks[tree.joint_slot] = stiff
-        self._joint_right[tree.joint_slot] = (
-            point.joint_impulses + (stiff @ point.joint_speeds[:, :, None])[:, :, 0]
-        )
-        right += self._joint_right[:, :, None]
-        tree.assemble(composite, self._joint_blocks)
-        if slopes is not None and len(paired):
-            return self._with_pairs(problem, slopes, right)
+        tree, rows, planes = self._tree, problem.rows, tangents.rows
+        bodies = len(problem.masses)
+        if planes is not None:
+            np.matmul(
+                rows.reach.transpose(0, 2, 1),
+                _lowered(rows, planes, corrections, stack.shape[2] - 6),
+                out=stack[bodies:],
+            )
+        summed = self._wide @ stack.reshape(len(stack), -1)
+        both = tree.motion @ summed.reshape(len(summed), 6, -1)
+        if tangents.slopes is not self._slopes:
+            self._slopes = tangents.slopes
+            self._joint_blocks[tree.joint_slot] = tangents.slopes
+        self._joint_right[tree.joint_slot] = tangents.right
+        right = both[:, :, 6:] + self._joint_right[:, :, None]
+        tree.assemble(both[:, :, :6], self._joint_blocks)
+        if planes is not None and len(rows.paired):
+            return self._with_pairs(problem, planes, right)
         return tree.solve(right)
 
-    def _with_pairs(self, problem: Problem, slopes: Floats, right: Floats) -> Floats:
+    def _with_pairs(self, problem: Problem, tangent: Tangent, right: Floats) -> Floats:
         """The solution with contacts between bodies of the figure.
 
         (H + JᵀWJ)⁻¹ r = y − Z (1 + W J Z)⁻¹ W J y with y = H⁻¹ r and Z = H⁻¹ Jᵀ.
@@ -233,14 +277,14 @@ class Newton:
         tree = self._tree
         rows = problem.rows
         paired = rows.paired
-        slopes = slopes[paired]
+        slopes = rows.pattern.gains[paired, None, None] * tangent.blocks()[paired]
         loaded = slopes.any(axis=(1, 2))
         paired, slopes = paired[loaded], slopes[loaded]
         if not len(paired):
             return tree.solve(right)
         count, columns = len(paired), right.shape[-1]
         # (slots, 3, 3 count): Sᵀ Xᵀ, with a sign for which of the two bodies a slot moves.
-        signs = tree.beyond[:, rows.bodies[paired]] - tree.beyond[:, rows.others[paired]]
+        signs = self._wide[:, len(problem.masses) + paired]
         wide = rows.reach[paired].transpose(2, 0, 1).reshape(6, 3 * count)
         spread = tree.motion @ wide
         spread *= np.repeat(signs, 3, axis=1)[:, None, :]
@@ -254,10 +298,9 @@ class Newton:
         result = both[:, :, 3 * count :] - both[:, :, : 3 * count] @ pull
         return result.reshape(-1, 3, columns)
 
-    def _lowest(  # noqa: PLR0917
+    def _lowest(
         self,
         problem: Problem,
-        inertias: Floats,
         start: _Point,
         end: _Point,
         joints: Floats,
@@ -269,11 +312,14 @@ class Newton:
         the tangents' impulses do along the way, and it is linear before.
         """
         joint_way = end.joint_speeds - start.joint_speeds
-        row_way = end.row_speeds - start.row_speeds
         body_way = end.velocities - start.velocities
-        mass = float((body_way * (inertias @ body_way[:, :, None])[:, :, 0]).sum())
+        mass = float((body_way * (problem.spatial @ body_way[:, :, None])[:, :, 0]).sum())
         pull = float((joints * joint_way).sum())
+        row_way = _NO_ROWS
         if rows is not None:
+            assert start.rows is not None
+            assert end.rows is not None
+            row_way = (start.rows.wanted - end.rows.wanted) / problem.rows.pattern.column
             pull += float((rows * row_way).sum())
 
         def slope(at: _Point, share: float) -> float:
@@ -290,7 +336,7 @@ class Newton:
         for _ in range(_SEARCHES):
             # False position, kept away from the ends: the slope may jump.
             share = low + (high - low) * min(max(at_low / (at_low - at_high), 0.1), 0.9)
-            best = self._at(problem, start.speeds + share * (end.speeds - start.speeds))
+            best = self._between(problem, start, end, share)
             value = slope(best, share)
             if abs(value) <= _ENOUGH * abs(at_low):
                 break
@@ -300,40 +346,80 @@ class Newton:
                 low, at_low = share, value
         return best
 
+    def _between(self, problem: Problem, start: _Point, end: _Point, share: float) -> _Point:
+        """All laws on the way from one point to another, where velocities need no products."""
+        joint_speeds = start.joint_speeds + share * (end.joint_speeds - start.joint_speeds)
+        response, impulses = self._joints(problem, joint_speeds)
+        answer = None
+        if start.rows is not None and end.rows is not None:
+            wanted = start.rows.wanted + share * (end.rows.wanted - start.rows.wanted)
+            answer = problem.rows.respond(wanted)
+        return _Point(
+            start.speeds + share * (end.speeds - start.speeds),
+            start.velocities + share * (end.velocities - start.velocities),
+            joint_speeds,
+            impulses,
+            response,
+            answer,
+        )
 
-def _predicted(start: _Point, end: _Point, slopes: Floats | None) -> tuple[Floats, Floats | None]:
-    """Impulses at the end by the tangents at the start: joints (bodies, 3), rows (rows, 3)."""
-    change = (end.joint_speeds - start.joint_speeds)[:, :, None]
-    joints = start.joint_impulses - (start.joint_slopes @ change)[:, :, 0]
-    if slopes is None:
-        return joints, None
-    assert start.rows is not None
-    change = (end.row_speeds - start.row_speeds)[:, :, None]
-    return joints, start.rows.impulses - (slopes @ change)[:, :, 0]
+
+def _with_columns(count: int) -> Floats:
+    """(16, 36 + 6 count) ``SPATIAL`` with empty columns beside each matrix."""
+    wide = np.concatenate([SPATIAL.reshape(16, 6, 6), np.zeros((16, 6, count))], axis=2)
+    return wide.reshape(16, -1)
+
+
+def _lowered(rows: Rows, planes: Tangent, corrections: Floats | None, columns: int) -> Floats:
+    """(rows, 3, 6 + columns) P a X, and P y₀ with what is left at rest: the rows' tangents."""
+    whole = np.empty((len(rows.bodies), 3, 6 + columns))
+    whole[:, :, :6] = rows.weighted
+    whole[:, :, 6] = rows.asked
+    if corrections is not None:
+        np.add(rows.asked, rows.pattern.column * corrections, out=whole[:, :, 7])
+    if planes.planes is None:
+        assert planes.shares is not None
+        whole *= planes.shares[:, None, None]
+    else:
+        whole = planes.planes @ whole
+    if planes.rest is not None:
+        whole[:, :, 6:] += planes.rest[:, :, None]
+    if len(rows.paired):
+        whole[rows.paired, :, :6] = 0.0
+    return whole
+
+
+def _predicted(tangents: _Tangents, end: _Point) -> tuple[Floats, Floats | None]:
+    """Impulses at the end by the tangents: joints (bodies, 3), rows (rows, 3)."""
+    joints, rows = end.joint_impulses, None
+    if not (tangents.linear and end.response.flows is None):
+        joints = tangents.right - (tangents.slopes @ end.joint_speeds[:, :, None])[:, :, 0]
+    if end.rows is not None:
+        assert tangents.rows is not None
+        rows = end.rows.impulses
+        if end.rows.slips is not None or not tangents.rows.same(end.rows):
+            rows = tangents.rows.impulses(end.rows.wanted)
+    return joints, rows
 
 
 def _miss(end: _Point, joints: Floats, rows: Floats | None) -> float:
     miss = 0.0
-    if not end.linear:
-        right = end.joint_impulses
+    right = end.joint_impulses
+    if joints is not right:
         miss = float(np.abs(joints - right).max()) / (float(np.abs(right).max()) + _LEAST)
     if rows is not None:
         assert end.rows is not None
         right = end.rows.impulses
-        miss = max(miss, float(np.abs(rows - right).max()) / (float(np.abs(rows).max()) + _LEAST))
+        if rows is not right:
+            most = float(np.abs(rows).max()) + _LEAST
+            miss = max(miss, float(np.abs(rows - right).max()) / most)
     return miss
 
 
-def _add_stops(stops: Stops, speeds: Floats, impulses: Floats, slopes: Floats) -> None:
-    """Add a set of stops to the impulses and slopes of the joints."""
-    axes = stops.axes
-    push = -stops.gains * ((speeds[stops.joints] * axes).sum(axis=1) + stops.rates)
-    pressed = push >= 0.0
-    if pressed.any():
-        impulses += stops.spread @ (np.maximum(push, 0.0)[:, None] * axes)
-        stiff = np.where(pressed, stops.gains, 0.0)[:, None] * axes
-        blocks = stiff[:, :, None] * axes[:, None, :]
-        slopes += (stops.spread @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
+def _stop_pushes(stops: Stops, speeds: Floats) -> Floats:
+    """(stops,) what each would give, above zero where it is pressed."""
+    into = (speeds[stops.joints] * stops.axes).sum(axis=1)
+    return -stops.gains * (into + stops.rates)
 
 
 _LEAST = 1e-12

@@ -24,25 +24,76 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..rotations import Floats
 from .figure import Elements
 
 _TINY = 1e-300
 _ONES = np.ones(3)
+_UNIT = np.eye(3)
+_INDEX = np.arange(3)
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
     """How the elements answer a relative angular velocity w over one step."""
 
+    law: PlasticLaw
     load: Floats
     """(…, 3) λ, the torque on the child, N·m."""
-    slope: Floats
-    """(…, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
-    flow: Floats | None
-    """(…, 3) w_d: how fast the series damper moves, rad/s, zero where it holds; None where all
-    hold, and the load is linear in w."""
+    trial: Floats
+    """(…, 3) λ_e, what it would be without flow."""
+    size: Floats
+    """(…) |λ_e|; of no account where nothing flows."""
+    flows: NDArray[np.bool_] | None
+    """(…) where the series damper moves; None where all hold, and the load is linear in w."""
+
+    @property
+    def slope(self) -> Floats:
+        """(…, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
+        law = self.law
+        if self.flows is None:
+            return law.diagonal
+        if law.alike:
+            return self._slope_alike(self.flows)
+        toward = self.trial / (self.size + _TINY)[..., None]
+        # Along s only what the flow leaves, across it also the turning of s. With unequal axes the
+        # exact slope is not symmetric; its symmetric neighbour leads to the same solution.
+        root = np.sqrt(law.backward)
+        ratio = law.shared_yield / (self.size + _TINY)[..., None]
+        middle = -(np.sqrt(ratio)[..., :, None] * np.sqrt(ratio)[..., None, :]) * (
+            toward[..., :, None] * toward[..., None, :]
+        )
+        middle[..., _INDEX, _INDEX] += law.kept + ratio
+        return np.where(
+            self.flows[..., None, None],
+            root[..., :, None] * middle * root[..., None, :],
+            law.diagonal,
+        )
+
+    def _slope_alike(self, flows: NDArray[np.bool_]) -> Floats:
+        """The same for elements whose axes are alike, worked out only for those that flow."""
+        law = self.law
+        which = flows.nonzero()[0]
+        size = self.size.take(which) + _TINY
+        toward = self.trial.take(which, 0) / size[:, None]
+        gain = law.backward[:, 0].take(which)
+        ratio = gain * law.shared_yield[:, 0].take(which) / size
+        across = gain * law.kept[:, 0].take(which) + ratio
+        blocks = across[:, None, None] * _UNIT
+        blocks -= (ratio[:, None] * toward)[:, :, None] * toward[:, None, :]
+        slope = law.diagonal.copy()
+        slope[which] = blocks
+        return slope
+
+    @property
+    def flow(self) -> Floats | None:
+        """(…, 3) w_d: how fast the series damper moves, rad/s; None where all hold."""
+        if self.flows is None:
+            return None
+        excess = np.where(self.flows, self.size - self.law.yield_torque, 0.0)
+        return -self.trial * (excess / (self.size + _TINY))[..., None] * self.law.compliance
 
 
 class PlasticLaw:
@@ -61,51 +112,55 @@ class PlasticLaw:
         """G/(D_d + G), of a load above yield: what the flow takes away."""
         self.kept = 1.0 - self.share
         self.yield_torque = np.array(elements.yield_torque, dtype=np.float64)
-        self._shared_yield = (
+        self.shared_yield = (
             self.share * np.where(np.isfinite(self.yield_torque), self.yield_torque, 0.0)[..., None]
         )
+        """G τ/(D_d + G)."""
         self.can_flow = bool(
             np.any((self.compliance > 0.0) & np.isfinite(self.yield_torque)[..., None])
         )
         self.diagonal = np.zeros((*self.backward.shape, 3))
-        index = np.arange(3)
-        self.diagonal[..., index, index] = self.backward
+        self.diagonal[..., _INDEX, _INDEX] = self.backward
         """(…, 3, 3) slope of an element that holds."""
+        self.held = step * self.diagonal
+        """The same for the impulse over a step."""
+        self.alike = self.yield_torque.ndim == 1 and all(
+            bool((array == array[:, :1]).all())
+            for array in (self.stiffness, self.backward, self.compliance)
+        )
+        """Whether all axes of an element are alike, so that no axes are needed at all."""
 
     def trial(self, spring: Floats, speed: Floats) -> Floats:
         """λ_e, the load without flow, from q_f at the step's start and w at its end."""
-        return -(self.stiffness * spring) - self.backward * speed
+        return self.at_rest(spring) - self.backward * speed
+
+    def at_rest(self, spring: Floats) -> Floats:
+        """−K_f q_f (…, 3), the load at rest without flow."""
+        return -self.stiffness * spring
 
     def respond(self, spring: Floats, speed: Floats) -> Response:
         """Load, its slope and the flow, from q_f at the step's start and w at its end."""
-        load = self.trial(spring, speed)
+        return self.answer(self.trial(spring, speed))
+
+    def answer(self, trial: Floats) -> Response:
+        """The same from λ_e (…, 3)."""
         if not self.can_flow:
-            return Response(load, self.diagonal, None)
-        size = np.sqrt((load * load) @ _ONES)
+            return Response(self, trial, trial, _NONE, None)
+        size = np.sqrt((trial * trial) @ _ONES)
         # With a threshold of 0 it flows even at rest: there its law is linear.
         flows = size >= self.yield_torque
         if not flows.any():
-            return Response(load, self.diagonal, None)
-        toward = load / (size + _TINY)[..., None]
-        flowing = flows[..., None]
-        held = self._shared_yield * toward
-        # Along s only what the flow leaves, across it also the turning of s. With unequal axes the
-        # exact slope is not symmetric; its symmetric neighbour leads to the same solution.
-        root = np.sqrt(self.backward)
-        ratio = self._shared_yield / (size + _TINY)[..., None]
-        middle = -(np.sqrt(ratio)[..., :, None] * np.sqrt(ratio)[..., None, :]) * (
-            toward[..., :, None] * toward[..., None, :]
-        )
-        index = np.arange(3)
-        middle[..., index, index] += self.kept + ratio
-        slope = np.where(
-            flowing[..., None],
-            root[..., :, None] * middle * root[..., None, :],
-            self.diagonal,
-        )
-        excess = np.where(flows, size - self.yield_torque, 0.0)[..., None]
-        return Response(
-            np.where(flowing, self.kept * load + held, load),
-            slope,
-            -toward * excess * self.compliance,
-        )
+            return Response(self, trial, trial, size, None)
+        if self.alike:
+            which = flows.nonzero()[0]
+            factor = self.shared_yield[:, 0].take(which) / (size.take(which) + _TINY)
+            factor += self.kept[:, 0].take(which)
+            load = trial.copy()
+            load[which] = trial.take(which, 0) * factor[:, None]
+        else:
+            held = self.shared_yield * (trial / (size + _TINY)[..., None])
+            load = np.where(flows[..., None], self.kept * trial + held, trial)
+        return Response(self, load, trial, size, flows)
+
+
+_NONE = np.zeros(0)

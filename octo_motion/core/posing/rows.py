@@ -10,6 +10,9 @@ within Coulomb's cone |p_t| ≤ μ p_n. With a gain a, the gap g and the last st
     sticks   p = y                                                 where |y_t| ≤ μ y_n
     slips    p_n = (y_n + μ |y_t|)/(1 + μ²),  p_t = μ p_n y_t/|y_t|     between
 
+or p = P(y), the nearest point of a cone, with y = y₀ − a w. Stretching y stretches p alike, so that
+p = P′(y) y: a tangent of the law is the matrix P′ alone, whatever the velocity is.
+
 That is the cone complementarity of Anitescu (2006), softened as by Castro et al. (2022): every
 impulse is the slope of a convex function of the velocities, so the step has one solution and it can
 always be found. What sticks is held by b wholly once it is at rest, so it does not creep; what
@@ -65,22 +68,109 @@ class Holds:
         return len(self.bodies)
 
 
+_Flags = NDArray[np.bool_]
+_Touch = tuple[_Flags, _Flags | None, Floats, Floats, Floats | _Flags]
+
+
 @dataclass(frozen=True, eq=False)
 class Answer:
     """What the rows do at some velocities, and what is needed for their slopes."""
 
+    wanted: Floats
+    """(rows, 3) y."""
     impulses: Floats
     """(rows, 3) p on the body."""
-    sticks: NDArray[np.bool_]
+    sticks: _Flags
     """(contacts,)"""
-    slips: NDArray[np.bool_] | None
+    slips: _Flags | None
     """(contacts,) None where none does."""
-    toward: Floats
-    """(contacts, 3) the way of friction where it slips, unit."""
-    aside: Floats
-    """(contacts,) |p_t|/|y_t| where it slips: what holds it against slipping another way."""
-    shares: Floats
-    """(holds,) of the impulse without bound."""
+    across: Floats
+    """(contacts, 3) y_t."""
+    size: Floats
+    """(contacts,) |y_t|."""
+    shares: Floats | _Flags
+    """(contacts,) |p_t|/|y_t|; where it slips, what holds it against slipping another way."""
+    held: Floats
+    """(holds,) share of the impulse without bound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """The rows' laws as planes: p = P y + rest."""
+
+    shares: Floats | None
+    """(rows,) where P is this times the unit matrix; else None."""
+    planes: Floats | None
+    """(rows, 3, 3) P, symmetric and positive semidefinite; else None."""
+    rest: Floats | None
+    """(rows, 3) None where it is zero."""
+    sticks: bytes
+    """Which contacts stick."""
+
+    def same(self, answer: Answer) -> bool:
+        """Whether these planes are the law at another place, where nothing slips."""
+        if self.planes is not None or self.sticks != answer.sticks.tobytes():
+            return False
+        return not len(answer.held) or bool(answer.held.min() == 1.0)
+
+    def impulses(self, wanted: Floats) -> Floats:
+        """(rows, 3) p at y."""
+        if self.planes is None:
+            assert self.shares is not None
+            return self.shares[:, None] * wanted
+        result = (self.planes @ wanted[:, :, None])[:, :, 0]
+        return result if self.rest is None else result + self.rest
+
+    def blocks(self) -> Floats:
+        """(rows, 3, 3) P."""
+        if self.planes is None:
+            assert self.shares is not None
+            return self.shares[:, None, None] * _UNIT
+        return self.planes
+
+
+class Pattern:
+    """What hangs only on which bodies touch or are held: the same for many steps in a row."""
+
+    def __init__(
+        self, contacts: Contacts, holds: Holds | None, masses: Floats, step: float
+    ) -> None:
+        """For bodies of masses (bodies,) and steps of h."""
+        self.key = Pattern.key_of(contacts, holds)
+        count = len(contacts.bodies)
+        self.bodies, self.others = contacts.bodies, contacts.others
+        if holds is not None:
+            self.bodies = np.concatenate([contacts.bodies, holds.bodies])
+            self.others = np.concatenate([contacts.others, np.full(len(holds), -1)])
+        self.paired = np.flatnonzero(self.others >= 0)
+        whole = float(masses.sum())
+        lightest = masses[contacts.bodies]
+        if len(self.paired):
+            other = masses[contacts.others[self.paired]]
+            lightest[self.paired] = np.minimum(lightest[self.paired], other)
+        self.contact_gains = _GAIN * np.maximum(lightest, _LEAST_SHARE * whole)
+        self.gains = self.contact_gains
+        if holds is not None:
+            self.gains = np.concatenate([self.contact_gains, holds.gains])
+            self.turning = count + np.flatnonzero(holds.turns)
+        # As deep as what rests with twice the figure's weight on one point: so far the contact is a
+        # spring. What is deeper is made good by ``corrections``.
+        self.deepest = -2.0 * _WEIGHT * step * whole / self.contact_gains
+        """(contacts,) least g/h that counts, m/s."""
+        self.deepest_gaps = step * self.deepest
+        self.column = self.gains[:, None]
+        self.spread = 1.0 / (1.0 + contacts.friction * contacts.friction)
+        self.root_spread = np.sqrt(self.spread)
+        self.normals: Floats | None = None
+        """Across which friction was taken over last: then it need not be turned."""
+
+    @staticmethod
+    def key_of(contacts: Contacts, holds: Holds | None) -> tuple[bytes, ...]:
+        """What tells two patterns apart."""
+        own = (contacts.bodies.tobytes(), contacts.others.tobytes(), contacts.friction.tobytes())
+        if holds is None:
+            return own
+        return (*own, holds.bodies.tobytes(), holds.turns.tobytes(), holds.gains.tobytes())
 
 
 class Rows:
@@ -94,6 +184,7 @@ class Rows:
         masses: Floats,
         step: float,
         grips: Floats | None = None,
+        pattern: Pattern | None = None,
     ) -> None:
         """Put them together.
 
@@ -104,158 +195,194 @@ class Rows:
             masses: (bodies,)
             step: h.
             grips: (contacts, 3) friction of the step before; None where nothing touched.
+            pattern: of the step before, for it may be the same.
         """
         self.contacts = contacts
         self.holds = holds
-        count = len(contacts.bodies)
-        self.count = count
+        if pattern is None or pattern.key != Pattern.key_of(contacts, holds):
+            pattern = Pattern(contacts, holds, masses, step)
+        self.pattern = pattern
+        self.count = len(contacts.bodies)
         """Number of contacts, the first rows."""
+        self.bodies, self.others = pattern.bodies, pattern.others
+        self.paired = pattern.paired
+        """Rows between two bodies of the figure."""
+        self.gains = pattern.contact_gains
+        """(contacts,) a."""
         if holds is None:
-            self.bodies = contacts.bodies
-            self.others = contacts.others
-            points = contacts.points - origin
+            self.places = contacts.points - origin
             self.targets = contacts.speeds
         else:
-            self.bodies = np.concatenate([contacts.bodies, holds.bodies])
-            self.others = np.concatenate([contacts.others, np.full(len(holds), -1)])
-            points = np.concatenate([contacts.points, holds.points]) - origin
+            self.places = np.concatenate([contacts.points, holds.points]) - origin
             self.targets = np.concatenate([contacts.speeds, np.zeros((len(holds), 3))])
-        self.places = points
-        """(rows, 3) of their points, from the origin."""
-        size = len(self.bodies)
-        self.reach = np.empty((size, 3, 6))
+        self.reach = (self.places @ _REACH + _REACH_AT_ORIGIN).reshape(-1, 3, 6)
         """(rows, 3, 6) from a spatial velocity to that of the point or turn."""
-        self.reach[:, :, :3] = skew(-points)
-        self.reach[:, :, 3:] = _UNIT
-        if holds is not None:
-            turning = count + np.flatnonzero(holds.turns)
-            self.reach[turning, :, :3] = _UNIT
-            self.reach[turning, :, 3:] = 0.0
-        self.paired = np.flatnonzero(self.others >= 0)
-        """Rows between two bodies of the figure."""
-        whole = float(masses.sum())
-        lightest = masses[contacts.bodies]
-        if len(self.paired):
-            other = masses[contacts.others[self.paired]]
-            lightest[self.paired] = np.minimum(lightest[self.paired], other)
-        self.gains = _GAIN * np.maximum(lightest, _LEAST_SHARE * whole)
-        """(contacts,) a."""
-        # As deep as what rests with twice the figure's weight on one point: so far the contact is a
-        # spring. What is deeper is made good by ``corrections``.
-        self._spring = 2.0 * _WEIGHT * step * whole / self.gains
-        self._closing = np.maximum(contacts.gaps / step, -self._spring)
+        if holds is not None and len(pattern.turning):
+            self.reach[pattern.turning] = _TURNS
+        self._step = step
+        self._followed: Floats | None = None
+        self.fastest = 0.0
+        """m/s: the most that slip adds to a rate."""
+        self._closing = np.maximum(contacts.gaps / step, pattern.deepest)
         self.rates = self._closing
         """(contacts,) g/h + μ |w_t|, as ``follow`` was told |w_t| last."""
-        self._followed = np.zeros(count)
-        self._fastest = 0.0
-        self._step = step
-        self.grips: Floats | None = None
+        self.grips = grips
         """(contacts, 3) b; None for zero."""
-        if grips is not None and count:
+        if grips is not None:
             normals = contacts.normals
-            self.grips = grips - ((grips * normals) @ _ONES)[:, None] * normals
-        self._spread = 1.0 / (1.0 + contacts.friction * contacts.friction)
-        self.still = not self.targets.any()
+            if pattern.normals is not normals:
+                self.grips = grips - ((grips * normals) @ _ONES)[:, None] * normals
+            pattern.normals = normals
+        self.still = not contacts.speeds.any()
         """Whether no obstacle moves: then w is the velocity of the points themselves."""
+        self._ask()
 
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.bodies)
 
+    def _ask(self) -> None:
+        """y₀, from the rates."""
+        count, holds, contacts = self.count, self.holds, self.contacts
+        asked = contacts.normals * (-self.gains * self.rates)[:, None]
+        if self.grips is not None:
+            asked += self.grips
+        if not self.still:
+            asked += self.gains[:, None] * contacts.speeds
+        if holds is None:
+            self.asked = asked
+            return
+        self.asked = np.empty((len(self), 3))
+        """(rows, 3) y₀: what a row wants to give where its point does not move in the world."""
+        self.asked[:count] = asked
+        self.asked[count:] = holds.biases
+
+    def wanted(self, velocities: Floats) -> Floats:
+        """What rows want to give, y (rows, 3), at spatial velocities (bodies, 6)."""
+        return self.asked - self.pattern.column * self._moving(velocities)
+
     def speeds(self, velocities: Floats) -> Floats:
         """The rows' velocities w (rows, 3), of spatial velocities (bodies, 6)."""
-        own = velocities[self.bodies]
+        moving = self._moving(velocities)
+        return moving if self.still else moving - self.targets
+
+    def _moving(self, velocities: Floats) -> Floats:
+        own = velocities.take(self.bodies, 0)
         if len(self.paired):
             own[self.paired] -= velocities[self.others[self.paired]]
-        result = (self.reach @ own[:, :, None])[:, :, 0]
-        return result if self.still else result - self.targets
+        return (self.reach @ own[:, :, None])[:, :, 0]
 
-    def follow(self, speeds: Floats, tolerance: float, *, slips_none: bool = False) -> bool:
-        """Take |w_t| from w (rows, 3); false where that changes no rate by ``tolerance``, m/s.
-
-        ``slips_none`` tells that nothing slips at w, which saves looking.
-        """
+    def follow(self, speeds: Floats, tolerance: float) -> bool:
+        """Take |w_t| from w (rows, 3); false where that changes no rate by ``tolerance``, m/s."""
         count = self.count
         if not count:
             return False
-        if slips_none and self._fastest <= tolerance:
-            return False
         normals, w = self.contacts.normals, speeds[:count]
         across = w - ((w * normals) @ _ONES)[:, None] * normals
-        slip = np.sqrt((across * across) @ _ONES)
-        change = self.contacts.friction * np.abs(slip - self._followed)
+        slip = self.contacts.friction * np.sqrt((across * across) @ _ONES)
+        change = slip if self._followed is None else np.abs(slip - self._followed)
         if change.max() <= tolerance:
             return False
         self._followed = slip
-        self._fastest = float((self.contacts.friction * slip).max())
-        self.rates = self._closing + self.contacts.friction * slip
+        self.fastest = float(slip.max())
+        self.rates = self._closing + slip
+        self._ask()
         return True
 
     def answer(self, speeds: Floats) -> Answer:
         """Impulses at w (rows, 3)."""
-        count = self.count
-        holds = self.holds
-        impulses = np.empty_like(speeds)
-        sticks, slips, toward, aside = _NOBODY, None, _NO_ROWS, _NO_ONES
-        if count:
-            normals, friction = self.contacts.normals, self.contacts.friction
-            w = speeds[:count] if holds is not None else speeds
-            into = (w * normals) @ _ONES
-            push = self.gains * (-self.rates - into)
-            pull = self.gains[:, None] * (into[:, None] * normals - w)
-            if self.grips is not None:
-                pull += self.grips
-            size = np.sqrt((pull * pull) @ _ONES)
-            most = friction * push
-            sticks = size <= most
-            slipping = push + friction * size > 0.0
-            slipping &= ~sticks
-            load = np.where(sticks, push, 0.0)
-            if slipping.any():
-                slips = slipping
-                size += _TINY
-                sliding = self._spread * (push + friction * size)
-                load = np.where(slips, sliding, load)
-                aside = friction * sliding / size
-                toward = pull / size[:, None]
-                pull *= np.where(slips, aside, sticks)[:, None]
-            else:
-                pull *= sticks[:, None]
-            impulses[:count] = load[:, None] * normals + pull
+        moving = speeds if self.still else speeds + self.targets
+        return self.respond(self.asked - self.pattern.column * moving)
+
+    def respond(self, wanted: Floats, known: Answer | None = None) -> Answer:
+        """Impulses at y (rows, 3); what contacts do there may be known already."""
+        count, holds = self.count, self.holds
+        if holds is None and known is not None:
+            return known
+        impulses = np.empty_like(wanted)
         if holds is None:
-            return Answer(impulses, sticks, slips, toward, aside, _NO_ONES)
-        wanted = holds.biases - holds.gains[:, None] * speeds[count:]
-        shares = np.minimum(holds.bounds / (np.sqrt((wanted * wanted) @ _ONES) + _TINY), 1.0)
-        impulses[count:] = shares[:, None] * wanted
-        return Answer(impulses, sticks, slips, toward, aside, shares)
+            return Answer(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
+        pulls = wanted[count:]
+        held = np.minimum(holds.bounds / (np.sqrt((pulls * pulls) @ _ONES) + _TINY), 1.0)
+        np.multiply(pulls, held[:, None], out=impulses[count:])
+        if not count:
+            return Answer(wanted, impulses, _NOBODY, None, _NO_ROWS, _NO_ONES, _NO_ONES, held)
+        if known is None:
+            return Answer(wanted, impulses, *self._touch(wanted[:count], impulses[:count]), held)
+        impulses[:count] = known.impulses[:count]
+        touch = known.sticks, known.slips, known.across, known.size, known.shares
+        return Answer(wanted, impulses, *touch, held)
+
+    def _touch(self, y: Floats, impulses: Floats) -> _Touch:
+        """Contacts' impulses (contacts, 3) at y, and what ``Answer`` tells of how they come."""
+        normals, friction = self.contacts.normals, self.contacts.friction
+        push = (y * normals) @ _ONES
+        across = y - push[:, None] * normals
+        size = np.sqrt((across * across) @ _ONES)
+        sticks = size <= friction * push
+        lift = push + friction * size
+        slips = (lift > 0.0) > sticks
+        if not slips.any():
+            np.multiply(y, sticks[:, None], out=impulses)
+            return sticks, None, across, size, sticks
+        # What neither sticks nor slips is apart.
+        load = np.where(sticks, push, slips * (self.pattern.spread * lift))
+        shares = np.where(sticks, 1.0, friction * load / (size + _TINY))
+        np.multiply(normals, load[:, None], out=impulses)
+        impulses += shares[:, None] * across
+        return sticks, slips, across, size, shares
+
+    def tangent(self, answer: Answer) -> Tangent:
+        """The laws as planes that touch them at y."""
+        holds, count = self.holds, self.count
+        sticks = answer.sticks.tobytes()
+        full = holds is not None and bool((answer.held < 1.0).any())
+        if answer.slips is None and not full:
+            shares = answer.sticks.astype(np.float64)
+            if holds is not None:
+                shares = np.concatenate([shares, answer.held])
+            return Tangent(shares, None, None, sticks)
+        planes = np.empty((len(self), 3, 3))
+        if count:
+            planes[:count] = self._cones(answer)
+        rest = None
+        if holds is not None:
+            held = answer.held
+            planes[count:] = held[:, None, None] * _UNIT
+            if full:
+                pulls = answer.impulses[count:]
+                way = pulls / holds.bounds[:, None]
+                part = np.where(held < 1.0, held, 0.0)[:, None] * way
+                planes[count:] -= part[:, :, None] * way[:, None, :]
+                rest = np.zeros((len(self), 3))
+                rest[count:] = np.where((held < 1.0)[:, None], pulls, 0.0)
+        return Tangent(None, planes, rest, sticks)
+
+    def _cones(self, answer: Answer) -> Floats:
+        """P′ of the contacts (contacts, 3, 3)."""
+        if answer.slips is None:
+            return answer.sticks[:, None, None] * _UNIT
+        contacts, pattern = self.contacts, self.pattern
+        # Along n + μ t with 1/(1 + μ²), sideways of both with |p_t|/|y_t|.
+        toward = answer.across / (answer.size + _TINY)[:, None]
+        ways = np.empty((len(toward), 3, 2))
+        ways[:, :, 0] = (answer.slips * pattern.root_spread)[:, None] * (
+            contacts.normals + contacts.friction[:, None] * toward
+        )
+        aside = np.sqrt(answer.slips * answer.shares)
+        ways[:, :, 1] = aside[:, None] * cross(contacts.normals, toward)
+        planes = ways @ ways.transpose(0, 2, 1)
+        planes += answer.sticks[:, None, None] * _UNIT
+        return planes
 
     def slopes(self, answer: Answer) -> Floats:
         """−∂p/∂w (rows, 3, 3), symmetric and positive semidefinite."""
-        count = self.count
-        slopes = np.empty((len(self.bodies), 3, 3))
-        if count:
-            block = np.where(answer.sticks, self.gains, 0.0)[:, None, None] * _UNIT
-            slips = answer.slips
-            if slips is not None:
-                normals = self.contacts.normals
-                gains = np.where(slips, self.gains, 0.0)
-                way = normals + self.contacts.friction[:, None] * answer.toward
-                block += ((gains * self._spread)[:, None] * way)[:, :, None] * way[:, None, :]
-                sideways = cross(normals, answer.toward)
-                held = np.where(slips, gains * answer.aside, 0.0)
-                block += (held[:, None] * sideways)[:, :, None] * sideways[:, None, :]
-            slopes[:count] = block
-        holds = self.holds
-        if holds is not None:
-            shares = answer.shares
-            slope = (holds.gains * shares)[:, None, None] * _UNIT
-            full = shares < 1.0
-            if full.any():
-                way = answer.impulses[count:] / holds.bounds[:, None]
-                part = np.where(full, holds.gains * shares, 0.0)[:, None] * way
-                slope -= part[:, :, None] * way[:, None, :]
-            slopes[count:] = slope
-        return slopes
+        return self.pattern.gains[:, None, None] * self.tangent(answer).blocks()
+
+    @property
+    def weighted(self) -> Floats:
+        """(rows, 3, 6) what a row gives less for a spatial velocity: a times ``reach``."""
+        return self.reach * self.pattern.gains[:, None, None]
 
     def corrections(self, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.
@@ -265,14 +392,14 @@ class Rows:
         """
         count = self.count
         step = self._step
-        depth = -self.contacts.gaps - step * self._spring
-        deep = depth.max(initial=0.0) > 0.0
+        room = self.contacts.gaps - self.pattern.deepest_gaps
+        deep = bool(count) and room.min() < 0.0
         off = self.holds is not None and bool(self.holds.errors.any())
         if not (deep or off):
             return None
         result = np.zeros((len(self.bodies), 3))
         if deep:
-            speed = np.clip(0.2 / step * depth, 0.0, fastest)
+            speed = np.clip(-0.2 / step * room, 0.0, fastest)
             result[:count] = speed[:, None] * self.contacts.normals
         if off:
             assert self.holds is not None
@@ -285,3 +412,7 @@ class Rows:
 _NOBODY = np.zeros(0, dtype=bool)
 _NO_ROWS = np.zeros((0, 3))
 _NO_ONES = np.zeros(0)
+_REACH = np.zeros((3, 18))
+_REACH.reshape(3, 3, 6)[:, :, :3] = -skew(np.eye(3))
+_TURNS = np.concatenate([np.eye(3), np.zeros((3, 3))], axis=1)
+_REACH_AT_ORIGIN = np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1).ravel()

@@ -71,6 +71,7 @@ class Tree:
     def use(self, layout: Layout) -> None:
         """Solve by this plan; any plan that covers the figure gives the same solutions."""
         self.layout = layout
+        self._placed: Floats | None = None
         count = len(self.parents)
         slots = len(layout.bodies)
         filled = layout.bodies >= 0
@@ -85,7 +86,7 @@ class Tree:
         """(bodies, slots) 1 where the slot moves the body."""
         self.beyond = np.ascontiguousarray(self.chain.T)
         self._joint_body = np.where(filled, layout.bodies, 0)
-        self._minus_joint = np.zeros((slots, 1))
+        self._minus_joint = np.zeros((slots, 3))
         self._minus_joint[joints] = -1.0
         # [1 | −p×] for a joint, [0 | 1] for a shift: Sᵀ, of which −p× changes.
         self.motion = np.zeros((slots, 3, 6))
@@ -107,22 +108,16 @@ class Tree:
                 upper[slot, slot] = 1.0
         wide = np.kron(upper, np.ones((3, 3)))
         cut = 3 * trunk
-        self._trunk_upper = np.ascontiguousarray(wide[:cut, :cut])
-        self._trunk_lower = np.kron(upper[:trunk, :trunk].T - np.eye(trunk), np.ones((3, 3)))
+        # With half of the diagonal: a matrix is this part of the products, and its mirror image.
+        halves = np.kron(upper - 0.5 * np.eye(slots), np.ones((3, 3)))
+        self._trunk_upper = np.ascontiguousarray(halves[:cut, :cut])
         self.trunk_matrix = np.zeros((cut, cut))
-        self._trunk_mirror = np.zeros((cut, cut))
         self._trunk_diagonal = _diagonal_blocks(self.trunk_matrix[None])[0]
         self._cross_upper = np.ascontiguousarray(wide[:cut, cut:])
         size = 3 * width
-        inner = upper[trunk:, trunk:].reshape(branches, width, branches, width)
-        inner = inner[np.arange(branches), :, np.arange(branches), :]
-        ones = np.ones((1, 3, 3))
-        self._branch_upper = np.kron(inner, ones)
-        lower = inner.transpose(0, 2, 1).copy()
-        lower[:, np.arange(width), np.arange(width)] = 0.0
-        self._branch_lower = np.kron(lower, ones)
+        inner = halves[cut:, cut:].reshape(branches, size, branches, size)
+        self._branch_upper = inner[np.arange(branches), :, np.arange(branches), :]
         self.branch_matrix = np.zeros((branches, size, size))
-        self._branch_mirror = np.zeros((branches, size, size))
         self._branch_diagonal = _diagonal_blocks(self.branch_matrix)
         # Empty slots: a one on the diagonal, so that their velocity is zero and harms nobody.
         empty = np.repeat(~filled, 3).astype(np.float64)
@@ -133,8 +128,12 @@ class Tree:
 
     def place(self, points: Floats) -> None:
         """Take over where the joints are: (bodies, 3) from the common origin."""
-        at = points[self._joint_body] * self._minus_joint
-        self.motion[:, :, 3:] = skew(at) + self._fixed
+        if points is self._placed:
+            return
+        self._placed = points
+        at = points.take(self._joint_body, 0)
+        at *= self._minus_joint
+        np.add(skew(at), self._fixed, out=self.motion[:, :, 3:])
 
     def velocities(self, speeds: Floats) -> Floats:
         """V (bodies, 6) of u (slots, 3)."""
@@ -146,30 +145,28 @@ class Tree:
         summed = self.beyond @ momenta.reshape(len(momenta), 6 * count)
         return self.motion @ summed.reshape(-1, 6, count)
 
-    def assemble(self, composite: Floats, joints: Floats) -> None:
+    def assemble(self, carried: Floats, joints: Floats) -> None:
         """Fill the matrix of (1).
 
         Args:
-            composite: (slots, 6, 6) inertia of all that moves with each slot, rows included.
+            carried: (slots, 3, 6) ``motion`` times the inertia of all that moves with each slot,
+                rows included.
             joints: (slots, 3, 3) K, which stands on each slot's own block.
         """
         trunk, branches, width = self.layout.trunk, self.layout.branches, self.layout.width
         motion = self.motion
-        carried = motion @ composite
         rows = motion[:trunk].reshape(3 * trunk, 6)
         products = rows @ carried[:trunk].reshape(3 * trunk, 6).T
-        np.multiply(products, self._trunk_upper, out=self.trunk_matrix)
-        np.multiply(products.T, self._trunk_lower, out=self._trunk_mirror)
-        self.trunk_matrix += self._trunk_mirror
+        products *= self._trunk_upper
+        np.add(products, products.T, out=self.trunk_matrix)
         self._trunk_diagonal += joints[:trunk]
         if not branches:
             return
         of_branches = carried[trunk:].reshape(branches, 3 * width, 6)
         inner = motion[trunk:].reshape(branches, 3 * width, 6)
         products = inner @ of_branches.transpose(0, 2, 1)
-        np.multiply(products, self._branch_upper, out=self.branch_matrix)
-        np.multiply(products.transpose(0, 2, 1), self._branch_lower, out=self._branch_mirror)
-        self.branch_matrix += self._branch_mirror
+        products *= self._branch_upper
+        np.add(products, products.transpose(0, 2, 1), out=self.branch_matrix)
         self._branch_diagonal += joints[trunk:].reshape(branches, width, 3, 3)
         if self._has_empty:
             self.branch_matrix += self._branch_empty
