@@ -101,6 +101,58 @@ def test_limits_are_added_to_those_of_the_defaults_and_inf_lifts_one(tmp_path: P
     assert c == {}
 
 
+def test_ground_and_lists_are_what_the_table_says(tmp_path: Path) -> None:
+    text = WALK + (
+        'ground = "Sea Floor"\n'
+        'settings = { change.height = 0.7, change.gait = "jet_escape", ground.duty = 0.6 }\n'
+        'changes = [{ gait = "swim", position = 0.5 }]\n'
+        'reaches = [{ mode = "curl", arm = "Arm 1 L", turns = 1.5, frame_contact = 20 }]\n'
+        '[[shots.contacts]]\narm = "Arm 2 R"\ncycle = 3\nposition = [1, 0.5, 0]\n'
+        'heading = "90°"\n'
+    )
+    (shot,) = read(tmp_path, text).shots
+    entry = shot.entry
+    assert entry.ground == "Sea Floor"
+    assert entry.settings["change.gait"] == "jet_escape"
+    assert entry.lists == {
+        "changes": [{"gait": "swim", "position": 0.5}],
+        "reaches": [{"mode": "CURL", "arm": "Arm 1 L", "turns": 1.5, "frame_contact": 20}],
+        "contacts": [
+            {
+                "arm": "Arm 2 R",
+                "cycle": 3,
+                "position": [1.0, 0.5, 0.0],
+                "heading": pytest.approx(math.pi / 2.0),
+            }
+        ],
+    }
+    assert ShotEntry.from_plain(json.loads(json.dumps(entry.to_plain()))) == entry
+
+
+def test_every_fault_of_a_list_is_told_with_its_place(tmp_path: Path) -> None:
+    text = WALK + (
+        'changes = [{ gait = "hop", position = 2 }, { position = 0.5 }]\n'
+        'reaches = [{ mode = "juggle" }, { traget = "Ball" }]\n'
+        'contacts = [{ arm = "Arm 1 L", position = [1, 2] }]\n'
+    )
+    told = "\n".join(faults(tmp_path, text))
+    assert "changes 1: The setting 'position' cannot be 2." in told
+    assert "changes 1: There is no gait 'hop'." in told
+    assert "changes 2: It has no gait: write gait = …." in told
+    assert "reaches 1: The setting 'mode' cannot be 'juggle'." in told
+    assert "reaches 2: There is no setting 'traget'. Did you mean 'target'?" in told
+    assert "contacts 1: It has no cycle" in told
+    assert "Give three numbers, [x, y, z]." in told
+    assert faults(tmp_path, WALK + "reaches = 3\n")[0].startswith(
+        "shot 'walk': reaches must be a list of tables"
+    )
+    splice = '[[shots]]\nname = "s"\nkind = "splice"\nfile = "a.bvh"\noutput = "s.blend"\n'
+    (told,) = [each for each in faults(tmp_path, splice + 'ground = "Sea"\n') if "ground" in each]
+    assert told == "shot 's': ground is for shots with kind = \"generate\"."
+    (told,) = faults(tmp_path, NEW + "octopus = {}\n" + ROUTE + 'ground = "Sea"\n')
+    assert "A new octopus has no ground 'Sea'" in told
+
+
 def test_gait_file_is_read_beside_the_job(tmp_path: Path) -> None:
     table = gait.renamed(gait.presets()["swim"], "sneak")
     (tmp_path / "sneak.json").write_text(gait.to_json(table), encoding="utf-8")

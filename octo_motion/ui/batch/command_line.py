@@ -65,6 +65,7 @@ A job file is TOML; its paths are relative to its folder. [defaults] is for all 
   file = "reef.blend"               # the scene; its armature and curve by name
   armature = "Octopus"              # if there are several
   route = "Wall"                    # default: the armature's own
+  ground = "Sea Floor"              # the mesh to walk on; default: its own
   gait = "walk"                     # or a gait file, "gaits/sneak.json"
 
   [[shots]]
@@ -127,6 +128,9 @@ def _add_generate(
     )
     command.add_argument(
         "--route", metavar="NAME", default="", help="the curve; default: the armature's own"
+    )
+    command.add_argument(
+        "--ground", metavar="NAME", default="", help="the mesh to walk on; default: its own"
     )
     command.add_argument(
         "--gait", metavar="NAME", default="", help="a gait by name, or a gait file (.json)"

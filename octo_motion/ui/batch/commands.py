@@ -99,6 +99,7 @@ def _entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
         file=source,
         armature=options.armature,
         route=options.route,
+        ground=options.ground,
         gait=_gait(options.gait, may_name),
         settings=_settings(options, may_name.settings),
         limits=parse_limits(options.limits),

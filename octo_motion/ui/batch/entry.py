@@ -77,6 +77,10 @@ class ShotEntry:
     armature: str = ""
     route: str | NewRoute = ""
     """Name of a curve, a route to draw, or "" for the armature's own."""
+    ground: str = ""
+    """Name of the object to walk on, or "" for the armature's own."""
+    lists: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    """Items of its lists, by the names of ``shot_lists.LISTS``; others are as in the file."""
     gait: str = ""
     """The gait table as JSON, or "" for the armature's own."""
     settings: dict[str, Value] = field(default_factory=dict)
@@ -128,6 +132,8 @@ class ShotEntry:
             else None,
             armature=plain["armature"],
             route=route,
+            ground=plain["ground"],
+            lists=plain["lists"],
             gait=plain["gait"],
             settings=plain["settings"],
             fps=plain["fps"],

@@ -33,12 +33,13 @@ from .entry import (
 from .limits import read_limits
 from .motion_files import is_motion
 from .setting_values import Setting, check_settings, unknown
+from .shot_lists import LISTS, Items, read_list
 from .splice_job import read_splices
 
 KINDS: Final = {
     "generate": (
-        *("name", "kind", "file", "octopus", "armature", "route", "gait", "settings", "fps"),
-        *("limits", "output", "export"),
+        *("name", "kind", "file", "octopus", "armature", "route", "ground", "gait", "settings"),
+        *("fps", *LISTS, "limits", "output", "export"),
     ),
     "splice": (
         *("name", "kind", "file", "armature", "base", "frames", "splices", "settings", "fps"),
@@ -73,6 +74,8 @@ class Known:
     """Of a shot that splices."""
     splice_settings: Mapping[str, Setting] = field(default_factory=dict)
     """Of each splice in its list."""
+    lists: Mapping[str, Mapping[str, Setting]] = field(default_factory=dict)
+    """Of each item in the lists of a shot that is to walk or swim."""
 
 
 @dataclass(frozen=True)
@@ -258,6 +261,8 @@ class _Reader:
             octopus=octopus,
             armature="" if octopus else self._text("armature"),
             route=self._route(),
+            ground=self._ground(),
+            lists=self._lists(),
             gait=gait_text,
             settings=self._settings(self._known.settings),
             fps=self._fps(),
@@ -363,6 +368,24 @@ class _Reader:
             elif "route" not in self._table and not self._stays():
                 self._fault("A new octopus has no route: give the route's points.")
         return name
+
+    def _ground(self) -> str:
+        name = self._text("ground")
+        if name and "octopus" in self._table:
+            self._fault(f"A new octopus has no ground '{name}': leave it to walk on its route.")
+        return name
+
+    def _lists(self) -> dict[str, Items]:
+        """The lists that the shot has of its own."""
+        found: dict[str, Items] = {}
+        for name in LISTS:
+            if name not in self._table:
+                continue
+            known = self._known.lists.get(name, {})
+            found[name], faults = read_list(name, self._table[name], known, self._known.gait)
+            for fault in faults:
+                self._fault(fault)
+        return found
 
     def _stays(self) -> bool:
         """Whether the settings let nothing travel, which takes no route."""

@@ -11,7 +11,10 @@ import bpy
 
 from ...blender import presets
 from ...core.errors import OctoMotionError
+from ..locomotion.change_properties import ChangeItem
+from ..locomotion.ground_properties import ContactItem
 from ..locomotion.properties import OCTO_MOTION_PG_locomotion
+from ..locomotion.reach_properties import ReachItem
 from ..splicing.landmark_properties import OCTO_MOTION_PG_landmarks
 from ..splicing.properties import OCTO_MOTION_PG_splicing
 from ..splicing.splice_properties import SpliceItem
@@ -21,6 +24,8 @@ from .setting_values import Setting
 
 _OWN_KEYS = {"name", "gait"}
 """No settings: Blender's own name of a group, and the gait, which a shot names itself."""
+_LISTED = {"changes": ChangeItem, "reaches": ReachItem, "contacts": ContactItem}
+"""What the items are of the lists that a shot may have."""
 
 
 def known() -> Known:
@@ -36,6 +41,7 @@ def known() -> Known:
                 *_settings(OCTO_MOTION_PG_landmarks, "landmarks."),
             )
         ),
+        lists={name: _by_name(_of_item(item)) for name, item in _LISTED.items()},
     )
 
 
@@ -43,13 +49,25 @@ def _by_name(settings: Iterable[Setting]) -> dict[str, Setting]:
     return {setting.name: setting for setting in settings}
 
 
+def _of_item(item: Any) -> Iterator[Setting]:
+    """What may be said of an item of a list: of an object its name, of a contact its place."""
+    yield Setting("name", "STRING")
+    for name in item.__annotations__:
+        each: Any = item.bl_rna.properties[name]
+        if each.type == "POINTER" or name == "gait":
+            yield Setting(name, "STRING")
+        elif each.type == "FLOAT" and each.is_array:
+            yield Setting(name, "POINT")
+    yield from _settings(item)
+
+
 def _settings(group: Any, before: str = "") -> Iterator[Setting]:
     """Plain values of a group of properties, and of the groups within."""
     properties: Any = group.bl_rna.properties  # of many types, which the stubs do not tell apart
     for each in properties:
-        if each.identifier in {"rna_type", *_OWN_KEYS} or each.is_hidden:
-            continue
         name = before + each.identifier
+        if each.identifier in {"rna_type", "name"} or name in _OWN_KEYS or each.is_hidden:
+            continue
         if each.type == "POINTER":
             inner = bpy.types.PropertyGroup.bl_rna_get_subclass_py(each.fixed_type.identifier, None)
             if inner is not None:

@@ -12,8 +12,8 @@ from typing import Any, Final, Literal
 
 from ...core.errors import SettingsError
 
-Kind = Literal["BOOLEAN", "INT", "FLOAT", "ENUM", "STRING"]
-Value = bool | int | float | str
+Kind = Literal["BOOLEAN", "INT", "FLOAT", "ENUM", "STRING", "POINT"]
+Value = bool | int | float | str | list[float]
 
 _TRUE: Final = {"true", "yes", "on", "1"}
 _FALSE: Final = {"false", "no", "off", "0"}
@@ -55,6 +55,16 @@ class Setting:
                 if isinstance(given, str):
                     return given
                 raise self._wrong(given, "Give a text.")
+            case "POINT":
+                return self._point(given)
+
+    def _point(self, given: Any) -> list[float]:
+        numbers = given if isinstance(given, list) else ()
+        if len(numbers) == 3 and not any(isinstance(each, bool | str) for each in numbers):
+            found = [self._read_number(each) for each in numbers]
+            if all(each is not None and math.isfinite(each) for each in found):
+                return [float(each) for each in found if each is not None]
+        raise self._wrong(given, "Give three numbers, [x, y, z].")
 
     def _boolean(self, given: Any) -> bool:
         if isinstance(given, bool):

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -13,9 +13,10 @@ from mathutils import Matrix
 
 from ...blender import actions
 from ...blender.armature import read_skeleton, world_matrix
+from ...blender.contacts import remove_markers
 from ...blender.curves import add_route_curve
 from ...blender.octopus import add_octopus
-from ...core.errors import OctoMotionError, RigError, RouteError, WriteError
+from ...core.errors import OctoMotionError, RigError, RouteError, SettingsError, WriteError
 from ...core.locomotion import gait
 from ...core.locomotion.detection import detect_arms
 from ..locomotion.properties import locomotion_settings, set_gait
@@ -228,10 +229,65 @@ def _apply(entry: ShotEntry, armature: bpy.types.Object, scene: bpy.types.Scene)
         for each in groups:
             group = getattr(group, each)
         setattr(group, last, value)
+    if entry.ground:
+        settings.ground.object = _object(entry.ground, "MESH", "a mesh")
+    _fill_lists(entry, armature, settings)
     if isinstance(entry.route, NewRoute):
         settings.route = _draw(entry.route, scene)
     elif entry.route:
         settings.route = _curve(entry.route)
+
+
+def _fill_lists(entry: ShotEntry, armature: bpy.types.Object, settings: Any) -> None:
+    """Give the armature the lists of the shot, in place of its own."""
+    lists = entry.lists
+    if "changes" in lists:
+        _filled(settings.change.places, lists["changes"])
+        if "change.by" not in entry.settings:
+            settings.change.by = "MARKERS" if lists["changes"] else "NONE"
+    if "reaches" in lists:
+        objects = [each.get("target") for each in lists["reaches"]]
+        found = [_object(name) if name else None for name in objects]
+        rest = [{**each, "target": None} for each in lists["reaches"]]
+        _filled(settings.reaches, rest)
+        for item, target in zip(settings.reaches, found, strict=True):
+            item.target = target
+    if "contacts" in lists:
+        names = [item.name for item in settings.arms]
+        for each in lists["contacts"]:
+            if names and each["arm"] not in names:
+                raise RigError(
+                    f"There is no arm '{each['arm']}'.", f"Name one of {', '.join(names)}."
+                )
+        # Those that are shown would count too.
+        remove_markers(armature)
+        settings.ground.shown = ""
+        items = [{**each, "locked": "position" in each} for each in lists["contacts"]]
+        _filled(settings.ground.contacts, items)
+
+
+def _filled(collection: Any, items: Sequence[Mapping[str, Any]]) -> None:
+    collection.clear()
+    for values in items:
+        item = collection.add()
+        for name, value in values.items():
+            setattr(item, name, value)
+
+
+def _object(name: str, kind: str = "", what: str = "") -> bpy.types.Object:
+    """The object of that name.
+
+    Raises:
+        SettingsError: there is none, or it is of another kind.
+    """
+    found = [each for each in bpy.data.objects if each.name == name]
+    fitting = [each for each in found if kind in {"", each.type}]
+    if fitting:
+        return fitting[0]
+    names = sorted({each.name for each in bpy.data.objects if kind in {"", each.type}})
+    remedy = f"Name one of {', '.join(names)}." if names else "Give a file that has one."
+    problem = f"'{name}' is not {what}." if found else f"There is no object '{name}'."
+    raise SettingsError(problem, remedy)
 
 
 def _draw(route: NewRoute, scene: bpy.types.Scene) -> bpy.types.Object:
