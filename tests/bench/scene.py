@@ -49,6 +49,7 @@ def build(arms: int, joints: int, frames: int, gait: str, *, skin: bool) -> bpy.
     # Steering would move the targets by a rule of our own; the comparison is about reaching them.
     settings.turning = 0.0
     settings.stand = False
+    settings.give = 0.0
     return armature
 
 

@@ -368,6 +368,19 @@ def test_softness_takes_the_sharpest_bends_off() -> None:
     assert np.mean(soft**2) < np.mean(softer**2) < np.mean(sharp**2)
 
 
+def test_give_takes_the_snap_out_of_an_arm_that_straightens() -> None:
+    rig = body_with_arms(1, 12)
+
+    def snaps(give: float) -> float:
+        turns = posed(generated(rig, give=give), 480).rotations
+        return float(angle_between(turns[1:], turns[:-1]).max())
+
+    assert snaps(0.08) < 0.5 * snaps(0.0)
+    # It is paid for with what it says, in thirds of the arm.
+    misses = posed(generated(rig, give=0.08)).misses
+    assert 1e-3 < misses.max() <= 0.08 / 3.0
+
+
 def test_walking_and_swimming_arms_do_not_wring_themselves() -> None:
     # Twist about its own bone: what a straight arm carried along the same way would not have.
     for name in ("walk", "swim"):
@@ -512,6 +525,7 @@ def test_a_bone_that_is_gone_is_a_clear_error() -> None:
         ({"variation": (0.2, 0.1)}, "The variation's minimum is greater than its maximum."),
         ({"contraction": -0.5}, "The contraction is -0.5."),
         ({"softness": 1.5}, "The softness is 1.5."),
+        ({"give": -0.1}, "The give is -0.1."),
     ],
 )
 def test_a_senseless_setting_is_a_clear_error(changes: dict[str, object], message: str) -> None:

@@ -79,6 +79,7 @@ def solve(
     targets: Floats,
     *,
     softness: float = 0.8,
+    give: float = 0.0,
     floor: Floats | None = None,
 ) -> Floats:
     """Directions (segments, 3, batch) of arms whose groups end at their targets.
@@ -90,6 +91,7 @@ def solve(
         links: (links, 4, batch) orientations of the links.
         targets: (links + 1, 3, batch) pseudo-targets Q₀ … Q₃; those out of reach are pointed at.
         softness: 0 leaves the bends as they are; towards 1 they are spread over neighbours.
+        give: group lengths by which a group may reach beyond its target as it straightens.
         floor: (batch,) height that joints between the groups' ends keep above, as far as the
             targets let them.
     """
@@ -100,7 +102,7 @@ def solve(
         own = aimed(turned(links[group], shape[segments]), lengths, goal)
         for _ in range(SWEEPS if len(own) > 1 else 0):
             own = swept(own, lengths, chain.weights[segments], goal)
-        directions[segments] = closed(own, lengths, goal)
+        directions[segments] = closed(own, lengths, goal, give=give)
         root = root + chord(directions[segments], lengths)
     rounds = SOFTENINGS if softness > 0.0 or floor is not None else 0
     for number in range(1, rounds + 1):
@@ -113,7 +115,7 @@ def solve(
         root = np.zeros_like(root)
         for group, segments in enumerate(chain.groups):
             lengths, goal = chain.lengths[segments], targets[group + 1] - root
-            directions[segments] = closed(directions[segments], lengths, goal, steps)
+            directions[segments] = closed(directions[segments], lengths, goal, steps, give=give)
             root = root + chord(directions[segments], lengths)
     return directions
 
@@ -219,17 +221,30 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
     return result
 
 
-def closed(directions: Floats, lengths: Floats, goal: Floats, steps: int = _NEWTON_STEPS) -> Floats:
+def closed(
+    directions: Floats,
+    lengths: Floats,
+    goal: Floats,
+    steps: int = _NEWTON_STEPS,
+    *,
+    give: float = 0.0,
+) -> Floats:
     """A group bent as much as it takes for its end to be at the goal, in the shape it has.
 
     The bends are the angles between the segments and the chord. The tangents of half of them are
     all scaled by one factor, so that the chord is as long as the goal is far; then the group is
     turned about its root.
+
+    The bend goes with the square root of what the chord is short of the group. So a goal that
+    comes and goes at an even speed straightens the group with a snap. With s what the chord is
+    short of, in group lengths, s² / (s + give) in its place makes the bend go with s itself where
+    that is little.
     """
     whole = float(np.sum(lengths))
     if len(lengths) > 1:
         slack = 1.0 - _size(goal) / whole
         slack = 0.5 * (slack + np.sqrt(slack * slack + _ROUNDING**2))
+        slack *= slack / (slack + give)
         directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0), steps)
     return aimed(directions, lengths, goal)
 

@@ -71,6 +71,9 @@ class GaitSettings:
     """Weights a of the joints, at even steps from the arm's root to its tip, each in (0, 1]."""
     softness: float = 0.8
     """0 leaves bends where CCD puts them; towards 1 they are spread over neighbouring joints."""
+    give: float = 0.0
+    """Group lengths by which an arm may reach beyond its targets as it straightens, so that it does
+    so gently; 0 meets them, as the source does, with a snap."""
     sway: float = np.radians(10.0)
     """Bend across the gait's own that each group starts with, so that no group passes through a
     straight line."""
@@ -90,8 +93,8 @@ class GaitSettings:
 
     def __post_init__(self) -> None:
         numbers = (
-            *(self.contraction, self.softness, self.sway, self.phase_spread, self.turning),
-            *(*self.weights, *self.variation),
+            *(self.contraction, self.softness, self.give, self.sway, self.phase_spread),
+            *(self.turning, *self.weights, *self.variation),
         )
         if not np.all(np.isfinite(numbers)):
             raise SettingsError("A setting of the gait is not a number.", "Set it anew.")
@@ -109,6 +112,8 @@ class GaitSettings:
             )
         if not 0.0 <= self.softness <= 1.0:
             raise SettingsError(f"The softness is {self.softness:g}.", "Give a value from 0 to 1.")
+        if not 0.0 <= self.give <= 1.0:
+            raise SettingsError(f"The give is {self.give:g}.", "Give a value from 0 to 1.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,6 +389,7 @@ class Generator:
             _batch_last(links, batch),
             targets,
             softness=self._settings.softness,
+            give=self._settings.give,
             floor=floor,
         )
         joints = np.cumsum(build.chain.lengths[:, None, None] * directions, axis=0)

@@ -290,6 +290,17 @@ class OCTO_MOTION_PG_locomotion(
         max=1.0,
         override=OVERRIDE,
     )
+    give: FloatProperty(
+        name="Give",
+        description="How far an arm may reach beyond its targets as it straightens, in lengths of "
+        "a third of it: it straightens gently. 0 meets them exactly, and snaps straight",
+        subtype="FACTOR",
+        default=0.08,
+        min=0.0,
+        max=1.0,
+        soft_max=0.3,
+        override=OVERRIDE,
+    )
     sway: FloatProperty(
         name="Sway",
         description="Bend across the gait's own that keeps an arm from becoming a straight line",

@@ -909,6 +909,7 @@ def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> Gait
         contraction=settings.contraction,
         weights=weights,
         softness=settings.softness,
+        give=settings.give,
         sway=settings.sway,
         phase_spread=settings.phase_spread,
         variation=(settings.variation_min, settings.variation_max),
