@@ -211,8 +211,9 @@ def write_action(
     settings_note: str = "",
     repeats: bool = False,
     replaceable: bool = False,
+    automatic: bool = False,
 ) -> bpy.types.Action:
-    """Give an object an action with these channels: their own keys, or one linear key per frame.
+    """Give an object an action with these channels: their own keys, or one key per frame.
 
     ``previous`` is written anew in place, and keeps its name, slot and users, if it was made here
     for this object, nobody has edited it since, and no other object, NLA strip or constraint uses
@@ -228,6 +229,7 @@ def write_action(
         settings_note: kept with the action, for whoever wants to know how it was made.
         repeats: whether curves go on before their first key and after their last, over and over.
         replaceable: whether :func:`may_replace` has just said yes of ``previous``.
+        automatic: whether keys on every frame have automatic handles, and lead straight on if not.
 
     Returns:
         The action, assigned to the object together with its slot.
@@ -250,7 +252,7 @@ def write_action(
     assert isinstance(strip, bpy.types.ActionKeyframeStrip)
     channelbag = strip.channelbag(slot, ensure=True)
     assert channelbag is not None
-    digests, handles = _write_curves(channelbag, times, channels)
+    digests, handles = _write_curves(channelbag, times, channels, automatic=automatic)
     _repeat(channelbag, repeats=repeats)
     action.use_cyclic = repeats
     action.use_frame_range = True
@@ -383,14 +385,18 @@ def _checked(frames: Floats, channels: Sequence[Channel]) -> np.ndarray:
 
 
 def _write_curves(
-    channelbag: bpy.types.ActionChannelbag, times: np.ndarray, channels: Sequence[Channel]
+    channelbag: bpy.types.ActionChannelbag,
+    times: np.ndarray,
+    channels: Sequence[Channel],
+    *,
+    automatic: bool,
 ) -> tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]:
     """Make the curves what the channels say. Curves that are there already are filled anew, so
     that their colours, selection and place in the editors stay.
 
     Returns:
         The hash of each curve's keys, by its data path and index: to read them back takes longer
-        than to write them. The handles of those that have Bézier keys.
+        than to write them. The handles of those that have keys of their own.
     """
     digests: dict[tuple[str, int], bytes] = {}
     handles: dict[tuple[str, int], np.ndarray] = {}
@@ -398,7 +404,8 @@ def _write_curves(
     # Everything goes through the same few buffers: memory stays modest, however many the bones.
     points = np.empty((len(times), 2), dtype=np.float32)
     points[:, 0] = times
-    linear = _filled(len(times), "interpolation", "LINEAR")
+    kinds = _filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR")
+    sides = _filled(len(times), "handle_left_type", "AUTO") if automatic else None
     # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
     generated = _filled(len(times), "type", "GENERATED")
     for channel in channels:
@@ -408,7 +415,7 @@ def _write_curves(
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
             keys = curve.keyframe_points
             # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
-            regrouped = _is_bezier(curve) != (channel.keys is not None)
+            regrouped = _has_own_handles(curve) != (channel.keys is not None)
             if curve.group is None or (regrouped and curve.group.name != channel.group):
                 group = channelbag.groups.get(channel.group)
                 curve.group = group or channelbag.groups.new(channel.group)
@@ -421,10 +428,15 @@ def _write_curves(
                 keys.add(len(times))
             points[:, 1] = channel.values[:, component]
             keys.foreach_set("co", points.ravel())
-            keys.foreach_set("interpolation", linear)
+            keys.foreach_set("interpolation", kinds)
             keys.foreach_set("type", generated)
+            if sides is not None:
+                # Else handles depend on those of all other keys, and swing after a sudden turn.
+                curve.auto_smoothing = "NONE"
+                keys.foreach_set("handle_left_type", sides)
+                keys.foreach_set("handle_right_type", sides)
             curve.update()
-            digests[place] = _keys_digest(points, linear, generated)
+            digests[place] = _keys_digest(points, kinds, generated, sides)
     for curve in curves.values():
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
@@ -463,9 +475,19 @@ def _write_bezier(
     return _keys_digest(coordinates, bezier, generated), _handles(curve)
 
 
-def _is_bezier(curve: bpy.types.FCurve) -> bool:
+def _has_own_handles(curve: bpy.types.FCurve) -> bool:
+    """Whether its handles were set, rather than left to Blender, or to nobody."""
     keys = curve.keyframe_points
-    return len(keys) > 0 and keys[0].interpolation == "BEZIER"
+    if len(keys) == 0 or keys[0].interpolation != "BEZIER":
+        return False
+    return keys[0].handle_left_type != "AUTO"
+
+
+def _has_automatic_handles(curve: bpy.types.FCurve) -> bool:
+    keys = curve.keyframe_points
+    return (
+        len(keys) > 0 and keys[0].interpolation == "BEZIER" and keys[0].handle_left_type == "AUTO"
+    )
 
 
 def _handles(curve: bpy.types.FCurve) -> np.ndarray:
@@ -486,7 +508,7 @@ def _handles_moved(action: bpy.types.Action) -> bool:
     start = 0
     for curve in _sorted_curves(action):
         points = curve.keyframe_points
-        if not _is_bezier(curve):
+        if not _has_own_handles(curve):
             continue
         now, then = _handles(curve), written[start : start + len(points)]
         start += len(points)
@@ -533,8 +555,9 @@ def _fingerprint(
     """A hash of all in an action that an artist can have set on purpose.
 
     Handles of linear keys are left out: they have no effect, and a key that is made Bézier changes
-    its interpolation. Those of Bézier keys are compared, not hashed: Blender rounds aligned ones
-    anew each time that a curve is updated.
+    its interpolation. Of automatic ones their being so counts: one that is moved is so no more.
+    Others are compared, not hashed: Blender rounds aligned ones anew each time that a curve is
+    updated.
 
     Args:
         action: the action.
@@ -561,15 +584,37 @@ def _fingerprint(
         keys.foreach_get("co", points.ravel())
         keys.foreach_get("interpolation", interpolation)
         keys.foreach_get("type", kinds)
-        digest.update(_keys_digest(points, interpolation, kinds))
+        sides = None
+        if _has_automatic_handles(curve):
+            sides = np.empty(len(keys), dtype=_ENUMERATION)
+            right = sides.copy()
+            keys.foreach_get("handle_left_type", sides)
+            keys.foreach_get("handle_right_type", right)
+            # The same number twice, as it was written, or neither of the two.
+            sides = np.where(sides == right, sides, np.uint8(255))
+        digest.update(_keys_digest(points, interpolation, kinds, sides))
     return digest.hexdigest()
 
 
-def _keys_digest(points: np.ndarray, interpolation: np.ndarray, kinds: np.ndarray) -> bytes:
-    """Hash of a curve's keys: (keys, 2) frames and values, single precision, and their kinds."""
+def _keys_digest(
+    points: np.ndarray,
+    interpolation: np.ndarray,
+    kinds: np.ndarray,
+    sides: np.ndarray | None = None,
+) -> bytes:
+    """Hash of a curve's keys.
+
+    Args:
+        points: (keys, 2) frames and values, single precision.
+        interpolation: (keys,) of each.
+        kinds: (keys,) types.
+        sides: (keys,) types of the handles, where these are automatic.
+    """
     digest = hashlib.blake2b(points, digest_size=16)
     digest.update(interpolation)
     digest.update(kinds)
+    if sides is not None:
+        digest.update(sides)
     return digest.digest()
 
 

@@ -17,11 +17,15 @@ _SAME_FRAME: Final = 1e-4
 def evaluate(curve: bpy.types.FCurve, frames: Floats) -> Floats:
     """The values (frames,) of one F-curve at these frames, subframes included.
 
-    Straight and stepped keys are read in bulk. Whatever else there is (Bézier and eased keys,
-    modifiers, sampled curves) Blender evaluates itself.
+    Straight and stepped keys are read in bulk, and so are values that are asked for where a key is.
+    Whatever else there is (between Bézier and eased keys, modifiers, sampled curves) Blender
+    evaluates itself.
     """
     keys = _plain_keys(curve)
     if keys is None:
+        values = _at_keys(curve, frames)
+        if values is not None:
+            return values
         return np.array([curve.evaluate(float(frame)) for frame in frames])
     times, values, steps = keys
     result = np.interp(frames, times, values)
@@ -66,6 +70,20 @@ def _plain_keys(curve: bpy.types.FCurve) -> tuple[Floats, Floats, np.ndarray] | 
     if (np.diff(times) <= _SAME_FRAME).any():
         return None
     return times, values, steps
+
+
+def _at_keys(curve: bpy.types.FCurve, frames: Floats) -> Floats | None:
+    """Values at frames that have keys, all of them; else none."""
+    count = len(curve.keyframe_points)
+    if count == 0 or len(curve.modifiers) or not len(frames):
+        return None
+    points = np.empty(2 * count, dtype=np.float32)
+    curve.keyframe_points.foreach_get("co", points)
+    times, values = points.reshape(-1, 2).T.astype(np.float64)
+    if (np.diff(times) <= 2.0 * _SAME_FRAME).any():
+        return None
+    nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), frames)
+    return values[nearest] if np.all(np.abs(times[nearest] - frames) <= 1e-6) else None
 
 
 def _kind(name: str) -> int:

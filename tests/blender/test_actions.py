@@ -13,6 +13,7 @@ from octo_motion.blender import actions
 from octo_motion.blender.actions import Channel
 from octo_motion.core import rotations
 from octo_motion.core.errors import RigError
+from octo_motion.core.locomotion import figures
 from octo_motion.core.rotations import EULER_ORDERS, Floats
 
 ROTATION_MODES = ("QUATERNION", "AXIS_ANGLE", *EULER_ORDERS)
@@ -156,6 +157,45 @@ def test_bone_locations_play_back() -> None:
         now = array(pose_bones(posed(obj, frame))[0].matrix)
         wanted = rest[:3, 3] + rest[:3, :3] @ locations[frame]
         np.testing.assert_allclose(now[:3, 3], wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_with_automatic_handles_it_plays_half_way_between_frames_what_is_measured(
+    *,
+    cyclic: bool,
+) -> None:
+    obj = make_armature()
+    rng = np.random.default_rng(4)
+    turns = rotations.from_rotation_vector(np.cumsum(0.4 * rng.normal(size=(30, 3)), axis=0))
+    places = np.cumsum(rng.normal(size=(30, 3)), axis=0)
+    if cyclic:
+        turns[-1], places[-1] = turns[0], places[0]
+    turns = rotations.continuous(turns)
+    channels = [
+        actions.location_channel(obj, "Arm 1", places),
+        *actions.rotation_channels(obj, ["Arm 1"], turns[:, None]),
+    ]
+    frames = np.arange(1.0, 31.0)
+    action = actions.write_action(
+        obj, "Walk", frames, channels, previous=None, automatic=True, repeats=cyclic
+    )
+    poses = figures.Poses(turns[:, None], np.zeros((30, 1)), places, turns)
+    half = figures.automatic(poses, cyclic=cyclic)
+    curves = {(each.data_path, each.array_index): each for each in channelbag(action).fcurves}
+    path = 'pose.bones["Arm 1"].'
+    for component in range(3):
+        curve = curves[path + "location", component]
+        played = [curve.evaluate(frame + 0.5) for frame in frames[:-1]]
+        np.testing.assert_allclose(played, half.locations[:, component], atol=2e-5)
+    played = np.array(
+        [
+            [curves[path + "rotation_quaternion", each].evaluate(frame + 0.5) for each in range(4)]
+            for frame in frames[:-1]
+        ]
+    )
+    played /= np.linalg.norm(played, axis=1, keepdims=True)
+    np.testing.assert_allclose(np.abs(np.sum(played * half.orientations, axis=1)), 1.0, atol=1e-6)
+    assert not actions.is_edited(action)
 
 
 @pytest.mark.parametrize("frames", [[1.0, 2.5, 2.75, 10.0], [-20.5, 0.0, 3.125]])

@@ -52,6 +52,7 @@ def generate(
     height: float = 1.0,
     count: int = 10,
     bones: tuple[str, ...] = ("Arm", "Tip"),
+    automatic: bool = True,
 ) -> bpy.types.Action:
     """A walk whose height tells which one it is."""
     turns = np.zeros((count, len(bones), 4))
@@ -61,7 +62,9 @@ def generate(
         *actions.rotation_channels(obj, bones, turns),
     ]
     frames = np.arange(1.0, count + 1.0)
-    return actions.write_action(obj, "Walk", frames, channels, previous=previous)
+    return actions.write_action(
+        obj, "Walk", frames, channels, previous=previous, automatic=automatic
+    )
 
 
 def height_at(obj: bpy.types.Object, frame: int) -> float:
@@ -245,7 +248,11 @@ EDITS: dict[str, Callable[[bpy.types.Action], object]] = {
     ),
     "key inserted": lambda action: curve(action).keyframe_points.insert(4.5, 1.0),
     "interpolation": lambda action: setattr(
-        curve(action).keyframe_points[3], "interpolation", "BEZIER"
+        curve(action).keyframe_points[3], "interpolation", "CONSTANT"
+    ),
+    "handle": lambda action: setattr(curve(action).keyframe_points[3], "handle_right_type", "FREE"),
+    "first handle": lambda action: setattr(
+        curve(action).keyframe_points[0], "handle_left_type", "VECTOR"
     ),
     "key type": lambda action: setattr(curve(action).keyframe_points[3], "type", "EXTREME"),
     "modifier": lambda action: curve(action).modifiers.new("NOISE"),
@@ -288,6 +295,25 @@ def test_edited_action_is_kept_and_a_new_one_made(
     # From then on the new one is made anew, the edited one stays.
     assert generate(obj, second, height=3.0) == second
     assert everything(first) | {"users": 0} == before | {"users": 0}
+
+
+def test_linear_keys_made_bezier_are_an_edit_and_their_handles_are_none() -> None:
+    obj = make_armature()
+    first = generate(obj, automatic=False)
+    curve(first).keyframe_points[3].handle_left_type = "FREE"
+    assert not actions.is_edited(first)
+    curve(first).keyframe_points[3].interpolation = "BEZIER"
+    assert actions.is_edited(first)
+
+
+def test_a_motion_may_be_made_anew_with_the_other_kind_of_keys() -> None:
+    obj = make_armature()
+    first = generate(obj, automatic=False)
+    for automatic in (True, False, True):
+        assert generate(obj, first, automatic=automatic) == first
+        assert not actions.is_edited(first)
+        kind = "BEZIER" if automatic else "LINEAR"
+        assert {key.interpolation for key in curve(first).keyframe_points} == {kind}
 
 
 def test_eye_keyed_by_the_artist_in_the_same_action_is_kept() -> None:

@@ -145,6 +145,7 @@ def computed(armature: Any) -> Shot:
 
 
 def test_an_arm_that_reaches_neither_slips_nor_misses(octopus: Any) -> None:
+    octopus.octo_motion.locomotion.frame_end = 120
     before = {figure.kind: figure for figure in computed(octopus).figures}
     cube: Any = make_mesh(
         [(x, y, z) for x in (-0.03, 0.03) for y in (-0.03, 0.03) for z in (-0.03, 0.03)],

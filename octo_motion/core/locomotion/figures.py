@@ -13,13 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from ..rotations import Floats, normalized, rotate
+from ..rotations import Floats, continuous, normalized, rotate
 from . import quality
 from .arm_frames import ArmFrames
 from .ground import Ground
 from .quality import Worst
 from .separation import Separation
 
+_HANDLE: Final = 1.0 / 2.5614
+"""Length of an automatic handle, as a share of the time between two keys."""
 KINDS: Final = ("SLIP", "DEPTH", "STRAIN", "MISS", "TURN", "OVERLAP")
 """What is measured: arm lengths that an arm slides over the ground that it holds, that its joints
 are below the ground, by which share a bone is longer or shorter than at rest, arm lengths that an
@@ -82,6 +84,39 @@ class Measured:
     """At every how many frames overlaps were looked for."""
     halfway: Poses | None = None
     """Half way between frames (frames − 1); none where keys on every frame lead straight on."""
+
+
+def automatic(poses: Poses, *, cyclic: bool) -> Poses:
+    """Half way between frames (frames − 1), as Blender plays keys with automatic handles.
+
+    Args:
+        poses: at the frames, one frame apart.
+        cyclic: whether the motion is a loop whose curves repeat.
+    """
+    return Poses(
+        _automatic(continuous(poses.rotations), cyclic=cyclic, turns=True),
+        _automatic(poses.strains, cyclic=cyclic),
+        _automatic(poses.locations, cyclic=cyclic),
+        _automatic(continuous(poses.orientations), cyclic=cyclic, turns=True),
+    )
+
+
+def _automatic(values: Floats, *, cyclic: bool, turns: bool = False) -> Floats:
+    """Half way between values (frames, …) whose keys have automatic handles.
+
+    The slope at a key is that from its neighbour before to the one after; at either end of a curve
+    that does not repeat it is level. The handle's length is Blender's.
+    """
+    slopes = np.zeros_like(values)
+    slopes[1:-1] = 0.5 * (values[2:] - values[:-2])
+    if cyclic and len(values) > 2:
+        # The last frame is the first again; of a turn it may be so the other way round.
+        same = np.sum(values[-1] * values[0], axis=-1, keepdims=True)
+        sign = np.where(same < 0.0, -1.0, 1.0) if turns else 1.0
+        slopes[0] = 0.5 * (values[1] - values[0] + sign * (values[-1] - values[-2]))
+        slopes[-1] = sign * slopes[0]
+    half = 0.5 * (values[:-1] + values[1:]) + 0.375 * _HANDLE * (slopes[:-1] - slopes[1:])
+    return normalized(half) if turns else half
 
 
 def figures(measured: Measured) -> tuple[Figure, ...]:

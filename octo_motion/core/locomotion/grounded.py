@@ -174,7 +174,12 @@ class GroundedWalk:
         return self._rhythm.phases(self._stride * np.asarray(phase) / _CYCLE)
 
     def pose(
-        self, phase: Floats, turn: Floats, centres: Floats, orientations: Floats
+        self,
+        phase: Floats,
+        turn: Floats,
+        centres: Floats,
+        orientations: Floats,
+        lift: Floats | None = None,
     ) -> GroundedPoses:
         """The arms at some frames.
 
@@ -183,6 +188,8 @@ class GroundedWalk:
             turn: (frames, 2) turn that lies ahead, in the body's XY plane.
             centres: (frames, 3) of the body, world.
             orientations: (frames, 4) of the canonical body, world.
+            lift: (frames, arms) arm lengths that arms are to be higher where they do not lie, none
+                for as high as they have to be.
         """
         generator = self._generator
         frames, count = len(phase), len(generator.arms)
@@ -210,6 +217,7 @@ class GroundedWalk:
                 np.ascontiguousarray(roots.reshape(batch, 3).T),
                 turned(facing, np.array([1.0, 0.0, 0.0])[:, None]),
                 turned(facing, np.array([0.0, 0.0, 1.0])[:, None]),
+                self._lifted(limbs, lift, columns, frames),
             )
             held = hold(
                 held_by,
@@ -246,6 +254,13 @@ class GroundedWalk:
             tuple(np.moveaxis(each, 0, 2) for each in lying),
             cycles,
         )
+
+    @staticmethod
+    def _lifted(limbs: Limbs, lift: Floats | None, columns: list[int], frames: int) -> Floats:
+        """Metres (frames × arms) that arms are to be higher."""
+        if lift is None:
+            return np.zeros(frames * len(columns))
+        return (lift[:, columns] * limbs.reach[-1]).reshape(-1)
 
     @property
     def builds(self) -> tuple[tuple[int, ...], ...]:

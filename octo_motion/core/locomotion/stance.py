@@ -82,6 +82,8 @@ class Batch:
     """(3, batch) unit: straight out of the body, world."""
     upward: Floats
     """(3, batch) unit: the body's up, world."""
+    lift: Floats
+    """(batch,) metres that joints which do not lie are to be higher than they need be."""
 
     @cached_property
     def lengths(self) -> Floats:
@@ -106,6 +108,7 @@ class Batch:
             self.roots[:, chosen],
             self.outward[:, chosen],
             self.upward[:, chosen],
+            self.lift[chosen],
         )
 
 
@@ -225,7 +228,7 @@ def stand(
         away = 1.0 - own.weight
         let_go = smooth(_AT_ONCE * away)
         free = _freedom(part, own)
-        needed = part.radii + settings.lift * part.reach[-1] * away**2
+        needed = part.radii + (settings.lift * part.reach[-1] * away**2 + part.lift)
         directions[..., swinging] = raised(
             directions[..., swinging],
             lengths[:, swinging],
@@ -279,7 +282,7 @@ def _held(
             lengths,
             free=free,
             roots=batch.roots,
-            needed=batch.radii,
+            needed=batch.radii + batch.lift,
             loose=loose,
             ground=ground,
             rounds=_RAISES_BETWEEN,

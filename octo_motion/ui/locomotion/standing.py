@@ -71,12 +71,24 @@ class Standing:
         centres, upright = self.line.ride(travel.positions, travel.distance)
         return centres, leaning(upright, travel.rotations)
 
-    def pose(self, travel: Travel, part: slice, places: tuple[Floats, Floats]) -> GroundedPoses:
-        """The arms at some of the frames, whose places :meth:`place` has found."""
+    def pose(
+        self,
+        travel: Travel,
+        part: slice | np.ndarray,
+        places: tuple[Floats, Floats],
+        lift: Floats | None = None,
+    ) -> GroundedPoses:
+        """The arms at some of the frames, whose places :meth:`place` has found.
+
+        Args:
+            travel: the body's.
+            part: which frames.
+            places: of all frames.
+            lift: (frames, arms) arm lengths that arms are to be higher in the air.
+        """
         centres, orientations = places
-        return self.walk.pose(
-            travel.phase[part], travel.turn[part], centres[part], orientations[part]
-        )
+        phase, turn = travel.phase[part], travel.turn[part]
+        return self.walk.pose(phase, turn, centres[part], orientations[part], lift)
 
 
 def resting(settings: OCTO_MOTION_PG_locomotion) -> tuple[bool, bool]:

@@ -35,14 +35,16 @@ from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
 from ...core.keys import check_bounds
 from ...core.locomotion.arm_frames import arm_frames
+from ...core.locomotion.between_frames import Course, raised_between
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.changes import between
 from ...core.locomotion.detection import Detection, detect_arms
-from ...core.locomotion.figures import Figure, Measured, Poses, figures
+from ...core.locomotion.figures import Figure, Measured, Poses, automatic, figures
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
 from ...core.locomotion.ground import Ground
+from ...core.locomotion.keeping_apart import kept_apart
 from ...core.locomotion.loops import route_in_place, travel_in_place, whole_frames
 from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
@@ -177,7 +179,12 @@ class Shot:
     wanted: dict[Place, Wanted]
     """What the artist wants of single contacts."""
     apart: Apart | None
-    """What tells whether arms overlap."""
+    """What there is of the creature, where arms keep apart or overlaps are told."""
+    keep_apart: bool
+    """Whether arms make way for each other."""
+    tell_overlaps: bool
+    cycle: float
+    """Frames of a cycle of the gait."""
     measure: bool
     """Whether figures of the motion are wanted."""
     reaching: Reaching | None
@@ -234,6 +241,7 @@ class Shot:
         cycles = np.zeros((count, len(self.arms)), dtype=np.int64)
         step = max(1, _BONES_AT_ONCE // max(bones, 1))
         moving = 1.0 if self.tolerances is None else _MOVING
+        joints: list[list[Floats]] = []
         if self.changing is not None:
             for done in self.changing.compute(travel.distance, places, step):
                 if isinstance(done, Moved):
@@ -251,6 +259,7 @@ class Shot:
                 rotations[part], strains[part] = stood.rotations, stood.strains
                 late[part] = stood.misses
                 cycles[part] = stood.cycles
+                joints.append(standing.walk.by_arm(stood.joints))
                 for arm, rests in zip(lying, standing.walk.by_arm(stood.lying), strict=True):
                     arm[part] = rests
             else:
@@ -259,14 +268,44 @@ class Shot:
                 misses[part] = poses.misses.max(axis=2)
             if part.stop < count:
                 yield moving * part.stop / count
+        if standing is not None and self.changing is None:
+
+            def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
+                """Some frames anew, with arms raised."""
+                stood = standing.pose(travel, chosen, places, lift)
+                late[chosen] = stood.misses
+                poses = Poses(stood.rotations, stood.strains, going[0][chosen], going[1][chosen])
+                return poses, standing.walk.by_arm(stood.joints)
+
+            frames = [arm_frames(self.skeleton, arm.bones, self.body) for arm in self.arms]
+            course = Course(frames, standing.ground, self.scale, cyclic=self.in_place)
+            whole = Poses(rotations, strains, *going)
+            together = [np.concatenate(each) for each in zip(*joints, strict=True)]
+            raised = raised_between(course, whole, together, again)
+            rotations, strains = raised.rotations, raised.strains
+        busy = np.zeros((count, len(self.arms)), dtype=bool)
         if self.reaching is not None:
             travelling = Travelling(locations, orientations, self.scale)
             before = rotations.copy()
             reached = self.reaching.apply(self.frames, rotations, travelling, strains)
             self.reached, self.carried = reached
-            self._let_go(np.any(rotations != before, axis=-1), lying, late, misses)
+            busy = self._let_go(np.any(rotations != before, axis=-1), lying, late, misses)
+        if self.apart is not None and self.keep_apart:
+            moved = kept_apart(
+                self.apart.bulk,
+                rotations,
+                strains,
+                lying=lying,
+                busy=busy,
+                travel=going,
+                ground=self._ground(),
+                scale=self.scale,
+                frames_per_cycle=self.cycle,
+                cyclic=self.in_place,
+            )
+            rotations = rotations if moved is None else moved
         separation, every = None, 1
-        if self.apart is not None:
+        if self.apart is not None and self.tell_overlaps:
             separation, every = self.apart.measure(rotations, strains)
             self.overlaps = self.apart.told(separation, every, self.frames)
         if self.measure:
@@ -284,6 +323,7 @@ class Shot:
                 cycles=cycles,
                 separation=separation,
                 every=every,
+                halfway=automatic(Poses(rotations, strains, *going), cyclic=self.repeats),
             )
         self.rotations, self.misses = rotations, misses
         self.strains, self.out_of_reach = strains, late
@@ -326,8 +366,11 @@ class Shot:
 
     def _let_go(
         self, moved: np.ndarray, lying: Sequence[np.ndarray], late: Floats, misses: Floats
-    ) -> None:
+    ) -> np.ndarray:
         """Note in place that arms which reach hold no ground and follow no gait.
+
+        Returns:
+            Which arms (frames, arms) these are.
 
         Args:
             moved: (frames, bones) which bones reach.
@@ -335,13 +378,15 @@ class Shot:
             late: (frames, arms) arm lengths to footholds.
             misses: (frames, arms) arm lengths to targets.
         """
-        start = 0
+        start, busy = 0, np.zeros(late.shape, dtype=bool)
         for number, arm in enumerate(self.arms):
             own = moved[:, start : start + len(arm.bones)]
             start += len(arm.bones)
             lying[number][:, 1:] &= ~np.logical_or.accumulate(own, axis=1)
             reaches = own.any(axis=1)
             late[reaches, number] = misses[reaches, number] = 0.0
+            busy[:, number] = reaches
+        return busy
 
     def _ground(self) -> Ground | None:
         """What the arms stand on, where they do."""
@@ -381,6 +426,7 @@ class Shot:
                 settings_note=self.note,
                 repeats=self.repeats,
                 replaceable=unedited,
+                automatic=self.few is None,
             )
         except WriteError:
             settings.result = previous
@@ -650,8 +696,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         if any(not way.gait.on_ground for way in changing.ways) and settings.streamline > 0.0:
             mantle = head
     apart = None
-    if settings.tell_overlaps and not live:
-        apart = read_apart(armature, skeleton, arms, body)
+    tell_overlaps = settings.tell_overlaps and not live
+    if settings.keep_apart or tell_overlaps:
+        apart = read_apart(armature, skeleton, arms, body, live=live)
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -683,6 +730,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         changing=changing,
         wanted=wanted,
         apart=apart,
+        keep_apart=settings.keep_apart,
+        tell_overlaps=tell_overlaps,
+        cycle=(len(frames) - 1) / max(strides(route, travel), 1e-9),
         measure=not live,
         reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
         note=settings_note(settings),

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms that would dip into the ground between two frames, raised at these.
+
+On every frame an arm is off the ground. From one to the next keys lead each bone on by itself, and
+where a fast arm turns far in one frame, the way between two poses is not the arm's own: it may
+lead through a bump. The frames round such a moment are posed again, with the arm higher by as much
+as it was too low.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..rotations import Floats, rotate
+from .arm_frames import ArmFrames
+from .figures import Poses, automatic
+from .ground import Ground
+from .over_time import covered
+
+_TOLERATED: Final = 0.002
+"""Arm lengths that a joint may be below the ground half way between frames …"""
+_SPARE: Final = 0.003
+"""… and by which one that was deeper is raised above it."""
+_ROUNDS: Final = 4
+_ASTRAY: Final = 0.125
+"""By how much an arm is astray half way between frames at most, in arm lengths: for straight keys,
+and with the whole arm as a lever, an eighth of what each of its bones' quaternions bends by, twice
+as that is half an angle, and half as there are two such frames."""
+_WIDTH: Final = 1
+"""Frames of the means by which arms rise and sink again: smoothly, within six frames."""
+_MOST: Final = 0.25
+"""Arm lengths that an arm is raised at most: what needs more is no matter of frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """The arms of a body over time, and what they are above of."""
+
+    arms: Sequence[ArmFrames]
+    ground: Ground
+    scale: float
+    """Metres of the armature's unit."""
+    cyclic: bool = False
+    """Whether the last frame is the first again, and the motion repeats."""
+
+    def clear(self, joints: Sequence[Floats]) -> Floats:
+        """Arm lengths (frames, arms) that each arm's lowest joint is above the ground.
+
+        Args:
+            joints: of each arm (frames, joints, 3), world.
+        """
+        return np.stack(
+            [
+                (own[:, 1:, 2] - self.ground.height(own[:, 1:])).min(axis=1)
+                / (arm.length * self.scale)
+                for arm, own in zip(self.arms, joints, strict=True)
+            ],
+            axis=1,
+        )
+
+    def dips(self, poses: Poses, clear: Floats) -> Floats:
+        """Arm lengths (frames − 1, arms) that each one's lowest joint is below the ground half way
+        between frames; 0 where it cannot be.
+
+        Args:
+            poses: at the frames.
+            clear: (frames, arms) arm lengths that they are above the ground there.
+        """
+        bends = _bends(poses.rotations)
+        half = automatic(poses, cyclic=self.cyclic)
+        found = np.zeros((len(half.rotations), len(self.arms)))
+        start = 0
+        for number, arm in enumerate(self.arms):
+            own = slice(start, start + len(arm.bones))
+            start = own.stop
+            astray = bends[:, own].sum(axis=1)
+            least = np.minimum(clear[:-1, number], clear[1:, number])
+            chosen = np.flatnonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + _TOLERATED)
+            frames = arm.from_bones(half.rotations[chosen, own])
+            joints = self.scale * arm.joints(frames, half.strains[chosen, own])[:, 1:]
+            world = rotate(half.orientations[chosen, None], joints)
+            world += half.locations[chosen, None]
+            below = self.ground.height(world) - world[..., 2]
+            found[chosen, number] = below.max(axis=1) / (arm.length * self.scale)
+        return found
+
+
+def _bends(values: Floats) -> Floats:
+    """Second differences of quaternions (frames, bones, 4), how long they are (frames, bones)."""
+    last = [2 * values[:1] - values[1:2], values, 2 * values[-1:] - values[-2:-1]]
+    around = np.concatenate(last)
+    second = around[2:] - 2.0 * values + around[:-2]
+    return np.sqrt(np.einsum("fbc,fbc->fb", second, second))
+
+
+def raised_between(
+    course: Course,
+    poses: Poses,
+    joints: Sequence[Floats],
+    again: Callable[[np.ndarray, Floats], tuple[Poses, Sequence[Floats]]],
+) -> Poses:
+    """The same motion, without arms that dip into the ground between frames.
+
+    Args:
+        course: arms and ground.
+        poses: of all frames; they are left as they are.
+        joints: of each arm (frames, joints, 3) then, world.
+        again: poses of some frames (n,), with arms (n, arms) so many arm lengths higher, and the
+            joints of each arm.
+    """
+    if len(poses.rotations) < 2:
+        return poses
+    clear = course.clear(joints)
+    lift = np.zeros(clear.shape)
+    tried = [(poses, course.dips(poses, clear))]
+    for _ in range(_ROUNDS):
+        last, deep = tried[-1]
+        asked = _at_frames(np.where(deep > _TOLERATED, deep + _SPARE, 0.0), cyclic=course.cyclic)
+        more = covered(asked, _WIDTH, cyclic=course.cyclic)
+        chosen = np.flatnonzero(np.any(more > 0.0, axis=1))
+        if not len(chosen):
+            break
+        lift = np.minimum(lift + more, _MOST)
+        fresh, places = again(chosen, lift[chosen])
+        rotations, strains = last.rotations.copy(), last.strains.copy()
+        rotations[chosen], strains[chosen] = fresh.rotations, fresh.strains
+        clear[chosen] = course.clear(places)
+        higher = Poses(rotations, strains, poses.locations, poses.orientations)
+        tried.append((higher, course.dips(higher, clear)))
+    return _best(course, tried, lift > 0.0)
+
+
+def _best(course: Course, tried: Sequence[tuple[Poses, Floats]], raised: np.ndarray) -> Poses:
+    """Of several ways to raise arms, wherever one was raised, the one with the least dip.
+
+    A higher arm may dip the more, where it has to come down from there in a frame.
+
+    Args:
+        course: the arms.
+        tried: poses, and what :meth:`Course.dips` says of them.
+        raised: (frames, arms) where these are not the same.
+    """
+    if len(tried) == 1:
+        return tried[0][0]
+    rotations, strains = tried[0][0].rotations.copy(), tried[0][0].strains.copy()
+    start = 0
+    for number, arm in enumerate(course.arms):
+        bones = slice(start, start + len(arm.bones))
+        start = bones.stop
+        for first, end in _runs(raised[:, number]):
+            moments = slice(max(first - 1, 0), end)
+            depths = [deep[moments, number].max(initial=0.0) for _, deep in tried]
+            poses, _ = tried[int(np.argmin(np.maximum(depths, _TOLERATED)))]
+            rotations[first:end, bones] = poses.rotations[first:end, bones]
+            strains[first:end, bones] = poses.strains[first:end, bones]
+    whole = tried[0][0]
+    return Poses(rotations, strains, whole.locations, whole.orientations)
+
+
+def _at_frames(halfway: Floats, *, cyclic: bool) -> Floats:
+    """The greater (frames, …) of values half way (frames − 1, …) before and after each frame."""
+    none = np.zeros((1, *halfway.shape[1:]))
+    before, after = (halfway[-1:], halfway[:1]) if cyclic else (none, none)
+    return np.maximum(np.concatenate([before, halfway]), np.concatenate([halfway, after]))
+
+
+def _runs(where: np.ndarray) -> list[tuple[int, int]]:
+    """Starts and ends of frames (frames,) in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]])))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
