@@ -9,6 +9,7 @@ from typing import Final
 import bpy
 import numpy as np
 
+from ..core.remembered import key_of
 from ..core.rotations import Floats
 
 _MOST_VERTICES: Final = 3_000
@@ -17,6 +18,8 @@ _FEW: Final = 4
 """Vertices of a bone that do not yet tell its thickness."""
 _MOST: Final = 0.75
 """Share of a bone's vertices that lie within its radius: suckers stand out a little."""
+_ROUNDED: Final = 1e-6
+"""To which a skin's place on its armature is known."""
 _BONE_ROOT, _BONE_TIP = 0.06, 0.012
 """Radius in arm lengths at root and tip of an arm without skin."""
 
@@ -48,6 +51,11 @@ def skin_radii(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> l
     return [_of_chain(bones, chain, measured) for chain in chains]
 
 
+def skin_key(armature: bpy.types.Object) -> bytes:
+    """What the radii hang on, as far as it can be read at once: not which bones points follow."""
+    return key_of([(names, points) for names, points in _skins(armature)])
+
+
 def _of_chain(
     bones: bpy.types.ArmatureBones, chain: Sequence[str], measured: dict[str, Floats]
 ) -> Floats:
@@ -71,25 +79,41 @@ def _of_chain(
     return np.minimum.accumulate(result)
 
 
-def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
-    """Of each mesh, the points at rest that follow a bone of that name most."""
-    to_armature = np.array(armature.matrix_world.inverted_safe(), dtype=np.float64)
+def _skins(armature: bpy.types.Object) -> Iterator[tuple[tuple[str, ...], Floats]]:
+    """Names of the vertex groups and some points (n, 3) at rest of each mesh, armature space."""
+    for item, points, _ in _meshes(armature):
+        yield tuple(group.name for group in item.vertex_groups), points
+
+
+def _meshes(
+    armature: bpy.types.Object,
+) -> Iterator[tuple[bpy.types.Object, Floats, int]]:
+    """Meshes that the armature deforms, points of theirs, and at every how many these are."""
+    inverse = np.array(armature.matrix_world.inverted_safe(), dtype=np.float64)
     for item in bpy.data.objects:
         if item.type != "MESH" or item.find_armature() != armature:
             continue
         mesh = item.data
         assert isinstance(mesh, bpy.types.Mesh)
-        count = len(mesh.vertices)
-        step = max(1, -(-count // _MOST_VERTICES))
-        points = np.empty((count, 3), dtype=np.float32)
+        step = max(1, -(-len(mesh.vertices) // _MOST_VERTICES))
+        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
         mesh.vertices.foreach_get("co", points.ravel())
-        matrix = to_armature @ np.array(item.matrix_world, dtype=np.float64)
-        moved = points[::step] @ matrix[:3, :3].T + matrix[:3, 3]
+        matrix = inverse @ np.array(item.matrix_world, dtype=np.float64)
+        # Wherever the armature has walked to, its skin is as thick.
+        matrix = np.round(matrix / _ROUNDED) * _ROUNDED
+        yield item, points[::step] @ matrix[:3, :3].T + matrix[:3, 3], step
+
+
+def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
+    """Of each mesh, the points at rest that follow a bone of that name most."""
+    for item, moved, step in _meshes(armature):
+        assert isinstance(item.data, bpy.types.Mesh)
         owner = np.full(len(moved), -1)
-        for number in range(0, count, step):
-            groups = mesh.vertices[number].groups
+        vertices = item.data.vertices
+        for number in range(len(moved)):
+            groups = vertices[number * step].groups
             if len(groups) > 0:
-                owner[number // step] = max(groups, key=lambda each: each.weight).group
+                owner[number] = max(groups, key=lambda each: each.weight).group
         order = np.argsort(owner, kind="stable")
         found, starts = np.unique(owner[order], return_index=True)
         names = {group.index: group.name for group in item.vertex_groups}

@@ -76,41 +76,79 @@ def measure(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) -> Separ
     every = [*chains, *still]
     if not chains:
         return Separation(np.zeros(0), ())
-    frames = len(chains[0].joints)
-    starts = np.concatenate([each.joints[:, :-1] for each in every], axis=1)
-    ends = np.concatenate([each.joints[:, 1:] for each in every], axis=1)
-    first, second = (
-        np.concatenate([each.radii[:-1] for each in every]),
-        np.concatenate([each.radii[1:] for each in every]),
-    )
-    owner = np.repeat(np.arange(len(every)), [len(each.radii) - 1 for each in every])
-    rest_starts = np.concatenate([each.at_rest[:-1] for each in every])
-    rest_ends = np.concatenate([each.at_rest[1:] for each in every])
-    one, other = np.triu_indices(len(owner), 1)
-    asked = (owner[one] != owner[other]) & (owner[one] < len(chains))
-    one, other = one[asked], other[asked]
-    radii = first, second
-    apart = _depths(rest_starts[None], rest_ends[None], radii, (np.zeros_like(one), one, other))
-    asked = apart <= _BUILT_SO
-    one, other = one[asked], other[asked]
-    depths = np.zeros(frames)
-    if len(one) == 0:
-        return Separation(depths, ())
-    number, pair = _near(starts, ends, radii, one, other)
-    found = _depths(starts, ends, radii, (number, one[pair], other[pair]))
+    parts = parts_of(every)
+    one, other = pairs_of(every, len(chains))
+    depths = np.zeros(len(parts.starts))
+    number, pair = near(parts, one, other)
+    found = _depths(parts, (number, one[pair], other[pair]))
     touching = found > 0.0
     number, pair, found = number[touching], pair[touching], found[touching]
     np.maximum.at(depths, number, found)
+    owner = parts.owner
     return Separation(depths, _pairs(every, owner[one[pair]], owner[other[pair]], number, found))
 
 
-def _near(
-    starts: Floats, ends: Floats, radii: tuple[Floats, Floats], one: np.ndarray, other: np.ndarray
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The capsules of all chains, one after the other."""
+
+    starts: Floats
+    """(frames, capsules, 3)"""
+    ends: Floats
+    """(frames, capsules, 3)"""
+    radii: tuple[Floats, Floats]
+    """(capsules,) at starts and at ends."""
+    owner: np.ndarray
+    """(capsules,) number of each one's chain."""
+
+
+def parts_of(chains: Sequence[Capsules]) -> Parts:
+    """The capsules of chains that all have as many frames."""
+    return Parts(
+        np.concatenate([each.joints[:, :-1] for each in chains], axis=1),
+        np.concatenate([each.joints[:, 1:] for each in chains], axis=1),
+        (
+            np.concatenate([each.radii[:-1] for each in chains]),
+            np.concatenate([each.radii[1:] for each in chains]),
+        ),
+        np.repeat(np.arange(len(chains)), [len(each.radii) - 1 for each in chains]),
+    )
+
+
+def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers (pairs,) and (pairs,) of the capsules that must not overlap.
+
+    They are of two chains, of which one at least moves, and are apart at rest.
+
+    Args:
+        chains: those that move first.
+        moving: how many these are.
+    """
+    rest = [Capsules(each.name, each.at_rest[None], each.radii, each.at_rest) for each in chains]
+    parts = parts_of(rest)
+    one, other = np.triu_indices(len(parts.owner), 1)
+    asked = (parts.owner[one] != parts.owner[other]) & (parts.owner[one] < moving)
+    one, other = one[asked], other[asked]
+    apart = _depths(parts, (np.zeros_like(one), one, other)) <= _BUILT_SO
+    return one[apart], other[apart]
+
+
+def near(
+    parts: Parts, one: np.ndarray, other: np.ndarray, margin: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of frames and of pairs whose bounding spheres touch."""
-    middles = (0.5 * (starts + ends)).astype(np.float32)
-    half = 0.5 * np.sqrt(np.max(np.sum((ends - starts) ** 2, axis=-1), axis=0))
-    size = half + np.maximum(*radii)
+    """Numbers of frames and of pairs whose bounding spheres touch.
+
+    Args:
+        parts: the capsules.
+        one: (pairs,) capsules …
+        other: (pairs,) … and others.
+        margin: radii by which they may be further apart.
+    """
+    if len(one) == 0:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    middles = (0.5 * (parts.starts + parts.ends)).astype(np.float32)
+    half = 0.5 * np.sqrt(np.max(np.sum((parts.ends - parts.starts) ** 2, axis=-1), axis=0))
+    size = half + (1.0 + margin) * np.maximum(*parts.radii)
     # Around its middle a scene's rounding in single precision is least.
     middles -= middles.mean(axis=(0, 1))
     squares = np.einsum("fsi,fsi->fs", middles, middles)
@@ -132,23 +170,36 @@ def _near(
     return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 
-def _depths(
-    starts: Floats,
-    ends: Floats,
-    radii: tuple[Floats, Floats],
-    chosen: tuple[np.ndarray, np.ndarray, np.ndarray],
-) -> Floats:
+def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Floats:
     """Overlap (pairs,) as a share of the smaller radius, negative for those that are apart.
 
     Args:
-        starts: (frames, capsules, 3)
-        ends: (frames, capsules, 3)
-        radii: (capsules,) at starts and at ends.
+        parts: the capsules.
         chosen: frame, one capsule and the other of each pair.
     """
     frame, one, other = chosen
+    starts, ends, radii = parts.starts, parts.ends, parts.radii
     p, q = starts[frame, one], starts[frame, other]
     u, v = ends[frame, one] - p, ends[frame, other] - q
+    s, t = nearest(p, u, q, v)
+    gap = p - q + s[:, None] * u - t[:, None] * v
+    here = (1.0 - s) * radii[0][one] + s * radii[1][one]
+    there = (1.0 - t) * radii[0][other] + t * radii[1][other]
+    return (here + there - np.sqrt(_dot(gap, gap))) / np.maximum(np.minimum(here, there), _TINY)
+
+
+def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Where two line segments are nearest to each other.
+
+    Args:
+        p: (pairs, 3) start of the one.
+        u: (pairs, 3) from its start to its end.
+        q: (pairs, 3) start of the other.
+        v: (pairs, 3)
+
+    Returns:
+        Shares (pairs,) of the way from start to end on the one and on the other.
+    """
     w = p - q
     a, b, e = _dot(u, u), _dot(u, v), _dot(v, v)
     c, f = _dot(u, w), _dot(v, w)
@@ -160,11 +211,7 @@ def _depths(
     t = (b * s + f) / np.maximum(e, _TINY)
     s = np.where(t < 0.0, np.clip(-c / np.maximum(a, _TINY), 0.0, 1.0), s)
     s = np.where(t > 1.0, np.clip((b - c) / np.maximum(a, _TINY), 0.0, 1.0), s)
-    t = np.clip(t, 0.0, 1.0)
-    gap = w + s[:, None] * u - t[:, None] * v
-    here = (1.0 - s) * radii[0][one] + s * radii[1][one]
-    there = (1.0 - t) * radii[0][other] + t * radii[1][other]
-    return (here + there - np.sqrt(_dot(gap, gap))) / np.maximum(np.minimum(here, there), _TINY)
+    return s, np.clip(t, 0.0, 1.0)
 
 
 def _dot(first: Floats, second: Floats) -> Floats:

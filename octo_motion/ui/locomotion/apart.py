@@ -10,11 +10,13 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty
 
-from ...blender.skin_radii import skin_radii
+from ...blender.skin_radii import skin_key, skin_radii
 from ...core.locomotion.arm_frames import ArmFrames, arm_frames
 from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.generator import Arm
+from ...core.locomotion.keeping_apart import MOST_CAPSULES, Bulk, joints_that_count
 from ...core.locomotion.separation import Capsules, Separation, measure
+from ...core.remembered import Remembered, key_of
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
 from .gait_properties import OVERRIDE
@@ -22,8 +24,6 @@ from .gait_properties import OVERRIDE
 DEEP: Final = 0.1
 """Share of a radius by which arms may overlap without a word: flesh gives."""
 
-_MOST_CAPSULES: Final = 16
-"""Of an arm; those of more bones are taken together."""
 _MOST_DISTANCES: Final = 60_000_000
 """With more, of very many arms over very many frames, only every second, third … is measured."""
 
@@ -37,6 +37,13 @@ class Apart:
     radii: tuple[Floats, ...]
     still: tuple[Capsules, ...]
     """Of the body, one frame."""
+    upward: Floats
+    """(3,) unit: the body's, armature space."""
+
+    @property
+    def bulk(self) -> Bulk:
+        """What must not pass through itself."""
+        return Bulk(self.arms, self.radii, self.still, self.upward)
 
     def measure(self, rotations: Floats, strains: Floats) -> tuple[Separation, int]:
         """What overlaps, and at every how many frames it was looked for.
@@ -45,7 +52,7 @@ class Apart:
             rotations: (frames, bones, 4) of all arms, one after the other.
             strains: (frames, bones) by how much bones are longer than at rest.
         """
-        capsules = sum(min(len(arm.bones), _MOST_CAPSULES) for arm in self.arms) + len(self.still)
+        capsules = sum(min(len(arm.bones), MOST_CAPSULES) for arm in self.arms) + len(self.still)
         every = max(1, -(-len(rotations) * capsules * capsules // _MOST_DISTANCES))
         looked = rotations[::every]
         ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)])
@@ -53,8 +60,7 @@ class Apart:
         for number, arm in enumerate(self.arms):
             columns = slice(int(ends[number]), int(ends[number + 1]))
             own, longer = looked[:, columns], strains[::every, columns]
-            count = len(arm.bones)
-            some = np.unique(np.linspace(0, count, min(count, _MOST_CAPSULES) + 1).astype(int))
+            some = joints_that_count(len(arm.bones))
             joints, rest = arm.joints(arm.from_bones(own), longer), arm.joints(arm.at_rest)
             radii = self.radii[number][some]
             chains.append(Capsules(self.names[number], joints[:, some], radii, rest[some]))
@@ -88,6 +94,13 @@ class Apart:
 class KeepingApart:
     """What ``Object.octo_motion.locomotion`` has of it."""
 
+    keep_apart: BoolProperty(
+        name="Keep Apart",
+        description="Arms that would pass through each other or through the body make way: those "
+        "in the air, and what does not lie on the ground of those that hold on",
+        default=True,
+        override=OVERRIDE,
+    )
     tell_overlaps: BoolProperty(
         name="Tell Overlaps",
         description="After generating, say at which frame an arm passes deepest through another "
@@ -97,8 +110,16 @@ class KeepingApart:
     )
 
 
+_known: Final[Remembered[Apart]] = Remembered(2)
+
+
 def read_apart(
-    armature: bpy.types.Object, skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    arms: tuple[Arm, ...],
+    body: BodyFrame,
+    *,
+    live: bool = False,
 ) -> Apart:
     """The arms and the parts of the body as thick as their skin.
 
@@ -107,7 +128,18 @@ def read_apart(
         skeleton: its bones.
         arms: those that move.
         body: which way it faces.
+        live: whether it is to be quick: which bones a skin follows is then looked at anew only
+            where the skin has changed its form.
     """
+    if not live:
+        _known.clear()
+    key = key_of(skeleton, arms, body, skin_key(armature))
+    return _known.get(key, lambda: _read_apart(armature, skeleton, arms, body))
+
+
+def _read_apart(
+    armature: bpy.types.Object, skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame
+) -> Apart:
     limbs = {bone for arm in arms for bone in arm.bones}
     parts = [
         name
@@ -127,6 +159,7 @@ def read_apart(
         names=tuple(arm.name for arm in arms),
         radii=tuple(radii[: len(arms)]),
         still=tuple(still),
+        upward=body.rotation[:, 2],
     )
 
 

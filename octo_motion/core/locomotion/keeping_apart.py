@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms of a rig kept apart: from the rotations of its bones to a crowd, and back.
+
+Of an arm with many bones some joints stand for all: what lies between two of them moves as one.
+Bones follow their segments by the smallest turn, so nothing is twisted by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from ..rotations import Floats, conjugate, multiply, normalized, rotate, shortest_arc
+from .arm_frames import ArmFrames
+from .ground import Ground
+from .parting import parted
+from .separation import Capsules
+from .touching import Crowd
+
+MOST_CAPSULES: Final = 16
+"""Of an arm; those of more bones are taken together."""
+_WIDTH: Final = 28.0
+"""Means over time (``over_time.blurred``) to a cycle of the gait."""
+_MOST_WIDTH: Final = 24
+
+_UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A ground in the space of an armature that moves over it."""
+
+    ground: Ground
+    locations: Floats
+    """(frames, 3) of the armature, world."""
+    orientations: Floats
+    """(frames, 4)"""
+    scale: float
+    """Metres of the armature's unit."""
+
+    def clearance(self, frames: np.ndarray, points: Floats) -> Floats:
+        """Height (items, joints) of points (items, joints, 3) above it, armature units."""
+        turned = rotate(self.orientations[frames][:, None], self.scale * points)
+        world = self.locations[frames][:, None] + turned
+        return (world[..., 2] - self.ground.height(world[..., :2])) / self.scale
+
+
+@dataclass(frozen=True, eq=False)
+class Bulk:
+    """What there is of a creature that must not pass through itself."""
+
+    arms: Sequence[ArmFrames]
+    radii: Sequence[Floats]
+    """Of each arm (bones + 1,) at its joints, armature units."""
+    still: Sequence[Capsules]
+    """Parts of the body, one frame each."""
+    upward: Floats
+    """(3,) unit: the body's, armature space."""
+
+
+def joints_that_count(bones: int) -> np.ndarray:
+    """Numbers of the joints of an arm of so many bones that stand for all."""
+    return np.unique(np.linspace(0, bones, min(bones, MOST_CAPSULES) + 1).astype(int))
+
+
+def width_of(frames_per_cycle: float) -> int:
+    """Width of the means over time for a gait of so many frames to the cycle."""
+    return int(np.clip(np.rint(frames_per_cycle / _WIDTH), 1, _MOST_WIDTH))
+
+
+def kept_apart(
+    bulk: Bulk,
+    rotations: Floats,
+    strains: Floats,
+    *,
+    lying: Sequence[np.ndarray],
+    busy: np.ndarray,
+    travel: tuple[Floats, Floats],
+    ground: Ground | None,
+    scale: float,
+    frames_per_cycle: float,
+    cyclic: bool = False,
+) -> Floats | None:
+    """Rotations (frames, bones, 4) of arms that have made way; none if nobody has to.
+
+    Args:
+        bulk: the arms and the body.
+        rotations: (frames, bones, 4) of all arms, one after the other.
+        strains: (frames, bones) by how much bones are longer than at rest, as a share.
+        lying: for each arm (frames, joints) which joints rest on the ground.
+        busy: (frames, arms) which arms must not be moved.
+        travel: locations (frames, 3) and orientations (frames, 4) of the armature, world.
+        ground: what they walk on, if anything.
+        scale: metres of the armature's unit.
+        frames_per_cycle: of the gait: the shorter, the quicker arms make way.
+        cyclic: whether the last frame is the first again.
+    """
+    ends = np.cumsum([0, *(len(arm.bones) for arm in bulk.arms)])
+    columns = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+    frames = [
+        arm.from_bones(rotations[:, own]) for arm, own in zip(bulk.arms, columns, strict=True)
+    ]
+    some = [joints_that_count(len(arm.bones)) for arm in bulk.arms]
+    most = max(len(each) for each in some)
+    # Arms with fewer joints than others end in the same one several times.
+    chosen = [np.pad(each, (0, most - len(each)), mode="edge") for each in some]
+    joints = [
+        arm.joints(own, strains[:, part])[:, which]
+        for arm, own, part, which in zip(bulk.arms, frames, columns, chosen, strict=True)
+    ]
+    locations, orientations = travel
+    crowd = Crowd(
+        joints=np.stack(joints, axis=1),
+        radii=np.stack([own[which] for own, which in zip(bulk.radii, chosen, strict=True)]),
+        at_rest=np.stack(
+            [arm.joints(arm.at_rest)[which] for arm, which in zip(bulk.arms, chosen, strict=True)]
+        ),
+        lying=np.stack(
+            [_lying(own, which) for own, which in zip(lying, chosen, strict=True)], axis=1
+        ),
+        kept=busy,
+        upward=bulk.upward,
+        up=rotate(conjugate(orientations), _UP),
+    )
+    floor = Surface(ground, locations, orientations, scale) if ground is not None else None
+    moved = parted(crowd, bulk.still, floor=floor, width=width_of(frames_per_cycle), cyclic=cyclic)
+    if moved is None:
+        return None
+    result = rotations.copy()
+    for number, (arm, own, which) in enumerate(zip(bulk.arms, columns, some, strict=True)):
+        before, after = (
+            normalized(np.diff(each[:, number, : len(which)], axis=1))
+            for each in (crowd.joints, moved)
+        )
+        turned = np.flatnonzero(np.any(before != after, axis=(1, 2)))
+        turns = shortest_arc(before[turned], after[turned])
+        per_bone = np.repeat(turns, np.diff(which), axis=1)
+        result[turned, own] = arm.to_bones(multiply(per_bone, frames[number][turned]))
+    return result
+
+
+def _lying(joints: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Which of some joints (frames, some) stand for one that lies: what lies moves nowhere."""
+    passed = np.concatenate([np.zeros((len(joints), 1), dtype=int), joints.cumsum(axis=1)], axis=1)
+    before, after = np.append(which[:1], which[:-1]), np.append(which[1:], which[-1:])
+    # From after the joint before to before the joint after, its own place included.
+    first = np.where(before < which, before + 1, which)
+    last = np.where(after > which, after, which + 1)
+    return passed[:, last] > passed[:, first]
