@@ -29,6 +29,7 @@ _SHARE: Final = 0.7
 
 _radii_known: Final[Remembered[list[Floats]]] = Remembered(4)
 _faces_known: Final[Remembered[Floats]] = Remembered(2)
+_corners_known: Final[Remembered[np.ndarray]] = Remembered(2)
 
 
 def read_triangles(
@@ -48,23 +49,43 @@ def read_triangles(
     evaluated = ground.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        count = len(mesh.loop_triangles) if mesh is not None else 0
-        if mesh is None or count == 0:
+        if mesh is None or len(mesh.loop_triangles) == 0:
             raise GroundError(f"The ground '{ground.name}' has no faces.", "Choose another mesh.")
         points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-        corners = np.empty((count, 3), dtype=np.int32)
         mesh.vertices.foreach_get("co", points.ravel())
-        mesh.loop_triangles.foreach_get("vertices", corners.ravel())
+        corners, content = _corners(mesh, points)
     finally:
         evaluated.to_mesh_clear()
     world = np.array(evaluated.matrix_world, dtype=np.float64)
-    key = key_of(points, corners, world)
+    key = key_of(content, world)
 
     def placed() -> Floats:
         moved = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
         return moved[corners]
 
     return _faces_known.get(key, placed), key
+
+
+def _corners(mesh: bpy.types.Mesh, points: np.ndarray) -> tuple[np.ndarray, bytes]:
+    """Vertices (faces, 3) of a mesh's triangles, and a key of its content.
+
+    Args:
+        mesh: the mesh.
+        points: (vertices, 3) its vertices.
+    """
+
+    def read() -> np.ndarray:
+        corners = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners.ravel())
+        return corners
+
+    # How faces are cut into triangles hangs on nothing else, and takes much longer to read.
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    vertices = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    content = key_of(points, starts, vertices)
+    return _corners_known.get(content, read), content
 
 
 def arm_radii(

@@ -21,6 +21,8 @@ _EDGE: Final = 1e-6
 """Share of a face by which it reaches beyond its edges, so that none falls between two."""
 _AT_ONCE: Final = 2_000_000
 """Pairs of faces and samples that are looked at together."""
+_SIDE: Final = 16
+"""Samples along a side of a face that is small."""
 _BLOCK: Final = 16
 """Samples: a ground's border lies at multiples of as many from the world's origin."""
 _MOST_SAMPLES: Final = 4_000_000
@@ -247,36 +249,126 @@ def _beneath(
     return heights
 
 
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Faces as they lie over a grid, each (faces,)."""
+
+    first: np.ndarray
+    """Number of the first sample that may lie on it."""
+    columns: np.ndarray
+    """How many may, along X …"""
+    rows: np.ndarray
+    """… and along Y."""
+    second: tuple[Floats, Floats, Floats]
+    """How near the first sample is to the second corner, 1 at the corner and 0 on the side across,
+    and how much nearer the next one along X and along Y is."""
+    third: tuple[Floats, Floats, Floats]
+    """The same of the third corner."""
+    heights: tuple[Floats, Floats, Floats]
+    """World Z of the first corner, and of the others above it."""
+
+    def part(self, chosen: np.ndarray) -> _Faces:
+        """Some of the faces."""
+        (s, sx, sy), (t, tx, ty), (z, z1, z2) = self.second, self.third, self.heights
+        return _Faces(
+            self.first[chosen],
+            self.columns[chosen],
+            self.rows[chosen],
+            (s[chosen], sx[chosen], sy[chosen]),
+            (t[chosen], tx[chosen], ty[chosen]),
+            (z[chosen], z1[chosen], z2[chosen]),
+        )
+
+
 def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Floats]]:
     """Numbers of samples and heights there, of faces that lie over or under them, in blocks."""
-    shape = grid.heights.shape
-    corners = triangles[..., :2] - np.array(grid.origin)
-    corners = corners / grid.spacing
-    first = np.maximum(np.ceil(corners.min(axis=1) - _EDGE), 0.0).astype(np.int64)
-    last = np.minimum(np.floor(corners.max(axis=1) + _EDGE), np.array(shape) - 1).astype(np.int64)
-    sizes = np.maximum(last - first + 1, 0)
-    edges = corners[:, 1:] - corners[:, :1]
-    area = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    counts = np.where(np.abs(area) > 1e-12, sizes[:, 0] * sizes[:, 1], 0)
-    kept = np.flatnonzero(counts)
-    # Faces in blocks of about so many samples; one huge face is a block of its own.
-    block = np.cumsum(counts[kept]) // _AT_ONCE
+    faces, width = _over(triangles, grid), grid.heights.shape[1]
+    longest = np.maximum(faces.columns, faces.rows)
+    size, done = 1, 0
+    while done < _SIDE:
+        # Faces of about one size together: sample after sample of all of them at once.
+        size = min(2 * size, _SIDE)
+        alike = np.flatnonzero((longest > done) & (longest <= size))
+        many = _AT_ONCE // (size * size)
+        for start in range(0, len(alike), many):
+            part = faces.part(alike[start : start + many])
+            for column, row in np.ndindex(size, size):
+                over = (column < part.columns) & (row < part.rows)
+                second, third = _nearness(part, slice(None), column, row)
+                hit = np.flatnonzero(over & _inside(second, third))
+                height = _height(part, hit, second[hit], third[hit])
+                yield part.first[hit] + (column * width + row), height
+        done = size
+    large = np.flatnonzero(longest > _SIDE)
+    counts = faces.columns[large] * faces.rows[large]
+    # In blocks of about so many samples; one huge face is a block of its own.
+    block = np.cumsum(counts) // _AT_ONCE
     for number in np.unique(block):
-        chosen = kept[block == number]
-        many = counts[chosen]
+        chosen, many = large[block == number], counts[block == number]
         face = np.repeat(chosen, many)
         within = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
-        column = first[face, 0] + within // sizes[face, 1]
-        row = first[face, 1] + within % sizes[face, 1]
-        x, y = column - corners[face, 0, 0], row - corners[face, 0, 1]
-        second = (x * edges[face, 1, 1] - y * edges[face, 1, 0]) / area[face]
-        third = (y * edges[face, 0, 0] - x * edges[face, 0, 1]) / area[face]
-        hit = (second >= -_EDGE) & (third >= -_EDGE) & (second + third <= 1.0 + _EDGE)
-        face, second, third = face[hit], second[hit], third[hit]
-        corner = triangles[face, :, 2]
-        z = corner[:, 0]
-        z = z + second * (corner[:, 1] - z) + third * (corner[:, 2] - z)
-        yield column[hit] * shape[1] + row[hit], z
+        column, row = np.divmod(within, faces.rows[face])
+        second, third = _nearness(faces, face, column, row)
+        hit = np.flatnonzero(_inside(second, third))
+        face, place = face[hit], column[hit] * width + row[hit]
+        yield faces.first[face] + place, _height(faces, face, second[hit], third[hit])
+
+
+def _over(triangles: Floats, grid: HeightField) -> _Faces:
+    """The faces that may lie over some sample of a grid."""
+    (x0, x1, x2), (y0, y1, y2) = (
+        [(triangles[:, corner, axis] - grid.origin[axis]) / grid.spacing for corner in range(3)]
+        for axis in range(2)
+    )
+    area = (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0)
+    over, sides = np.abs(area) > 1e-12, []
+    for one, two, three, count in zip(
+        (x0, y0), (x1, y1), (x2, y2), grid.heights.shape, strict=True
+    ):
+        low = np.minimum(np.minimum(one, two), three)
+        high = np.maximum(np.maximum(one, two), three)
+        first = np.maximum(np.ceil(low - _EDGE), 0.0)
+        sides.append((first, np.minimum(np.floor(high + _EDGE), count - 1.0) - first + 1.0))
+        over &= sides[-1][1] > 0.0
+    kept = np.flatnonzero(over)
+    x0, x1, x2, y0, y1, y2, area = (each[kept] for each in (x0, x1, x2, y0, y1, y2, area))
+    (column, columns), (row, rows) = ((first[kept], count[kept]) for first, count in sides)
+    across = (y2 - y0) / area, (x0 - x2) / area, (y0 - y1) / area, (x1 - x0) / area
+    x, y = column - x0, row - y0
+    z0, z1, z2 = (triangles[kept, corner, 2] for corner in range(3))
+    return _Faces(
+        (column * grid.heights.shape[1] + row).astype(np.int64),
+        columns.astype(np.int64),
+        rows.astype(np.int64),
+        (x * across[0] + y * across[1], across[0], across[1]),
+        (x * across[2] + y * across[3], across[2], across[3]),
+        (z0, z1 - z0, z2 - z0),
+    )
+
+
+def _nearness(
+    faces: _Faces,
+    chosen: np.ndarray | slice,
+    column: np.ndarray | int,
+    row: np.ndarray | int,
+) -> tuple[Floats, Floats]:
+    """How near samples, so many after the first of chosen faces, are to their other corners."""
+    (s, sx, sy), (t, tx, ty) = faces.second, faces.third
+    return (
+        s[chosen] + column * sx[chosen] + row * sy[chosen],
+        t[chosen] + column * tx[chosen] + row * ty[chosen],
+    )
+
+
+def _inside(second: Floats, third: Floats) -> np.ndarray:
+    """Whether samples lie on their faces."""
+    return (np.minimum(second, third) >= -_EDGE) & (second + third <= 1.0 + _EDGE)
+
+
+def _height(faces: _Faces, chosen: np.ndarray, second: Floats, third: Floats) -> Floats:
+    """Heights of chosen faces at samples that are so near to their other corners."""
+    first, rise, other = faces.heights
+    return first[chosen] + (second * rise[chosen] + third * other[chosen])
 
 
 def _filled(heights: Floats) -> Floats:
