@@ -421,6 +421,21 @@ def test_blenders_own_space_mouse_is_calibrated_by_its_driver(
         session.cancel()
 
 
+def test_turn_of_blenders_space_mouse_is_the_caps_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Blender tells it against the cap, and both motions as strong as its preferences say."""
+    session = PuppetSession(arm(), bpy.context.scene, clock=None)
+    hands = NdofHands(session, clock=lambda: 0.0)
+    try:
+        monkeypatch.setattr("octo_motion.ui.posing.device_ndof.ndof_sensitivities", lambda: (4, 2))
+        # Half a push to the right; the cap turned to the left as seen from above, all the way.
+        hands.move((2.0, 0.0, 0.0), (0.0, -2.0, 0.0), 0.1, room(), TOLD)
+        assert hands.shown()[0].position == pytest.approx((0.5 * 0.4 * 0.1, 0.0, 1.3))
+        half = 0.5 * TOLD.angular_speed * 0.1
+        assert hands._turn == pytest.approx((np.cos(half), 0.0, 0.0, np.sin(half)))
+    finally:
+        session.cancel()
+
+
 def test_settings_of_the_panel_are_told_in_the_bridges_units() -> None:
     settings = device_settings(bpy.context.window_manager)
     settings.force, settings.toggle, settings.speed, settings.reach = 0.5, True, 2.0, 0.1

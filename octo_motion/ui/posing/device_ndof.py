@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from ...blender.versions import ndof_sensitivities
 from ...core.posing.picking import Hit
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
 from ...device.client import Client
@@ -78,9 +79,13 @@ class NdofHands:
     ) -> None:
         """One event of Blender's.
 
+        It is made for a camera: a turn is told as the scene then seems to turn, against the cap
+        (GHOST_NDOFManagerUnix and libspnav's spnav_posrot_moveobj differ in all three signs). And
+        it is multiplied by what the preferences say of flying.
+
         Args:
-            translation: (3,) push, −1…1: right, up, towards the user.
-            rotation: (3,) turn about these, −1…1.
+            translation: (3,) push: right, up, towards the user.
+            rotation: (3,) turn about these, against the cap's.
             seconds: since the event before.
             room: what the view shows.
             settings: how devices behave.
@@ -88,11 +93,12 @@ class NdofHands:
         if self.position is None:
             self.position = room.middle.copy()
         seconds = min(max(seconds, 0.0), _LONGEST)
-        way = room.axes @ np.array(translation, dtype=np.float64)
+        push, turn = ndof_sensitivities()
+        way = room.axes @ np.array(translation, dtype=np.float64) / push
         self.position = self.position + way * (settings.speed * seconds * room.width / RATE_WIDTH)
-        swing = room.axes @ np.array(rotation, dtype=np.float64)
-        turn = from_rotation_vector(swing * settings.angular_speed * seconds)
-        self._turn = multiply(turn, self._turn)
+        swing = room.axes @ np.array(rotation, dtype=np.float64) / -turn
+        more = from_rotation_vector(swing * settings.angular_speed * seconds)
+        self._turn = multiply(more, self._turn)
 
     def grab(self) -> None:
         """Grab what is near, or let go."""
