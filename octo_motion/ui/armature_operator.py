@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...blender.armature import active_armature
-from ...core.errors import RigError
-from ..operator_base import OctoOperator
+from ..blender.armature import active_armature
+from ..core.errors import RigError
+from .operator_base import OctoOperator
 
 if TYPE_CHECKING:
     import bpy

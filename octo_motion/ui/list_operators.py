@@ -13,7 +13,7 @@ from bpy.props import EnumProperty
 from ..blender.armature import active_armature
 from ..blender.overrides import linked_names
 from ..core.errors import RigError
-from .locomotion.armature_operator import ArmatureOperator
+from .armature_operator import ArmatureOperator
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems

@@ -5,6 +5,7 @@ Blender draws panels in a window only. A layout of our own takes its place and c
 ones complain about on the console.
 """
 
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -90,8 +91,9 @@ class Layout:
         check("template_list", more)
         assert active in other.bl_rna.properties
         for number, item in enumerate(getattr(data, items)):
-            row = getattr(bpy.types, kind).draw_item
-            row(SimpleNamespace(), bpy.context, self, data, item, 0, other, active, number)
+            rows = getattr(bpy.types, kind)
+            stand_in = SimpleNamespace(draw_row=partial(rows.draw_row, None))
+            rows.draw_item(stand_in, bpy.context, self, data, item, 0, other, active, number)
 
     def template_curve_mapping(self, data: Any, name: str) -> None:
         assert "template_curve_mapping" in FUNCTIONS
@@ -120,6 +122,7 @@ class Tab(dict[str, list[str]]):
             stand_in = SimpleNamespace(layout=layout)
             if hasattr(kept, "show"):
                 stand_in.show = kept.show.__get__(stand_in)
+                stand_in.settings_of = kept.settings_of
             kept.draw(stand_in, bpy.context)
             self[panel.__name__.removeprefix("OCTO_MOTION_PT_")] = layout.drawn
 

@@ -849,6 +849,7 @@ def drawn() -> dict[str, list[str]]:
         layout = Layout()
         stand_in = SimpleNamespace(layout=layout, show=None)
         stand_in.show = kept.show.__get__(stand_in)
+        stand_in.settings_of = kept.settings_of
         kept.draw(stand_in, bpy.context)
         found[kept.__name__.removeprefix("OCTO_MOTION_PT_")] = layout.drawn
     return found

@@ -7,11 +7,11 @@ import bpy
 import numpy as np
 from bpy.props import FloatVectorProperty
 
-from ...blender.armature import active_armature
 from ...blender.curves import add_route_curve, suggested_control_points
-from ...core.errors import RigError, WriteError
+from ...core.errors import WriteError
 from ...core.locomotion.route import Route
 from ..operator_base import OctoOperator
+from ..panel_base import armature_in
 from .properties import locomotion_settings
 
 _POINTS = ("b0", "b1", "b2", "b3")
@@ -46,7 +46,7 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
         return True
 
     def run(self, context: bpy.types.Context) -> None:
-        armature = _armature(context)
+        armature = armature_in(context)
         suggested = suggested_control_points(armature, context)
         for name, point in zip(_POINTS, suggested, strict=True):
             if not self.properties.is_property_set(name):
@@ -66,13 +66,6 @@ def draw_in_add_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     layout = self.layout
     assert layout is not None
     layout.operator(OCTO_MOTION_OT_add_route.bl_idname, icon="CURVE_BEZCURVE")
-
-
-def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    try:
-        return active_armature(context)
-    except RigError:
-        return None
 
 
 def _collection(context: bpy.types.Context) -> bpy.types.Collection:

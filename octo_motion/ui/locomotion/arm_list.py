@@ -26,6 +26,7 @@ from ...core.locomotion.chains import (
 )
 from ...core.locomotion.detection import detect_arms
 from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
+from ..panel_base import ItemRows
 from . import arm_properties
 from .arm_items import (
     active_arm,
@@ -52,26 +53,15 @@ _AXIS_CHOICES: Final = (
 )
 
 
-class OCTO_MOTION_UL_arms(bpy.types.UIList):
+class OCTO_MOTION_UL_arms(ItemRows, bpy.types.UIList):
     """A row for each arm: on or off, name, bones, side, pair, phase."""
 
-    def draw_item(  # noqa: PLR0917 - Blender's order
-        self,
-        context: bpy.types.Context | None,  # noqa: ARG002
-        layout: bpy.types.UILayout,
-        data: Any,
-        item: Any,
-        icon: int | None,  # noqa: ARG002
-        active_data: Any,  # noqa: ARG002
-        active_property: str | None,  # noqa: ARG002
-        index: int | None = 0,  # noqa: ARG002
-        flt_flag: int | None = 0,  # noqa: ARG002
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
         columns = layout.split(factor=0.5)
         row = columns.row(align=True)
         row.prop(item, "enabled", text="")
         # Red: bones were renamed or removed since.
-        row.alert = any(bone.name not in data.id_data.data.bones for bone in item.bones)
+        row.alert = any(bone.name not in item.id_data.data.bones for bone in item.bones)
         row.prop(item, "name", text="", emboss=False)
         row = columns.row()
         row.active = item.enabled

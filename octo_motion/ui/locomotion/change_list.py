@@ -11,6 +11,7 @@ from bpy.props import FloatProperty, StringProperty
 from ...blender import presets
 from ...blender.actions import writable_armature
 from ..list_operators import ListKind, ListOperator, RemoveOperator
+from ..panel_base import ItemRows
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 
 
@@ -28,21 +29,10 @@ _PLACES: Final = ListKind(
 )
 
 
-class OCTO_MOTION_UL_changes(bpy.types.UIList):
+class OCTO_MOTION_UL_changes(ItemRows, bpy.types.UIList):
     """A row for each place: where, and which gait from there on."""
 
-    def draw_item(  # noqa: PLR0917 - Blender's order
-        self,
-        context: bpy.types.Context | None,  # noqa: ARG002
-        layout: bpy.types.UILayout,
-        data: Any,  # noqa: ARG002
-        item: Any,
-        icon: int | None,  # noqa: ARG002
-        active_data: Any,  # noqa: ARG002
-        active_property: str | None,  # noqa: ARG002
-        index: int | None = 0,  # noqa: ARG002
-        flt_flag: int | None = 0,  # noqa: ARG002
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
         row = layout.row(align=True)
         row.alert = item.gait not in presets.gait_names()
         row.label(text=item.gait, icon="ANIM")

@@ -11,8 +11,8 @@ from bpy.props import FloatProperty
 from ...blender.armature import active_armature
 from ...blender.contacts import remove_markers
 from ...core.errors import SettingsError
+from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
-from .armature_operator import ArmatureOperator
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from .standing import resting
 from .wishes import gathered, store

@@ -17,7 +17,7 @@ from ...blender.armature import active_armature
 from ...core.errors import GaitError
 from ...core.locomotion import gait
 from ...core.locomotion.gait import CYCLE
-from .armature_operator import ArmatureOperator
+from ..armature_operator import ArmatureOperator
 from .gait_properties import SIDES, fill_curve, fill_offsets, fill_table, read_curve, used
 from .properties import (
     OCTO_MOTION_PG_locomotion,

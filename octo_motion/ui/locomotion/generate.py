@@ -9,9 +9,9 @@ import bpy
 
 from ...blender.armature import active_armature
 from ...core.errors import OctoMotionError
+from ..armature_operator import ArmatureOperator
 from ..job import Job
 from . import live
-from .armature_operator import ArmatureOperator
 from .workflow import Shot, Summary, generate, prepare
 
 if TYPE_CHECKING:

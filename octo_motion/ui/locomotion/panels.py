@@ -8,9 +8,8 @@ from typing import Any, Final, cast
 import bpy
 
 from ...blender.actions import key_counts
-from ...blender.armature import active_armature
 from ...blender.weight_curve import NODE, curve_node
-from ...core.errors import RigError
+from ..panel_base import ArmaturePanel, ItemRows, TabPanel, armature_in
 from .add_octopus import OCTO_MOTION_OT_add_octopus
 from .add_route import OCTO_MOTION_OT_add_route
 from .arm_list import draw_arms
@@ -36,52 +35,23 @@ from .setups import OCTO_MOTION_PT_setups
 _SIDES: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
 
 
-class _Panel:
-    """A panel of the tab. Those that need an armature are not there without one."""
+class _Panel(ArmaturePanel):
+    """A panel of the armature's locomotion."""
 
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Octo Motion"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _armature(context) is not None
-
-    def draw(self, context: bpy.types.Context) -> None:
-        armature = _armature(context)
-        assert armature is not None
-        layout = cast("Any", self).layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        # Greyed out where nothing that is set would be saved.
-        layout.enabled = armature.is_editable
-        self.show(context, layout, locomotion_settings(armature))
-
-    def show(
-        self, context: bpy.types.Context, layout: Any, settings: OCTO_MOTION_PG_locomotion
-    ) -> None:
-        raise NotImplementedError
+    @staticmethod
+    def settings_of(armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion:
+        return locomotion_settings(armature)
 
 
-def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    try:
-        return active_armature(context)
-    except RigError:
-        return None
-
-
-class OCTO_MOTION_PT_rig(bpy.types.Panel):
+class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_rig"
     bl_label = "Rig"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Octo Motion"
     bl_order = 0
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         assert layout is not None
-        armature = _armature(context)
+        armature = armature_in(context)
         if armature is None:
             column = layout.column(align=True)
             column.label(text="No armature is active.", icon="INFO")
@@ -146,7 +116,7 @@ class OCTO_MOTION_PT_ground(_Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context: bpy.types.Context) -> None:
-        armature = _armature(context)
+        armature = armature_in(context)
         layout = cast("Any", self).layout
         if armature is not None and layout is not None:
             layout.prop(locomotion_settings(armature).ground, "use", text="")
@@ -295,21 +265,10 @@ def _draw_knots(
         layout.prop(curve, "free")
 
 
-class OCTO_MOTION_UL_gait_curves(bpy.types.UIList):
+class OCTO_MOTION_UL_gait_curves(ItemRows, bpy.types.UIList):
     """A row for the angles of all arms, and one for each pair that has its own."""
 
-    def draw_item(  # noqa: PLR0917 - Blender's order
-        self,
-        context: bpy.types.Context | None,  # noqa: ARG002
-        layout: bpy.types.UILayout,
-        data: Any,  # noqa: ARG002
-        item: Any,
-        icon: int | None,  # noqa: ARG002
-        active_data: Any,  # noqa: ARG002
-        active_property: str | None,  # noqa: ARG002
-        index: int | None = 0,  # noqa: ARG002
-        flt_flag: int | None = 0,  # noqa: ARG002
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
         if item.unused:
             layout.active = False
             layout.label(text="Unused, of the linked file")
@@ -451,7 +410,7 @@ class OCTO_MOTION_PT_quality(_Panel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        armature = _armature(context)
+        armature = armature_in(context)
         return armature is not None and bool(known_figures(locomotion_settings(armature)))
 
     def show(

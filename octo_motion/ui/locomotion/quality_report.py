@@ -21,7 +21,7 @@ from ...blender.armature import active_armature
 from ...blender.overrides import linked_names
 from ...core.errors import SettingsError
 from ...core.locomotion.figures import Figure
-from .armature_operator import ArmatureOperator
+from ..armature_operator import ArmatureOperator
 from .gait_properties import OVERRIDE, OVERRIDE_LIST
 
 if TYPE_CHECKING:

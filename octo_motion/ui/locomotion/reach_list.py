@@ -13,8 +13,9 @@ from ...blender.arms import require_editable
 from ...blender.grasp_target import WITH_SURFACE
 from ...blender.overrides import linked_names
 from ...core.errors import RigError, SettingsError
+from ..armature_operator import ArmatureOperator
+from ..panel_base import ItemRows
 from .arm_items import bones_of
-from .armature_operator import ArmatureOperator
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from .reach_properties import MODES
 
@@ -28,21 +29,10 @@ def active_reach(settings: Any) -> Any:
     return settings.reaches[number] if 0 <= number < len(settings.reaches) else None
 
 
-class OCTO_MOTION_UL_reaches(bpy.types.UIList):
+class OCTO_MOTION_UL_reaches(ItemRows, bpy.types.UIList):
     """A row for each reach: on or off, name, when it touches."""
 
-    def draw_item(  # noqa: PLR0917 - Blender's order
-        self,
-        context: bpy.types.Context | None,  # noqa: ARG002
-        layout: bpy.types.UILayout,
-        data: Any,  # noqa: ARG002
-        item: Any,
-        icon: int | None,  # noqa: ARG002
-        active_data: Any,  # noqa: ARG002
-        active_property: str | None,  # noqa: ARG002
-        index: int | None = 0,  # noqa: ARG002
-        flt_flag: int | None = 0,  # noqa: ARG002
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
         row = layout.row(align=True)
         row.prop(item, "mute", text="", icon="HIDE_ON" if item.mute else "HIDE_OFF", emboss=False)
         name = row.row()

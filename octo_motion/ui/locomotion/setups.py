@@ -21,7 +21,7 @@ from ...blender.actions import writable_armature
 from ...blender.armature import active_armature
 from ...blender.presets import load_gait
 from ...core.errors import SettingsError
-from .armature_operator import ArmatureOperator
+from ..armature_operator import ArmatureOperator
 from .gait_properties import DEFAULT_GAIT, assign
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait, set_gait
 

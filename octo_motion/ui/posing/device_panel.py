@@ -17,7 +17,7 @@ from .device_pose import (
     active_hands,
 )
 from .device_settings import device_settings
-from .panels import OCTO_MOTION_PT_posing, _Panel
+from .panels import OCTO_MOTION_PT_posing, PosePanel
 
 _LATE: Final = 0.002
 """s: a loop that is off its period by more, in one of a hundred ticks, is felt."""
@@ -27,7 +27,7 @@ _LAGS: Final = 0.05
 """s: a puppet that follows later is felt to lag."""
 
 
-class OCTO_MOTION_PT_posing_device(_Panel, bpy.types.Panel):
+class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_posing_device"
     bl_label = "Device"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname

@@ -12,7 +12,7 @@ from bpy.props import IntProperty
 from ...blender.armature import active_armature
 from ...core.errors import OctoMotionError, SettingsError
 from ...device.client import Client, State
-from ..locomotion.armature_operator import ArmatureOperator
+from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room

@@ -12,7 +12,7 @@ from ...blender.actions import writable_armature
 from ...blender.armature import active_armature, selected_bones
 from ...blender.figure_reading import mark_bones
 from ...core.errors import RigError, WriteError
-from ..locomotion.armature_operator import ArmatureOperator
+from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
 from .properties import OBSTACLES
 

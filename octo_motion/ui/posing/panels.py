@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import bpy
 
-from ...blender.armature import active_armature
-from ...core.errors import RigError
+from ..panel_base import ArmaturePanel
 from .marks import OCTO_MOTION_OT_pose_mark_bones, OCTO_MOTION_OT_pose_obstacle
 from .pose_script import OCTO_MOTION_OT_pose_script
 from .pose_start import OCTO_MOTION_OT_pose_start
@@ -16,40 +15,17 @@ from .properties import posing_settings
 from .puppet_session import active_session
 
 
-class _Panel:
-    """A panel of the tab that is there for armatures."""
+class PosePanel(ArmaturePanel):
+    """A panel of the armature's posing."""
 
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Octo Motion"
     bl_options = {"DEFAULT_CLOSED"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _armature(context) is not None
-
-    def draw(self, context: bpy.types.Context) -> None:
-        armature = _armature(context)
-        assert armature is not None
-        layout = cast("Any", self).layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        # Greyed out where nothing that is set would be saved.
-        layout.enabled = armature.is_editable
-        self.show(context, layout, posing_settings(armature))
-
-    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
-        raise NotImplementedError
+    @staticmethod
+    def settings_of(armature: bpy.types.Object) -> Any:
+        return posing_settings(armature)
 
 
-def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    try:
-        return active_armature(context)
-    except RigError:
-        return None
-
-
-class OCTO_MOTION_PT_posing(_Panel, bpy.types.Panel):
+class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_posing"
     bl_label = "Pose"
     bl_order = 7
@@ -72,7 +48,7 @@ class OCTO_MOTION_PT_posing(_Panel, bpy.types.Panel):
             layout.label(text="Enter keeps, Esc takes back", icon="INFO")
 
 
-class OCTO_MOTION_PT_posing_world(_Panel, bpy.types.Panel):
+class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_posing_world"
     bl_label = "World"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
@@ -95,7 +71,7 @@ class OCTO_MOTION_PT_posing_world(_Panel, bpy.types.Panel):
         )
 
 
-class OCTO_MOTION_PT_posing_bones(_Panel, bpy.types.Panel):
+class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_posing_bones"
     bl_label = "Limbs"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
@@ -113,7 +89,7 @@ class OCTO_MOTION_PT_posing_bones(_Panel, bpy.types.Panel):
         )
 
 
-class OCTO_MOTION_PT_posing_keys(_Panel, bpy.types.Panel):
+class OCTO_MOTION_PT_posing_keys(PosePanel, bpy.types.Panel):
     bl_idname = "OCTO_MOTION_PT_posing_keys"
     bl_label = "Keys"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname

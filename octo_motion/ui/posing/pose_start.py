@@ -10,7 +10,7 @@ import bpy
 
 from ...blender.armature import active_armature
 from ...core.errors import OctoMotionError, SettingsError
-from ..locomotion.armature_operator import ArmatureOperator
+from ..armature_operator import ArmatureOperator
 from .controls import HELP, Outcome, PoseControls
 from .overlay import Overlay
 from .puppet_session import PuppetSession, active_session

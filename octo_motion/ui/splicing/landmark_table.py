@@ -20,7 +20,7 @@ from ...core.errors import RigError
 from ...core.splicing.bone_names import mirrored
 from ...core.splicing.landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED
 from ...core.splicing.mapping import map_skeleton
-from ..locomotion.armature_operator import ArmatureOperator
+from ..armature_operator import ArmatureOperator
 from . import landmark_properties
 from .landmark_properties import PROPERTIES, read_landmarks, title, write_landmarks
 from .properties import splicing_settings

@@ -12,6 +12,7 @@ from ...blender.actions import writable_armature
 from ...blender.armature import active_armature
 from ...core.errors import ClipError
 from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
+from ..panel_base import ItemRows
 from .properties import splicing_settings
 from .splice_properties import PARTS
 from .stack import Reader
@@ -23,21 +24,10 @@ _SPARE_EASE: Final = 0.25
 """Of a clip's length: longer easing would leave little of a short clip."""
 
 
-class OCTO_MOTION_UL_splices(bpy.types.UIList):
+class OCTO_MOTION_UL_splices(ItemRows, bpy.types.UIList):
     """A row for each splice: on or off, name, where it begins."""
 
-    def draw_item(  # noqa: PLR0917 - Blender's order
-        self,
-        context: bpy.types.Context | None,  # noqa: ARG002
-        layout: bpy.types.UILayout,
-        data: Any,  # noqa: ARG002
-        item: Any,
-        icon: int | None,  # noqa: ARG002
-        active_data: Any,  # noqa: ARG002
-        active_property: str | None,  # noqa: ARG002
-        index: int | None = 0,  # noqa: ARG002
-        flt_flag: int | None = 0,  # noqa: ARG002
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
         row = layout.row(align=True)
         row.prop(item, "mute", text="", icon="HIDE_ON" if item.mute else "HIDE_OFF", emboss=False)
         name = row.row()

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import bpy
 
-from ...blender.armature import active_armature
-from ...core.errors import RigError
+from ..panel_base import ArmaturePanel, armature_in
 from .landmark_table import draw_landmarks
 from .properties import splicing_settings
 from .splice_build import OCTO_MOTION_OT_splice_build, OCTO_MOTION_OT_splice_suggest_timing
@@ -23,30 +22,14 @@ from .splice_list import (
 from .stack import ARM_PARTS, LEG_PARTS
 
 
-class _Panel:
-    """A panel of the tab that is there for armatures."""
+class _Panel(ArmaturePanel):
+    """A panel of the armature's splicing."""
 
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Octo Motion"
     bl_options = {"DEFAULT_CLOSED"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _armature(context) is not None
-
-    def draw(self, context: bpy.types.Context) -> None:
-        armature = _armature(context)
-        assert armature is not None
-        layout = cast("Any", self).layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        # Greyed out where nothing that is set would be saved.
-        layout.enabled = armature.is_editable
-        self.show(context, layout, cast("Any", splicing_settings(armature)))
-
-    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
-        raise NotImplementedError
+    @staticmethod
+    def settings_of(armature: bpy.types.Object) -> Any:
+        return splicing_settings(armature)
 
 
 class _SplicePanel(_Panel):
@@ -54,15 +37,8 @@ class _SplicePanel(_Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        armature = _armature(context)
+        armature = armature_in(context)
         return armature is not None and active_splice(splicing_settings(armature)) is not None
-
-
-def _armature(context: bpy.types.Context) -> bpy.types.Object | None:
-    try:
-        return active_armature(context)
-    except RigError:
-        return None
 
 
 class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
