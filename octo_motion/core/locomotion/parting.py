@@ -24,6 +24,8 @@ from .separation import Capsules
 from .touching import NEAR, Crowd, Touches, Touching, aside
 
 _ROUNDS: Final = 8
+_BOLDLY: Final = 1.3
+"""How much further arms are asked to go than they have to: they never get all the way."""
 _DONE: Final = 0.08
 """Share of the thinner radius: arms that overlap no deeper have made way."""
 _AROUND: Final = 4
@@ -170,7 +172,7 @@ class _Parting:
             arm, segment = touches.arms[which][chosen], touches.segments[which][chosen]
             share = touches.shares[which][chosen]
             own = arm < shape[1]
-            push = (far * can[which] / whole)[:, None] * ways[which]
+            push = (_BOLDLY * far * can[which] / whole)[:, None] * ways[which]
             for joint, part in ((0, 1.0 - share), (1, share)):
                 at = ((frame * shape[1] + arm) * shape[2] + segment + joint)[own]
                 weight = (far * part)[own, None]

@@ -165,8 +165,9 @@ def near(
         products *= -2.0
         products += squares[part, :, None]
         products += squares[part, None, :]
-        frame, row, column = np.nonzero(products <= limit)
-        found.append((frame + begin, place[row, column]))
+        # Several times faster than where a row, a column and a frame are found at once.
+        frame, spot = np.divmod(np.flatnonzero(products <= limit), limit.size)
+        found.append((frame + begin, place.ravel()[spot]))
     return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 

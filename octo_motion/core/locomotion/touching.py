@@ -26,6 +26,8 @@ _SOFT: Final = 0.15
 """The same from which on, before that, they begin to make way."""
 NEAR: Final = 1.0
 """Sums of radii between arms up to which one may be on the wrong side of the other."""
+_BESIDE: Final = 0.4
+"""How much less that is where it is on the right side."""
 _TINY: Final = 1e-12
 
 
@@ -109,7 +111,9 @@ class Touching:
         frame, pair = near(parts, one, other, margin)
         self._frame, self._one, self._other = frames[frame], one[pair], other[pair]
         seen = self.at(crowd.joints)
-        chosen = seen.distance <= (1.0 + margin) * seen.wide
+        # On its own side an arm has less far to be looked for.
+        wrong = np.einsum("ci,ci->c", seen.gap, seen.side) < 0.0
+        chosen = seen.distance <= (1.0 + np.where(wrong, margin, _BESIDE * margin)) * seen.wide
         self._frame = self._frame[chosen]
         self._one, self._other = self._one[chosen], self._other[chosen]
 
@@ -174,10 +178,9 @@ def aside(touches: Touches) -> tuple[Floats, Floats]:
     least = touches.wide - GIVEN * touches.thin
     across = touches.distance**2 - along**2
     far = np.sqrt(np.maximum(least**2 - across, 0.0)) - along
-    far *= np.where(along < 0.0, told, 1.0)
     soft = _SOFT * touches.thin
     far = np.where(far > soft, far, np.maximum(far + soft, 0.0) ** 2 / (4.0 * soft))
-    return way, far
+    return way, told * far
 
 
 def _length(vectors: Floats) -> Floats:
