@@ -42,14 +42,14 @@ class ArmaturePanel(TabPanel):
         layout.use_property_decorate = False
         # Greyed out where nothing that is set would be saved.
         layout.enabled = armature.is_editable
-        self.show(context, layout, self.settings_of(armature))
+        self.show(layout, self.settings_of(armature))
 
     @staticmethod
     def settings_of(armature: bpy.types.Object) -> Any:
         """Which of the armature's settings the panel is about."""
         raise NotImplementedError
 
-    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         """Draw the panel."""
         raise NotImplementedError
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Walks that hold the ground, as the artist makes them: settings, markers, what is told."""
 
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -12,6 +13,7 @@ from octo_motion.core.errors import GroundError
 from octo_motion.core.locomotion import quality
 from octo_motion.core.locomotion.ground import Plane
 from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.ui.locomotion.wishes import Wanted, changed_by_hand, gathered, store
 from octo_motion.ui.locomotion.workflow import prepare
 from tests.blender.test_ground import make_mesh, make_square
 from tests.ui.rig import click, generate, give_route, joints_in_world, keys
@@ -260,6 +262,46 @@ def test_a_contact_out_of_reach_is_told_with_its_frame(octopus: Any) -> None:
     name = marker.octo_motion.contact.arm
     (told,) = [each for each in warnings(octopus) if "out of reach" in each]
     assert told.startswith(f"'{name}' slides at frame ")
+
+
+def test_an_override_keeps_contacts_of_its_own_and_lays_down_those_of_its_linked_file(
+    octopus: Any, tmp_path: Path
+) -> None:
+    settings = octopus.octo_motion.locomotion
+    arms = [item.name for item in settings.arms]
+    frees = [(arms[0], 1), (arms[1], 1)]
+    store(settings.ground, {place: Wanted(removed=True) for place in frees})
+    library = str(tmp_path / "rig.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=library)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(library, link=True) as (_, wanted):  # type: ignore[attr-defined]
+        wanted.objects = ["Octopus"]
+    linked: Any = bpy.data.objects["Octopus"]
+    bpy.context.scene.collection.objects.link(linked)
+    armature: Any = linked.override_create(remap_local_usages=True)
+    armature.override_library.is_system_override = False
+    bpy.context.view_layer.objects.active = armature
+    give_route(armature, WAY)
+    kept = {(arms[0], 1): Wanted(shift=0.1), (arms[2], 2): Wanted(removed=True)}
+    ground = armature.octo_motion.locomotion.ground
+    for _ in range(2):
+        store(ground, kept)
+        generate(armature)
+        assert set(gathered(ground, armature)) == set(kept)
+    assert changed_by_hand(ground) == 2
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    again: Any = next(each for each in bpy.data.objects if each.override_library)
+    ground = again.octo_motion.locomotion.ground
+    found = gathered(ground, again)
+    assert {place: (each.removed, round(each.shift, 3)) for place, each in found.items()} == {
+        (arms[0], 1): (False, 0.1),
+        (arms[2], 2): (True, 0.0),
+    }
+    bpy.context.view_layer.objects.active = again
+    click("contacts_clear")
+    assert gathered(ground, again) == {}
+    assert changed_by_hand(ground) == 0
 
 
 def test_there_are_no_contacts_to_show_of_a_swim(octopus: Any) -> None:

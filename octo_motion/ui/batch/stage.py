@@ -16,10 +16,12 @@ from ...blender.armature import read_skeleton, world_matrix
 from ...blender.contacts import remove_markers
 from ...blender.curves import add_route_curve
 from ...blender.octopus import add_octopus
+from ...blender.overrides import linked_names
 from ...core.errors import OctoMotionError, RigError, RouteError, SettingsError, WriteError
 from ...core.locomotion import gait
 from ...core.locomotion.detection import detect_arms
 from ..locomotion.properties import locomotion_settings, set_gait
+from ..locomotion.wishes import store
 from ..locomotion.workflow import Summary, generate
 from . import pose_stage, splice_stage
 from .blender_said import blender_said
@@ -242,15 +244,15 @@ def _fill_lists(entry: ShotEntry, armature: bpy.types.Object, settings: Any) -> 
     """Give the armature the lists of the shot, in place of its own."""
     lists = entry.lists
     if "changes" in lists:
-        _filled(settings.change.places, lists["changes"])
+        _filled(settings.change, "places", lists["changes"])
         if "change.by" not in entry.settings:
             settings.change.by = "MARKERS" if lists["changes"] else "NONE"
     if "reaches" in lists:
         objects = [each.get("target") for each in lists["reaches"]]
         found = [_object(name) if name else None for name in objects]
         rest = [{**each, "target": None} for each in lists["reaches"]]
-        _filled(settings.reaches, rest)
-        for item, target in zip(settings.reaches, found, strict=True):
+        _filled(settings, "reaches", rest)
+        for item, target in zip(list(settings.reaches)[-len(rest) :], found, strict=False):
             item.target = target
     if "contacts" in lists:
         names = [item.name for item in settings.arms]
@@ -263,15 +265,35 @@ def _fill_lists(entry: ShotEntry, armature: bpy.types.Object, settings: Any) -> 
         remove_markers(armature)
         settings.ground.shown = ""
         items = [{**each, "locked": "position" in each} for each in lists["contacts"]]
-        _filled(settings.ground.contacts, items)
+        store(settings.ground, {})
+        _filled(settings.ground, "contacts", items)
 
 
-def _filled(collection: Any, items: Sequence[Mapping[str, Any]]) -> None:
-    collection.clear()
+def _filled(settings: Any, name: str, items: Sequence[Mapping[str, Any]]) -> None:
+    """Give a list these items alone.
+
+    What a library override has from its linked file cannot be removed: a reach is muted, a contact
+    says nothing any more.
+
+    Raises:
+        SettingsError: it can neither be removed nor left out.
+    """
+    collection = getattr(settings, name)
+    linked = linked_names(settings, name)
+    if linked and name == "places":
+        raise SettingsError(
+            "Places of a linked file where the gait changes cannot be taken away.",
+            "Leave changes out, or open the linked file itself.",
+        )
+    for number in reversed(range(len(collection))):
+        if collection[number].name not in linked:
+            collection.remove(number)
+        elif name == "reaches":
+            collection[number].mute = True
     for values in items:
         item = collection.add()
-        for name, value in values.items():
-            setattr(item, name, value)
+        for each, value in values.items():
+            setattr(item, each, value)
 
 
 def _object(name: str, kind: str = "", what: str = "") -> bpy.types.Object:

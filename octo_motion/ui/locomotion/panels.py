@@ -72,11 +72,9 @@ class OCTO_MOTION_PT_arms(_Panel, bpy.types.Panel):
     bl_label = "Arms"
     bl_order = 1
 
-    def show(
-        self, context: bpy.types.Context, layout: Any, settings: OCTO_MOTION_PG_locomotion
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         layout.use_property_split = False
-        draw_arms(layout, context, settings)
+        draw_arms(layout, bpy.context, settings)
 
 
 class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
@@ -84,12 +82,7 @@ class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
     bl_label = "Route"
     bl_order = 2
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         layout.prop(settings, "route", text="Curve")
         if settings.route is None:
             layout.operator(
@@ -121,12 +114,7 @@ class OCTO_MOTION_PT_ground(_Panel, bpy.types.Panel):
         if armature is not None and layout is not None:
             layout.prop(locomotion_settings(armature).ground, "use", text="")
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         draw_ground(layout, settings)
 
 
@@ -136,12 +124,7 @@ class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
     bl_parent_id = OCTO_MOTION_PT_route.bl_idname
     bl_options = {"DEFAULT_CLOSED"}
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         if settings.table.manner != "SWIM":
             layout.row().prop(settings, "heading", expand=True)
             layout.prop(settings, "heading_angle")
@@ -169,12 +152,7 @@ class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
     def draw_header_preset(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         OCTO_MOTION_PT_setups.draw_panel_header(cast("Any", self).layout)
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         table = settings.table
         row = layout.row(align=True)
         row.alert = bool(used(table.curves)) and table.name != settings.gait
@@ -197,12 +175,7 @@ class OCTO_MOTION_PT_table(_Panel, bpy.types.Panel):
     bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
     bl_options = {"DEFAULT_CLOSED"}
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         table = settings.table
         layout.row().prop(table, "manner", expand=True)
         if table.manner == "SWIM":
@@ -286,12 +259,7 @@ class OCTO_MOTION_PT_change(_Panel, bpy.types.Panel):
     bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
     bl_options = {"DEFAULT_CLOSED"}
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         draw_changes(layout, settings)
 
 
@@ -301,12 +269,7 @@ class OCTO_MOTION_PT_variation(_Panel, bpy.types.Panel):
     bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
     bl_options = {"DEFAULT_CLOSED"}
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         layout.prop(settings, "phase_spread")
         column = layout.column(align=True)
         column.prop(settings, "variation_min", text="Random Min")
@@ -322,12 +285,7 @@ class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
     bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
     bl_options = {"DEFAULT_CLOSED"}
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         layout.prop(settings, "use_weight_curve")
         group = settings.weight_curve
         if not settings.use_weight_curve:
@@ -352,12 +310,7 @@ class OCTO_MOTION_PT_reaches(_Panel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
     bl_order = 3
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         draw_reaches(layout, settings)
 
 
@@ -366,9 +319,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
     bl_label = "Generate"
     bl_order = 4
 
-    def show(
-        self, context: bpy.types.Context, layout: Any, settings: OCTO_MOTION_PG_locomotion
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         layout.row().prop(settings, "timing", expand=True)
         column = layout.column(align=True)
         if settings.timing == "CADENCE":
@@ -399,7 +350,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             row = layout.row()
             row.alert = True
             row.label(text=settings.live_error, icon="ERROR")
-        _draw_result(layout, context, settings)
+        _draw_result(layout, bpy.context, settings)
 
 
 class OCTO_MOTION_PT_quality(_Panel, bpy.types.Panel):
@@ -413,12 +364,7 @@ class OCTO_MOTION_PT_quality(_Panel, bpy.types.Panel):
         armature = armature_in(context)
         return armature is not None and bool(known_figures(locomotion_settings(armature)))
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         draw_figures(layout, settings)
 
 

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...blender.contacts import Contact, read_markers
+from ...blender.overrides import linked_names
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.generator import Arm
 from ...core.rotations import Floats
@@ -47,6 +48,7 @@ def gathered(settings: OCTO_MOTION_PG_ground, armature: bpy.types.Object) -> dic
         )
         for item in settings.contacts
     }
+    wanted = {place: each for place, each in wanted.items() if each.matters}
     if not settings.shown:
         return wanted
     found = read_markers(armature)
@@ -78,15 +80,33 @@ def as_wishes(wanted: dict[Place, Wanted], arms: Sequence[Arm]) -> list[Wish]:
 
 
 def store(settings: OCTO_MOTION_PG_ground, wanted: dict[Place, Wanted]) -> None:
-    """Keep wishes in the settings."""
-    settings.contacts.clear()
+    """Keep wishes in the settings.
+
+    What a library override has from its linked file can be changed, but not removed: there it says
+    nothing any more.
+    """
+    linked = linked_names(settings, "contacts")
+    for number in reversed(range(len(settings.contacts))):
+        item = settings.contacts[number]
+        if item.name not in linked:
+            settings.contacts.remove(number)
+        elif (item.arm, item.cycle) not in wanted:
+            item.removed, item.shift, item.locked = False, 0.0, False
     for (arm, cycle), each in sorted(wanted.items()):
-        item = settings.contacts.add()
-        item.name = f"{arm} {cycle}"
-        item.arm, item.cycle, item.removed = arm, cycle, each.removed
+        name = f"{arm} {cycle}"
+        item = settings.contacts.get(name)
+        if item is None:
+            item = settings.contacts.add()
+            item.name, item.arm, item.cycle = name, arm, cycle
+        item.removed = each.removed
         item.shift, item.locked = each.shift, each.position is not None
         if each.position is not None:
             item.position, item.heading = each.position, each.heading
+
+
+def changed_by_hand(settings: OCTO_MOTION_PG_ground) -> int:
+    """How many contacts the settings have wishes of."""
+    return sum(item.removed or item.shift != 0.0 or item.locked for item in settings.contacts)
 
 
 def note_shown(settings: OCTO_MOTION_PG_ground, contacts: Sequence[Contact]) -> None:

@@ -32,14 +32,9 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
     bl_label = "Device"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
 
-    def show(
-        self,
-        context: bpy.types.Context,
-        layout: Any,
-        settings: Any,  # noqa: ARG002
-    ) -> None:
-        assert context.window_manager is not None
-        own = device_settings(context.window_manager)
+    def show(self, layout: Any, settings: Any) -> None:  # noqa: ARG002
+        assert bpy.context.window_manager is not None
+        own = device_settings(bpy.context.window_manager)
         row = layout.row()
         row.operator_context = "INVOKE_DEFAULT"
         row.operator(OCTO_MOTION_OT_pose_device.bl_idname, icon="ORIENTATION_GIMBAL")

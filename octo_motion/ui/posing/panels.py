@@ -30,12 +30,7 @@ class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
     bl_label = "Pose"
     bl_order = 7
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: Any,
-    ) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "material")
         layout.prop(settings, "strength")
         layout.prop(settings, "root")
@@ -53,7 +48,7 @@ class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
     bl_label = "World"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
 
-    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "gravity")
         row = layout.row(heading="Floor")
         row.prop(settings, "floor", text="")
@@ -63,7 +58,7 @@ class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
         layout.prop(settings, "use_obstacles")
         layout.prop(settings, "self_collision")
         layout.prop(settings, "friction")
-        item: Any = context.object
+        item: Any = bpy.context.object
         if item is not None and item.type != "ARMATURE":
             layout.prop(item.octo_motion.posing, "obstacle")
         layout.operator_menu_enum(
@@ -76,12 +71,7 @@ class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):
     bl_label = "Limbs"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: Any,
-    ) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "smallest")
         layout.prop(settings, "show_loads")
         layout.operator_menu_enum(
@@ -94,12 +84,7 @@ class OCTO_MOTION_PT_posing_keys(PosePanel, bpy.types.Panel):
     bl_label = "Keys"
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: Any,
-    ) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "keys_to")
         if settings.keys_to == "CHOSEN":
             row = layout.row()

@@ -46,12 +46,7 @@ class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
     bl_label = "Splicing"
     bl_order = 5
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: Any,
-    ) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         _draw_action(layout, settings, "base", "base_slot")
         layout.prop(settings, "visual")
         row = layout.row()
@@ -89,12 +84,7 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
     bl_label = "Splice"
     bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: Any,
-    ) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         item = active_splice(settings)
         layout.prop(item, "part")
         if item.part == "CHAIN":
@@ -126,12 +116,7 @@ class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):
     bl_label = "Timing of the Splice"
     bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
 
-    def show(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        layout: Any,
-        settings: Any,
-    ) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         item = active_splice(settings)
         column = layout.column(align=True)
         column.prop(item, "base_start")
@@ -149,9 +134,9 @@ class OCTO_MOTION_PT_landmarks(_Panel, bpy.types.Panel):
     bl_label = "Landmarks"
     bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
 
-    def show(self, context: bpy.types.Context, layout: Any, settings: Any) -> None:
+    def show(self, layout: Any, settings: Any) -> None:
         layout.use_property_split = False
-        draw_landmarks(layout, context, settings)
+        draw_landmarks(layout, bpy.context, settings)
 
 
 def _draw_action(layout: Any, group: Any, action: str, slot: str) -> None:
