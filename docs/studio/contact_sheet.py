@@ -18,6 +18,8 @@ from mathutils import Vector
 from shots import Performance
 from stage import Pixels, Points
 
+FRONT: Final = np.array([0.0, -1.0, 0.0])
+"""Where a creature faces that nothing turns."""
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _PHASES: Final = 8
 _COLUMNS: Final = 4
@@ -83,7 +85,10 @@ def _travel(
     for frame in frames:
         before, here, after = (_place(armature, frame + shift) for shift in (-1.0, 0.0, 1.0))
         right = (after - before) * [1.0, 1.0, 0.0]
-        right /= np.linalg.norm(right)
+        if not np.any(right):
+            # In place the ground would go by.
+            right = FRONT
+        right = right / np.linalg.norm(right)
         away = np.cross(_UP, right)
         up = np.cos(view.elevation) * _UP + np.sin(view.elevation) * away
         bodies.append(here)

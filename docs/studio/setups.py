@@ -104,7 +104,8 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
     route = np.array(_RISING if swims else _ROUTE) * (unit / _LENGTH)
     bpy.ops.octo_motion.add_route(**dict(zip(("b0", "b1", "b2", "b3"), route, strict=True)))
     scene.frame_end = 1
-    if not swims:
+    stays = settings.travel_on == "NONE"
+    if not swims and not stays:
         settings.ground.object = add_bumps(route, unit)
     bpy.ops.octo_motion.generate_locomotion()
     octopus.show_in_front = False
@@ -112,6 +113,8 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
     stage.set_light(scene)
     if swims:
         stage.add_ground(points, float(points[..., 2].min()) - 0.4 * unit)
+    if stays:
+        stage.add_ground(points, float(octopus.matrix_world.translation.z))
     camera = stage.add_camera("Camera", lens=50.0)
     stage.look(camera, np.array((-0.35, 0.9, -0.45)), np.array([0.0, 0.0, 1.0]))
     stage.set_resolution(640, 360)
@@ -206,7 +209,9 @@ def _thumbnail(performance: shots.Performance) -> Pixels:
     stage.go_to(frame)
     travel = (after - points).mean(axis=0)
     travel[2] = 0.0
-    travel /= max(float(np.linalg.norm(travel)), 1e-9)
+    if octopus.octo_motion.locomotion.travel_on == "NONE":
+        travel = contact_sheet.FRONT
+    travel = travel / max(float(np.linalg.norm(travel)), 1e-9)
     side = np.array([-travel[1], travel[0], 0.0])
     forward = 0.85 * side - 0.35 * travel - np.array([0.0, 0.0, 0.4])
     camera = stage.add_camera("Thumbnail")

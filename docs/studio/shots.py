@@ -67,6 +67,9 @@ class Performance:
         """
         settings = self.octopus.octo_motion.locomotion
         scene = stage.the_scene()
+        if settings.travel_on == "NONE":
+            loop = (scene.frame_end - scene.frame_start) / settings.cycles
+            return (scene.frame_start + loop * np.arange(pictures) / pictures).tolist()
         seconds = (scene.frame_end - scene.frame_start) / RATE
         behind = 0.5 * settings.ease_in * seconds
         first = math.ceil(behind / settings.cycle_time)

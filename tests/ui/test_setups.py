@@ -64,6 +64,22 @@ def test_setup_says_everything_that_it_is_about(name: str, settings: Any) -> Non
     assert state(settings) == fresh
 
 
+def test_idle_and_curl_stay_and_the_next_setup_goes_again(settings: Any) -> None:
+    for name in ("idle", "curl"):
+        bpy.ops.octo_motion.setup_load(name=name)
+        assert settings.travel_on == "NONE"
+        assert settings.breathing > 0.0
+    bpy.ops.octo_motion.setup_load(name="walk")
+    assert (settings.travel_on, settings.breathing) == ("OBJECT", 0.0)
+    # Who has chosen In Place for a walk keeps it.
+    settings.travel_on = "NONE"
+    bpy.ops.octo_motion.setup_load(name="hurry")
+    assert settings.travel_on == "NONE"
+    settings.travel_on = "BONE"
+    bpy.ops.octo_motion.setup_load(name="swim")
+    assert settings.travel_on == "BONE"
+
+
 def test_setup_leaves_shot_rig_and_keys_alone(settings: Any) -> None:
     bpy.ops.octo_motion.add_route()
     settings.frame_start, settings.keys, settings.seed = 17, "REDUCED", 5

@@ -15,7 +15,7 @@ from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from .standing import resting
-from .wishes import gathered, store
+from .wishes import changed_by_hand, gathered, store
 from .workflow import prepare, show_contacts
 
 
@@ -68,7 +68,7 @@ class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
         armature = active_armature(context)
         settings = locomotion_settings(armature).ground
         shown = bool(settings.shown)
-        settings.contacts.clear()
+        store(settings, {})
         settings.shown = ""
         remove_markers(armature)
         _activate(context, armature)
@@ -155,8 +155,7 @@ def draw_ground(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     else:
         row.operator(OCTO_MOTION_OT_contacts_show.bl_idname, icon="EMPTY_SINGLE_ARROW")
     row.operator(OCTO_MOTION_OT_contacts_clear.bl_idname, text="", icon="LOOP_BACK")
-    if len(ground.contacts):
-        count = len(ground.contacts)
+    if count := changed_by_hand(ground):
         layout.label(text=f"{count} contact{'s' * (count > 1)} changed by hand", icon="PINNED")
 
 

@@ -32,7 +32,10 @@ FOLDER: Final = "octo_motion/setups"
 PACKAGE: Final = Path(__file__).resolve().parents[2]
 """The folder that holds ``presets``."""
 
-ORDER: Final = ("walk", "hurry", "prowl", "tiptoe", "crawl", "settle", "swim", "jet_escape")
+ORDER: Final = (
+    *("walk", "hurry", "prowl", "tiptoe", "crawl", "settle", "swim", "jet_escape"),
+    *("idle", "curl"),
+)
 """In which set-ups that come with the add-on are shown; others follow by name."""
 
 APART: Final = frozenset(
@@ -62,6 +65,8 @@ APART: Final = frozenset(
 """Settings of the rig, the shot and the keys: no set-up of a motion changes them. The table of the
 gait goes as a whole."""
 
+_ON_THE_SPOT: Final = frozenset({"idle", "curl"})
+"""Gaits of set-ups that stay where they are."""
 _SINGLE: Final = frozenset({"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"})
 
 
@@ -135,6 +140,9 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
                 f"There is no set-up '{self.name}'.", f"Choose one of {', '.join(paths)}."
             )
         settings = locomotion_settings(armature)
+        if settings.travel_on == "NONE" and settings.gait in _ON_THE_SPOT:
+            # It stayed because of the set-up before.
+            settings.travel_on = "OBJECT"
         reset(settings)
         try:
             bpy.utils.execfile(str(path))

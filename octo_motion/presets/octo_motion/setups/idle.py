@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Rests on the spot and breathes; arms curl a little.
+import bpy
+
+active = bpy.context.object
+armature = active if active.type == "ARMATURE" else active.find_armature()
+settings = armature.octo_motion.locomotion
+
+settings.travel_on = "NONE"
+settings.gait = "idle"
+settings.cycle_time = 5.0
+settings.breathing = 0.09
+settings.breath_time = 2.5
