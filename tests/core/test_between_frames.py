@@ -7,6 +7,7 @@ import pytest
 from octo_motion.core.locomotion.arm_frames import arm_frames
 from octo_motion.core.locomotion.between_frames import Course, raised_between
 from octo_motion.core.locomotion.figures import Poses
+from octo_motion.core.locomotion.grounded import Raise
 from octo_motion.core.locomotion.placement import object_transforms
 from octo_motion.core.rotations import Floats, rotate
 from tests.core.grounds import GROUNDS, Walker, walker
@@ -24,13 +25,20 @@ class Shot:
         arms = [arm_frames(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
         self.course = Course(arms, walk.ground, 1.0)
         self.asked: list[np.ndarray] = []
+        self.shapes: tuple[Floats, ...] = ()
 
     def pose(self, chosen: np.ndarray, lift: Floats | None) -> tuple[Poses, list[Floats]]:
         travel, centres, orientations = self.walk.places(self.times[chosen])
-        stood = self.walk.walk.pose(travel.phase, travel.turn, centres, orientations, lift)
+        higher = None if lift is None else self.higher(chosen, lift)
+        stood = self.walk.walk.pose(travel.phase, travel.turn, centres, orientations, higher)
+        if lift is None:
+            self.shapes = stood.shapes
         locations, turns = (each[chosen] for each in self.going)
         poses = Poses(stood.rotations, stood.strains, locations, turns)
-        return poses, self.walk.walk.by_arm(stood.joints)
+        return poses, self.walk.walk.by_arm(stood.joints, higher)
+
+    def higher(self, chosen: np.ndarray, lift: Floats) -> Raise:
+        return Raise(lift, tuple(each[:, :, chosen] for each in self.shapes))
 
     def again(self, chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
         self.asked.append(chosen)

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -47,45 +49,55 @@ class Course:
     cyclic: bool = False
     """Whether the last frame is the first again, and the motion repeats."""
 
-    def clear(self, joints: Sequence[Floats]) -> Floats:
+    @cached_property
+    def bones(self) -> list[slice]:
+        """Which bones of all arms' are those of each."""
+        ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)]).tolist()
+        return [slice(start, end) for start, end in pairwise(ends)]
+
+    def clear(self, joints: Sequence[Floats], arms: Sequence[int] | None = None) -> Floats:
         """Arm lengths (frames, arms) that each arm's lowest joint is above the ground.
 
         Args:
             joints: of each arm (frames, joints, 3), world.
+            arms: which are looked at, none for all.
         """
-        return np.stack(
-            [
-                (own[:, 1:, 2] - self.ground.height(own[:, 1:])).min(axis=1)
-                / (arm.length * self.scale)
-                for arm, own in zip(self.arms, joints, strict=True)
-            ],
-            axis=1,
-        )
+        found = []
+        for number in range(len(self.arms)) if arms is None else arms:
+            own, length = joints[number][:, 1:], self.arms[number].length
+            height = own[..., 2] - self.ground.height(own)
+            found.append(height.min(axis=1) / (length * self.scale))
+        return np.stack(found, axis=1)
 
-    def dips(self, poses: Poses, clear: Floats) -> Floats:
+    def dips(self, poses: Poses, clear: Floats, arms: Sequence[int] | None = None) -> Floats:
         """Arm lengths (frames − 1, arms) that each one's lowest joint is below the ground half way
         between frames; 0 where it cannot be.
 
         Args:
             poses: at the frames.
-            clear: (frames, arms) arm lengths that they are above the ground there.
+            clear: (frames, all arms) arm lengths that they are above the ground there.
+            arms: which are looked at, none for all.
         """
-        bends = _bends(poses.rotations)
-        half = automatic(poses, cyclic=self.cyclic)
-        found = np.zeros((len(half.rotations), len(self.arms)))
-        start = 0
-        for number, arm in enumerate(self.arms):
-            own = slice(start, start + len(arm.bones))
-            start = own.stop
-            astray = bends[:, own].sum(axis=1)
+        numbers = range(len(self.arms)) if arms is None else arms
+        found = np.zeros((len(poses.rotations) - 1, len(numbers)))
+        for place, number in enumerate(numbers):
+            arm, own = self.arms[number], self.bones[number]
+            rotations = np.ascontiguousarray(poses.rotations[:, own])
+            astray = _bends(rotations).sum(axis=1)
             least = np.minimum(clear[:-1, number], clear[1:, number])
             chosen = np.flatnonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + _TOLERATED)
-            frames = arm.from_bones(half.rotations[chosen, own])
-            joints = self.scale * arm.joints(frames, half.strains[chosen, own])[:, 1:]
+            if not len(chosen):
+                continue
+            half = automatic(
+                Poses(rotations, poses.strains[:, own], poses.locations, poses.orientations),
+                cyclic=self.cyclic,
+            )
+            frames = arm.from_bones(half.rotations[chosen])
+            joints = self.scale * arm.joints(frames, half.strains[chosen])[:, 1:]
             world = rotate(half.orientations[chosen, None], joints)
             world += half.locations[chosen, None]
             below = self.ground.height(world) - world[..., 2]
-            found[chosen, number] = below.max(axis=1) / (arm.length * self.scale)
+            found[chosen, place] = below.max(axis=1) / (arm.length * self.scale)
         return found
 
 
@@ -110,7 +122,7 @@ def raised_between(
         poses: of all frames; they are left as they are.
         joints: of each arm (frames, joints, 3) then, world.
         again: poses of some frames (n,), with arms (n, arms) so many arm lengths higher, and the
-            joints of each arm.
+            joints of each arm; of arms that are nowhere higher it need say nothing.
     """
     if len(poses.rotations) < 2:
         return poses
@@ -126,11 +138,15 @@ def raised_between(
             break
         lift = np.minimum(lift + more, _MOST)
         fresh, places = again(chosen, lift[chosen])
-        rotations, strains = last.rotations.copy(), last.strains.copy()
-        rotations[chosen], strains[chosen] = fresh.rotations, fresh.strains
-        clear[chosen] = course.clear(places)
+        arms = np.flatnonzero(np.any(lift[chosen] > 0.0, axis=0)).tolist()
+        rotations, strains, deep = last.rotations.copy(), last.strains.copy(), deep.copy()
+        for bones in (course.bones[arm] for arm in arms):
+            rotations[chosen, bones] = fresh.rotations[:, bones]
+            strains[chosen, bones] = fresh.strains[:, bones]
+        clear[np.ix_(chosen, arms)] = course.clear(places, arms)
         higher = Poses(rotations, strains, poses.locations, poses.orientations)
-        tried.append((higher, course.dips(higher, clear)))
+        deep[:, arms] = course.dips(higher, clear, arms)
+        tried.append((higher, deep))
     return _best(course, tried, lift > 0.0)
 
 
@@ -147,10 +163,7 @@ def _best(course: Course, tried: Sequence[tuple[Poses, Floats]], raised: np.ndar
     if len(tried) == 1:
         return tried[0][0]
     rotations, strains = tried[0][0].rotations.copy(), tried[0][0].strains.copy()
-    start = 0
-    for number, arm in enumerate(course.arms):
-        bones = slice(start, start + len(arm.bones))
-        start = bones.stop
+    for number, bones in enumerate(course.bones):
         for first, end in _runs(raised[:, number]):
             moments = slice(max(first - 1, 0), end)
             depths = [deep[moments, number].max(initial=0.0) for _, deep in tried]

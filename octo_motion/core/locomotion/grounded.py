@@ -49,6 +49,23 @@ class GroundedPoses:
     """For each build (frames, arms, segments + 1): which joints rest on the ground."""
     cycles: np.ndarray
     """(frames, arms) number of the cycle that each arm is in."""
+    shapes: tuple[Floats, ...]
+    """For each build (segments, 3, frames, arms): the gait's own, in the arms' frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class Raise:
+    """What is asked of arms that are to be higher than they need be."""
+
+    lift: Floats
+    """(frames, arms) arm lengths, where they do not lie."""
+    shapes: tuple[Floats, ...]
+    """``GroundedPoses.shapes`` of the same frames."""
+
+    @property
+    def arms(self) -> list[int]:
+        """Those that are raised at any frame."""
+        return np.flatnonzero(np.any(self.lift > 0.0, axis=0)).tolist()
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +196,7 @@ class GroundedWalk:
         turn: Floats,
         centres: Floats,
         orientations: Floats,
-        lift: Floats | None = None,
+        higher: Raise | None = None,
     ) -> GroundedPoses:
         """The arms at some frames.
 
@@ -188,36 +205,45 @@ class GroundedWalk:
             turn: (frames, 2) turn that lies ahead, in the body's XY plane.
             centres: (frames, 3) of the body, world.
             orientations: (frames, 4) of the canonical body, world.
-            lift: (frames, arms) arm lengths that arms are to be higher where they do not lie, none
-                for as high as they have to be.
+            higher: which arms are to be higher, and nothing is said of the others; none for all
+                of them, as high as they have to be.
         """
         generator = self._generator
         frames, count = len(phase), len(generator.arms)
+        wanted = range(count) if higher is None else higher.arms
         phases = self.arm_phases(phase)
         angles, steering = generator.asked_at(phases, turn, self._rhythm.rounds)
         cycles, since = cycles_at(phases, self._middle)
         ends = np.cumsum([0] + [len(arm.bones) for arm in generator.arms])
-        rotations = np.empty((frames, ends[-1], 4))
+        rotations = np.zeros((frames, ends[-1], 4))
         strains = np.zeros((frames, ends[-1]))
         misses = np.zeros((frames, count))
-        joints, lying = [], []
+        joints, lying, asked = [], [], []
         to_armature = multiply(self._body_turn, conjugate(orientations))
-        for build, limbs, footholds in self._limbs:
-            columns = list(build.arms)
+        for number, (build, limbs, footholds) in enumerate(self._limbs):
+            chosen = [place for place, arm in enumerate(build.arms) if arm in wanted]
+            columns = [build.arms[place] for place in chosen]
             many, batch = len(columns), frames * len(columns)
-            own = angles[:, columns]
-            shapes, _ = generator.shapes(build, own, steering[:, columns])
-            segments = len(shapes)
+            own, segments = angles[:, columns], len(build.chain.lengths)
+            if not columns:
+                joints.append(np.zeros((segments + 1, frames, 0, 3)))
+                lying.append(np.zeros((segments + 1, frames, 0), dtype=bool))
+                continue
+            if higher is None:
+                shapes, _ = generator.shapes(build, own, steering[:, columns])
+                asked.append(shapes)
+            else:
+                shapes = higher.shapes[number][..., chosen]
             facing = multiply(orientations[:, None], generator.outward[columns]).reshape(batch, 4).T
             shapes = turned(facing, shapes.reshape(segments, 3, batch))
-            roots = centres[:, None] + rotate(orientations[:, None], limbs.roots)
+            roots = centres[:, None] + rotate(orientations[:, None], limbs.roots[chosen])
             held_by = Batch(
                 limbs,
-                np.tile(np.arange(many), frames),
+                np.tile(chosen, frames),
                 np.ascontiguousarray(roots.reshape(batch, 3).T),
                 turned(facing, np.array([1.0, 0.0, 0.0])[:, None]),
                 turned(facing, np.array([0.0, 0.0, 1.0])[:, None]),
-                self._lifted(limbs, lift, columns, frames),
+                self._lifted(limbs, higher, chosen, columns, frames),
             )
             held = hold(
                 held_by,
@@ -253,26 +279,36 @@ class GroundedWalk:
             tuple(np.moveaxis(each, 0, 2) for each in joints),
             tuple(np.moveaxis(each, 0, 2) for each in lying),
             cycles,
+            tuple(asked),
         )
 
     @staticmethod
-    def _lifted(limbs: Limbs, lift: Floats | None, columns: list[int], frames: int) -> Floats:
+    def _lifted(
+        limbs: Limbs, higher: Raise | None, chosen: list[int], columns: list[int], frames: int
+    ) -> Floats:
         """Metres (frames × arms) that arms are to be higher."""
-        if lift is None:
+        if higher is None:
             return np.zeros(frames * len(columns))
-        return (lift[:, columns] * limbs.reach[-1]).reshape(-1)
+        return (higher.lift[:, columns] * limbs.reach[-1, chosen]).reshape(-1)
 
     @property
     def builds(self) -> tuple[tuple[int, ...], ...]:
         """Numbers of the arms of each build, in the order of ``GroundedPoses.joints``."""
         return tuple(build.arms for build, _, _ in self._limbs)
 
-    def by_arm(self, values: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """What poses have for each build (frames, arms, …), for each arm (frames, …) instead."""
-        found = {
+    def by_arm(self, values: Sequence[np.ndarray], higher: Raise | None = None) -> list[np.ndarray]:
+        """What poses have for each build (frames, arms, …), for each arm (frames, …) instead.
+
+        Args:
+            values: of the builds.
+            higher: which arms they were asked of, none for all; of others it is none at all.
+        """
+        wanted = range(len(self._generator.arms)) if higher is None else higher.arms
+        found = {arm: np.zeros((0, 1, 3)) for arm in range(len(self._generator.arms))}
+        found |= {
             arm: each[:, place]
             for arms, each in zip(self.builds, values, strict=True)
-            for place, arm in enumerate(arms)
+            for place, arm in enumerate(arm for arm in arms if arm in wanted)
         }
         return [found[arm] for arm in sorted(found)]
 

@@ -20,7 +20,7 @@ from ...core.locomotion.crawl import CrawlSettings
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.generator import Arm, Generator
 from ...core.locomotion.ground import Ground, Plane, along_path, passes_over_itself, sampled
-from ...core.locomotion.grounded import GroundedPoses, GroundedWalk
+from ...core.locomotion.grounded import GroundedPoses, GroundedWalk, Raise
 from ...core.locomotion.rhythm import Even, at_rest, crawling, crawling_in_place
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, strides, walked_at
@@ -76,7 +76,7 @@ class Standing:
         travel: Travel,
         part: slice | np.ndarray,
         places: tuple[Floats, Floats],
-        lift: Floats | None = None,
+        higher: Raise | None = None,
     ) -> GroundedPoses:
         """The arms at some of the frames, whose places :meth:`place` has found.
 
@@ -84,11 +84,11 @@ class Standing:
             travel: the body's.
             part: which frames.
             places: of all frames.
-            lift: (frames, arms) arm lengths that arms are to be higher in the air.
+            higher: arms that are to be higher, of which alone there is to be said something.
         """
         centres, orientations = places
         phase, turn = travel.phase[part], travel.turn[part]
-        return self.walk.pose(phase, turn, centres[part], orientations[part], lift)
+        return self.walk.pose(phase, turn, centres[part], orientations[part], higher)
 
 
 def resting(settings: OCTO_MOTION_PG_locomotion) -> tuple[bool, bool]:

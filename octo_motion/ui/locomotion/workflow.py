@@ -34,7 +34,7 @@ from ...blender.stretching import stretch_channels
 from ...blender.weight_curve import sample_weight_curve
 from ...core.errors import RigError, RouteError, SettingsError, WriteError
 from ...core.keys import check_bounds
-from ...core.locomotion.arm_frames import arm_frames
+from ...core.locomotion.arm_frames import ArmFrames, arm_frames
 from ...core.locomotion.between_frames import Course, raised_between
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
 from ...core.locomotion.changes import between
@@ -44,6 +44,7 @@ from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
 from ...core.locomotion.ground import Ground
+from ...core.locomotion.grounded import Raise
 from ...core.locomotion.keeping_apart import kept_apart
 from ...core.locomotion.loops import route_in_place, travel_in_place, whole_frames
 from ...core.locomotion.mantle import find_mantle, stretched
@@ -242,6 +243,7 @@ class Shot:
         step = max(1, _BONES_AT_ONCE // max(bones, 1))
         moving = 1.0 if self.tolerances is None else _MOVING
         joints: list[list[Floats]] = []
+        shapes: list[tuple[Floats, ...]] = []
         if self.changing is not None:
             for done in self.changing.compute(travel.distance, places, step):
                 if isinstance(done, Moved):
@@ -260,6 +262,7 @@ class Shot:
                 late[part] = stood.misses
                 cycles[part] = stood.cycles
                 joints.append(standing.walk.by_arm(stood.joints))
+                shapes.append(stood.shapes)
                 for arm, rests in zip(lying, standing.walk.by_arm(stood.lying), strict=True):
                     arm[part] = rests
             else:
@@ -271,13 +274,15 @@ class Shot:
         if standing is not None and self.changing is None:
 
             def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
-                """Some frames anew, with arms raised."""
-                stood = standing.pose(travel, chosen, places, lift)
-                late[chosen] = stood.misses
+                """Some frames anew, with arms raised; others are left as they are."""
+                higher = Raise(lift, tuple(each[:, :, chosen] for each in asked))
+                stood = standing.pose(travel, chosen, places, higher)
+                late[np.ix_(chosen, higher.arms)] = stood.misses[:, higher.arms]
                 poses = Poses(stood.rotations, stood.strains, going[0][chosen], going[1][chosen])
-                return poses, standing.walk.by_arm(stood.joints)
+                return poses, standing.walk.by_arm(stood.joints, higher)
 
-            frames = [arm_frames(self.skeleton, arm.bones, self.body) for arm in self.arms]
+            asked = [np.concatenate(each, axis=2) for each in zip(*shapes, strict=True)]
+            frames = _arm_frames(self.skeleton, self.arms, self.body)
             course = Course(frames, standing.ground, self.scale, cyclic=self.in_place)
             whole = Poses(rotations, strains, *going)
             together = [np.concatenate(each) for each in zip(*joints, strict=True)]
@@ -310,7 +315,7 @@ class Shot:
             self.overlaps = self.apart.told(separation, every, self.frames)
         if self.measure:
             names = [arm.name for arm in self.arms]
-            frames = [arm_frames(self.skeleton, arm.bones, self.body) for arm in self.arms]
+            frames = _arm_frames(self.skeleton, self.arms, self.body)
             self.measured = Measured(
                 frames=self.frames,
                 arms=frames,
@@ -939,6 +944,15 @@ def _displaced(
 # --- Settings to core's --------------------------------------------------------------------------
 
 _generators: Final[Remembered[Generator]] = Remembered(12)
+_frames_known: Final[Remembered[list[ArmFrames]]] = Remembered(4)
+
+
+def _arm_frames(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -> list[ArmFrames]:
+    bones = [arm.bones for arm in arms]
+    return _frames_known.get(
+        key_of(skeleton, bones, body),
+        lambda: [arm_frames(skeleton, each, body) for each in bones],
+    )
 
 
 def _generator(
