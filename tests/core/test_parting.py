@@ -90,7 +90,7 @@ def test_an_arm_far_on_the_wrong_side_is_let_be() -> None:
 def chains(seed: int) -> tuple[Floats, Floats, Floats]:
     """Directions (5, 7, 3), lengths and freedom (5, 7) of some chains."""
     random = np.random.default_rng(seed)
-    directions = np.cumsum(random.normal(size=(5, 7, 3)), axis=1) + [4.0, 0.0, 0.0]
+    directions = np.cumsum(random.normal(size=(5, 7, 3)), axis=1) + np.array([4.0, 0.0, 0.0])
     directions /= np.linalg.norm(directions, axis=2, keepdims=True)
     return directions, random.uniform(0.5, 1.5, (5, 7)), random.uniform(0.2, 1.0, (5, 7))
 
