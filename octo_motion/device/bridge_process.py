@@ -350,6 +350,8 @@ def run(hand_arguments: Sequence[str]) -> int:
             now = schedule.begin()
             bridge.turn(now)
             schedule.end()
+            if bridge.simulation is not None:
+                bridge.simulation.worked(time.perf_counter() - now)
     except ChannelClosedError:
         pass
     finally:

@@ -94,6 +94,7 @@ class Simulation:
         self._clock = clock
         self.pace = 1.0
         """Simulated against real time, of late; 1 keeps up."""
+        self._load = 0.0
         self._turn = 0.0
         self._turns = 0
         self._calm = 0.0
@@ -300,7 +301,6 @@ class Simulation:
         calm = float(np.abs(self.world.velocities()).max(initial=0.0)) < _STILL
         self._calm = self._calm + h if calm else 0.0
         self.cost += 0.05 * (spent - self.cost)
-        self._keep_up()
 
     def _time(self, passed: float) -> None:
         """Learn from one more turn how long they take, and how much of that is simulated."""
@@ -310,19 +310,26 @@ class Simulation:
         self._turn += max(_EXPECTED, 1.0 / self._turns) * (passed - self._turn)
         h = self.step_seconds
         pace = 1.0 if passed < 1.5 * h else h / passed
-        self.pace += 0.2 * (pace - self.pace)
+        self.pace += _EXPECTED * (pace - self.pace)
 
     @property
     def holds(self) -> float:
         """For how many seconds hands need not expect the next step; 0 where they come promptly."""
         return _LATE * self._turn if self._turn > _PROMPT else 0.0
 
-    def _keep_up(self) -> None:
-        """Lengthen steps that take too long, shorten them when there is time again."""
+    def worked(self, seconds: float) -> None:
+        """Lengthen steps if turns take too long, shorten them when there is time again.
+
+        Args:
+            seconds: that a whole turn took to compute: the step, and all that is heard and told.
+        """
+        if self.resting:
+            return
         h = self.step_seconds
-        if self.cost > BUSY * h and h < COARSEST:
+        self._load += 0.05 * (seconds - self._load)
+        if self._load > BUSY * h and h < COARSEST:
             self._rebuild(replace(self.world.settings, step=min(2.0 * h, COARSEST)))
-        elif self.cost < 0.3 * BUSY * h and h > self._nominal:
+        elif self._load < 0.3 * BUSY * h and h > self._nominal:
             self._rebuild(replace(self.world.settings, step=max(0.5 * h, self._nominal)))
 
     def _rebuild(self, settings: WorldSettings) -> None:
@@ -332,6 +339,8 @@ class Simulation:
         )
         self.world.restore(old.state())
         self._pin_again()
+        if settings.step != old.settings.step:
+            self.pace = 1.0  # to be learned anew
         for hand in self.hands.values():
             if hand.handle is not None:
                 held = hand.handle

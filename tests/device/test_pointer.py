@@ -348,8 +348,8 @@ def test_simulation_slower_than_the_loop_is_felt_through_the_local_model(every: 
     bench = Bench(every, step=8e-3)
     bench.run(0.1)
     bench.driver.buttons = 1
-    bench.run(1.0)
-    assert bench.simulation.pace == pytest.approx(8.0 / every, rel=0.2)
+    bench.run(2.5)
+    assert bench.simulation.pace == pytest.approx(8.0 / every, rel=0.1)
     assert bench.simulation.holds == pytest.approx(1.5e-3 * every, rel=0.02)
     bench.hand.wish = lambda t: ((0.02 * math.sin(6.0 * t), 0.0, 0.04), IDENTITY)
     bench.run(1.0)
@@ -361,6 +361,21 @@ def test_simulation_slower_than_the_loop_is_felt_through_the_local_model(every: 
     changes = [length(tuple(np.subtract(b[0], a[0]))) for a, b in itertools.pairwise(bench.log)]
     assert max(changes) < 0.25 * max(sizes), "no click when the simulation speaks"
     assert bench.work <= 0.02 + 1e-3, "no more than the store holds came out"
+
+
+def test_steps_get_longer_when_all_that_is_done_beside_them_takes_too_long() -> None:
+    simulation = Bench(2).simulation
+
+    def work(seconds: float) -> float:
+        for _ in range(200):
+            simulation.worked(seconds)
+        return simulation.step_seconds
+
+    assert work(0.0012) == 2e-3
+    assert work(0.0018) == 4e-3
+    assert work(0.02) == 8e-3, "and no longer: what is coarser would shake"
+    assert work(0.0018) == 8e-3, "not to and fro"
+    assert work(0.0005) == 2e-3
 
 
 def test_one_late_step_does_not_make_a_slow_simulation() -> None:
