@@ -13,6 +13,7 @@ from octo_motion.blender.curves import read_route
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.ui.locomotion import workflow
 from octo_motion.ui.locomotion.generate import OCTO_MOTION_OT_generate_locomotion
+from octo_motion.ui.modal_job import ModalJob
 from tests.ui.rig import (
     ROUTE,
     click,
@@ -803,8 +804,6 @@ class Press:
 class Operator:
     """The operator's methods on a plain object: Blender makes real ones only with a window."""
 
-    _shot = _job = _timer = None
-
     def __init__(self) -> None:
         self.reports: list[str] = []
 
@@ -812,7 +811,8 @@ class Operator:
         self.reports.append(text)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(OCTO_MOTION_OT_generate_locomotion, name).__get__(self)
+        found = getattr(OCTO_MOTION_OT_generate_locomotion, name)
+        return found.__get__(self) if callable(found) else found
 
 
 @pytest.fixture
@@ -821,7 +821,7 @@ def long_job(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     settings_of(octopus).tell_overlaps = False
     monkeypatch.setattr(workflow, "_BONES_AT_ONCE", 24 * 6)
     monkeypatch.setattr("octo_motion.ui.locomotion.generate.PATIENCE", 0.0)
-    monkeypatch.setattr("octo_motion.ui.locomotion.generate._TURN", 0.0)
+    monkeypatch.setattr(ModalJob, "_turn", 0.0)
     operator, window = Operator(), Window()
     assert operator.invoke(window, Press("LEFTMOUSE")) == {"RUNNING_MODAL"}
     assert window.calls == ["timer on", "progress on", "modal", "text on"]

@@ -333,7 +333,6 @@ def test_first_frame_and_collection_are_as_asked(shared_data: Data) -> None:
 class Operator:
     """The operator's methods on a plain object: Blender makes real ones only with a window."""
 
-    _session = _job = _timer = None
     _browsing = False
     frame_start = 1
     filepath = ""
@@ -348,7 +347,8 @@ class Operator:
         self.reports.append(text)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(OCTO_MOTION_OT_import_clips, name).__get__(self)
+        found = getattr(OCTO_MOTION_OT_import_clips, name)
+        return found.__get__(self) if callable(found) else found
 
 
 CLEAN = ["timer off", "progress off", "text off"]

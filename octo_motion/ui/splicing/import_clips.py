@@ -12,15 +12,14 @@ from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringPrope
 
 from ...blender.imports import SUFFIXES
 from ...core.errors import OctoMotionError
-from ..job import Job
-from ..operator_base import OctoOperator
+from ..modal_job import ModalJob
 from .import_session import ImportSession
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
 
 
-class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
     bl_idname = "octo_motion.import_clips"
     bl_label = "Import Motion Clips"
     bl_description = (
@@ -64,9 +63,9 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
     )
 
     _session: ImportSession | None = None
-    _job: Job | None = None
-    _timer: bpy.types.Timer | None = None
     _browsing = False
+    _turn = 0.0
+    _stopped = "Cancelled: nothing was imported."
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -82,7 +81,7 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
     ) -> set[OperatorReturnItems]:
         """Open the file browser; files that were dropped need none."""
         if self.files:
-            return self._begin(context)
+            return self._import(context)
         self._browsing = True
         assert context.window_manager is not None
         context.window_manager.fileselect_add(self)
@@ -116,37 +115,6 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
             window_manager.progress_end()
         self._tell(session.end())
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
-        """The next file. Everything but Esc has to wait."""
-        session, job = self._session, self._job
-        assert session is not None
-        assert job is not None
-        if event.type == "ESC":
-            session.undo()
-            self._tear_down(context)
-            self.report({"INFO"}, "Cancelled: nothing was imported.")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        try:
-            if job.work(0.0):
-                return self._finish(context)
-        except OctoMotionError as error:
-            session.undo()
-            self._tear_down(context)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except BaseException:
-            session.undo()
-            self._tear_down(context)
-            raise
-        self._show(context)
-        return {"RUNNING_MODAL"}
-
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Blender's own end of it: another file is opened, or Blender quits."""
-        self._tear_down(context)
-
     def _new_session(self, context: bpy.types.Context) -> ImportSession:
         folder = Path(bpy.path.abspath(self.directory))
         named = [folder / each.name for each in self.files if each.name]
@@ -154,7 +122,7 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
             named = [Path(bpy.path.abspath(self.filepath))]
         return ImportSession(named, self.frame_start, context, up=self.up)
 
-    def _begin(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
+    def _import(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
         window_manager = context.window_manager
         assert window_manager is not None
         try:
@@ -162,42 +130,19 @@ class OCTO_MOTION_OT_import_clips(OctoOperator, bpy.types.Operator):
         except OctoMotionError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        self._job = Job(self._session.steps(window_manager.progress_update))
-        self._timer = window_manager.event_timer_add(0.01, window=context.window)
-        window_manager.progress_begin(0.0, 1.0)
-        window_manager.modal_handler_add(self)
-        self._show(context)
-        return {"RUNNING_MODAL"}
+        return self.begin(context, self._session.steps(window_manager.progress_update))
 
-    def _finish(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
-        session = self._session
-        assert session is not None
-        self._tear_down(context)
-        try:
-            self._tell(session.end())
-        except OctoMotionError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
-
-    def _show(self, context: bpy.types.Context) -> None:
+    def conclude(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         assert self._session is not None
-        if context.workspace is not None:
-            context.workspace.status_text_set(
-                f"Importing {self._session.told}    Esc: none of them"
-            )
+        self._tell(self._session.end())
 
-    def _tear_down(self, context: bpy.types.Context) -> None:
-        """Leave nothing on the screen; safe to call twice."""
-        self._session = self._job = None
-        if self._timer is None:
-            return
-        assert context.window_manager is not None
-        context.window_manager.event_timer_remove(self._timer)
-        self._timer = None
-        context.window_manager.progress_end()
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
+    def status(self, progress: float) -> str:  # noqa: ARG002
+        assert self._session is not None
+        return f"Importing {self._session.told}    Esc: none of them"
+
+    def take_back(self) -> None:
+        if self._session is not None:
+            self._session.undo()
 
     def _tell(self, session: ImportSession) -> None:
         for clip in session.clips:

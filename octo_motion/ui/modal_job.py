@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that work in short turns: with progress, and Esc stops them cleanly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, cast
+
+from ..core.errors import OctoMotionError
+from .job import Job
+from .operator_base import OctoOperator
+
+if TYPE_CHECKING:
+    import bpy
+    from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+
+class ModalJob(OctoOperator):
+    """Mix-in: ``invoke`` calls ``begin``; write ``conclude`` and ``status``."""
+
+    _job = cast("Job | None", None)
+    _timer = cast("Any", None)
+    _turn = 0.1
+    """Seconds of work between two looks at the keyboard."""
+    _stopped = "Cancelled: nothing has changed."
+
+    def conclude(self, context: bpy.types.Context) -> None:
+        """Use what the work has come to; may raise ``OctoMotionError``."""
+        raise NotImplementedError
+
+    def status(self, progress: float) -> str:
+        """What is being done, for people, the share of it that is done being 0…1."""
+        raise NotImplementedError
+
+    def take_back(self) -> None:
+        """Undo what the work has done so far."""
+
+    def begin(
+        self, context: bpy.types.Context, steps: Iterator[float], patience: float | None = None
+    ) -> set[OperatorReturnItems]:
+        """Work for a while at once, and in turns from then on.
+
+        Args:
+            context: Blender's.
+            steps: the work; yields the share that is done.
+            patience: seconds that the window may stand still first; none for turns from the start.
+        """
+        self._job = Job(steps)
+        try:
+            if patience is not None and self._job.work(patience):
+                return self._finish(context)
+        except OctoMotionError as error:
+            return self._fail(context, error)
+        window_manager = context.window_manager
+        assert window_manager is not None
+        self._timer = window_manager.event_timer_add(0.01, window=context.window)
+        window_manager.progress_begin(0.0, 1.0)
+        window_manager.modal_handler_add(cast("bpy.types.Operator", self))
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
+        """One turn of the work. Everything but Esc has to wait."""
+        if event.type == "ESC":
+            self.take_back()
+            self._tear_down(context)
+            self.report({"INFO"}, self._stopped)  # type: ignore[attr-defined]
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        assert self._job is not None
+        try:
+            if self._job.work(self._turn):
+                return self._finish(context)
+        except OctoMotionError as error:
+            return self._fail(context, error)
+        except BaseException:
+            self.take_back()
+            self._tear_down(context)
+            raise
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender's own end of it: another file is opened, or Blender quits."""
+        self._tear_down(context)
+
+    def _finish(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
+        self._tear_down(context)
+        self.conclude(context)
+        return {"FINISHED"}
+
+    def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
+        self.take_back()
+        self._tear_down(context)
+        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+        return {"CANCELLED"}
+
+    def _show(self, context: bpy.types.Context) -> None:
+        assert self._job is not None
+        assert context.window_manager is not None
+        if self._job.progress > 0.0:
+            context.window_manager.progress_update(self._job.progress)
+        if context.workspace is not None:
+            context.workspace.status_text_set(self.status(self._job.progress))
+
+    def _tear_down(self, context: bpy.types.Context) -> None:
+        """Leave nothing on the screen; safe to call twice."""
+        self._job = None
+        if self._timer is None:
+            return
+        assert context.window_manager is not None
+        context.window_manager.event_timer_remove(self._timer)
+        self._timer = None
+        context.window_manager.progress_end()
+        if context.workspace is not None:
+            context.workspace.status_text_set(None)
