@@ -11,7 +11,7 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ..core.errors import RigError
+from ..core.errors import RigError, WriteError
 from ..core.posing.bone_roles import (
     BODY,
     FOLLOW,
@@ -30,12 +30,18 @@ from ..core.posing.figure_building import (
     PosedBones,
     build_figure,
 )
+from ..core.posing.presets import Material
 from ..core.rotations import Floats, from_matrix
 from ..core.skeleton import Skeleton
 from .armature import armature_data, read_skeleton
 
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
+
+MATERIAL: Final = "octo_motion_material"
+"""Custom property of a bone: what its joint alone is made of, four numbers of ``Material``."""
+_NEVER: Final = -1.0
+"""In place of what a joint bears that never yields: files of other programs know no infinity."""
 
 MOST_LIMBS: Final = 300
 """More cannot be moved at a speed at which one could pose them."""
@@ -60,6 +66,22 @@ class Rig:
     pose: Pose
     unit: float
     """Puppet metres of one metre in the world: every puppet is simulated at the same size."""
+
+    def body(self, bone: str, armature: str) -> int:
+        """The body of a bone, or the one that a helper bone follows.
+
+        Raises:
+            RigError: the armature has no such bone, or it follows nothing.
+        """
+        number = self.skeleton.index.get(bone)
+        if number is None:
+            raise RigError(f"'{armature}' has no bone '{bone}'.", "Check its name.")
+        body = self.roles.follows[number]
+        if body < 0:
+            raise RigError(
+                f"The bone '{bone}' is no limb of the puppet.", "Choose one that it carries."
+            )
+        return body
 
 
 def read_rig(
@@ -207,6 +229,45 @@ def mark_bones(armature: bpy.types.Object, names: list[str], mark: str) -> None:
             bones[name][MARK] = mark
         elif MARK in bones[name]:
             del bones[name][MARK]
+
+
+def bone_materials(armature: bpy.types.Object) -> dict[str, Material]:
+    """Materials of single bones, as they were measured; what is damaged counts for nothing."""
+    found: dict[str, Material] = {}
+    for bone in armature_data(armature).bones:
+        values: Any = bone.get(MATERIAL)
+        if values is None:
+            continue
+        try:
+            bears, springs, settles, gives = (float(each) for each in values)
+        except (TypeError, ValueError):
+            continue
+        if min(springs, settles) > 0.0 and gives >= 0.0 and bears != 0.0:
+            found[bone.name] = Material(
+                bears if bears > 0.0 else float(np.inf), springs, settles, gives
+            )
+    return found
+
+
+def set_bone_material(armature: bpy.types.Object, name: str, material: Material | None) -> None:
+    """Let a bone's joint be of a material of its own, or of the figure's again with None.
+
+    Raises:
+        WriteError: the bones are linked.
+    """
+    data = armature_data(armature)
+    if not data.is_editable:
+        raise WriteError(
+            f"The bones of '{armature.name}' are linked and read-only.",
+            "Let the whole figure have the material, or measure in the linked file.",
+        )
+    bone = data.bones[name]
+    if material is None:
+        if MATERIAL in bone:
+            del bone[MATERIAL]
+        return
+    bears = material.bears if np.isfinite(material.bears) else _NEVER
+    bone[MATERIAL] = [bears, material.springs, material.settles, material.gives]
 
 
 def joint_limits(armature: bpy.types.Object) -> dict[str, JointLimits]:

@@ -35,6 +35,7 @@ from .posing import (
     device_pose,
     device_settings,
     marks,
+    measure,
     pose_script,
     pose_start,
 )
@@ -92,6 +93,7 @@ CLASSES: tuple[type, ...] = (
     *pose_start.CLASSES,
     *pose_script.CLASSES,
     *marks.CLASSES,
+    *measure.CLASSES,
     *posing_panels.CLASSES,
     *device_pose.CLASSES,
     *device_calibrate.CLASSES,

@@ -27,6 +27,7 @@ import numpy as np
 from octo_motion.core.posing.figure import Figure, Limits
 from octo_motion.core.posing.obstacles import Box, Plane, Sphere
 from octo_motion.core.posing.presets import elements_for
+from octo_motion.core.posing.session import hand_for
 from octo_motion.core.posing.world import World, WorldSettings
 from octo_motion.core.rotations import Floats
 from tests.core.puppets import Torn, doll, octopus, posed, soft, torn, tree
@@ -224,7 +225,7 @@ def _random(steps: int, only: str) -> list[dict[str, Any]]:
         )
         start = time.perf_counter()
         found = Torn()
-        for found in torn(world, rng, steps):
+        for found in torn(world, rng, steps, hand_for(figure)):
             if found.steps % max(steps // 20, 1) == 0:
                 _tell(name, found, time.perf_counter() - start)
         seconds = time.perf_counter() - start

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from octo_motion.core.posing.coupling import Coupling
 from octo_motion.core.posing.figure import Elements, Figure, Limits, Pose
 from octo_motion.core.posing.kinematics import pose_of, product
 from octo_motion.core.posing.limits import bends
@@ -187,8 +188,13 @@ class Torn:
     """Radians by which a joint was beyond the end of its range."""
 
 
-def torn(world: World, rng: np.random.Generator, steps: int) -> Iterator[Torn]:
-    """Random grabs, pulls and pins; what came of them so far, after each step."""
+def torn(
+    world: World, rng: np.random.Generator, steps: int, hand: Coupling | None = None
+) -> Iterator[Torn]:
+    """Random grabs, pulls and pins; what came of them so far, after each step.
+
+    ``hand`` is how firmly they hold; without, ten times as firmly as a session's.
+    """
     figure = world.figure
     found = Torn()
     unrest = figure.rest * [1.0, -1.0, -1.0, -1.0]
@@ -199,8 +205,8 @@ def torn(world: World, rng: np.random.Generator, steps: int) -> Iterator[Torn]:
         if len(world.grabs) < HANDS and rng.random() < 0.03:
             body = int(rng.integers(len(figure)))
             at = world.pose().positions[body]
-            hand = np.array([1.0, 0.0, 0.0, 0.0]) if rng.random() < 0.5 else None
-            world.grab(body, at, hand)
+            turned = np.array([1.0, 0.0, 0.0, 0.0]) if rng.random() < 0.5 else None
+            world.grab(body, at, turned, hand)
         if world.grabs and rng.random() < 0.03:
             world.release(world.grabs[int(rng.integers(len(world.grabs)))])
         for grab in world.grabs:

@@ -20,6 +20,7 @@ import numpy as np
 from ..errors import SettingsError
 from ..rotations import Floats
 from .figure import Elements, Figure
+from .measuring import Measured
 
 GRAVITY: Final = 9.81
 """m/s², for the loads; whether the simulation has gravity is another matter."""
@@ -59,41 +60,71 @@ MATERIALS: Final[Mapping[str, Material]] = MappingProxyType(
 )
 
 
-def elements_for(figure: Figure, material: str, strength: float = 1.0) -> Elements:
+def elements_for(
+    figure: Figure,
+    material: str | Material,
+    strength: float = 1.0,
+    own: Mapping[int, Material] | None = None,
+) -> Elements:
     """The elements of a figure that is made of one material.
 
     Args:
         figure: the puppet; its own elements are of no account.
-        material: a name in ``MATERIALS``.
+        material: a name in ``MATERIALS``, or one that was measured.
         strength: factor on all torques; with 1 every joint of a material that yields just bears
             what hangs on it.
+        own: bodies whose joints are made of another material.
 
     Raises:
         SettingsError: no such material, or a strength that is not positive.
     """
-    if material not in MATERIALS:
-        raise SettingsError(
-            f"There is no material '{material}'.", f"Choose one of {', '.join(MATERIALS)}."
-        )
+    if isinstance(material, str):
+        if material not in MATERIALS:
+            raise SettingsError(
+                f"There is no material '{material}'.", f"Choose one of {', '.join(MATERIALS)}."
+            )
+        material = MATERIALS[material]
     if not (np.isfinite(strength) and strength > 0.0):
         raise SettingsError(
             "The strength of the joints is not positive.", "Set it to 1, for example."
         )
-    chosen = MATERIALS[material]
     load = strength * joint_loads(figure)
+    made_of = [(own or {}).get(body, material) for body in range(len(figure))]
+    # Rows: stiffness, damping, flow, yield torque.
+    values = np.array([_values(each, at) for each, at in zip(made_of, load.tolist(), strict=True)])
+    stiffness, damping, flow, limit = values.reshape(-1, 4).T
     ones = np.ones((len(figure), 3))
-    yields = np.isfinite(chosen.bears)
-    limit = chosen.bears * load if yields else np.full(len(figure), np.inf)
-    bearing = limit if yields else load
-    if np.isfinite(chosen.springs):
-        stiffness = bearing / chosen.springs
-        damping = stiffness * chosen.settles
-    else:
-        stiffness = np.zeros(len(figure))
-        damping = load * chosen.settles
-    # A joint that never yields has a series damper that never moves; any size will do.
-    flow = bearing / chosen.gives if chosen.gives > 0.0 else 1e6 * load
     return Elements(stiffness[:, None] * ones, damping[:, None] * ones, flow[:, None] * ones, limit)
+
+
+def _values(material: Material, load: float) -> tuple[float, float, float, float]:
+    """K_f, D_f, D_d and τ of a joint with a load, N·m."""
+    limit = material.bears * load
+    bearing = limit if np.isfinite(limit) else load
+    stiffness, damping = 0.0, load * material.settles
+    if np.isfinite(material.springs):
+        stiffness = bearing / material.springs
+        damping = stiffness * material.settles
+    # A joint that never yields has a series damper that never moves; any size will do.
+    flow = bearing / material.gives if material.gives > 0.0 else 1e6 * load
+    return stiffness, damping, flow, limit
+
+
+def material_of(measured: Measured, load: float) -> Material:
+    """The material of which a joint with a load has been measured.
+
+    Args:
+        measured: its coefficients.
+        load: of the joint, N·m, strength included; see ``joint_loads``.
+    """
+    yields = bool(np.isfinite(measured.yield_torque))
+    bearing = measured.yield_torque if yields else load
+    return Material(
+        bears=measured.yield_torque / load,
+        springs=bearing / measured.stiffness,
+        settles=measured.damping / measured.stiffness,
+        gives=bearing / measured.flow if yields else 0.0,
+    )
 
 
 def joint_loads(figure: Figure) -> Floats:

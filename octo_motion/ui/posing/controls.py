@@ -8,8 +8,10 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
+from ...core.errors import OctoMotionError
 from ...core.posing.picking import Hit
 from ...core.rotations import IDENTITY, Floats, from_axis_angle, multiply
+from .measuring_hand import MeasuringHand
 from .puppet_session import PuppetSession
 
 HELP: Final = (
@@ -22,11 +24,21 @@ HELP: Final = (
     ("K", "key touched"),
     ("Shift K", "key all"),
     ("O", "record"),
+    ("M", "measure"),
     ("R", "restore"),
     ("Ctrl Z", "back"),
     ("Enter", "keep"),
     ("Esc", "as it was"),
 )
+MEASURING: Final = (
+    ("Drag", "bend the limb and let go; then lead it to where it is to stay"),
+    ("Wheel", "pull"),
+    ("M, Enter", "the figure becomes so"),
+    ("Shift M", "this joint alone"),
+    ("Esc", "no"),
+)
+PULL_STEP: Final = 0.25
+"""In what hangs on the joint, per notch of the wheel while measuring."""
 FINE: Final = 0.1
 """Of a movement, with Shift."""
 DEPTH_STEP: Final = 0.03
@@ -43,6 +55,8 @@ _PASSED: Final = frozenset(
         *("NDOF_MOTION", "HOME"),
     }
 )
+_OWN: Final = frozenset({"G", "P", "K", "O", "R", "Z"})
+"""Keys of a session that mean nothing while measuring, and nothing else to Blender either."""
 _ARROWS: Final = {"LEFT_ARROW": -1, "RIGHT_ARROW": 1}
 
 
@@ -89,8 +103,16 @@ class PoseControls:
         """Whether the hand holds something."""
         return self.hand is not None
 
+    @property
+    def help(self) -> tuple[tuple[str, str], ...]:
+        """Keys and what they do now."""
+        return HELP if self.session.measuring is None else MEASURING
+
     def tick(self, seconds: float) -> None:
         """Time has passed."""
+        if self.session.measuring is not None:
+            self.session.tick(seconds, self.hand)
+            return
         if self.session.core.grip is None:
             # A change of frame has taken the puppet out of the hand.
             self.hand = None
@@ -125,7 +147,51 @@ class PoseControls:
             return Outcome.TAKEN
         if not press:
             return Outcome.PASSED
+        if self.session.measuring is not None:
+            return self._press_measuring(self.session.measuring, event, view, x, y)
         return self._press(event, view, x, y)
+
+    def _press_measuring(
+        self, measuring: MeasuringHand, event: Any, view: EyeOn, x: float, y: float
+    ) -> Outcome:
+        session, kind = self.session, event.type
+        if kind == "LEFTMOUSE":
+            hit = self._look(view, x, y)
+            if hit is None or not measuring.takes(hit.body):
+                self.said = f"Drag {session.bone(measuring.body)}, which is measured"
+                return Outcome.TAKEN
+            measuring.grab(hit.point)
+            self.hand, self._pixel = hit.point / session.unit, (x, y)
+        elif kind in {"ESC", "RIGHTMOUSE"}:
+            self.hand = None
+            session.drop_measure()
+            self.said = "Not measured"
+        elif kind in {"M", "RET", "NUMPAD_ENTER"}:
+            self.hand = None
+            measuring.release()
+            try:
+                self.said = session.take_measure(bone_only=kind == "M" and event.shift)
+            except OctoMotionError as error:
+                # Another drag may put it right.
+                session.drop_measure()
+                self.said = str(error)
+        elif kind not in _OWN:
+            return Outcome.PASSED
+        return Outcome.TAKEN
+
+    def _measure(self) -> None:
+        grip = self.session.core.grip
+        body = grip.body if grip is not None else self.hover.body if self.hover else None
+        if body is None:
+            self.said = "Point at a limb to measure its joint"
+            return
+        self._latched = self._turning = False
+        self.hand = None
+        try:
+            self.session.measure(body)
+            self.said = ""
+        except OctoMotionError as error:
+            self.said = str(error)
 
     def _press(self, event: Any, view: EyeOn, x: float, y: float) -> Outcome:
         kind = event.type
@@ -162,6 +228,8 @@ class PoseControls:
             self._say_keys(session.key(all_bones=event.shift))
         elif kind == "O":
             self._record()
+        elif kind == "M":
+            self._measure()
         elif kind == "R":
             if self.holding:
                 self._turning = True
@@ -192,6 +260,9 @@ class PoseControls:
     def _let_go(self, *, keep: bool = True) -> None:
         self._latched = self._turning = False
         self.hand = None
+        if self.session.measuring is not None:
+            self.session.measuring.release()
+            return
         if keep:
             self._say_keys(self.session.release(), quiet=True)
         else:
@@ -221,6 +292,10 @@ class PoseControls:
         self.hand = self.hand + share * way
 
     def _wheel(self, view: EyeOn, notches: float, event: Any) -> Outcome:
+        measuring = self.session.measuring
+        if measuring is not None:
+            measuring.pull = max(measuring.pull + notches * PULL_STEP, PULL_STEP)
+            return Outcome.TAKEN
         if self.hand is None:
             return Outcome.PASSED
         towards = view.axes()[:, 2]
@@ -259,7 +334,15 @@ class PoseControls:
         """One line about the session, for the header."""
         session = self.session
         parts = [f"Posing {session.puppet.name}"]
-        if self.holding and session.core.grip is not None:
+        measuring = session.measuring
+        if measuring is not None:
+            bone, angle = session.bone(measuring.body), np.degrees(measuring.angle)
+            step = "stays" if measuring.shown else "bends"
+            parts.append(
+                f"Measuring {bone}: pulled by {measuring.pull:.2f} of what hangs on it,"
+                f" {step} {angle:.0f}°"
+            )
+        elif self.holding and session.core.grip is not None:
             bone = session.bone(session.core.grip.body)
             parts.append(f"{bone}: pulled by {session.pull():.2f} of the figure's weight")
         elif self.hover is not None:

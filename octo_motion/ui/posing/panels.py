@@ -8,7 +8,9 @@ from typing import Any, Final
 import bpy
 
 from ..panel_base import ArmaturePanel
+from .custom_material import CUSTOM
 from .marks import OCTO_MOTION_OT_pose_mark_bones, OCTO_MOTION_OT_pose_obstacle
+from .measure import OCTO_MOTION_OT_pose_forget_measured, OCTO_MOTION_OT_pose_measure
 from .pose_script import OCTO_MOTION_OT_pose_script
 from .pose_start import OCTO_MOTION_OT_pose_start
 from .properties import posing_settings
@@ -32,6 +34,15 @@ class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
 
     def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "material")
+        if settings.material == CUSTOM:
+            column = layout.column(align=True)
+            column.prop(settings, "custom_yields")
+            giving = column.column(align=True)
+            giving.active = settings.custom_yields
+            giving.prop(settings, "custom_bears")
+            giving.prop(settings, "custom_gives")
+            column.prop(settings, "custom_springs")
+            column.prop(settings, "custom_settles")
         layout.prop(settings, "strength")
         layout.prop(settings, "root")
         row = layout.row()
@@ -72,6 +83,10 @@ class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):
     bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
 
     def show(self, layout: Any, settings: Any) -> None:
+        row = layout.row(align=True)
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(OCTO_MOTION_OT_pose_measure.bl_idname, icon="DRIVER_ROTATIONAL_DIFFERENCE")
+        row.operator(OCTO_MOTION_OT_pose_forget_measured.bl_idname, text="", icon="X")
         layout.prop(settings, "smallest")
         layout.prop(settings, "show_loads")
         layout.operator_menu_enum(

@@ -11,7 +11,7 @@ import bpy
 from ...blender.armature import active_armature
 from ...core.errors import OctoMotionError, SettingsError
 from ..armature_operator import ArmatureOperator
-from .controls import HELP, Outcome, PoseControls
+from .controls import Outcome, PoseControls
 from .overlay import Overlay
 from .puppet_session import PuppetSession, active_session
 from .view import view_under
@@ -143,7 +143,9 @@ class OCTO_MOTION_OT_pose_start(ArmatureOperator, bpy.types.Operator):
                 area.header_text_set(text)
                 area.tag_redraw()
         if context.workspace is not None:
-            context.workspace.status_text_set("    ".join(f"{keys}: {what}" for keys, what in HELP))
+            context.workspace.status_text_set(
+                "    ".join(f"{keys}: {what}" for keys, what in self._controls.help)
+            )
 
     def _end(self, context: bpy.types.Context, *, keep: bool) -> None:
         """Leave nothing on screen; safe to call twice."""

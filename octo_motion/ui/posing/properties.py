@@ -20,6 +20,7 @@ MATERIALS: Final = (
     ("DOLL", "Doll", "Ball joints that hold by friction and stay where they are put", 2),
     ("RUBBER", "Rubber", "Springs back nearly all the way when it is let go", 3),
     ("LIMP", "Limp", "Hardly resists at all, like a rag doll", 4),
+    ("CUSTOM", "Custom", "What was measured, or what is set below", 5),
 )
 
 OBSTACLES: Final = (
@@ -76,6 +77,58 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_min=0.1,
         soft_max=10.0,
         step=10,
+        override=OVERRIDE,
+    )
+    custom_yields: BoolProperty(
+        name="Gives Way",
+        description="Keep a bend, instead of springing back always",
+        default=True,
+        override=OVERRIDE,
+    )
+    custom_bears: FloatProperty(
+        name="Bears",
+        description="What a joint bears before it gives way, in the weight of what hangs on it",
+        default=1.25,
+        min=0.01,
+        max=1000.0,
+        soft_max=10.0,
+        step=10,
+        override=OVERRIDE,
+    )
+    custom_springs: FloatProperty(
+        name="Springs Back",
+        description="How far a joint springs back that was pulled as hard as it bears",
+        subtype="ANGLE",
+        default=float(np.radians(2.0)),
+        min=float(np.radians(0.01)),
+        max=float(np.radians(720.0)),
+        soft_max=float(np.radians(90.0)),
+        step=50,
+        precision=2,
+        override=OVERRIDE,
+    )
+    custom_settles: FloatProperty(
+        name="Settles",
+        description="How long springing back takes",
+        subtype="TIME_ABSOLUTE",
+        default=0.05,
+        min=0.001,
+        max=60.0,
+        soft_max=1.0,
+        step=1,
+        precision=3,
+        override=OVERRIDE,
+    )
+    custom_gives: FloatProperty(
+        name="Gives",
+        description="How far a joint gives way in a second, pulled twice as hard as it bears",
+        subtype="ANGLE",
+        default=float(np.radians(90.0)),
+        min=0.0,
+        max=float(np.radians(36000.0)),
+        soft_max=float(np.radians(1000.0)),
+        step=500,
+        precision=1,
         override=OVERRIDE,
     )
     root: EnumProperty(

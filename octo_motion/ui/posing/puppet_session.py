@@ -15,21 +15,29 @@ import bpy
 import numpy as np
 
 from ...blender.actions import writable_armature
-from ...blender.figure_reading import read_rig
+from ...blender.figure_reading import bone_materials, read_rig
 from ...blender.obstacle_reading import read_obstacle
 from ...blender.pose_keys import Keyed, PoseKeys
 from ...blender.puppet import Puppet
 from ...blender.shown_pose import pose_values, restore_pose
-from ...core.errors import OctoMotionError, RigError
+from ...core.errors import OctoMotionError, RigError, SettingsError
 from ...core.posing.blas_threads import OneThread
 from ...core.posing.figure import Figure, Pose
 from ...core.posing.figure_building import turned_bodies
 from ...core.posing.obstacles import Obstacle, Plane
 from ...core.posing.picking import Hit, capsules_in_world, pick
-from ...core.posing.presets import elements_for, joint_loads
+from ...core.posing.presets import Material, elements_for, joint_loads
 from ...core.posing.session import TOUCHED, Sample, Session, Told, hand_for
 from ...core.posing.world import WorldSettings
 from ...core.rotations import IDENTITY, Floats
+from .custom_material import (
+    chosen_material,
+    coefficients,
+    keep_material,
+    kept_before,
+    measured_joint,
+)
+from .measuring_hand import MeasuringHand
 from .properties import marked_obstacles, posing_settings
 
 GRAVITY: Final = (0.0, 0.0, -9.81)
@@ -45,6 +53,11 @@ class _Shown:
 
     material: str
     strength: float
+    custom_yields: bool
+    custom_bears: float
+    custom_springs: float
+    custom_settles: float
+    custom_gives: float
     root: str
     gravity: bool
     floor: bool
@@ -56,6 +69,11 @@ class _Shown:
     @classmethod
     def of(cls, settings: Any) -> _Shown:
         return cls(**{each.name: getattr(settings, each.name) for each in fields(cls)})
+
+    @property
+    def joints(self) -> tuple[Any, float]:
+        """What decides on the joints."""
+        return chosen_material(self), self.strength
 
     @property
     def ground(self) -> tuple[bool, float, bool]:
@@ -114,6 +132,9 @@ class PuppetSession:
         self.keys = PoseKeys(armature, settings.keys_to, chosen)
         self._scene = scene.name
         self._shown = _Shown.of(settings)
+        self._materials = self._bone_materials(armature)
+        self._measured: list[Callable[[], None]] = []
+        self.measuring: MeasuringHand | None = None
         figure = replace(self.puppet.figure, elements=self._elements(self.puppet.figure))
         self.core = Session(
             figure,
@@ -147,6 +168,11 @@ class PuppetSession:
         """The puppet."""
         return self.core.figure
 
+    @property
+    def shown_pose(self) -> Pose:
+        """Where the bodies are, with the joint bent that is being measured."""
+        return self.core.pose if self.measuring is None else self.measuring.pose()
+
     def scene(self) -> bpy.types.Scene:
         """The scene of the session.
 
@@ -168,21 +194,12 @@ class PuppetSession:
         Raises:
             RigError: there is no such bone, or it follows nothing.
         """
-        rig = self.puppet.rig
-        number = rig.skeleton.index.get(bone)
-        if number is None:
-            raise RigError(f"'{self.puppet.name}' has no bone '{bone}'.", "Check its name.")
-        body = rig.roles.follows[number]
-        if body < 0:
-            raise RigError(
-                f"The bone '{bone}' is no limb of the puppet.", "Choose one that it carries."
-            )
-        return body
+        return self.puppet.rig.body(bone, self.puppet.name)
 
     def capsules(self) -> tuple[Floats, Floats]:
         """Ends (bodies, 2, 3) and radii (bodies,) of the limbs in the world."""
         return (
-            capsules_in_world(self.figure, self.core.pose) / self.unit,
+            capsules_in_world(self.figure, self.shown_pose) / self.unit,
             self.figure.radii / self.unit,
         )
 
@@ -221,7 +238,7 @@ class PuppetSession:
 
     def pick(self, origin: Floats, direction: Floats, *, margin: float = 0.0) -> Hit | None:
         """The body that a ray of the world meets; the hit's point is in the puppet's metres."""
-        return pick(self.figure, self.core.pose, origin * self.unit, direction, margin=margin)
+        return pick(self.figure, self.shown_pose, origin * self.unit, direction, margin=margin)
 
     def grab(self, hit: Hit) -> None:
         """Take hold of a body."""
@@ -276,12 +293,81 @@ class PuppetSession:
             raise RigError(f"'{armature.name}' is in edit mode.", "Leave it and start again.")
         self._apply_settings(armature)
         sample = None
+        if self.measuring is not None:
+            if position is not None:
+                self.measuring.tick(seconds, position * self.unit)
+            self.puppet.write(self.measuring.pose())
+            # Time stands still meanwhile.
+            self.told = Told(0.0, 0, 1.0, self.core.world.settings.step, resting=False)
+            return self.told
         if position is not None:
             sample = Sample(position * self.unit, IDENTITY if turn is None else turn)
         self.told = self.core.tick(seconds, sample)
         if not self.told.resting:
             self.puppet.write(self.core.pose)
         return self.told
+
+    # --- Measuring ------------------------------------------------------------------------------
+
+    def measure(self, body: int) -> None:
+        """From now on the hand shows how the joint of a limb is to bend, and nothing resists.
+
+        Raises:
+            RigError: the limb has no joint.
+            SettingsError: a recording is going on.
+        """
+        if self.recording:
+            raise SettingsError("A recording is going on.", "End it before you measure.")
+        self.core.release()
+        self.measuring = MeasuringHand(self.figure, self.core.pose, body)
+
+    def drop_measure(self) -> None:
+        """End measuring without a result; the figure stands as before."""
+        if self.measuring is not None:
+            self.measuring = None
+            self.puppet.forget()
+            self.puppet.write(self.core.pose)
+
+    def take_measure(self, *, bone_only: bool = False) -> str:
+        """End measuring, and let the figure be of what was shown; the coefficients, in words.
+
+        Args:
+            bone_only: whether only the joint that was bent is.
+
+        Raises:
+            SettingsError: what was shown makes no sense; measuring goes on.
+            WriteError: the bones are linked; likewise.
+        """
+        assert self.measuring is not None
+        body, bend = self.measuring.body, self.measuring.bend()
+        strength = self._shown.strength
+        measured, material = measured_joint(self.figure, body, strength, bend)
+        self.take_material(material, self.bone(body) if bone_only else "")
+        self.drop_measure()
+        return coefficients(self.bone(body), measured)
+
+    def take_material(self, material: Material, bone: str) -> None:
+        """Let the figure, or one bone's joint, be of a material; taken back by ``cancel``.
+
+        Raises:
+            WriteError: the bones are linked.
+        """
+        armature = self.puppet.armature()
+        settings: Any = posing_settings(armature)
+        self._measured.append(kept_before(armature, settings, bone))
+        keep_material(armature, settings, material, bone)
+        self.read_materials()
+
+    def read_materials(self) -> None:
+        """Take the materials of single bones anew."""
+        self._materials = self._bone_materials(self.puppet.armature())
+        self._shown = _Shown.of(posing_settings(self.puppet.armature()))
+        self.core.change_elements(self._elements(self.figure))
+
+    def _bone_materials(self, armature: bpy.types.Object) -> dict[int, Material]:
+        own = bone_materials(armature)
+        names = self.puppet.figure.names
+        return {body: own[name] for body, name in enumerate(names) if name in own}
 
     # --- Keys -----------------------------------------------------------------------------------
 
@@ -359,6 +445,7 @@ class PuppetSession:
     def finish(self) -> None:
         """End, and keep the pose and the keys; safe to call twice."""
         if not self._down:
+            self.drop_measure()
             self.core.release()
             if self._recorded is not None:
                 self.stop_record()
@@ -375,6 +462,8 @@ class PuppetSession:
             scene = self.scene()
         except OctoMotionError:
             return
+        for take_back in reversed(self._measured):
+            take_back()
         self.keys.take_back(armature)
         restore_pose(armature, self._values)
         if scene.frame_current_final != self._started:
@@ -413,6 +502,7 @@ class PuppetSession:
             return
         self._frame = scene.frame_current_final
         try:
+            self.measuring = None
             self.puppet.forget()
             if self._recorded is None:
                 self.core.adopt(self.puppet.read())
@@ -444,7 +534,7 @@ class PuppetSession:
         if shown == self._shown:
             return
         before, self._shown = self._shown, shown
-        if (before.material, before.strength) != (shown.material, shown.strength):
+        if before.joints != shown.joints:
             self.core.change_elements(self._elements(self.figure))
             self.core.hand = hand_for(self.figure, shown.strength)
         if before.ground != shown.ground:
@@ -460,7 +550,7 @@ class PuppetSession:
             self._hold_root()
 
     def _elements(self, figure: Figure) -> Any:
-        return elements_for(figure, self._shown.material.lower(), self._shown.strength)
+        return elements_for(figure, *self._shown.joints, own=self._materials)
 
     def _world_settings(self) -> WorldSettings:
         shown = self._shown

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Saying how a joint is to give way, and getting the material that does so."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, FloatProperty, StringProperty
+
+from ...blender.actions import writable_armature
+from ...blender.armature import active_armature, selected_bones
+from ...blender.figure_reading import bone_materials, read_rig, set_bone_material
+from ...core.errors import RigError
+from ...core.posing.figure import Figure
+from ...core.posing.measuring import Bend
+from ..armature_operator import ArmatureOperator
+from .custom_material import coefficients, keep_material, measured_joint
+from .measuring_hand import BEARS
+from .properties import posing_settings
+from .puppet_session import PuppetSession, active_session
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+
+class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_measure"
+    bl_label = "Measure Joint"
+    bl_description = (
+        "Say how the joint of the active bone is to give way: so far under this pull, so much of "
+        "it to stay. The figure gets the material that does so"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    bone: StringProperty(
+        name="Bone", description="The limb whose joint is bent; empty for the active bone"
+    )
+    pull: FloatProperty(
+        name="Pull",
+        description="How hard it is pulled, in the weight of what hangs on the joint",
+        default=2.0,
+        min=0.01,
+        max=1000.0,
+        soft_max=10.0,
+    )
+    seconds: FloatProperty(
+        name="Time",
+        description="How long it is pulled",
+        subtype="TIME_ABSOLUTE",
+        default=0.5,
+        min=0.01,
+        max=60.0,
+    )
+    bends: FloatProperty(
+        name="Bends",
+        description="How far the joint is bent at the end of the pull",
+        subtype="ANGLE",
+        default=float(np.radians(30.0)),
+        min=0.0,
+        max=float(np.radians(180.0)),
+    )
+    stays: FloatProperty(
+        name="Stays",
+        description="How much of the bend is left afterwards; 0 springs back always",
+        subtype="ANGLE",
+        default=float(np.radians(20.0)),
+        min=0.0,
+        max=float(np.radians(180.0)),
+    )
+    settles: FloatProperty(
+        name="Settles",
+        description="How long springing back takes",
+        subtype="TIME_ABSOLUTE",
+        default=0.05,
+        min=0.001,
+        max=60.0,
+        precision=3,
+    )
+    bears: FloatProperty(
+        name="Bears",
+        description="What the joint bears without giving way, in the weight of what hangs on it",
+        default=BEARS,
+        min=0.01,
+        max=1000.0,
+        soft_max=10.0,
+    )
+    bone_only: BoolProperty(
+        name="This Bone Only",
+        description="Let this joint alone be of the material, and the others stay as they are",
+    )
+
+    def invoke(
+        self,
+        context: bpy.types.Context,
+        event: bpy.types.Event,  # noqa: ARG002
+    ) -> set[OperatorReturnItems]:
+        """For the bone that is active now, whatever it was for before."""
+        self.bone = ""
+        return self.execute(context)
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        writable_armature(armature)
+        settings: Any = posing_settings(armature)
+        session = _session_of(armature)
+        figure, body = self._joint(context, armature, session)
+        bend = Bend(self.pull, self.bears, self.seconds, self.bends, self.stays, self.settles)
+        measured, material = measured_joint(figure, body, settings.strength, bend)
+        bone = figure.names[body] if self.bone_only else ""
+        if session is not None:
+            session.take_material(material, bone)
+        else:
+            keep_material(armature, settings, material, bone)
+        self.report({"INFO"}, coefficients(figure.names[body], measured))
+
+    def _joint(
+        self, context: bpy.types.Context, armature: bpy.types.Object, session: PuppetSession | None
+    ) -> tuple[Figure, int]:
+        active = context.active_pose_bone
+        name = self.bone or (active.name if active is not None else "")
+        if not name:
+            raise RigError(
+                "No bone is active.", "Make the limb active in pose mode, or measure while posing."
+            )
+        if session is not None:
+            return session.figure, session.body(name)
+        settings: Any = posing_settings(armature)
+        rig = read_rig(armature, smallest=settings.smallest)
+        return rig.figure, rig.body(name, armature.name)
+
+
+class OCTO_MOTION_OT_pose_forget_measured(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_forget_measured"
+    bl_label = "Forget Measured Bones"
+    bl_description = (
+        "Let bones that have a material of their own be of the figure's again: the selected ones "
+        "in pose mode, or all"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        writable_armature(armature)
+        own = set(bone_materials(armature))
+        if context.mode == "POSE" and (chosen := own & set(selected_bones(armature))):
+            own = chosen
+        if not own:
+            raise RigError("No bone has a material of its own.", "Measure one with This Bone Only.")
+        for name in own:
+            set_bone_material(armature, name, None)
+        session = _session_of(armature)
+        if session is not None:
+            session.read_materials()
+        self.report({"INFO"}, f"{len(own)} bones are of the figure's material again.")
+
+
+def _session_of(armature: bpy.types.Object) -> PuppetSession | None:
+    session = active_session()
+    return session if session is not None and session.puppet.name == armature.name else None
+
+
+CLASSES: Final[tuple[type, ...]] = (
+    OCTO_MOTION_OT_pose_measure,
+    OCTO_MOTION_OT_pose_forget_measured,
+)
