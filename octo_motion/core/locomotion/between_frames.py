@@ -28,6 +28,8 @@ _TOLERATED: Final = 0.002
 _SPARE: Final = 0.003
 """… and by which one that was deeper is raised above it."""
 _ROUNDS: Final = 4
+_BETTER: Final = 0.9
+"""Share of a dip that may be left after a round for another to be worth its while."""
 _ASTRAY: Final = 0.125
 """By how much an arm is astray half way between frames at most, in arm lengths: for straight keys,
 and with the whole arm as a lever, an eighth of what each of its bones' quaternions bends by, twice
@@ -131,7 +133,10 @@ def raised_between(
     tried = [(poses, course.dips(poses, clear))]
     for _ in range(_ROUNDS):
         last, deep = tried[-1]
-        asked = _at_frames(np.where(deep > _TOLERATED, deep + _SPARE, 0.0), cyclic=course.cyclic)
+        # What dips no less for having been raised is not raised any further.
+        before = tried[-2][1] if len(tried) > 1 else np.zeros_like(deep)
+        worth = (deep > _TOLERATED) & ((before <= _TOLERATED) | (deep < _BETTER * before))
+        asked = _at_frames(np.where(worth, deep + _SPARE, 0.0), cyclic=course.cyclic)
         more = covered(asked, _WIDTH, cyclic=course.cyclic)
         chosen = np.flatnonzero(np.any(more > 0.0, axis=1))
         if not len(chosen):
