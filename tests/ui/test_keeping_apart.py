@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keep Apart: arms make way for each other and for the body, and nothing else is spoilt by it."""
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.ui.locomotion import live, workflow
+from octo_motion.ui.locomotion.apart import DEEP
+from octo_motion.ui.locomotion.properties import locomotion_settings
+from tests.bench.apart import add_bumps
+from tests.ui.rig import keys
+
+
+@pytest.fixture
+def octopus() -> Any:
+    """The octopus of the add-on, about to crawl to the side in a way that tangles its arms."""
+    operators: Any = bpy.ops.octo_motion
+    operators.add_octopus()
+    armature: Any = bpy.context.object
+    operators.detect_arms()
+    operators.setup_load(name="crawl")
+    operators.add_route(
+        b0=(0.0, 0.0, 0.0), b1=(0.0, -0.5, 0.0), b2=(0.3, -0.8, 0.0), b3=(0.8, -0.9, 0.0)
+    )
+    settings = armature.octo_motion.locomotion
+    settings.seed = 1
+    return armature
+
+
+def computed(armature: Any, *, keep_apart: bool) -> workflow.Shot:
+    locomotion_settings(armature).keep_apart = keep_apart
+    shot = workflow.prepare(armature, bpy.context)
+    for _ in shot.compute():
+        pass
+    return shot
+
+
+def figures(shot: workflow.Shot) -> dict[str, float]:
+    return {each.kind: each.value for each in shot.figures}
+
+
+def test_arms_pass_through_each_other_without_it_and_not_with_it(octopus: Any) -> None:
+    without, kept = (figures(computed(octopus, keep_apart=on)) for on in (False, True))
+    assert without["OVERLAP"] > DEEP
+    assert kept["OVERLAP"] <= DEEP
+    # What holds the ground holds it as before, between frames too, and nothing becomes jerky.
+    assert kept["SLIP"] <= without["SLIP"] + 2e-4
+    assert kept["DEPTH"] <= without["DEPTH"] + 5e-4
+    assert kept["STRAIN"] == pytest.approx(without["STRAIN"])
+    assert kept["TURN"] <= 1.1 * without["TURN"]
+
+
+def test_arms_that_rest_on_the_ground_rest_where_they_did(octopus: Any) -> None:
+    without, kept = (computed(octopus, keep_apart=on) for on in (False, True))
+    assert without.measured is not None
+    assert kept.measured is not None
+    moved = 0
+    for number, arm in enumerate(kept.measured.arms):
+        columns = slice(number * len(arm.bones), (number + 1) * len(arm.bones))
+        places = [
+            arm.joints(arm.from_bones(each.rotations[:, columns]), each.strains[:, columns])
+            for each in (without.measured.poses, kept.measured.poses)
+        ]
+        apart = np.linalg.norm(places[1] - places[0], axis=-1) / arm.length
+        assert apart[kept.measured.lying[number]].max(initial=0.0) < 1e-4
+        moved += int((apart > 1e-3).sum())
+    assert moved > 0
+
+
+def test_hurried_arms_on_bumps_stay_out_of_each_other_and_of_the_body() -> None:
+    operators: Any = bpy.ops.octo_motion
+    operators.add_octopus()
+    armature: Any = bpy.context.object
+    operators.detect_arms()
+    operators.setup_load(name="hurry")
+    route = np.array([[-1.1, 0.35, 0.0], [-0.4, -0.45, 0.0], [0.3, 0.5, 0.0], [1.1, 0.0, 0.0]])
+    operators.add_route(**dict(zip(("b0", "b1", "b2", "b3"), route, strict=True)))
+    armature.octo_motion.locomotion.ground.object = add_bumps(route, 0.58)
+    bpy.context.view_layer.objects.active = armature
+    without, kept = (figures(computed(armature, keep_apart=on)) for on in (False, True))
+    assert without["OVERLAP"] > DEEP
+    assert kept["OVERLAP"] <= DEEP
+    assert kept["TURN"] <= 1.1 * without["TURN"]
+
+
+def test_what_lives_keeps_apart_like_what_is_generated(octopus: Any) -> None:
+    settings = octopus.octo_motion.locomotion
+    assert settings.keep_apart
+    bpy.ops.octo_motion.generate_locomotion()
+    generated = keys(settings.result)
+    settings.live = True
+    octopus.update_tag(refresh={"OBJECT"})
+    bpy.context.view_layer.update()
+    live.run_pending()
+    assert not settings.live_error
+    lived = keys(settings.result)
+    assert generated.keys() == lived.keys()
+    for path, values in generated.items():
+        np.testing.assert_allclose(lived[path], values, atol=1e-6)
+
+
+def test_a_loop_stays_a_loop(octopus: Any) -> None:
+    operators: Any = bpy.ops.octo_motion
+    operators.setup_load(name="prowl")
+    settings = octopus.octo_motion.locomotion
+    settings.travel_on, settings.cycles = "NONE", 1
+    # Each arm steps where its neighbour still is.
+    settings.table.spread_pairs = 1.15
+    without, kept = (computed(octopus, keep_apart=on).rotations for on in (False, True))
+    assert without is not None
+    assert kept is not None
+    assert np.abs(kept - without).max() > 0.01
+    # The last frame is the first, and goes on as the first does.
+    cosines = np.abs(np.sum(kept[0] * kept[-1], axis=-1))
+    np.testing.assert_allclose(cosines, 1.0, atol=1e-9)
+    once = kept[:-1] * np.sign(np.sum(kept[:-1] * kept[0], axis=-1, keepdims=True))
+    around = np.roll(once, -1, axis=0) - once
+    within = np.linalg.norm(around[:-1], axis=-1).max()
+    assert np.linalg.norm(around[-1], axis=-1).max() <= within
+
+
+def test_switched_off_the_motion_is_the_gait_s_own(octopus: Any) -> None:
+    shot = computed(octopus, keep_apart=False)
+    locomotion_settings(octopus).tell_overlaps = False
+    assert shot.rotations is not None
+    again = computed(octopus, keep_apart=False)
+    np.testing.assert_array_equal(again.rotations, shot.rotations)
+    assert again.apart is None
