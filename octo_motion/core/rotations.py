@@ -22,8 +22,16 @@ _TINY: Final = 1e-12
 def normalized(vectors: ArrayLike) -> Floats:
     """Vectors (or quaternions) scaled to length one; those of no length stay zero."""
     array = np.asarray(vectors, dtype=np.float64)
-    length = np.linalg.norm(array, axis=-1, keepdims=True)
-    return np.divide(array, length, out=np.zeros_like(array), where=length > _TINY)
+    length = np.sqrt(_products(array, array))[..., None]
+    return array / np.where(length > _TINY, length, np.inf)
+
+
+def _products(first: Floats, second: Floats) -> Floats:
+    """Scalar products (…) of vectors (…, components), of which a few are added the quickest."""
+    total = first[..., 0] * second[..., 0]
+    for component in range(1, first.shape[-1]):
+        total = total + first[..., component] * second[..., component]
+    return total
 
 
 def multiply(first: ArrayLike, second: ArrayLike) -> Floats:
@@ -78,7 +86,7 @@ def from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Floats:
 def from_rotation_vector(vector: ArrayLike) -> Floats:
     """Exponential map: axis times angle ``(…, 3)`` to unit quaternions."""
     v = np.asarray(vector, dtype=np.float64)
-    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    angle = np.sqrt(_products(v, v))[..., None]
     # numpy's sinc(x) is sin(πx)/(πx), smooth through zero.
     return np.concatenate([np.cos(0.5 * angle), 0.5 * np.sinc(0.5 * angle / np.pi) * v], axis=-1)
 
@@ -87,7 +95,7 @@ def to_rotation_vector(quaternion: ArrayLike) -> Floats:
     """Logarithm: unit quaternions to axis times angle, the angle within [0, π]."""
     q = np.asarray(quaternion, dtype=np.float64)
     q = np.where(q[..., :1] < 0.0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    sine = np.sqrt(_products(q[..., 1:], q[..., 1:]))[..., None]
     angle = 2.0 * np.arctan2(sine, q[..., :1])
     factor = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > _TINY)
     return factor * q[..., 1:]
@@ -126,7 +134,9 @@ def continuous(quaternions: ArrayLike) -> Floats:
     q = np.asarray(quaternions, dtype=np.float64)
     if len(q) < 2:
         return q.copy()
-    flips = np.sum(q[1:] * q[:-1], axis=-1) < 0.0
+    flips = _products(q[1:], q[:-1]) < 0.0
+    if not np.any(flips):
+        return q.copy()
     signs = np.where(np.cumsum(flips, axis=0) % 2 == 1, -1.0, 1.0)
     return np.concatenate([q[:1], q[1:] * signs[..., None]], axis=0)
 
