@@ -392,7 +392,8 @@ def _write_curves(
     automatic: bool,
 ) -> tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]:
     """Make the curves what the channels say. Curves that are there already are filled anew, so
-    that their colours, selection and place in the editors stay.
+    that their colours, selection and place in the editors stay. All keys of one that has a key on
+    each frame are of one kind, as nobody has edited them.
 
     Returns:
         The hash of each curve's keys, by its data path and index: to read them back takes longer
@@ -423,18 +424,23 @@ def _write_curves(
             if channel.keys is not None:
                 digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
                 continue
+            alike = len(keys) == len(times) and (
+                _has_automatic_handles(curve) if automatic else keys[0].interpolation == "LINEAR"
+            )
             if len(keys) != len(times):
                 keys.clear()
                 keys.add(len(times))
             points[:, 1] = channel.values[:, component]
             keys.foreach_set("co", points.ravel())
-            keys.foreach_set("interpolation", kinds)
-            keys.foreach_set("type", generated)
-            if sides is not None:
+            if not alike:
+                keys.foreach_set("interpolation", kinds)
+                keys.foreach_set("type", generated)
+                if sides is not None:
+                    keys.foreach_set("handle_left_type", sides)
+                    keys.foreach_set("handle_right_type", sides)
+            if sides is not None and curve.auto_smoothing != "NONE":
                 # Else handles depend on those of all other keys, and swing after a sudden turn.
                 curve.auto_smoothing = "NONE"
-                keys.foreach_set("handle_left_type", sides)
-                keys.foreach_set("handle_right_type", sides)
             curve.update()
             digests[place] = _keys_digest(points, kinds, generated, sides)
     for curve in curves.values():
