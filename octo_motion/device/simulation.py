@@ -44,6 +44,8 @@ _PROMPT: Final = 0.01
 """s from one step to the next, up to which the hand waits for the next and nothing else."""
 _EXPECTED: Final = 0.1
 """Of one more turn, in what is expected of the next: one late turn alone is no slow simulation."""
+_AT_ONCE: Final = 5
+"""Steps in a turn, at most: after a longer pause the puppet is not hurried."""
 _LATE: Final = 1.5
 """Times the expected turn, before the next one counts as late."""
 _STALE: Final = 0.25
@@ -270,7 +272,11 @@ class Simulation:
     # --- Time ------------------------------------------------------------------------------------
 
     def step(self, now: float) -> None:
-        """Go on by one step, with the hands where they were last heard of."""
+        """Go on by what has passed, with the hands where they were last heard of.
+
+        That is one step as a rule, and a few where the machine did not wake this process in time;
+        what would take longer than there is time is left out, and simulated time falls behind.
+        """
         for hand in self.hands.values():
             if hand.handle is None:
                 continue
@@ -290,26 +296,35 @@ class Simulation:
         passed, self._now = now - self._now, now
         if self.resting:
             return
-        self._time(passed)
-        before = self._clock()
-        self.world.step()
-        spent = self._clock() - before
         h = self.step_seconds
-        self.steps += 1
-        self.time += h
+        count = self._count(passed)
+        self._time(passed, count * h)
+        before = self._clock()
+        for _ in range(count):
+            self.world.step()
+        spent = (self._clock() - before) / count
+        self.steps += count
+        self.time += count * h
         self.changed = True
         calm = float(np.abs(self.world.velocities()).max(initial=0.0)) < _STILL
-        self._calm = self._calm + h if calm else 0.0
-        self.cost += 0.05 * (spent - self.cost)
+        self._calm = self._calm + count * h if calm else 0.0
+        self.cost += (0.05 if self.cost > 0.0 else 1.0) * (spent - self.cost)
 
-    def _time(self, passed: float) -> None:
+    def _count(self, passed: float) -> int:
+        """How many steps are due, and can be afforded."""
+        if self.cost <= 0.0 or passed > _STALE:
+            return 1
+        return max(
+            1, min(round(passed / self.step_seconds), int(BUSY * passed / self.cost), _AT_ONCE)
+        )
+
+    def _time(self, passed: float, simulated: float) -> None:
         """Learn from one more turn how long they take, and how much of that is simulated."""
         if not 0.0 < passed < _STALE:
             return
         self._turns += 1
         self._turn += max(_EXPECTED, 1.0 / self._turns) * (passed - self._turn)
-        h = self.step_seconds
-        pace = 1.0 if passed < 1.5 * h else h / passed
+        pace = 1.0 if passed < 1.5 * simulated else simulated / passed
         self.pace += _EXPECTED * (pace - self.pace)
 
     @property

@@ -287,12 +287,15 @@ def test_test_of_a_device_is_a_gentle_push_each_way() -> None:
 class Bench:
     """A puppet in the simulation, a simulated hand, and a clock; a step every so many ticks."""
 
-    def __init__(self, every: int = 4, yielding: float = 1.0, step: float = 0.0) -> None:
+    def __init__(
+        self, every: int = 4, yielding: float = 1.0, step: float = 0.0, cost: float = 0.0
+    ) -> None:
+        """A step of the simulation takes ``cost`` seconds to compute, by its own clock."""
         self.figure = chain(3, elements=soft(3, 40.0, 2.0, 100.0, yielding))
         self.simulation = Simulation(
             *(self.figure, posed(self.figure)),
             settings=WorldSettings(step=step or every * PERIOD),
-            clock=lambda: 0.0,
+            clock=itertools.count(0.0, cost).__next__,
         )
         self.simulation.pin({0: False})
         self.now = 0.0
@@ -345,7 +348,7 @@ def test_puppet_follows_the_hand_and_the_hand_feels_it(every: int) -> None:
 @pytest.mark.parametrize("every", [15, 34, 60])
 def test_simulation_slower_than_the_loop_is_felt_through_the_local_model(every: int) -> None:
     """Steps of 8 ms that take longer: the loop goes on without them, and the force with it."""
-    bench = Bench(every, step=8e-3)
+    bench = Bench(every, step=8e-3, cost=every * PERIOD)
     bench.run(0.1)
     bench.driver.buttons = 1
     bench.run(2.5)
@@ -376,6 +379,19 @@ def test_steps_get_longer_when_all_that_is_done_beside_them_takes_too_long() -> 
     assert work(0.02) == 8e-3, "and no longer: what is coarser would shake"
     assert work(0.0018) == 8e-3, "not to and fro"
     assert work(0.0005) == 2e-3
+
+
+@pytest.mark.parametrize(("cost", "pace"), [(0.0005, 1.0), (0.0039, 0.5)])
+def test_steps_that_a_busy_machine_left_out_are_made_up_for_if_there_is_time(
+    cost: float, pace: float
+) -> None:
+    bench = Bench(4, step=2e-3, cost=cost)  # woken only every 4 ms
+    bench.driver.buttons = 1
+    bench.run(1.0)
+    assert bench.simulation.pace == pytest.approx(pace, abs=0.01)
+    assert bench.simulation.time == pytest.approx(pace, abs=0.1)
+    bench.simulation.step(bench.now + 0.2)
+    assert bench.simulation.time <= pace + 0.12, "after a long pause it is not hurried"
 
 
 def test_one_late_step_does_not_make_a_slow_simulation() -> None:
