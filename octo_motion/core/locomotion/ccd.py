@@ -152,10 +152,14 @@ def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
             + after[group] * (3.0 * along**2 - 2.0 * along)
             + (-1.0) ** group * swaying[group] * (1.0 - 2.0 * along)
         )
-        level = np.cos(turn[:, 0])
-        shape[segments, 0] = level * np.cos(turn[:, 1])
-        shape[segments, 1] = level * np.sin(turn[:, 1])
-        shape[segments, 2] = np.sin(turn[:, 0])
+        # Cosines and sines by the tangent of half of the angle, which is quicker.
+        half = np.tan(0.5 * turn)
+        share = 2.0 / (1.0 + half * half)
+        half *= share
+        share -= 1.0
+        shape[segments, 0] = share[:, 0] * share[:, 1]
+        shape[segments, 1] = share[:, 0] * half[:, 1]
+        shape[segments, 2] = half[:, 0]
     return shape
 
 

@@ -39,11 +39,26 @@ def cross(first: Floats, second: Floats) -> Floats:
 
 def turned(turn: Floats, vectors: Floats) -> Floats:
     """Vectors (…, 3, batch) turned by quaternions (4, batch)."""
+    if vectors.ndim > turn.ndim:
+        # Several by each: by way of matrices.
+        return np.einsum("ijb,...jb->...ib", matrices(turn), vectors)
     twice = cross(turn[1:], vectors)
     twice += twice
     result = turn[0] * twice
     result += vectors
     result += cross(turn[1:], twice)
+    return result
+
+
+def matrices(turn: Floats) -> Floats:
+    """Matrices (3, 3, batch) of unit quaternions (4, batch)."""
+    doubled = 2.0 * turn[1:]
+    (wx, wy, wz), (xx, xy, xz) = turn[0] * doubled, turn[1] * doubled
+    yy, yz, zz = turn[2] * doubled[1], turn[2] * doubled[2], turn[3] * doubled[2]
+    result = np.empty((3, 3, turn.shape[-1]))
+    result[0, 0], result[0, 1], result[0, 2] = 1.0 - (yy + zz), xy - wz, xz + wy
+    result[1, 0], result[1, 1], result[1, 2] = xy + wz, 1.0 - (xx + zz), yz - wx
+    result[2, 0], result[2, 1], result[2, 2] = xz - wy, yz + wx, 1.0 - (xx + yy)
     return result
 
 
