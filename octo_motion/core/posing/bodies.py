@@ -110,8 +110,9 @@ class Bodies:
 
     def rest_springs_at(self, springs: Floats, which: Integers) -> None:
         """Move springs' rest so that they are bent by ``springs`` (which, 3), parents' frames."""
-        rest = product(exponential(-springs), self.turns()[which])
-        self.rest[which] = rest / np.sqrt((rest * rest).sum(axis=1, keepdims=True))
+        parents = self._parent_turns().take(which, 0)
+        turns = inverse_product(parents, self.orientations.take(which, 0))
+        self.rest[which] = product(exponential(-springs), turns)
 
     # How they move
 

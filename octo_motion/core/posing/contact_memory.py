@@ -8,75 +8,90 @@ from numpy.typing import NDArray
 
 from ..rotations import Floats
 from .contacts import Contacts
-from .rows import Answer
+from .rows import Answer, Rows
 
 
 class ContactMemory:
-    """Friction and wishes of the last step's contacts, found again by their labels."""
+    """Friction, slip and wishes of the last step's contacts, found again by their labels."""
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
         """Begin anew."""
-        self.set(np.zeros(0, np.int64), _NO_ROWS, _NO_ROWS)
+        self.set(np.zeros(0, np.int64), _NO_ROWS, _NO_ROWS, _NO_ONES)
 
-    def set(self, labels: NDArray[np.int64], grips: Floats, wanted: Floats) -> None:
+    def set(self, labels: NDArray[np.int64], grips: Floats, wanted: Floats, slips: Floats) -> None:
         """Take over what a snapshot has."""
         self.labels = labels
         self._key = labels.tobytes()
         self.grips = grips
         """(contacts, 3) friction b of the step before, N·s."""
         self.wanted = wanted
-        """(contacts, 3) y of the step before, see ``rows``."""
+        """(rows, 3) y of the step before, see ``rows``."""
+        self.slips = slips
+        """(contacts,) μ |w_t| at its end, m/s; none where it is not known, or nothing slipped."""
         self._answer: Answer | None = None
         self._normals: Floats | None = None
 
-    def answer(self, contacts: Contacts) -> Answer | None:
-        """What these contacts did in the step before, where not even their normals are others."""
-        return self._answer if contacts.normals is self._normals else None
-
-    def recall(
-        self, contacts: Contacts
-    ) -> tuple[Floats | None, Floats | None, NDArray[np.bool_] | None]:
-        """Friction, wishes and which of them are known, for these contacts.
-
-        Returns:
-            (contacts, 3) b and y, and (contacts, 1) whether they are known; they are zero where
-            not. All None where nothing is known, the last one None where all is.
-        """
+    def grips_of(self, contacts: Contacts) -> Floats | None:
+        """(contacts, 3) b of these contacts, zero for those that are new; None where all are."""
         if not (len(self.labels) and len(contacts.labels)):
-            return None, None, None
-        if contacts.labels.tobytes() == self._key:
-            return self.grips, self.wanted, None
+            return None
+        if self.knows(contacts):
+            return self.grips
+        found, same = self._places(contacts)
+        return self.grips.take(found, 0) * same
+
+    def knows(self, contacts: Contacts) -> bool:
+        """Whether these are the contacts of the step before."""
+        return contacts.labels.tobytes() == self._key
+
+    def before(self, rows: Rows) -> Answer | None:
+        """What these rows did in the step before; None where some are new."""
+        if len(self.wanted) != len(rows) or not self.knows(rows.contacts):
+            return None
+        if self._answer is not None and self._normals is rows.contacts.normals:
+            return self._answer
+        return rows.respond(self.wanted)
+
+    def before_or(self, rows: Rows, there: Floats) -> Answer:
+        """The same, with y (rows, 3) for those that are new."""
+        count = rows.count
+        if len(self.labels) and count:
+            found, same = self._places(rows.contacts)
+            there[:count] = np.where(same, self.wanted.take(found, 0), there[:count])
+        return rows.respond(there)
+
+    def _places(self, contacts: Contacts) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Where contacts are in what is remembered, and (contacts, 1) whether they are there."""
         order = self.labels.argsort()
         ordered = self.labels.take(order)
         place = np.minimum(ordered.searchsorted(contacts.labels), len(order) - 1)
-        same = (ordered.take(place) == contacts.labels)[:, None]
-        found = order.take(place)
-        return self.grips.take(found, 0) * same, self.wanted.take(found, 0) * same, same
+        return order.take(place), (ordered.take(place) == contacts.labels)[:, None]
 
-    def keep(self, contacts: Contacts, answer: Answer | None, most: Floats | float) -> None:
+    def keep(self, rows: Rows, answer: Answer | None, most: Floats | float) -> None:
         """Remember a step.
 
         Args:
-            contacts: of the step.
+            rows: of the step.
             answer: what they did.
             most: (contacts,) friction that is held on to, N·s: less than that of a blow.
         """
-        count = len(contacts.labels)
-        if answer is None or not count:
-            if len(self.labels):
+        if answer is None:
+            if len(self.wanted):
                 self.forget()
             return
+        contacts = rows.contacts
         size = answer.shares * answer.size
         shares = answer.shares * np.minimum(most / (size + 1e-300), 1.0)
-        labels, wanted = contacts.labels, answer.wanted
-        if labels is not self.labels:
-            self.labels, self._key = labels, labels.tobytes()
+        if contacts.labels is not self.labels:
+            self.labels, self._key = contacts.labels, contacts.labels.tobytes()
         self.grips = answer.across * shares[:, None]
-        self.wanted = wanted if len(wanted) == count else wanted[:count].copy()
+        self.wanted = answer.wanted
+        self.slips = _NO_ONES if answer.slips is None else rows.slip(answer)
         self._answer, self._normals = answer, contacts.normals
 
 
 _NO_ROWS = np.zeros((0, 3))
+_NO_ONES = np.zeros(0)

@@ -32,6 +32,7 @@ and yet under a pull that lasts the joint stands still instead of creeping on.""
 _OPEN = 5e-4
 """cos² of half the swing; a bone that points backwards has no way to say which way it is bent."""
 _TINY = 1e-12
+_ONES = np.ones(3)
 
 
 def bends(turns: Floats) -> Floats:
@@ -67,14 +68,18 @@ def slopes(turns: Floats) -> Floats:
     angle = 2.0 * np.arctan2(sine, cosine)
     rest = np.where(straight, 1.0, angle * (cosine * cosine - sine * sine) / (2.0 * whole))
     half = sine / cosine
-    ones = np.ones_like(angle)
-    cross = right * back * (1.0 - rest)
-    rows = (
-        (right * right + back * back * rest, back * angle, cross),
-        (-back * half, ones, right * half),
-        (cross, -right * angle, back * back + right * right * rest),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    across = right * right
+    along = 1.0 - across
+    result = np.empty((*angle.shape, 3, 3))
+    result[..., 0, 0] = across + along * rest
+    result[..., 2, 2] = along + across * rest
+    result[..., 0, 2] = result[..., 2, 0] = right * back * (1.0 - rest)
+    result[..., 0, 1] = back * angle
+    result[..., 2, 1] = -right * angle
+    result[..., 1, 0] = -back * half
+    result[..., 1, 1] = 1.0
+    result[..., 1, 2] = right * half
+    return result
 
 
 class JointStops:
@@ -122,11 +127,13 @@ class JointStops:
         which, side, axis = found.nonzero()
         if not len(which):
             return ()
-        joints = self.joints[which]
-        rows = self._signs[side] * slopes(own)[which, axis]
-        sizes = np.sqrt((rows * rows).sum(axis=1))
-        rows = (frames[joints] @ (self._axes[which] @ rows[:, :, None]))[:, :, 0] / sizes[:, None]
+        # In world axes: rows times the transposed frame of the bone at rest.
+        seen = slopes(own) @ (frames[self.joints] @ self._axes).transpose(0, 2, 1)
+        sizes = np.sqrt((seen * seen) @ _ONES)[which, axis]
+        rows = seen[which, axis] * (self._signs[side] / sizes[:, None])
         rates = np.maximum(gaps[which, side, axis] / (sizes * step), -_BACK)
+        joints = self.joints[which]
         spread = np.zeros((self._count, len(which)))
         spread[joints, np.arange(len(which))] = 1.0
-        return (Stops(joints, rows, rates, self._gains[which], spread),)
+        labels = 6 * which + 3 * side + axis
+        return (Stops(joints, rows, rates, self._gains[which], spread, labels),)

@@ -29,7 +29,7 @@ import numpy as np
 from ..rotations import Floats
 from .plastic import Response
 from .problem import SPATIAL, Problem, Stops
-from .rows import Answer, Pattern, Rows, Tangent
+from .rows import Answer, Flags, Pattern, Rows, Tangent
 from .tree import Tree
 
 
@@ -44,10 +44,10 @@ class Solution:
     moving: Floats | None
     """(slots, 3) u with which positions move, with corrections that are not kept; None where there
     are none."""
-    loads: Floats
-    """(bodies, 3) λ of the elements, in the problem's axes."""
-    flow: Floats | None
-    """(bodies, 3) w_d, in the problem's axes; None where nothing flows."""
+    response: Response
+    """Loads and flow of the elements, in the problem's axes."""
+    pressed: Flags | None
+    """(stops,) which ends of ranges bear; None where none is near."""
     rows: Answer | None
     """What the rows do; None where there are none."""
     iterations: int
@@ -71,6 +71,8 @@ class Start:
     """What the rows did then, as they are now; None begins at ``speeds`` and nothing else."""
     flows: bool = True
     """Whether any element did; where none did, it begins as if none will."""
+    pressed: Flags | None = None
+    """(stops,) which ends of ranges bore; None begins with what they do at ``speeds``."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +88,7 @@ class _Point:
     joint_impulses: Floats
     """(bodies, 3) of elements and stops, world axes."""
     response: Response
+    pressed: Flags | None
     rows: Answer | None
 
 
@@ -127,6 +130,7 @@ class Newton:
         """
         self._tree.place(problem.joints)
         self._base = problem.law.at_rest(problem.springs)
+        self._held = problem.step * self._base
         stack = self._stack(problem, 1 if corrections is None else 2)
         point, tangents = self._begin(problem, start)
         shift: Floats | None = None
@@ -146,87 +150,121 @@ class Newton:
             if count >= self._iterations:
                 break
             if miss <= self._tolerance:
-                # Where slipping began or ended in a blow, once more with the speed that is left.
+                # Where slipping began or ended in a blow, once more with the speed that is left:
+                # with the same tangents, for impulses change less than what they are asked for.
                 rounds += 1
-                if rounds > _ROUNDS or not self._follow(problem, point):
+                if rounds > _ROUNDS or not self._follow(problem, end):
                     break
-                point = self._at(problem, point.speeds)
-            tangents = self._tangents(problem, point)
+                point = None
+            elif count == 1 and self._follow(problem, end):
+                point = None
+            tangents = self._tangents(problem, end)
         return Solution(
-            point.speeds,
-            point.velocities,
+            end.speeds,
+            end.velocities,
             # Added to what was settled on, which need not be where the last system led.
-            None if shift is None else point.speeds + shift,
-            point.response.load,
-            point.response.flow,
-            point.rows,
+            None if shift is None else end.speeds + shift,
+            end.response,
+            end.pressed,
+            end.rows,
             count,
             miss,
         )
 
     def _begin(self, problem: Problem, start: Start) -> tuple[_Point | None, _Tangents]:
         """The first tangents, and the velocities where they touch if all do at the same."""
-        if start.rows is None:
+        if start.rows is None and len(problem.rows.bodies):
             point = self._at(problem, start.speeds)
             return point, self._tangents(problem, point)
-        if not (start.flows or problem.stops or problem.frames is not None):
-            return None, self._linear_tangents(problem, problem.rows.tangent(start.rows))
-        speeds = start.speeds.take(self._tree.joint_slot, 0)
-        response, impulses = self._joints(problem, speeds)
-        point = _Point(start.speeds, _NO_ROWS, speeds, impulses, response, start.rows)
-        return None, self._tangents(problem, point)
+        speeds, pressed = start.speeds.take(self._tree.joint_slot, 0), start.pressed
+        if pressed is None and problem.stops:
+            pressed = _pushes(problem.stops[0], speeds) >= 0.0
+        rows = None if start.rows is None else problem.rows.tangent(start.rows)
+        if not start.flows and problem.frames is None:
+            return None, self._planes(problem, problem.law.held, self._held, pressed, rows)
+        response, _ = self._elements(problem, speeds)
+        return None, self._bent(problem, response, speeds, pressed, rows)
 
     def _follow(self, problem: Problem, point: _Point) -> bool:
         rows = problem.rows
-        if point.rows is None or (point.rows.slips is None and rows.fastest <= problem.blow):
+        if point.rows is None or (point.rows.slips is None and not rows.followed):
             return False
-        return rows.follow(rows.speeds(point.velocities), problem.blow)
+        return rows.follow(rows.slip(point.rows), problem.blow)
 
     def _at(self, problem: Problem, speeds: Floats) -> _Point:
         """All laws at u (slots, 3)."""
         tree = self._tree
         velocities = tree.velocities(speeds)
         joint_speeds = speeds.take(tree.joint_slot, 0)
-        response, impulses = self._joints(problem, joint_speeds)
+        response, impulses, pressed = self._joints(problem, joint_speeds)
         rows = problem.rows
         answer = rows.respond(rows.wanted(velocities)) if len(rows.bodies) else None
-        return _Point(speeds, velocities, joint_speeds, impulses, response, answer)
+        return _Point(speeds, velocities, joint_speeds, impulses, response, pressed, answer)
 
-    def _joints(self, problem: Problem, speeds: Floats) -> tuple[Response, Floats]:
-        """Elements, and impulses (bodies, 3) of elements and stops, at relative turns of joints."""
+    def _elements(self, problem: Problem, speeds: Floats) -> tuple[Response, Floats]:
+        """Elements, and their impulses (bodies, 3), at relative turns of joints (bodies, 3)."""
         frames, law = problem.frames, problem.law
         if frames is None:
             response = law.answer(self._base - law.backward * speeds)
-            impulses = problem.step * response.load
-        else:
-            seen = (speeds[:, None, :] @ frames)[:, 0]
-            response = law.answer(self._base - law.backward * seen)
-            impulses = problem.step * (frames @ response.load[:, :, None])[:, :, 0]
-        for stops in problem.stops:
-            push = _stop_pushes(stops, speeds)
+            return response, problem.step * response.load
+        seen = (speeds[:, None, :] @ frames)[:, 0]
+        response = law.answer(self._base - law.backward * seen)
+        return response, problem.step * (frames @ response.load[:, :, None])[:, :, 0]
+
+    def _joints(self, problem: Problem, speeds: Floats) -> tuple[Response, Floats, Flags | None]:
+        """The same with stops, and which of them bear."""
+        response, impulses = self._elements(problem, speeds)
+        if not problem.stops:
+            return response, impulses, None
+        stops = problem.stops[0]
+        push = _pushes(stops, speeds)
+        pressed = push >= 0.0
+        if pressed.any():
             impulses += stops.spread @ (np.maximum(push, 0.0)[:, None] * stops.axes)
-        return response, impulses
+        return response, impulses, pressed
 
     def _tangents(self, problem: Problem, point: _Point) -> _Tangents:
+        """All laws as planes that touch them at a point."""
         rows = None if point.rows is None else problem.rows.tangent(point.rows)
-        frames, response = problem.frames, point.response
-        linear = response.flows is None and not problem.stops
-        if linear and frames is None:
-            return self._linear_tangents(problem, rows)
-        slopes = problem.step * response.slope
+        if point.response.flows is None and problem.frames is None:
+            return self._planes(problem, problem.law.held, self._held, point.pressed, rows)
+        return self._bent(problem, point.response, point.joint_speeds, point.pressed, rows)
+
+    def _bent(
+        self,
+        problem: Problem,
+        response: Response,
+        speeds: Floats,
+        pressed: Flags | None,
+        rows: Tangent | None,
+    ) -> _Tangents:
+        """Planes of elements that flow, or have axes of their own."""
+        slopes, loads = problem.step * response.slope, problem.step * response.load
+        frames = problem.frames
         if frames is not None:
             slopes = frames @ slopes @ frames.transpose(0, 2, 1)
-        for stops in problem.stops:
-            pressed = _stop_pushes(stops, point.joint_speeds) >= 0.0
-            stiff = np.where(pressed, stops.gains, 0.0)[:, None] * stops.axes
+            loads = (frames @ loads[:, :, None])[:, :, 0]
+        right = loads + (slopes @ speeds[:, :, None])[:, :, 0]
+        return self._planes(problem, slopes, right, pressed, rows, linear=response.flows is None)
+
+    @staticmethod
+    def _planes(
+        problem: Problem,
+        slopes: Floats,
+        right: Floats,
+        pressed: Flags | None,
+        rows: Tangent | None,
+        *,
+        linear: bool = True,
+    ) -> _Tangents:
+        """Planes of elements and of stops that bear."""
+        if pressed is not None and pressed.any():
+            stops = problem.stops[0]
+            stiff = (pressed * stops.gains)[:, None] * stops.axes
+            right = right - stops.spread @ (stops.rates[:, None] * stiff)
             blocks = stiff[:, :, None] * stops.axes[:, None, :]
             slopes = slopes + (stops.spread @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
-        right = point.joint_impulses + (slopes @ point.joint_speeds[:, :, None])[:, :, 0]
-        return _Tangents(slopes, right, linear, rows)
-
-    def _linear_tangents(self, problem: Problem, rows: Tangent | None) -> _Tangents:
-        """Those of joints that hold, whatever their velocities are."""
-        return _Tangents(problem.law.held, problem.step * self._base, linear=True, rows=rows)
+        return _Tangents(slopes, right, linear and pressed is None, rows)
 
     def _stack(self, problem: Problem, columns: int) -> Floats:
         """(bodies and rows, 6, 6 + columns) inertias and momenta; those of rows are left open."""
@@ -349,7 +387,7 @@ class Newton:
     def _between(self, problem: Problem, start: _Point, end: _Point, share: float) -> _Point:
         """All laws on the way from one point to another, where velocities need no products."""
         joint_speeds = start.joint_speeds + share * (end.joint_speeds - start.joint_speeds)
-        response, impulses = self._joints(problem, joint_speeds)
+        response, impulses, pressed = self._joints(problem, joint_speeds)
         answer = None
         if start.rows is not None and end.rows is not None:
             wanted = start.rows.wanted + share * (end.rows.wanted - start.rows.wanted)
@@ -360,6 +398,7 @@ class Newton:
             joint_speeds,
             impulses,
             response,
+            pressed,
             answer,
         )
 
@@ -416,7 +455,7 @@ def _miss(end: _Point, joints: Floats, rows: Floats | None) -> float:
     return miss
 
 
-def _stop_pushes(stops: Stops, speeds: Floats) -> Floats:
+def _pushes(stops: Stops, speeds: Floats) -> Floats:
     """(stops,) what each would give, above zero where it is pressed."""
     into = (speeds[stops.joints] * stops.axes).sum(axis=1)
     return -stops.gains * (into + stops.rates)

@@ -87,6 +87,14 @@ class Response:
         slope[which] = blocks
         return slope
 
+    def flow_of(self, which: NDArray[np.int64]) -> Floats:
+        """(which, 3) w_d of those elements, of which each flows."""
+        law = self.law
+        size = self.size.take(which)
+        excess = (size - law.yield_torque.take(which)) / (size + _TINY)
+        toward = self.trial.take(which, 0) * excess[:, None]
+        return -toward * law.compliance.take(which, 0)
+
     @property
     def flow(self) -> Floats | None:
         """(…, 3) w_d: how fast the series damper moves, rad/s; None where all hold."""

@@ -37,6 +37,8 @@ class Stops:
     """(stops,) a, N·m·s per rad/s."""
     spread: Floats
     """(bodies, stops) 1 where the stop is the joint's: sums what a joint's stops do."""
+    labels: Integers
+    """(stops,) the same number for the same end of the same joint in every step."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rotations import Floats, cross
+from ..rotations import Floats
 from .contacts import Contacts
 from .kinematics import skew
 
@@ -68,8 +68,8 @@ class Holds:
         return len(self.bodies)
 
 
-_Flags = NDArray[np.bool_]
-_Touch = tuple[_Flags, _Flags | None, Floats, Floats, Floats | _Flags]
+Flags = NDArray[np.bool_]
+_Touch = tuple[Flags, Flags | None, Floats, Floats, Floats | Flags]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +80,15 @@ class Answer:
     """(rows, 3) y."""
     impulses: Floats
     """(rows, 3) p on the body."""
-    sticks: _Flags
+    sticks: Flags
     """(contacts,)"""
-    slips: _Flags | None
+    slips: Flags | None
     """(contacts,) None where none does."""
     across: Floats
     """(contacts, 3) y_t."""
     size: Floats
     """(contacts,) |y_t|."""
-    shares: Floats | _Flags
+    shares: Floats | Flags
     """(contacts,) |p_t|/|y_t|; where it slips, what holds it against slipping another way."""
     held: Floats
     """(holds,) share of the impulse without bound."""
@@ -159,10 +159,17 @@ class Pattern:
         """(contacts,) least g/h that counts, m/s."""
         self.deepest_gaps = step * self.deepest
         self.column = self.gains[:, None]
+        self.slipping = contacts.friction / self.contact_gains
         self.spread = 1.0 / (1.0 + contacts.friction * contacts.friction)
         self.root_spread = np.sqrt(self.spread)
-        self.normals: Floats | None = None
-        """Across which friction was taken over last: then it need not be turned."""
+        self._crossed: Floats | None = None
+        self._crossing = np.zeros((0, 3, 3))
+
+    def crossing(self, normals: Floats) -> Floats:
+        """(contacts, 3, 3) matrices of n ×."""
+        if normals is not self._crossed:
+            self._crossed, self._crossing = normals, skew(normals)
+        return self._crossing
 
     @staticmethod
     def key_of(contacts: Contacts, holds: Holds | None) -> tuple[bytes, ...]:
@@ -221,8 +228,8 @@ class Rows:
             self.reach[pattern.turning] = _TURNS
         self._step = step
         self._followed: Floats | None = None
-        self.fastest = 0.0
-        """m/s: the most that slip adds to a rate."""
+        self._slip_of: Answer | None = None
+        self._slip = _NO_ONES
         self._closing = np.maximum(contacts.gaps / step, pattern.deepest)
         self.rates = self._closing
         """(contacts,) g/h + μ |w_t|, as ``follow`` was told |w_t| last."""
@@ -230,9 +237,7 @@ class Rows:
         """(contacts, 3) b; None for zero."""
         if grips is not None:
             normals = contacts.normals
-            if pattern.normals is not normals:
-                self.grips = grips - ((grips * normals) @ _ONES)[:, None] * normals
-            pattern.normals = normals
+            self.grips = grips - ((grips * normals) @ _ONES)[:, None] * normals
         self.still = not contacts.speeds.any()
         """Whether no obstacle moves: then w is the velocity of the points themselves."""
         self._ask()
@@ -272,33 +277,44 @@ class Rows:
             own[self.paired] -= velocities[self.others[self.paired]]
         return (self.reach @ own[:, :, None])[:, :, 0]
 
-    def follow(self, speeds: Floats, tolerance: float) -> bool:
-        """Take |w_t| from w (rows, 3); false where that changes no rate by ``tolerance``, m/s."""
-        count = self.count
-        if not count:
-            return False
-        normals, w = self.contacts.normals, speeds[:count]
+    def slip(self, answer: Answer) -> Floats:
+        """(contacts,) μ |w_t|, m/s: what slipping as then adds to the rates."""
+        if self._slip_of is not answer:
+            # y_t = b − a w_t.
+            apart = answer.across if self.grips is None else answer.across - self.grips
+            self._slip = self.pattern.slipping * np.sqrt((apart * apart) @ _ONES)
+            self._slip_of = answer
+        return self._slip
+
+    def slip_at(self, velocities: Floats) -> Floats:
+        """(contacts,) the same at spatial velocities (bodies, 6)."""
+        normals, w = self.contacts.normals, self.speeds(velocities)[: self.count]
         across = w - ((w * normals) @ _ONES)[:, None] * normals
-        slip = self.contacts.friction * np.sqrt((across * across) @ _ONES)
+        return self.contacts.friction * np.sqrt((across * across) @ _ONES)
+
+    def follow(self, slip: Floats, tolerance: float) -> bool:
+        """Take over μ |w_t| (contacts,); false where that changes no rate by ``tolerance``, m/s."""
         change = slip if self._followed is None else np.abs(slip - self._followed)
-        if change.max() <= tolerance:
+        if not len(change) or change.max() <= tolerance:
             return False
         self._followed = slip
-        self.fastest = float(slip.max())
         self.rates = self._closing + slip
         self._ask()
         return True
+
+    @property
+    def followed(self) -> bool:
+        """Whether any slip was taken over."""
+        return self._followed is not None
 
     def answer(self, speeds: Floats) -> Answer:
         """Impulses at w (rows, 3)."""
         moving = speeds if self.still else speeds + self.targets
         return self.respond(self.asked - self.pattern.column * moving)
 
-    def respond(self, wanted: Floats, known: Answer | None = None) -> Answer:
-        """Impulses at y (rows, 3); what contacts do there may be known already."""
+    def respond(self, wanted: Floats) -> Answer:
+        """Impulses at y (rows, 3)."""
         count, holds = self.count, self.holds
-        if holds is None and known is not None:
-            return known
         impulses = np.empty_like(wanted)
         if holds is None:
             return Answer(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
@@ -307,11 +323,7 @@ class Rows:
         np.multiply(pulls, held[:, None], out=impulses[count:])
         if not count:
             return Answer(wanted, impulses, _NOBODY, None, _NO_ROWS, _NO_ONES, _NO_ONES, held)
-        if known is None:
-            return Answer(wanted, impulses, *self._touch(wanted[:count], impulses[:count]), held)
-        impulses[:count] = known.impulses[:count]
-        touch = known.sticks, known.slips, known.across, known.size, known.shares
-        return Answer(wanted, impulses, *touch, held)
+        return Answer(wanted, impulses, *self._touch(wanted[:count], impulses[:count]), held)
 
     def _touch(self, y: Floats, impulses: Floats) -> _Touch:
         """Contacts' impulses (contacts, 3) at y, and what ``Answer`` tells of how they come."""
@@ -366,11 +378,11 @@ class Rows:
         # Along n + μ t with 1/(1 + μ²), sideways of both with |p_t|/|y_t|.
         toward = answer.across / (answer.size + _TINY)[:, None]
         ways = np.empty((len(toward), 3, 2))
-        ways[:, :, 0] = (answer.slips * pattern.root_spread)[:, None] * (
-            contacts.normals + contacts.friction[:, None] * toward
-        )
+        both = contacts.normals + contacts.friction[:, None] * toward
+        np.multiply(both, (answer.slips * pattern.root_spread)[:, None], out=ways[:, :, 0])
         aside = np.sqrt(answer.slips * answer.shares)
-        ways[:, :, 1] = aside[:, None] * cross(contacts.normals, toward)
+        sideways = (pattern.crossing(contacts.normals) @ toward[:, :, None])[:, :, 0]
+        np.multiply(sideways, aside[:, None], out=ways[:, :, 1])
         planes = ways @ ways.transpose(0, 2, 1)
         planes += answer.sticks[:, None, None] * _UNIT
         return planes

@@ -94,6 +94,7 @@ class World:
         self._bodies = Bodies(figure, self._tree, pose)
         self._speeds = np.zeros((len(self._tree.layout.bodies), 3))
         self._flows = False
+        self._pressed = _NOBODY
         self._loads = np.zeros((count, 3))
         self._use_elements(figure.elements)
         for body in sorted(self.settings.pinned):
@@ -155,6 +156,7 @@ class World:
         bodies.stop()
         self._speeds[:] = 0.0
         self._flows = False
+        self._pressed = _NOBODY
         self._loads[:] = 0.0
         self._memory.forget()
 
@@ -171,6 +173,7 @@ class World:
         bodies.linear = np.array(velocities[:, :3], dtype=np.float64)
         bodies.angular = np.array(velocities[:, 3:], dtype=np.float64)
         bodies.spin = (bodies.inertias() @ bodies.angular[:, :, None])[:, :, 0]
+        self._memory.slips = np.zeros(0)
         # Where the solver begins; it ends in the same place from anywhere.
         before = np.where(bodies.is_root[:, None], 0.0, bodies.angular[bodies.parent_or_self])
         self._speeds[:] = 0.0
@@ -292,8 +295,10 @@ class World:
             bodies.spin.copy(),
             self._speeds.copy(),
             self._flows,
+            self._pressed.copy(),
             self._memory.grips.copy(),
             self._memory.wanted.copy(),
+            self._memory.slips.copy(),
             self._memory.labels.copy(),
         )
 
@@ -309,7 +314,10 @@ class World:
         bodies.spin = state.spin.copy()
         self._speeds = state.speeds.copy()
         self._flows = state.flows
-        self._memory.set(state.labels.copy(), state.grips.copy(), state.wanted.copy())
+        self._pressed = state.pressed.copy()
+        self._memory.set(
+            state.labels.copy(), state.grips.copy(), state.wanted.copy(), state.slips.copy()
+        )
         bodies.refresh()
 
     # The step
@@ -329,24 +337,22 @@ class World:
         """The question of the coming step, and where to begin with its answer."""
         bodies = self._bodies
         contacts = self._find()
-        grips, wanted, known = self._memory.recall(contacts)
         rows = Rows(
             contacts,
             self._holding.rows(bodies, tuple(self._pins.values()), self._grabs),
             bodies.roots[0],
             self.figure.masses,
             self.settings.step,
-            grips,
+            self._memory.grips_of(contacts),
             self._pattern,
         )
         self._pattern = rows.pattern
         problem = self._gathering.problem(bodies, self._law, self.forces, rows, self._speeds)
-        before = None
-        if wanted is not None:
-            before = self._before(problem, wanted, known)
-        if rows.count and (before is None or before.slips is not None):
-            rows.follow(rows.speeds(self._velocities_now(problem)), 0.0)
-        return problem, Start(self._speeds, before, flows=self._flows)
+        before = self._before(problem) if len(rows.bodies) else None
+        pressed = None
+        if problem.stops:
+            pressed = (problem.stops[0].labels[:, None] == self._pressed).any(axis=1)
+        return problem, Start(self._speeds, before, self._flows, pressed)
 
     def _find(self) -> Contacts:
         """Contacts that could carry anything within the step."""
@@ -356,18 +362,21 @@ class World:
         margin = 2e-3 * self._size + 2.0 * self.settings.step * fastest
         return self._detector.find(bodies.positions, bodies.matrices, self.obstacles, margin)
 
-    def _before(self, problem: Problem, wanted: Floats, known: NDArray[np.bool_] | None) -> Answer:
-        """What the rows of this step did in the step before."""
-        rows, tree = problem.rows, self._tree
-        if rows.holds is not None or known is not None:
-            # New rows, and holds, begin with what they would do at the velocities of before.
-            tree.place(problem.joints)
-            there = rows.wanted(tree.velocities(self._speeds))
-            if known is not None:
-                wanted = np.where(known, wanted, there[: rows.count])
-            there[: rows.count] = wanted
-            wanted = there
-        return rows.respond(wanted, self._memory.answer(rows.contacts) if known is None else None)
+    def _before(self, problem: Problem) -> Answer:
+        """What the rows of this step did in the step before; they are told how fast they slip."""
+        rows, memory = problem.rows, self._memory
+        before = memory.before(rows)
+        if before is None:
+            # New rows begin with what they would do at the velocities of before.
+            self._tree.place(problem.joints)
+            there = rows.wanted(self._tree.velocities(self._speeds))
+            before = memory.before_or(rows, there)
+            rows.follow(rows.slip_at(self._velocities_now(problem)), 0.0)
+        elif before.slips is not None:
+            known = len(memory.slips) == rows.count
+            slip = memory.slips if known else rows.slip_at(self._velocities_now(problem))
+            rows.follow(slip, 0.0)
+        return before
 
     def _velocities_now(self, problem: Problem) -> Floats:
         """(bodies, 6) spatial, about the problem's origin."""
@@ -380,14 +389,17 @@ class World:
 
     def _take(self, problem: Problem, solution: Solution) -> None:
         """Take over velocities, loads and what contacts and hands did."""
-        contacts = problem.rows.contacts
         self._speeds = solution.speeds
-        self._flows = solution.flow is not None
+        self._flows = solution.response.flows is not None
+        self._pressed = _NOBODY
+        if solution.pressed is not None:
+            self._pressed = problem.stops[0].labels[solution.pressed]
         self._bodies.take_velocities(solution.velocities, problem.skewed)
-        self._loads = solution.loads
+        self._loads = loads = solution.response.load
         if problem.frames is not None:
-            self._loads = (problem.frames @ solution.loads[:, :, None])[:, :, 0]
-        self._memory.keep(contacts, solution.rows, self._firmest * contacts.friction)
+            self._loads = (problem.frames @ loads[:, :, None])[:, :, 0]
+        rows = problem.rows
+        self._memory.keep(rows, solution.rows, self._firmest * rows.contacts.friction)
         if not self._grabs:
             return
         h = self.settings.step
@@ -404,9 +416,9 @@ class World:
     def _move(self, problem: Problem, solution: Solution) -> None:
         h, tree, bodies = self.settings.step, self._tree, self._bodies
         springs, flowing = None, _NOBODY
-        if solution.flow is not None:
-            flowing = solution.flow.any(axis=1).nonzero()[0]
-            springs = self._springs_after(problem, solution, solution.flow[flowing], flowing)
+        if solution.response.flows is not None:
+            flowing = solution.response.flows.nonzero()[0]
+            springs = self._springs_after(problem, solution, flowing)
         speeds, turning = solution.speeds, solution.velocities[:, :3]
         if solution.moving is not None:
             speeds = solution.moving
@@ -416,15 +428,14 @@ class World:
             # The spring is at q_f now; its rest has moved by what flowed.
             bodies.rest_springs_at(springs, flowing)
 
-    def _springs_after(
-        self, problem: Problem, solution: Solution, flow: Floats, flowing: Integers
-    ) -> Floats:
+    def _springs_after(self, problem: Problem, solution: Solution, flowing: Integers) -> Floats:
         """(flowing, 3) q_f at the step's end in the parents' frames: eq. 21."""
-        speeds = solution.speeds[self._tree.joint_slot[flowing]]
-        parents = self._bodies.parent_matrices[flowing]
+        speeds = solution.speeds.take(self._tree.joint_slot.take(flowing), 0)
+        parents = self._bodies.parent_matrices.take(flowing, 0)
         if problem.frames is not None:
             speeds = (speeds[:, None, :] @ parents)[:, 0]
-        springs = problem.springs[flowing] + self.settings.step * (speeds - flow)
+        flow = solution.response.flow_of(flowing)
+        springs = problem.springs.take(flowing, 0) + self.settings.step * (speeds - flow)
         if problem.frames is None:
             springs = (springs[:, None, :] @ parents)[:, 0]
         return springs

@@ -72,11 +72,15 @@ class WorldState:
     """(slots, 3) where the solver begins."""
     flows: bool
     """Whether any element did."""
+    pressed: NDArray[np.int64]
+    """Labels of the ends of joints' ranges that bore."""
     grips: Floats
     """(contacts, 3) friction of the last step, N·s."""
     wanted: Floats
-    """(contacts, 3) impulses that contacts would have given without the bounds of friction, N·s:
-    where the solver begins as well."""
+    """(rows, 3) impulses that contacts and holds would have given without their bounds, N·s (or
+    N·m·s): where the solver begins as well."""
+    slips: Floats
+    """(contacts,) how fast they slipped times friction, m/s; empty where none did."""
     labels: NDArray[np.int64]
     """(contacts,) to know them by."""
 
