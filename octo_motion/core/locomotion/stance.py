@@ -64,6 +64,9 @@ _GOING: Final = 0.12
 """Cycles within which an arm in the air comes to go along with its body."""
 _SOFT: Final = 0.25
 """Share of the height that it needs within which a joint begins to be raised."""
+_OVER: Final = 0.03
+"""Arm lengths that joints which do not lie keep between their skin and the ground: between two of
+them the skin is lower, where the ground is bent upwards or the arm sideways."""
 _AT_ONCE: Final = 20.0
 """How much faster than its hold an arm loses its stiffness against the ground."""
 _TINY: Final = 1e-12
@@ -228,7 +231,8 @@ def stand(
         away = 1.0 - own.weight
         let_go = smooth(_AT_ONCE * away)
         free = _freedom(part, own)
-        needed = part.radii + (settings.lift * part.reach[-1] * away**2 + part.lift)
+        whole = part.reach[-1]
+        needed = part.radii + ((settings.lift * away**2 + _OVER) * whole + part.lift)
         directions[..., swinging] = raised(
             directions[..., swinging],
             lengths[:, swinging],
@@ -282,7 +286,7 @@ def _held(
             lengths,
             free=free,
             roots=batch.roots,
-            needed=batch.radii + batch.lift,
+            needed=batch.radii + (_OVER * batch.reach[-1] + batch.lift),
             loose=loose,
             ground=ground,
             rounds=_RAISES_BETWEEN,
