@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 from typing import Final
 
 import bpy
@@ -11,9 +12,14 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.rotations import Floats
+from ..core.skeleton import Skeleton
 
 SCALE: Final = ("scale",)
 """Channels of a bone that stretches."""
+_UNSCALED: Final = 1e-3
+_UNSHEARED: Final = 1e-3
+"""Factors that are no scale, and cosines that are no shear."""
+_TINY: Final = 1e-6
 _STILL: Final = 0.01
 """Bone lengths, radians and factors by which a bone may be off its rest pose unnoticed."""
 
@@ -88,6 +94,54 @@ def standing_of(
             moved = moved @ rest @ each.matrix_basis @ rest.inverted_safe()
     shift, turn, _ = moved.decompose()
     return np.array(shift, dtype=np.float64), np.array(turn, dtype=np.float64)
+
+
+def as_posed(
+    armature: bpy.types.Object, skeleton: Skeleton, posed: Iterable[str], kept: Iterable[str]
+) -> Skeleton | None:
+    """The skeleton as if some bones' poses were part of the rest pose.
+
+    Args:
+        armature: the armature object.
+        skeleton: its rest skeleton.
+        posed: bones that stay as they are posed now; all others are at rest.
+        kept: bones that must keep their shape.
+
+    Returns:
+        The skeleton, or none where its numbers cannot tell it: something else than its pose moves
+        a bone, some of ``kept`` would be sheared or scaled unequally, or a rotation or a scale is
+        not handed on as a whole.
+    """
+    assert armature.pose is not None
+    bones, posed = armature.pose.bones, set(posed)
+    if any(skeleton.constrained[skeleton.index[name]] for name in posed):
+        return None
+    basis = {name: np.array(bones[name].matrix_basis, dtype=np.float64) for name in posed}
+    sizes = [np.linalg.norm(each[:3, :3], axis=0) for each in basis.values()]
+    scaled = any(np.abs(size - 1.0).max() > _UNSCALED for size in sizes)
+    moved: list[Floats] = []
+    for number, parent in enumerate(skeleton.parents):
+        bone = bones[skeleton.names[number]].bone
+        if not skeleton.inherits_rotation[number] or (scaled and bone.inherit_scale != "FULL"):
+            return None
+        rest = skeleton.rest_matrices[number]
+        matrix = rest
+        if parent >= 0:
+            matrix = moved[parent] @ np.linalg.inv(skeleton.rest_matrices[parent]) @ rest
+        moved.append(matrix @ basis.get(skeleton.names[number], np.eye(4)))
+    matrices = np.stack(moved)
+    axes = matrices[:, :3, :3]
+    sizes = np.cbrt(np.abs(np.linalg.det(axes)))
+    if sizes.min() < _TINY:
+        return None
+    sheared = np.abs(np.swapaxes(axes, 1, 2) @ axes / sizes[:, None, None] ** 2 - np.eye(3))
+    order = [skeleton.index[name] for name in kept]
+    if sheared[order].max(initial=0.0) > _UNSHEARED:
+        return None
+    # The turns of what is sheared, as near as can be.
+    before, _, after = np.linalg.svd(axes)
+    matrices[:, :3, :3] = before @ after
+    return replace(skeleton, rest_matrices=matrices, lengths=skeleton.lengths * sizes)
 
 
 def displaced_bones(

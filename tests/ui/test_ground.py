@@ -98,6 +98,28 @@ def test_a_walk_ends_where_its_route_ends_with_all_arms_at_rest(octopus: Any, ga
     assert min(speed[0], speed[-1]) > 0.1 * speed[2]
 
 
+def test_arms_hold_the_ground_where_a_posed_body_carries_them(octopus: Any) -> None:
+    root = octopus.pose.bones["root"]
+    root.location, root.rotation_mode = (0.02, 0.03, -0.01), "XYZ"
+    root.rotation_euler = (0.15, 0.1, 0.3)
+    bpy.context.view_layer.update()
+    assert warnings(octopus) == []
+    assert tuple(root.location) == pytest.approx((0.02, 0.03, -0.01))
+    length = prepare(octopus, bpy.context).generator.lengths
+    joints, lying, cycles = arms_in_world(octopus, np.arange(20.0, 60.0, 1.0))
+    assert quality.slip(joints, lying, cycles, length).value < 1e-5
+    assert quality.depth(joints, Plane(0.0), length).value < 0.005
+    heights = joints[lying][:, 2]
+    assert 0.0 < heights.min() < heights.max() < 0.03
+
+
+def test_a_body_scaled_unequally_cannot_be_reckoned_with_and_is_told(octopus: Any) -> None:
+    octopus.pose.bones["root"].scale = (1.0, 0.8, 0.8)
+    bpy.context.view_layer.update()
+    (told,) = warnings(octopus)
+    assert told.startswith("The pose of one bone moves the arms ('root')")
+
+
 def test_bones_that_stretch_get_keys_and_lose_them_again(octopus: Any) -> None:
     scaled = {path for path, _ in keys(generate(octopus)) if path.endswith(".scale")}
     assert scaled

@@ -108,6 +108,7 @@ def read_standing(
     depsgraph: bpy.types.Depsgraph,
     *,
     skeleton: Skeleton,
+    skin: Skeleton,
     arms: Sequence[Arm],
     generator: Generator,
     body: BodyFrame,
@@ -126,7 +127,8 @@ def read_standing(
         settings: how it stands.
         armature: the armature object.
         depsgraph: the evaluated scene.
-        skeleton: the rig.
+        skeleton: the rig, as its arms hang.
+        skin: the rig at rest, as its skin is made for.
         arms: its arms.
         generator: its gait.
         body: where the body lies in armature space.
@@ -153,7 +155,7 @@ def read_standing(
         ground, warnings = _ground(
             settings, depsgraph, route=route, travel=travel, bearings=bearings, reach=reach
         )
-    radii = arm_radii(armature, skeleton, [arm.bones for arm in arms])
+    radii = arm_radii(armature, skin, [arm.bones for arm in arms])
     if height is None:
         thickness = float(np.mean([each[len(each) // 2] for each in radii]))
         height = max(generator.clearance + thickness, _LOWEST * generator.arm_length) * scale

@@ -26,6 +26,7 @@ from ...blender.curves import read_route
 from ...blender.poses import (
     SCALE,
     animated_bones,
+    as_posed,
     displaced_bones,
     rest_bones,
     unscale_bones,
@@ -36,7 +37,7 @@ from ...core.errors import RigError, RouteError, SettingsError, WriteError
 from ...core.keys import check_bounds
 from ...core.locomotion.arm_frames import ArmFrames, arm_frames
 from ...core.locomotion.between_frames import Course, raised_between
-from ...core.locomotion.chains import BodyFrame, Side, body_frame, is_driven
+from ...core.locomotion.chains import BodyFrame, Side, body_frame, chain_of, is_driven
 from ...core.locomotion.changes import between
 from ...core.locomotion.detection import Detection, detect_arms
 from ...core.locomotion.figures import Figure, Measured, Poses, automatic, figures
@@ -629,6 +630,13 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     world = world_matrix(armature)
     scale = _uniform_scale(armature, world)
     arms, body, detection = _arms(settings, armature, skeleton)
+    at_rest, rest_body = skeleton, body
+    carriers = _carriers(settings, armature, skeleton, arms)
+    turned = [bone for arm in arms for bone in arm.bones]
+    if carriers and (posed := as_posed(armature, skeleton, carriers, turned)) is not None:
+        # Arms hang where the bones that carry them are.
+        skeleton, carriers = posed, []
+        body = _body(settings, posed, arms, detection)
     gait = read_gait(settings)
     generator = _generator(skeleton, arms, body, _gait_settings(settings, gait))
     stride = gait.stride * generator.arm_length * scale
@@ -666,6 +674,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
                 armature,
                 depsgraph,
                 skeleton=skeleton,
+                skin=at_rest,
                 arms=arms,
                 generator=own,
                 body=body,
@@ -703,7 +712,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     apart = None
     tell_overlaps = settings.tell_overlaps and not live
     if settings.keep_apart or tell_overlaps:
-        apart = read_apart(armature, skeleton, arms, body, live=live)
+        apart = read_apart(armature, at_rest, arms, rest_body, live=live)
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -739,13 +748,13 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         tell_overlaps=tell_overlaps,
         cycle=(len(frames) - 1) / max(strides(route, travel), 1e-9),
         measure=not live,
-        reaching=read_reaches(armature, settings, skeleton, arms, body=body, frames=frames),
+        reaching=read_reaches(armature, settings, at_rest, arms, body=rest_body, frames=frames),
         note=settings_note(settings),
         # Detection has looked for constraints itself.
         warnings=[
             *(detection.notes if detection else _held(skeleton, arms)),
             *_warnings(settings, armature, skeleton),
-            *_displaced(settings, armature, skeleton, arms),
+            *_displaced(settings, armature, arms, carriers),
             *(standing.warnings if standing else ()),
         ],
     )
@@ -843,9 +852,21 @@ def _arms(
     )
     if not arms:
         raise RigError("All arms are switched off.", "Switch on at least one in the list.")
+    return arms, _body(settings, skeleton, arms, None), None
+
+
+def _body(
+    settings: OCTO_MOTION_PG_locomotion,
+    skeleton: Skeleton,
+    arms: tuple[Arm, ...],
+    detection: Detection | None,
+) -> BodyFrame:
+    if detection is not None:
+        found = [arm.bones for arm in arms]
+        return body_frame(skeleton, found, detection.up, detection.front)
     # The body stays where it is, whichever arms are switched off.
     bones = [bones_of(item) for item in settings.arms if item.bones]
-    return arms, body_frame(skeleton, bones, settings.body_up, settings.body_front), None
+    return body_frame(skeleton, bones, settings.body_up, settings.body_front)
 
 
 def _root_bone(
@@ -908,29 +929,51 @@ def _warnings(
     return told
 
 
-def _displaced(
+def _carriers(
     settings: OCTO_MOTION_PG_locomotion,
     armature: bpy.types.Object,
     skeleton: Skeleton,
     arms: tuple[Arm, ...],
 ) -> list[str]:
-    """Poses that stay and move the arms: an artist's, or what an imported file has left."""
-    turned = [bone for arm in arms for bone in arm.bones]
+    """Bones that carry arms, get no keys and are posed: by an artist, or by an imported file."""
+    for arm in arms:
+        # Complains of bones that are gone.
+        chain_of(skeleton, arm.bones)
+    turned = {bone for arm in arms for bone in arm.bones}
     carrying: set[int] = set()
     for bone in turned:
         parent = skeleton.parents[skeleton.index[bone]]
         while parent >= 0 and parent not in carrying:
             carrying.add(parent)
             parent = skeleton.parents[parent]
-    own = {skeleton.names[number] for number in carrying} - set(turned)
+    own = {skeleton.names[number] for number in carrying} - turned
     if settings.travel_on == "BONE":
         own.discard(settings.root_bone)
     if (previous := previous_action(armature, settings)) is not None:
         # These go back to rest if they are not keyed again.
         own -= animated_bones(previous)
+    return displaced_bones(armature, (), sorted(own))
+
+
+def _displaced(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    arms: tuple[Arm, ...],
+    carriers: Sequence[str],
+) -> list[str]:
+    """What there is to say of poses that stay and move the arms.
+
+    Args:
+        settings: of the armature.
+        armature: the armature object.
+        arms: its arms.
+        carriers: bones that move the arms and could not be reckoned with.
+    """
+    turned = [bone for arm in arms for bone in arm.bones]
+    if (previous := previous_action(armature, settings)) is not None:
         stretched_by_it = animated_bones(previous, SCALE)
         turned = [bone for bone in turned if bone not in stretched_by_it]
-    found = displaced_bones(armature, turned, sorted(own))
+    found = [*displaced_bones(armature, turned, ()), *carriers]
     if not found:
         return []
     count = "one bone" if len(found) == 1 else f"{len(found)} bones"
