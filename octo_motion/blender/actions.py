@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import bpy
@@ -405,10 +406,12 @@ def _write_curves(
     # Everything goes through the same few buffers: memory stays modest, however many the bones.
     points = np.empty((len(times), 2), dtype=np.float32)
     points[:, 0] = times
-    kinds = _filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR")
-    sides = _filled(len(times), "handle_left_type", "AUTO") if automatic else None
     # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
     generated = _filled(len(times), "type", "GENERATED")
+    kinds = np.stack(
+        [_filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR"), generated]
+        + [_filled(len(times), "handle_left_type", "AUTO")] * automatic
+    )
     for channel in channels:
         for component in range(channel.values.shape[1]):
             curve = curves.pop((channel.data_path, component), None)
@@ -433,16 +436,16 @@ def _write_curves(
             points[:, 1] = channel.values[:, component]
             keys.foreach_set("co", points.ravel())
             if not alike:
-                keys.foreach_set("interpolation", kinds)
+                keys.foreach_set("interpolation", kinds[0])
                 keys.foreach_set("type", generated)
-                if sides is not None:
-                    keys.foreach_set("handle_left_type", sides)
-                    keys.foreach_set("handle_right_type", sides)
-            if sides is not None and curve.auto_smoothing != "NONE":
+                if automatic:
+                    keys.foreach_set("handle_left_type", kinds[2])
+                    keys.foreach_set("handle_right_type", kinds[2])
+            if automatic and curve.auto_smoothing != "NONE":
                 # Else handles depend on those of all other keys, and swing after a sudden turn.
                 curve.auto_smoothing = "NONE"
             curve.update()
-            digests[place] = _keys_digest(points, kinds, generated, sides)
+            digests[place] = _keys_digest(points, kinds)
     for curve in curves.values():
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
@@ -478,7 +481,7 @@ def _write_bezier(
     points.foreach_set("handle_left", np.ascontiguousarray(keys.left[:, component]).ravel())
     points.foreach_set("handle_right", np.ascontiguousarray(keys.right[:, component]).ravel())
     curve.update()
-    return _keys_digest(coordinates, bezier, generated), _handles(curve)
+    return _keys_digest(coordinates, np.stack([bezier, generated])), _handles(curve)
 
 
 def _has_own_handles(curve: bpy.types.FCurve) -> bool:
@@ -511,6 +514,9 @@ def _handles_moved(action: bpy.types.Action) -> bool:
     The keys themselves must be known to be as they were.
     """
     written = np.frombuffer(action[MARK].get("handles", b""), dtype=np.float32).reshape(-1, 4)
+    if not len(written):
+        # Then it has no curve with handles of its own: its keys would be others.
+        return False
     start = 0
     for curve in _sorted_curves(action):
         points = curve.keyframe_points
@@ -531,9 +537,15 @@ def _handles_moved(action: bpy.types.Action) -> bool:
 
 def _filled(count: int, name: str, item: str) -> np.ndarray:
     """A keyframe's enumeration value, as many times as there are keys."""
+    return np.full(count, _value(name, item), dtype=_ENUMERATION)
+
+
+@cache
+def _value(name: str, item: str) -> int:
+    """What Blender keeps a keyframe's enumeration as."""
     definition = bpy.types.Keyframe.bl_rna.properties[name]
     assert isinstance(definition, bpy.types.EnumProperty)
-    return np.full(count, definition.enum_items[item].value, dtype=_ENUMERATION)
+    return definition.enum_items[item].value
 
 
 def _mark(
@@ -586,41 +598,37 @@ def _fingerprint(
             digest.update(known[curve.data_path, curve.array_index])
             continue
         points = np.empty((len(keys), 2), dtype=np.float32)
-        interpolation, kinds = np.empty((2, len(keys)), dtype=_ENUMERATION)
         keys.foreach_get("co", points.ravel())
-        keys.foreach_get("interpolation", interpolation)
-        keys.foreach_get("type", kinds)
-        sides = None
-        if _has_automatic_handles(curve):
-            sides = np.empty(len(keys), dtype=_ENUMERATION)
-            right = sides.copy()
-            keys.foreach_get("handle_left_type", sides)
-            keys.foreach_get("handle_right_type", right)
-            # The same number twice, as it was written, or neither of the two.
-            sides = np.where(sides == right, sides, np.uint8(255))
-        digest.update(_keys_digest(points, interpolation, kinds, sides))
+        digest.update(_keys_digest(points, _kinds(keys)))
     return digest.hexdigest()
 
 
-def _keys_digest(
-    points: np.ndarray,
-    interpolation: np.ndarray,
-    kinds: np.ndarray,
-    sides: np.ndarray | None = None,
-) -> bytes:
+def _kinds(keys: bpy.types.FCurveKeyframePoints) -> np.ndarray:
+    """What a curve's keys are, (rows, keys): interpolation, type, and of automatic handles that."""
+    kinds = np.empty((4, len(keys)), dtype=_ENUMERATION)
+    keys.foreach_get("interpolation", kinds[0])
+    keys.foreach_get("type", kinds[1])
+    if not len(keys) or kinds[0, 0] != _value("interpolation", "BEZIER"):
+        return kinds[:2]
+    keys.foreach_get("handle_left_type", kinds[2])
+    if kinds[2, 0] != _value("handle_left_type", "AUTO"):
+        return kinds[:2]
+    keys.foreach_get("handle_right_type", kinds[3])
+    if kinds[2].tobytes() != kinds[3].tobytes():
+        # As nothing was ever written.
+        kinds[2] = 255
+    return kinds[:3]
+
+
+def _keys_digest(points: np.ndarray, kinds: np.ndarray) -> bytes:
     """Hash of a curve's keys.
 
     Args:
         points: (keys, 2) frames and values, single precision.
-        interpolation: (keys,) of each.
-        kinds: (keys,) types.
-        sides: (keys,) types of the handles, where these are automatic.
+        kinds: (rows, keys) what they are.
     """
     digest = hashlib.blake2b(points, digest_size=16)
-    digest.update(interpolation)
     digest.update(kinds)
-    if sides is not None:
-        digest.update(sides)
     return digest.digest()
 
 
