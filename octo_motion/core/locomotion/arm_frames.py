@@ -69,15 +69,12 @@ class ArmFrames:
 
     def from_bones(self, rotations: Floats) -> Floats:
         """Frames (…, bones, 4) in armature space of bones' rotations (…, bones, 4)."""
-        result = np.empty(rotations.shape)
-        orientation = np.array([1.0, 0.0, 0.0, 0.0])
+        # Against the bone before; of those that follow nothing, in armature space already.
+        result = multiply(self.rest.carried, rotations)
         for bone, follows in enumerate(self.rest.follows):
-            carried = self.rest.carried[bone]
             if follows:
-                carried = multiply(orientation, carried)
-            orientation = multiply(carried, rotations[..., bone, :])
-            result[..., bone, :] = multiply(orientation, self.own[bone])
-        return result
+                result[..., bone, :] = multiply(result[..., bone - 1, :], result[..., bone, :])
+        return multiply(result, self.own)
 
     def to_bones(self, frames: Floats) -> Floats:
         """Rotations (…, bones, 4) in each bone's rest frame (Blender's ``matrix_basis``)."""
