@@ -94,9 +94,9 @@ class Simulation:
         """Whether something may have moved since the last time that the pose was told."""
         self._nominal = settings.step
         self._clock = clock
-        self.pace = 1.0
-        """Simulated against real time, of late; 1 keeps up."""
         self._load = 0.0
+        self._due = 0.0
+        self._simulated = 0.0
         self._turn = 0.0
         self._turns = 0
         self._calm = 0.0
@@ -302,30 +302,42 @@ class Simulation:
         before = self._clock()
         for _ in range(count):
             self.world.step()
-        spent = (self._clock() - before) / count
+        spent = (self._clock() - before) / max(count, 1)
         self.steps += count
         self.time += count * h
         self.changed = True
         calm = float(np.abs(self.world.velocities()).max(initial=0.0)) < _STILL
         self._calm = self._calm + count * h if calm else 0.0
-        self.cost += (0.05 if self.cost > 0.0 else 1.0) * (spent - self.cost)
+        if count:
+            self.cost += (0.05 if self.cost > 0.0 else 1.0) * (spent - self.cost)
 
     def _count(self, passed: float) -> int:
-        """How many steps are due, and can be afforded."""
-        if self.cost <= 0.0 or passed > _STALE:
+        """How many steps are due, and can be afforded; never more than real time asks for."""
+        h = self.step_seconds
+        if not 0.0 < passed < _STALE:
+            self._due = 0.0
             return 1
-        return max(
-            1, min(round(passed / self.step_seconds), int(BUSY * passed / self.cost), _AT_ONCE)
-        )
+        self._due += passed
+        count = wanted = round(self._due / h)
+        if count > 1:
+            affordable = int(BUSY * passed / self.cost) if self.cost > 0.0 else 1
+            count = max(1, min(count, affordable, _AT_ONCE))
+        self._due = 0.0 if count < wanted else self._due - count * h
+        return count
 
     def _time(self, passed: float, simulated: float) -> None:
         """Learn from one more turn how long they take, and how much of that is simulated."""
         if not 0.0 < passed < _STALE:
             return
         self._turns += 1
-        self._turn += max(_EXPECTED, 1.0 / self._turns) * (passed - self._turn)
-        pace = 1.0 if passed < 1.5 * simulated else simulated / passed
-        self.pace += _EXPECTED * (pace - self.pace)
+        share = max(_EXPECTED, 1.0 / self._turns)
+        self._turn += share * (passed - self._turn)
+        self._simulated += share * (simulated - self._simulated)
+
+    @property
+    def pace(self) -> float:
+        """Simulated against real time, of late; 1 keeps up."""
+        return min(1.0, self._simulated / self._turn) if self._turn > 0.0 else 1.0
 
     @property
     def holds(self) -> float:
@@ -354,8 +366,6 @@ class Simulation:
         )
         self.world.restore(old.state())
         self._pin_again()
-        if settings.step != old.settings.step:
-            self.pace = 1.0  # to be learned anew
         for hand in self.hands.values():
             if hand.handle is not None:
                 held = hand.handle

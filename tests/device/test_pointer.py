@@ -394,6 +394,22 @@ def test_steps_that_a_busy_machine_left_out_are_made_up_for_if_there_is_time(
     assert bench.simulation.time <= pace + 0.12, "after a long pause it is not hurried"
 
 
+@pytest.mark.parametrize("gaps", [(0.003, 0.001), (0.001,), (0.0025, 0.0035, 0.0001), (0.002,)])
+def test_puppet_never_runs_ahead_of_the_clock_however_it_is_woken(gaps: tuple[float, ...]) -> None:
+    """A body that is ahead of the hand pulls it along: the two would shake each other."""
+    simulation = Bench(2, cost=1e-5).simulation
+    elapsed = 0.0
+    simulation.step(100.0)
+    begun = simulation.time
+    for gap in itertools.islice(itertools.cycle(gaps), 150):
+        elapsed += gap
+        simulation.step(100.0 + elapsed)
+        assert simulation.time - begun <= elapsed + 0.5 * simulation.step_seconds + 1e-9
+        simulation.changed = False
+        simulation._calm = 0.0
+    assert simulation.time - begun >= elapsed - simulation.step_seconds
+
+
 def test_one_late_step_does_not_make_a_slow_simulation() -> None:
     bench = Bench(2)
     bench.driver.buttons = 1
