@@ -156,15 +156,16 @@ def near(
     limit[one, other] = ((size[one] + size[other]) * (1.0 + 1e-4)) ** 2 + 1e-6 * squares.max()
     place = np.full(limit.shape, -1)
     place[one, other] = np.arange(len(one))
+    # |a − b|² = |a|² + |b|² − 2 a · b, all of it in one product.
+    one_more, own = np.ones_like(squares)[..., None], squares[..., None]
+    first = np.concatenate([-2.0 * middles, own, one_more], axis=2)
+    second = np.concatenate([middles, one_more, own], axis=2).transpose(0, 2, 1)
     step = max(1, _AT_ONCE // limit.size)
     found: list[tuple[np.ndarray, np.ndarray]] = []
     for begin in range(0, len(middles), step):
         part = slice(begin, begin + step)
-        # Squared distances of all from all by one matrix product.
-        products = np.matmul(middles[part], middles[part].transpose(0, 2, 1))
-        products *= -2.0
-        products += squares[part, :, None]
-        products += squares[part, None, :]
+        # Squared distances of all from all.
+        products = np.matmul(first[part], second[part])
         # Several times faster than where a row, a column and a frame are found at once.
         frame, spot = np.divmod(np.flatnonzero(products <= limit), limit.size)
         found.append((frame + begin, place.ravel()[spot]))
