@@ -712,7 +712,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     apart = None
     tell_overlaps = settings.tell_overlaps and not live
     if settings.keep_apart or tell_overlaps:
-        apart = read_apart(armature, at_rest, arms, rest_body, live=live)
+        apart = read_apart(armature, skeleton, arms, body, live=live)
     return Shot(
         armature=armature.name,
         scene=scene.name,
