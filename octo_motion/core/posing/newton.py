@@ -149,15 +149,13 @@ class Newton:
             point = end
             if count >= self._iterations:
                 break
-            if miss <= self._tolerance:
-                # Where slipping began or ended in a blow, once more with the speed that is left:
-                # with the same tangents, for impulses change less than what they are asked for.
+            # Where slipping began or ended in a blow, once more with the speed that is left. The
+            # tangents stay the same: impulses change less than what they are asked for.
+            if miss <= _NEARLY and rounds < _ROUNDS and self._follow(problem, end):
                 rounds += 1
-                if rounds > _ROUNDS or not self._follow(problem, end):
-                    break
                 point = None
-            elif count == 1 and self._follow(problem, end):
-                point = None
+            elif miss <= self._tolerance:
+                break
             tangents = self._tangents(problem, end)
         return Solution(
             end.speeds,
@@ -467,4 +465,6 @@ _ENOUGH = 0.1
 _SEARCHES = 6
 _ROUNDS = 2
 """In which contacts learn from each other how fast they slip."""
+_NEARLY = 0.1
+"""Miss at which they can: to settle before would be to settle what is asked anew."""
 _NO_ROWS = np.zeros((0, 3))

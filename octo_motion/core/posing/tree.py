@@ -164,7 +164,7 @@ class Tree:
             return
         of_branches = carried[trunk:].reshape(branches, 3 * width, 6)
         inner = motion[trunk:].reshape(branches, 3 * width, 6)
-        products = inner @ of_branches.transpose(0, 2, 1)
+        products = inner @ np.ascontiguousarray(of_branches.transpose(0, 2, 1))
         products *= self._branch_upper
         np.add(products, products.transpose(0, 2, 1), out=self.branch_matrix)
         self._branch_diagonal += joints[trunk:].reshape(branches, width, 3, 3)
