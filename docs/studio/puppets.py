@@ -197,6 +197,8 @@ def _make_doll() -> bpy.types.Object:
             bone.parent = bones.get(f"{parent}.{side}") or bones[parent]
             thick[bone.name] = radius
     bpy.ops.object.mode_set(mode="OBJECT")
+    for side in "LR":
+        _hinge(figure, f"shin.{side}", 150.0)
     for bone in figure.data.bones:
         for part, colour in _parts(bone.length, thick[bone.name]):
             made = _turned(bone.name, part, colour)
@@ -206,6 +208,21 @@ def _make_doll() -> bpy.types.Object:
             made.matrix_basis = Matrix.Rotation(-0.5 * np.pi, 4, "X")
     bpy.context.view_layer.update()
     return figure
+
+
+def _hinge(figure: bpy.types.Object, name: str, opens: float) -> None:
+    """Let a joint bend backwards by so many degrees, and no other way."""
+    assert figure.pose is not None
+    bone = figure.pose.bones[name]
+    axes = np.array(bone.bone.matrix_local)[:3, :3]
+    # The axis of the bone that lies across the figure, and which way round.
+    across = max("xz", key=lambda axis: abs(axes[0, "xyz".index(axis)]))
+    end = np.radians(opens) * np.sign(axes[0, "xyz".index(across)])
+    for axis in "xyz":
+        setattr(bone, f"lock_ik_{axis}", axis != across)
+    setattr(bone, f"use_ik_limit_{across}", True)
+    setattr(bone, f"ik_min_{across}", min(end, 0.0))
+    setattr(bone, f"ik_max_{across}", max(end, 0.0))
 
 
 def _parts(length: float, radius: float) -> list[tuple[list[tuple[float, float]], Colour]]:

@@ -14,6 +14,7 @@ from ..armature_operator import ArmatureOperator
 from .controls import Outcome, PoseControls
 from .overlay import Overlay
 from .puppet_session import PuppetSession, active_session
+from .scrubbing import Strip, frame_under, go_to, strip_under
 from .view import view_under
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class OCTO_MOTION_OT_pose_start(ArmatureOperator, bpy.types.Operator):
     _session: PuppetSession | None = None
     _controls: PoseControls | None = None
     _overlay: Overlay | None = None
+    _strip: Strip | None = None
     _timer: Any = None
     _last: float = 0.0
     _shown: tuple[str, int | None] = ("", None)
@@ -125,15 +127,38 @@ class OCTO_MOTION_OT_pose_start(ArmatureOperator, bpy.types.Operator):
         """Blender's own end of it: another file is opened, or Blender quits."""
         self._end(context, keep=False)
 
-    @staticmethod
     def _handle(
-        context: bpy.types.Context, controls: PoseControls, event: bpy.types.Event
+        self, context: bpy.types.Context, controls: PoseControls, event: bpy.types.Event
     ) -> Outcome:
         window = context.window
+        if window is not None and self._scrub(window, controls, event):
+            return Outcome.TAKEN
         found = None if window is None else view_under(window, event.mouse_x, event.mouse_y)
         if found is None:
             return controls.handle(event, None)
         return controls.handle(event, *found)
+
+    def _scrub(
+        self, window: bpy.types.Window, controls: PoseControls, event: bpy.types.Event
+    ) -> bool:
+        """Take drags in the frame numbers of a timeline; whether this event is one of them."""
+        if event.type == "LEFTMOUSE" and event.value == "PRESS" and not controls.holding:
+            self._strip = strip_under(window, event.mouse_x, event.mouse_y)
+        elif self._strip is None:
+            return False
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            self._strip = None
+            return True
+        elif event.type not in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
+            return False
+        if self._strip is None:
+            return False
+        frame = frame_under(window, self._strip, event.mouse_x)
+        if frame is None:
+            self._strip = None
+            return False
+        go_to(controls.session.scene(), frame)
+        return True
 
     def _tell(self, context: bpy.types.Context) -> None:
         assert self._controls is not None
