@@ -367,7 +367,8 @@ def _rested(table: Table, length: float, duty: float, *, start: bool, end: bool)
     if not low < high:
         # Hardly a step on so short a way: none at all if it were a hasty one.
         own = np.ptp(table.cycles(at))
-        values[-1] = first if last - first > _HASTE * own else max(first, last)
+        last = min(max(first, last), last + 1.0, key=lambda each: abs(each - first - own))
+        values[-1] = first if last - first > _HASTE * own else last
     secants = np.diff(values) / np.diff(at)
     if start and low > 0.0:
         slopes[0] = secants[0]
