@@ -132,20 +132,26 @@ def _skin(armature: bpy.types.Object, size: float) -> Floats:
         size: how large it is, armature units.
     """
     inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
-    parts: list[Floats] = []
+    found: list[tuple[np.ndarray, Floats]] = []
     for item in armature.children_recursive:
         mesh = item.data
         if not isinstance(mesh, bpy.types.Mesh) or item.find_armature() != armature:
             continue
         points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-        mesh.vertices.foreach_get("co", points.ravel())
+        if len(points):
+            _read(mesh, "position", "vector", points.ravel())
         place = inverse @ np.array(item.matrix_world, dtype=np.float64)
         # Wherever the armature has walked to, its skin is as thick.
         place[:3, :3] = np.round(place[:3, :3] / _ROUNDED) * _ROUNDED
         place[:3, 3] = np.round(place[:3, 3] / (_ROUNDED * size)) * (_ROUNDED * size)
-        parts.append(points.astype(np.float64) @ place[:3, :3].T + place[:3, 3])
-    whole = np.concatenate(parts) if parts else np.empty((0, 3))
-    return whole[:: max(1, len(whole) // _MOST_POINTS)]
+        found.append((points, place))
+    step = max(1, sum(len(points) for points, _ in found) // _MOST_POINTS)
+    parts, passed = [np.empty((0, 3))], 0
+    for points, place in found:
+        some = points[-passed % step :: step].astype(np.float64)
+        parts.append(some @ place[:3, :3].T + place[:3, 3])
+        passed += len(points)
+    return np.concatenate(parts)
 
 
 def _distances(points: Floats, joints: Floats) -> tuple[Floats, Floats]:

@@ -62,6 +62,8 @@ class Plane:
 
     def height(self, points: Floats) -> Floats:
         """World Z (…,)."""
+        if self.rise == (0.0, 0.0):
+            return np.full(points.shape[:-1], self.z)
         return self.z + points[..., 0] * self.rise[0] + points[..., 1] * self.rise[1]
 
     def slope(self, points: Floats) -> Floats:
