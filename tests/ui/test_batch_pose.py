@@ -12,6 +12,9 @@ import pytest
 
 from octo_motion.ui.batch.commands import main
 from octo_motion.ui.batch.entry import ShotEntry
+from octo_motion.ui.batch.job import JobError, read_job
+from octo_motion.ui.batch.known import known
+from octo_motion.ui.batch.stage import perform
 
 STEPS = (
     {"do": "grab", "bone": "arm1.04.L", "at": 1.0},
@@ -93,3 +96,58 @@ def test_shot_with_a_script_survives_the_way_to_another_process(tmp_path: Path) 
     again = ShotEntry.from_plain(json.loads(json.dumps(entry.to_plain())))
     assert again == entry
     assert tmp_path / "wave.json" in entry.inputs
+
+
+# --- Shots of a job ------------------------------------------------------------------------------
+
+
+def job(folder: Path, *lines: str) -> Path:
+    path = folder / "job.toml"
+    path.write_text("\n".join(["[[shots]]", 'name = "wave"', 'kind = "pose"', *lines]))
+    return path
+
+
+def test_shot_of_a_job_may_be_a_pose_script(file: Path, tmp_path: Path) -> None:
+    script(tmp_path, *STEPS)
+    path = job(tmp_path, f'file = "{file.name}"', 'script = "wave.json"', 'output = "{name}.blend"')
+    (shot,) = read_job(path, known(), tmp_path / "report.json").shots
+    assert shot.entry.posing == tmp_path / "wave.json"
+    perform(shot.entry, {tmp_path / "wave.blend": tmp_path / "wave.blend"})
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "wave.blend"))
+    armature: Any = bpy.data.objects["Octopus"]
+    assert armature.animation_data.action
+
+
+def test_new_octopus_is_posed_too(tmp_path: Path) -> None:
+    script(tmp_path, *STEPS)
+    path = job(
+        tmp_path,
+        "octopus = { arms = 4, joints = 4, with_mesh = false }",
+        'script = "wave.json"',
+        'output = "{name}.blend"',
+    )
+    (shot,) = read_job(path, known(), tmp_path / "report.json").shots
+    performed = perform(shot.entry, {tmp_path / "wave.blend": tmp_path / "wave.blend"})
+    assert "bones keyed" in performed.summary.message
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ((), "It poses nothing: give script"),
+        (('script = "nowhere.json"',), "nowhere.json"),
+        (('script = "wave.json"', 'gait = "walk"'), 'gait is for shots with kind = "generate"'),
+        (('script = "wrong.json"',), "Step 1 of the script does not say what to do"),
+        (('script = "octopus.blend"',), "cannot be read"),
+    ],
+)
+def test_shot_with_a_wrong_script_is_a_fault_before_anything_runs(
+    file: Path, tmp_path: Path, lines: tuple[str, ...], said: str
+) -> None:
+    script(tmp_path, *STEPS)
+    wrong = {"format": "octo_motion.pose", "version": 1, "steps": [{"do": "dance"}]}
+    (tmp_path / "wrong.json").write_text(json.dumps(wrong), encoding="utf-8")
+    path = job(tmp_path, f'file = "{file.name}"', 'output = "{name}.blend"', *lines)
+    with pytest.raises(JobError) as caught:
+        read_job(path, known(), tmp_path / "report.json")
+    assert said in str(caught.value)

@@ -20,6 +20,7 @@ from ...core.errors import OctoMotionError
 from ...core.locomotion import gait
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.octopus_shape import OctopusShape
+from ...core.posing.pose_script import parse_script
 from .entry import (
     EXPORT_SUFFIXES,
     HIGHEST_FPS,
@@ -45,8 +46,9 @@ KINDS: Final = {
         *("name", "kind", "file", "armature", "base", "frames", "splices", "settings", "fps"),
         *("output", "export"),
     ),
+    "pose": ("name", "kind", "file", "octopus", "armature", "script", "fps", "output", "export"),
 }
-"""What a shot of either kind may say."""
+"""What a shot of each kind may say."""
 KEYS: Final = tuple(dict.fromkeys(key for keys in KINDS.values() for key in keys))
 _OCTOPUS_KEYS: Final = (*(each.name for each in dataclasses.fields(OctopusShape)), "with_mesh")
 _ROUTE_KEYS: Final = ("control_points", "points", "cyclic")
@@ -237,7 +239,8 @@ class _Reader:
         for key in self._table:
             if key not in KINDS[kind]:
                 self._fault(self._strange(key, kind))
-        return self._splicing() if kind == "splice" else self._generating()
+        makers = {"splice": self._splicing, "pose": self._posing}
+        return makers.get(kind, self._generating)()
 
     def _strange(self, key: str, kind: str) -> str:
         others = [each for each in KINDS if key in KINDS[each]]
@@ -245,7 +248,8 @@ class _Reader:
             return f'{key} is for shots with kind = "{others[0]}".'
         return unknown("key", key, KINDS[kind])
 
-    def _generating(self) -> JobShot:
+    def _creature(self) -> tuple[Path | None, NewOctopus | None]:
+        """The file that has it, or the octopus that is to be made."""
         file, octopus = self._path("file"), self._octopus()
         if file is not None and is_motion(file):
             self._fault(f"'{file.name}' is a motion file, which is for kind = \"splice\".")
@@ -253,6 +257,35 @@ class _Reader:
             self._fault("It has a file and a new octopus: give one of the two.")
         elif "file" not in self._table and "octopus" not in self._table:
             self._fault('It has no creature: give file = "….blend", or octopus = {} for a new one.')
+        return file, octopus
+
+    def _posing(self) -> JobShot:
+        file, octopus = self._creature()
+        script = self._path("script")
+        if script is None:
+            self._fault('It poses nothing: give script = "….json", a pose script.')
+        else:
+            try:
+                parse_script(script.read_text(encoding="utf-8"), script.name)
+            except OctoMotionError as error:
+                self._fault(str(error))
+            except (OSError, UnicodeDecodeError) as error:
+                self._fault(f"The script '{script.name}' cannot be read: {error}.")
+        output, exports = self._outputs()
+        entry = ShotEntry(
+            name=self._name,
+            file=file,
+            octopus=octopus,
+            armature="" if octopus else self._text("armature"),
+            fps=self._fps(),
+            output=output,
+            exports=exports,
+            posing=script,
+        )
+        return JobShot(entry, self._table)
+
+    def _generating(self) -> JobShot:
+        file, octopus = self._creature()
         gait_text, gait_file = self._gait()
         output, exports = self._outputs()
         entry = ShotEntry(
