@@ -18,7 +18,14 @@ from ..core.posing.figure import Figure, Pose
 from ..core.posing.obstacles import Obstacle
 from ..core.posing.picking import capsules_in_world
 from ..core.posing.world import World, WorldSettings
-from ..core.rotations import Floats, conjugate, multiply, rotate
+from ..core.rotations import (
+    Floats,
+    conjugate,
+    from_rotation_vector,
+    multiply,
+    rotate,
+    to_rotation_vector,
+)
 from .haptics.local_model import Pull
 from .messages import DeviceMessage, HandMessage, HeldMessage, Settings
 from .spatial import IDENTITY, ZERO, Vector
@@ -70,6 +77,39 @@ class Hand:
     pull: Pull = field(default_factory=Pull)
     silence: float = 0.0
     """s that this process has run without a word from the hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """What a hand's target does in one turn."""
+
+    handle: Handle
+    start: Floats
+    way: Floats
+    """(3,) m"""
+    turned: Floats
+    """(4,) at the start."""
+    swing: Floats
+    """(3,) rotation vector."""
+    velocity: Floats
+    """(6,)"""
+
+    @classmethod
+    def to(cls, handle: Handle, told: HandMessage, share: float, seconds: float) -> _Way:
+        """The way towards a hand; seconds that it takes, 0: the hand's own velocity holds."""
+        assert handle.target_orientation is not None
+        way = share * (np.array(told.position) - handle.target_position)
+        turned = handle.target_orientation
+        swing = share * to_rotation_vector(multiply(np.array(told.orientation), conjugate(turned)))
+        velocity = np.array((*told.velocity, *told.angular_velocity))
+        if seconds > 0.0:
+            velocity = np.concatenate([way, swing]) / seconds
+        return cls(handle, handle.target_position, way, turned, swing, velocity)
+
+    def go(self, world: World, share: float) -> None:
+        """Move the target along."""
+        turn = multiply(from_rotation_vector(share * self.swing), self.turned)
+        world.pull(self.handle, self.start + share * self.way, turn, self.velocity)
 
 
 class Simulation:
@@ -280,19 +320,11 @@ class Simulation:
         for hand in self.hands.values():
             if hand.handle is None:
                 continue
-            told = hand.told
             hand.silence += min(now - self._now, _PAUSE)
             if hand.silence > _STALE:
                 log.info("A hand was not heard of for %.2f s and let go", hand.silence)
                 hand.refused = hand.grab  # let go is let go, until it grabs anew
                 self._release(hand)
-                continue
-            self.world.pull(
-                hand.handle,
-                np.array(told.position),
-                np.array(told.orientation),
-                np.array((*told.velocity, *told.angular_velocity)),
-            )
         passed, self._now = now - self._now, now
         if self.resting:
             return
@@ -300,7 +332,10 @@ class Simulation:
         count = self._count(passed)
         self._time(passed, count * h)
         before = self._clock()
-        for _ in range(count):
+        ways = self._ways(passed, count * h)
+        for number in range(1, count + 1):
+            for way in ways:
+                way.go(self.world, number / count)
             self.world.step()
         spent = (self._clock() - before) / max(count, 1)
         self.steps += count
@@ -310,6 +345,20 @@ class Simulation:
         self._calm = self._calm + count * h if calm else 0.0
         if count:
             self.cost += (0.05 if self.cost > 0.0 else 1.0) * (spent - self.cost)
+
+    def _ways(self, passed: float, simulated: float) -> list[_Way]:
+        """Where the held bodies are drawn in this turn.
+
+        To where the hands are, as a rule. Where simulated time falls behind, only as much of the
+        way as is simulated of the time: a target that jumps would yank the puppet.
+        """
+        late = simulated < 0.7 * passed < math.inf
+        share = simulated / passed if late else 1.0
+        return [
+            _Way.to(hand.handle, hand.told, share, simulated if late else 0.0)
+            for hand in self.hands.values()
+            if hand.handle is not None
+        ]
 
     def _count(self, passed: float) -> int:
         """How many steps are due, and can be afforded; never more than real time asks for."""

@@ -308,6 +308,7 @@ class Bench:
         self.log: list[tuple[Vector, Vector]] = []
         self.work = 0.0
         """J that the hand got."""
+        self.most_work = 0.0
 
     def run(self, seconds: float) -> None:
         for tick in range(round(seconds / PERIOD)):
@@ -317,6 +318,7 @@ class Bench:
             self.pointer.tick(self.now)
             moved = np.subtract(self.hand.position, before)
             self.work += float(np.dot(force, moved))
+            self.most_work = max(self.most_work, self.work)
             if tick % self.every == 0:
                 self.simulation.hear(self.pointer.message(self.now))
                 self.simulation.step(self.now)
@@ -379,6 +381,29 @@ def test_steps_get_longer_when_all_that_is_done_beside_them_takes_too_long() -> 
     assert work(0.02) == 8e-3, "and no longer: what is coarser would shake"
     assert work(0.0018) == 8e-3, "not to and fro"
     assert work(0.0005) == 2e-3
+
+
+@pytest.mark.parametrize("scale", [1.0, 3.0, 10.0])
+@pytest.mark.parametrize("every", [2, 25])
+def test_hand_never_gets_more_energy_than_it_gave(scale: float, every: int) -> None:
+    """What the simulation's own coupling puts into the puppet is no gift to the hand."""
+    bench = Bench(every, step=2e-3, cost=1e-4, yielding=50.0)
+    space = bench.pointer.workspace
+    bench.pointer.place(Workspace(0, space.origin, space.orientation, scale))
+    bench.run(0.1)
+    bench.driver.buttons = 1
+    bench.run(0.3)
+    bench.hand.wish = lambda t: (
+        (0.04 * math.sin(3.0 * t), 0.0, 0.04 * math.cos(3.0 * t)),
+        IDENTITY,
+    )
+    bench.run(4.0)
+    assert bench.most_work < 0.002
+    assert bench.pointer.given < 0.005
+    forces = [force for force, _ in bench.log]
+    assert max(map(length, forces)) > 0.1
+    changes = [length(tuple(np.subtract(b, a))) for a, b in itertools.pairwise(forces)]
+    assert np.percentile(changes, 95) < 0.3, "and it does not buzz"
 
 
 @pytest.mark.parametrize(("cost", "pace"), [(0.0005, 1.0), (0.0039, 0.5)])

@@ -191,6 +191,8 @@ class Pointer:
             self.want(grab=False)
             self._answered = 0
         if self._answered:
+            force = self._push.allowed(force, velocity, self.period)
+            torque = self._turn.allowed(torque, spin, self.period)
             force = add(force, self._push.damping(force, velocity, self.period))
             torque = add(torque, self._turn.damping(torque, spin, self.period))
         alive = self.sample.held or not self.settings.dead_man
