@@ -110,7 +110,8 @@ class Bodies:
 
     def rest_springs_at(self, springs: Floats, which: Integers) -> None:
         """Move springs' rest so that they are bent by ``springs`` (which, 3), parents' frames."""
-        parents = self._parent_turns().take(which, 0)
+        parents = self.orientations.take(self.parent_or_self.take(which), 0)
+        parents[self.is_root.take(which)] = _UNTURNED
         turns = inverse_product(parents, self.orientations.take(which, 0))
         self.rest[which] = product(exponential(-springs), turns)
 

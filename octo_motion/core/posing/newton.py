@@ -69,8 +69,8 @@ class Start:
     """(slots, 3) u."""
     rows: Answer | None = None
     """What the rows did then, as they are now; None begins at ``speeds`` and nothing else."""
-    flows: bool = True
-    """Whether any element did; where none did, it begins as if none will."""
+    response: Response | None = None
+    """What the elements did then; None where none flowed, and then it begins as if none will."""
     pressed: Flags | None = None
     """(stops,) which ends of ranges bore; None begins with what they do at ``speeds``."""
 
@@ -174,13 +174,19 @@ class Newton:
         if start.rows is None and len(problem.rows.bodies):
             point = self._at(problem, start.speeds)
             return point, self._tangents(problem, point)
-        speeds, pressed = start.speeds.take(self._tree.joint_slot, 0), start.pressed
+        pressed, response, law = start.pressed, start.response, problem.law
         if pressed is None and problem.stops:
+            speeds = start.speeds.take(self._tree.joint_slot, 0)
             pressed = _pushes(problem.stops[0], speeds) >= 0.0
         rows = None if start.rows is None else problem.rows.tangent(start.rows)
-        if not start.flows and problem.frames is None:
-            return None, self._planes(problem, problem.law.held, self._held, pressed, rows)
-        response, _ = self._elements(problem, speeds)
+        if problem.frames is not None:
+            speeds = start.speeds.take(self._tree.joint_slot, 0)
+            response, _ = self._elements(problem, speeds)
+            return None, self._bent(problem, response, speeds, pressed, rows)
+        if response is None:
+            return None, self._planes(problem, law.held, self._held, pressed, rows)
+        # The speeds at which they would bear now what they bore then.
+        speeds = (self._base - response.trial) * law.mobility
         return None, self._bent(problem, response, speeds, pressed, rows)
 
     def _follow(self, problem: Problem, point: _Point) -> bool:

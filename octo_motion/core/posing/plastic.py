@@ -116,6 +116,8 @@ class PlasticLaw:
         with np.errstate(divide="ignore", invalid="ignore"):
             self.compliance = np.where(whole > 0.0, 1.0 / whole, 0.0)
             """1/(D_d + G), zero where the series damper is rigid."""
+            self.mobility = np.where(self.backward > 0.0, 1.0 / self.backward, 0.0)
+            """1/G, zero where there is no element."""
         self.share = self.backward * self.compliance
         """G/(D_d + G), of a load above yield: what the flow takes away."""
         self.kept = 1.0 - self.share

@@ -30,7 +30,7 @@ from .gathering import Gathering, typical_size
 from .holding import Holding, Pin
 from .newton import Newton, Solution, Start
 from .obstacles import Obstacle
-from .plastic import PlasticLaw
+from .plastic import PlasticLaw, Response
 from .problem import Problem
 from .rows import Answer, Pattern, Rows
 from .tree import Tree
@@ -93,7 +93,7 @@ class World:
         self._pins: dict[int, Pin] = {}
         self._bodies = Bodies(figure, self._tree, pose)
         self._speeds = np.zeros((len(self._tree.layout.bodies), 3))
-        self._flows = False
+        self._response: Response | None = None
         self._pressed = _NOBODY
         self._loads = np.zeros((count, 3))
         self._use_elements(figure.elements)
@@ -155,7 +155,7 @@ class World:
             bodies.relax()
         bodies.stop()
         self._speeds[:] = 0.0
-        self._flows = False
+        self._response = None
         self._pressed = _NOBODY
         self._loads[:] = 0.0
         self._memory.forget()
@@ -294,7 +294,7 @@ class World:
             bodies.angular.copy(),
             bodies.spin.copy(),
             self._speeds.copy(),
-            self._flows,
+            np.zeros((0, 3)) if self._response is None else self._response.trial.copy(),
             self._pressed.copy(),
             self._memory.grips.copy(),
             self._memory.wanted.copy(),
@@ -313,7 +313,7 @@ class World:
         bodies.angular = state.angular.copy()
         bodies.spin = state.spin.copy()
         self._speeds = state.speeds.copy()
-        self._flows = state.flows
+        self._response = self._law.answer(state.trial.copy()) if len(state.trial) else None
         self._pressed = state.pressed.copy()
         self._memory.set(
             state.labels.copy(), state.grips.copy(), state.wanted.copy(), state.slips.copy()
@@ -352,7 +352,7 @@ class World:
         pressed = None
         if problem.stops:
             pressed = (problem.stops[0].labels[:, None] == self._pressed).any(axis=1)
-        return problem, Start(self._speeds, before, self._flows, pressed)
+        return problem, Start(self._speeds, before, self._response, pressed)
 
     def _find(self) -> Contacts:
         """Contacts that could carry anything within the step."""
@@ -390,7 +390,7 @@ class World:
     def _take(self, problem: Problem, solution: Solution) -> None:
         """Take over velocities, loads and what contacts and hands did."""
         self._speeds = solution.speeds
-        self._flows = solution.response.flows is not None
+        self._response = None if solution.response.flows is None else solution.response
         self._pressed = _NOBODY
         if solution.pressed is not None:
             self._pressed = problem.stops[0].labels[solution.pressed]
@@ -453,6 +453,8 @@ class World:
             elements.yield_torque,
         )
         self._law = PlasticLaw(used, self.settings.step)
+        if self._response is not None:
+            self._response = self._law.answer(self._response.trial)
 
 
 _NOBODY = np.zeros(0, np.int64)

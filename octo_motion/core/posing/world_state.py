@@ -70,8 +70,9 @@ class WorldState:
     """(bodies, 3) angular momentum about the centre of mass, world axes."""
     speeds: Floats
     """(slots, 3) where the solver begins."""
-    flows: bool
-    """Whether any element did."""
+    trial: Floats
+    """(bodies, 3) load that the elements would have borne without flow, N·m, in the problem's axes;
+    empty where none flowed."""
     pressed: NDArray[np.int64]
     """Labels of the ends of joints' ranges that bore."""
     grips: Floats
