@@ -175,7 +175,7 @@ class Generator:
         self._floor = -np.inf
         self._few: Remembered[tuple[Floats, Floats]] = Remembered()
         if settings.stand and gait.on_ground:
-            floor = float(np.quantile(self._cycle_depths(), _STANDING))
+            floor = float(np.quantile(self._whole_cycle()[0], _STANDING))
             if floor < -_LEAST_DEPTH * self.arm_length:
                 self._floor = floor
 
@@ -195,18 +195,25 @@ class Generator:
 
         It is the gait's own, whatever variation and turning add: the same for every shot.
         """
-        return -float(self._cycle_depths().min())
+        return -float(self._cycle[0].min())
 
-    def _cycle_depths(self) -> Floats:
-        """Heights (phases, arms) over the body's centre of each arm's lowest joint.
+    @cached_property
+    def _cycle(self) -> tuple[Floats, dict[int, Floats]]:
+        return self._whole_cycle()
+
+    def _whole_cycle(self) -> tuple[Floats, dict[int, Floats]]:
+        """Heights (phases, arms) over the body's centre of each arm's lowest joint, and shapes.
 
         At phases of the arms' own: arms that are built alike and have one curve go through the
-        same heights, whichever side they are on, so one of them is looked at.
+        same heights, whichever side they are on, so one of them is looked at. The shapes
+        (segments, 3) are those of each arm half way through its hold.
         """
-        phases = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
         gait = self._settings.gait
+        phases = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
+        phases = np.append(phases, gait.power_phase)
         heights = self._roots[:, 2] / self._lengths
         depths = np.empty((_CYCLE_SAMPLES, len(self._arms)))
+        middles: dict[int, Floats] = {}
         for build in self._builds:
             alike: dict[tuple[int, float], list[int]] = {}
             for arm in build.arms:
@@ -222,9 +229,22 @@ class Generator:
             # Up is the same for the arm's frame and the body's.
             climbs = np.cumsum(build.chain.lengths[:, None, None] * directions[:, 2], axis=0)
             lowest = np.minimum(climbs.min(axis=0), 0.0)
-            for arms, low in zip(alike.values(), lowest.T, strict=True):
-                depths[:, arms] = self._roots[arms, 2] + self._lengths[arms] * low[:, None]
-        return depths
+            for place, arms in enumerate(alike.values()):
+                low = lowest[:_CYCLE_SAMPLES, place, None]
+                depths[:, arms] = self._roots[arms, 2] + self._lengths[arms] * low
+                for arm in arms:
+                    middles[arm] = directions[:, :, -1, place].copy()
+                    # The other side is its mirror image.
+                    middles[arm][:, 1] *= self._hands[arm] * self._hands[arms[0]]
+        return depths, middles
+
+    def middle_shapes(self, arms: Sequence[int]) -> Floats:
+        """Directions (segments, 3, arms) half way through the hold, of arms that are built alike.
+
+        In the arms' frames, as the gait alone has them.
+        """
+        assert self.clearance is not None
+        return np.stack([self._cycle[1][arm] for arm in arms], axis=-1)
 
     def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""

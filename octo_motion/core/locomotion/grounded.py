@@ -174,13 +174,7 @@ class GroundedWalk:
                 [generator.settings.gait.curve(generator.arms[arm].pair).free for arm in columns]
             ),
         )
-        # Half way through the hold, as the gait alone has it: a frame for each arm.
-        phases = self._middle - generator.offsets[columns]
-        phases = phases[:, None] + generator.offsets
-        angles, _ = generator.asked_at(phases, np.zeros((len(columns), 2)))
-        own = angles[np.arange(len(columns)), columns][None]
-        shapes, _ = generator.shapes(build, own, np.zeros(own.shape[:2]))
-        steps = build.chain.lengths[:, None, None] * shapes[:, :, 0]
+        steps = build.chain.lengths[:, None, None] * generator.middle_shapes(columns)
         joint = limbs.touching(self._settings.planted)
         near, far = steps[:joint].sum(axis=0), steps[joint:].sum(axis=0)
         aims = np.arctan2([near[1], far[1]], [near[0], far[0]]).T
