@@ -376,9 +376,8 @@ def test_give_takes_the_snap_out_of_an_arm_that_straightens() -> None:
         return float(angle_between(turns[1:], turns[:-1]).max())
 
     assert snaps(0.08) < 0.5 * snaps(0.0)
-    # It is paid for with what it says, in thirds of the arm.
-    misses = posed(generated(rig, give=0.08)).misses
-    assert 1e-3 < misses.max() <= 0.08 / 3.0
+    # What it lets an arm reach beyond its targets is not missed, and nothing else is.
+    assert posed(generated(rig, give=0.08)).misses.max() <= 1e-3
 
 
 def test_walking_and_swimming_arms_do_not_wring_themselves() -> None:

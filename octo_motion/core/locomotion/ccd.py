@@ -253,6 +253,12 @@ def closed(
     return aimed(directions, lengths, goal)
 
 
+def overreach(chords: Floats, whole: Floats, give: float) -> Floats:
+    """How far beyond goals so far away groups of these lengths reach (see :func:`closed`)."""
+    slack = np.clip(1.0 - chords / whole, 0.0, 1.0)
+    return whole * slack * give / (slack + give)
+
+
 def softened(directions: Floats, amount: float) -> Floats:
     """Directions drawn towards the mean of their neighbours, across the borders of groups too.
 

@@ -20,7 +20,7 @@ from ..remembered import Remembered, key_of
 from ..rotations import Floats, from_axis_angle, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
 from .arm import GROUPS, group_lengths, split_groups
-from .ccd import Chain, asked_shape, raised, solve
+from .ccd import Chain, asked_shape, overreach, raised, solve
 from .chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
 from .columns import turned
 from .gait import GaitCurve, GaitTable, evaluate, variation
@@ -123,7 +123,8 @@ class ArmPoses:
     rotations: Floats
     """(frames, bones, 4) unit quaternions in each bone's rest frame (Blender's matrix_basis)."""
     misses: Floats
-    """(frames, arms, groups) distance of each group's end from its target, in arm lengths."""
+    """(frames, arms, groups) distance of each group's end from its target, in arm lengths, less what
+    the setting ``give`` lets it and those before it reach beyond."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,6 +416,12 @@ class Generator:
         joints = np.cumsum(build.chain.lengths[:, None, None] * directions, axis=0)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
         missed = np.linalg.norm(ends - targets[1:], axis=1)
+        if self._settings.give > 0.0:
+            roots = np.concatenate([np.zeros_like(ends[:1]), ends[:-1]])
+            chords = np.linalg.norm(targets[1:] - roots, axis=1)
+            beyond = overreach(chords, build.widths[:, None], self._settings.give)
+            # A group of a single bone begins where the one before has ended, and ends as far off.
+            missed = np.maximum(missed - beyond.cumsum(axis=0), 0.0)
         return (
             directions.reshape(len(directions), 3, frames, arms),
             np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1),
