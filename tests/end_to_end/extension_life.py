@@ -5,7 +5,9 @@ python -m tests.end_to_end.extension_life register
 python -m tests.end_to_end.extension_life install ZIP
 """
 
+import importlib
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -51,8 +53,30 @@ def register_twice() -> None:
         assert traces() == before, traces() ^ before
 
 
+def start_bridge() -> Iterator[str]:
+    """Start the installed extension's bridge; what it says, and the extension's own libraries."""
+    # The Python of these tests may have another hidapi, which Blender's would not.
+    sys.path.sort(key=lambda path: ".local" not in path)
+    process = importlib.import_module(f"{NAME}.device.process")
+    client = importlib.import_module(f"{NAME}.device.client").Client()
+    client.start(("--simulate", "--no-haply"))
+    end = time.monotonic() + 60.0
+    while not (client.hello and client.devices) and time.monotonic() < end:
+        client.poll()
+        time.sleep(0.01)
+    # The loop looks for HID devices at once, and would have told that hidapi is missing.
+    for _ in range(100):
+        client.poll()
+        time.sleep(0.01)
+    yield "bridge"
+    yield from (str(each.name).replace(" ", "-") for each in client.devices.values())
+    yield "hidapi-missing" if any("hidapi" in each.problem for each in client.notices) else "hidapi"
+    yield from (path for path in process.library_folders() if "extensions" in path)
+    client.stop()
+
+
 def install(archive: str) -> None:
-    """Install, disable, enable and uninstall; print the operators and hidapi's file."""
+    """Install, disable, enable and uninstall; print operators, bridge and hidapi's file."""
     extensions = Path(bpy.utils.resource_path("USER")) / "extensions"
     before = traces()
 
@@ -61,6 +85,7 @@ def install(archive: str) -> None:
     )
     installed = traces()
     print(*dir(bpy.ops.octo_motion))
+    print(*start_bridge())
     print(*(path.name for path in (extensions / ".local" / "lib").rglob("hid.*")))
 
     bpy.ops.preferences.addon_disable(module=NAME)

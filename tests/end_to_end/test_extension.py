@@ -49,12 +49,21 @@ def test_zip_installs_disables_enables_and_uninstalls_without_a_complaint_on_the
 ) -> None:
     monkeypatch.setenv("BLENDER_USER_RESOURCES", str(tmp_path))
 
-    installed, operators, hidapi, removed = run_blender("install", archive).splitlines()
+    said = [
+        line
+        for line in run_blender("install", archive).splitlines()
+        if not line.startswith("Octo Motion device: Found")  # the bridge's own log
+    ]
+    installed, operators, bridge, hidapi, removed = said
 
     assert installed == 'STATUS Installed "octo_motion"'
     assert {"add_octopus", "add_route", "detect_arms", "generate_locomotion"} <= set(
         operators.split()
     )
+    # The bridge runs in Blender's own Python, which is told where the wheel's files are.
+    what, device, library, *folders = bridge.split()
+    assert (what, device, library) == ("bridge", "Simulated-hand", "hidapi")
+    assert any(Path(each).is_relative_to(tmp_path / "extensions" / ".local") for each in folders)
     python = f"{sys.version_info.major}{sys.version_info.minor}"
     assert hidapi.startswith((f"hid.cpython-{python}", f"hid.cp{python}"))
     assert removed == 'STATUS Removed "octo_motion"'
