@@ -52,6 +52,8 @@ def _message(data: bytes) -> None:
             message.obstacle()
         case say.Settings():
             message.response()
+        case say.CalibrationMessage():
+            message.calibration()
         case say.WorldMessage():
             message.settings()
 
