@@ -41,7 +41,7 @@ def bends(turns: Floats) -> Floats:
     Args:
         turns: (…, 4) from rest, in the bone's own axes at rest.
     """
-    w, x, y, z = np.moveaxis(turns, -1, 0)
+    w, x, y, z = (turns[..., part] for part in range(4))
     cosine = np.sqrt(w * w + y * y)
     sine = np.sqrt(x * x + z * z)
     # θ n from sin(θ/2) n = (x w + z y, z w − x y)/cos(θ/2).
@@ -49,7 +49,11 @@ def bends(turns: Floats) -> Floats:
     factor = np.where(sine < 1e-9, 2.0, factor)
     twist = 2.0 * np.arctan2(y, w)
     twist -= 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
-    return np.stack([factor * (x * w + z * y), twist, factor * (z * w - x * y)], axis=-1)
+    result = np.empty((*twist.shape, 3))
+    result[..., 0] = factor * (x * w + z * y)
+    result[..., 1] = twist
+    result[..., 2] = factor * (z * w - x * y)
+    return result
 
 
 def slopes(turns: Floats) -> Floats:
@@ -58,7 +62,7 @@ def slopes(turns: Floats) -> Floats:
     Args:
         turns: (…, 4) as for ``bends``; none by a half turn.
     """
-    w, x, y, z = np.moveaxis(turns, -1, 0)
+    w, x, y, z = (turns[..., part] for part in range(4))
     cosine = np.maximum(np.sqrt(w * w + y * y), _TINY)
     sine = np.sqrt(x * x + z * z)
     whole = np.maximum(sine * cosine, _TINY)
