@@ -98,3 +98,18 @@ def test_what_cannot_be_helped_gets_no_worse(frames: int, *, stretch: bool) -> N
     low = np.zeros_like(shot.course.clear(joints))
     after = raised_between(shot.course, poses, joints, shot.again)
     assert shot.course.dips(after, low).max() <= shot.course.dips(poses, low).max()
+
+
+def test_an_arm_that_is_raised_alone_is_raised_as_with_all_others() -> None:
+    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 20)
+    shot.whole()
+    chosen = np.arange(5, 25)
+    lift = np.full((20, len(shot.course.arms)), 0.02)
+    alone = np.zeros_like(lift)
+    alone[:, 3] = 0.02
+
+    (poses, joints), (own, places) = shot.pose(chosen, lift), shot.pose(chosen, alone)
+
+    bones = shot.course.bones[3]
+    np.testing.assert_allclose(own.rotations[:, bones], poses.rotations[:, bones], atol=1e-12)
+    np.testing.assert_allclose(places[3], joints[3], atol=1e-12)

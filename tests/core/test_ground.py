@@ -127,3 +127,18 @@ def test_far_away_the_grid_answers_with_its_border() -> None:
     field = HeightField((0.0, 0.0), 1.0, np.array([[0.0, 1.0], [2.0, 3.0]]))
     assert field.height(np.array([0.5, 0.5])) == pytest.approx(1.5)
     assert field.height(np.array([99.0, -99.0])) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("cells", [1, 4, 17, 60, 200])
+def test_a_slope_is_the_same_ground_however_finely_it_is_cut(cells: int) -> None:
+    places = np.linspace(-8.0, 8.0, cells + 1)
+    x, y = np.meshgrid(places, places, indexing="ij")
+    corners = np.stack([x, y, 0.1 * x - 0.2 * y], axis=-1)
+    a, b, c, d = corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]
+    halves = [np.stack(each, axis=2).reshape(-1, 3, 3) for each in ((a, b, c), (a, c, d))]
+    path = PATH - 0.2 * PATH[:, 1:2] * np.array([0.0, 0.0, 1.0])
+
+    ground = sampled(np.concatenate(halves), path, ALL, **NEED)
+
+    at = np.random.default_rng(0).uniform([-1.0, -4.0], [1.0, 0.0], (200, 2))
+    np.testing.assert_allclose(ground.height(at), at @ [0.1, -0.2], atol=1e-12)
