@@ -37,6 +37,7 @@ def touches(gap: Floats, side: Floats, radius: float = 0.5) -> Touches:
         wide=none + 2.0 * radius,
         thin=none + radius,
         side=np.broadcast_to(side, gap.shape),
+        pair=whole,
     )
 
 
@@ -305,19 +306,27 @@ def test_arms_that_are_busy_stay_and_the_other_makes_way() -> None:
     assert depth(group, moved).max() <= 0.1
 
 
-def test_arms_that_cannot_be_parted_move_as_before() -> None:
-    still = np.zeros(FRAMES)
-    group = crowd(
-        straight(still - 0.3, RADIUS, at=0.1),
-        straight(still + 0.3, RADIUS, at=-0.1),
-    )
+def crossing(frames: slice) -> Crowd:
+    """Two arms that lie across each other at some frames, and else beside each other."""
+    turned = np.full(FRAMES, -0.3)
+    turned[frames] = 0.3
+    group = crowd(straight(-turned, RADIUS, at=0.1), straight(turned, RADIUS, at=-0.1))
     lying = np.zeros(group.lying.shape, dtype=bool)
     lying[:, :, 2:] = True
-    group = replace(group, lying=lying)
+    return replace(group, lying=lying)
+
+
+def test_arms_that_cannot_be_parted_move_as_before() -> None:
+    group = crossing(slice(40, 80))
     assert depth(group, group.joints).max() > 1.0
     moved = parted(group, (), floor=Level(), width=WIDTH)
     assert moved is not None
     np.testing.assert_allclose(moved, group.joints, atol=1e-9)
+
+
+def test_what_overlaps_nearly_all_the_while_is_the_creature_s_own_form() -> None:
+    group = crossing(slice(5, FRAMES))
+    assert parted(group, (), floor=Level(), width=WIDTH) is None
 
 
 def test_an_arm_stays_out_of_the_body() -> None:

@@ -44,6 +44,16 @@ _TORN: Final = 2e-5
 """Arm lengths by which an arm may miss that place; one that misses it more is left as it was."""
 _HOPELESS: Final = (0.5, 1.0)
 """Depths, as shares of the thinner radius, between which arms are left in each other."""
+_MOSTLY: Final = 0.5
+"""Share of all frames from which on two capsules that overlap belong together."""
+_SWIFT: Final = 1.2
+"""How much faster than anything before an arm may turn to make way …"""
+_UNSEEN: Final = 0.25
+"""… or radians from one frame to the next, if that is more."""
+_SUNK: Final = 2e-3
+"""Arm lengths that an arm may be pushed below where it was above the ground."""
+_REPEATS: Final = 3
+"""How often arms that could not make way well are looked for."""
 _LITTLE: Final = 0.02
 """Share of a mean radius by which it begins gently to matter what is asked."""
 _TINY: Final = 1e-12
@@ -81,13 +91,17 @@ def parted(
     if not len(every):
         return None
     touches = Touching(crowd, still, every, 0.0).at(crowd.joints)
+    chosen = touches.depth > _DONE
+    pairs, counts = np.unique(touches.pair[chosen], return_counts=True)
+    # What overlaps nearly all the while is the creature's own form, and not in anybody's way.
+    own_form = pairs[counts > _MOSTLY * len(every)]
     deep = np.zeros(len(every))
-    deep[touches.frame[touches.depth > _DONE]] = 1.0
+    deep[touches.frame[chosen & ~np.isin(touches.pair, own_form)]] = 1.0
     if not deep.any():
         return None
     # Who makes way may be in the way of others then, but not for ever.
     around = np.flatnonzero(widened(deep, _AROUND * reach(width), cyclic=cyclic))
-    touching = Touching(crowd, still, around, NEAR)
+    touching = Touching(crowd, still, around, NEAR, own_form)
     return _Parting(crowd, touching, floor, width, cyclic=cyclic).run()
 
 
@@ -125,7 +139,13 @@ class _Parting:
             chosen = np.nonzero(np.any(wanted != 0.0, axis=(2, 3)))
             if len(chosen[0]):
                 self._move(chosen, wanted[chosen])
-        self._give_up(self._touching.at(self._joints))
+        given_up = np.zeros(self._held.shape)
+        for _ in range(_REPEATS):
+            more = np.maximum(given_up, self._hopeless(self._touching.at(self._joints)))
+            if np.array_equal(more, given_up):
+                break
+            given_up = more
+            self._give_up(np.minimum(self._covered(given_up), 1.0))
         return self._joints
 
     # --- What is known before anything moves ---
@@ -281,17 +301,24 @@ class _Parting:
         if self._floor is not None:
             self._room[chosen] = self._floor.clearance(chosen[0], joints) - self._allowed[chosen]
 
-    def _give_up(self, touches: Touches) -> None:
-        """Let arms that could not be parted move as they did before."""
+    def _hopeless(self, touches: Touches) -> Floats:
+        """Which arms (frames, arms) could not make way, or not without a jump, 0…1."""
         frames, arms = self._held.shape
         worst = np.zeros((frames, arms + int(touches.arms[1].max(initial=0)) + 1))
         for which in (0, 1):
             np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
         low, high = _HOPELESS
-        hopeless = smooth((worst[:, :arms] - low) / (high - low))
-        if not hopeless.any():
-            return
-        share = np.minimum(self._covered(hopeless), 1.0)
+        result = smooth((worst[:, :arms] - low) / (high - low))
+        before, after = _turns(self._before), _turns(self._directions)
+        most = max(_SWIFT * float(before.max(initial=0.0)), _UNSEEN)
+        swift = after > most
+        result[1:][swift] = result[:-1][swift] = 1.0
+        result[self._room.min(axis=2) < -_SUNK * self._length] = 1.0
+        changed = np.any(self._directions != self._before, axis=(2, 3))
+        return np.where(changed | (result < 1.0), result, 0.0)
+
+    def _give_up(self, share: Floats) -> None:
+        """Let arms (frames, arms) move as they did before, by some share."""
         changed = np.any(self._directions != self._before, axis=(2, 3))
         chosen = np.nonzero((share > 1e-9) & changed)
         back = share[chosen][:, None, None]
@@ -299,6 +326,22 @@ class _Parting:
         mixed = _unit(after + back * (before - after))
         mixed = np.where(back >= 1.0 - 1e-9, before, self._drawn_back(chosen, mixed))
         self._put(chosen, mixed)
+
+
+def _turns(directions: Floats) -> Floats:
+    """How far (frames − 1, arms) a segment turns against the one before it at most, radians."""
+    first, second = directions[:-1], directions[1:]
+    # The one before, turned the shortest way to where it is a frame later, takes the next along.
+    start, end = first[:, :, :-1], second[:, :, :-1]
+    axis = np.cross(start, end)
+    cosine = np.sum(start * end, axis=-1, keepdims=True)
+    along = first[:, :, 1:]
+    across = np.cross(axis, along)
+    taken = along + across + np.cross(axis, across) / np.maximum(1.0 + cosine, 1e-6)
+    own = np.linalg.norm(second[:, :, :1] - first[:, :, :1], axis=-1)
+    return np.concatenate([own, np.linalg.norm(second[:, :, 1:] - taken, axis=-1)], axis=2).max(
+        axis=2
+    )
 
 
 def _anchors(lying: np.ndarray) -> np.ndarray:

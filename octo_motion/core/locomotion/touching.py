@@ -71,6 +71,8 @@ class Touches:
     """The smaller of them."""
     side: Floats
     """(touches, 3) on which side of the other the one belongs, unit."""
+    pair: np.ndarray
+    """(touches,) a number for each two capsules, the same at all frames."""
 
     @property
     def depth(self) -> Floats:
@@ -86,10 +88,16 @@ class Touching:
         still: parts of the body, one frame each.
         frames: (some,) numbers of those that matter.
         margin: sums of radii between them up to which they are near.
+        without: pairs of capsules (``Touches.pair``) that are left as they are.
     """
 
     def __init__(
-        self, crowd: Crowd, still: Sequence[Capsules], frames: np.ndarray, margin: float
+        self,
+        crowd: Crowd,
+        still: Sequence[Capsules],
+        frames: np.ndarray,
+        margin: float,
+        without: np.ndarray | None = None,
     ) -> None:
         _, arms, joints, _ = crowd.joints.shape
         chains = [
@@ -108,6 +116,9 @@ class Touching:
         self._radii, self._owner = parts.radii, parts.owner
         self._places = _places(crowd, len(body))
         one, other = pairs_of([*chains, *body], arms)
+        if without is not None:
+            asked = ~np.isin(one * len(parts.owner) + other, without)
+            one, other = one[asked], other[asked]
         frame, pair = near(parts, one, other, margin)
         self._frame, self._one, self._other = frames[frame], one[pair], other[pair]
         seen = self.at(crowd.joints)
@@ -147,6 +158,7 @@ class Touching:
             wide=here + there,
             thin=np.maximum(np.minimum(here, there), _TINY),
             side=side / np.maximum(_length(side), _TINY)[:, None],
+            pair=one * len(self._owner) + other,
         )
 
 

@@ -24,6 +24,8 @@ from .gait_properties import OVERRIDE
 DEEP: Final = 0.1
 """Share of a radius by which arms may overlap without a word: flesh gives."""
 
+_MOST_PARTED: Final = 200_000_000
+"""Distances with more of which arms are not kept apart: half a minute where all are tangled."""
 _MOST_DISTANCES: Final = 60_000_000
 """With more, of very many arms over very many frames, only every second, third … is measured."""
 
@@ -45,6 +47,20 @@ class Apart:
         """What must not pass through itself."""
         return Bulk(self.arms, self.radii, self.still, self.upward)
 
+    def _distances(self, frames: int) -> int:
+        """How many there are to be looked at over so many frames."""
+        capsules = sum(min(len(arm.bones), MOST_CAPSULES) for arm in self.arms) + len(self.still)
+        return frames * capsules * capsules
+
+    def too_many(self, frames: int) -> str:
+        """Why arms cannot be kept apart over so many frames, "" if they can."""
+        if self._distances(frames) <= _MOST_PARTED:
+            return ""
+        return (
+            f"Arms are not kept apart: {len(self.arms)} arms over {frames:,} frames would take too "
+            "long. Make shorter motions, or switch arms off."
+        )
+
     def measure(self, rotations: Floats, strains: Floats) -> tuple[Separation, int]:
         """What overlaps, and at every how many frames it was looked for.
 
@@ -52,8 +68,7 @@ class Apart:
             rotations: (frames, bones, 4) of all arms, one after the other.
             strains: (frames, bones) by how much bones are longer than at rest.
         """
-        capsules = sum(min(len(arm.bones), MOST_CAPSULES) for arm in self.arms) + len(self.still)
-        every = max(1, -(-len(rotations) * capsules * capsules // _MOST_DISTANCES))
+        every = max(1, -(-self._distances(len(rotations)) // _MOST_DISTANCES))
         looked = rotations[::every]
         ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)])
         chains: list[Capsules] = []

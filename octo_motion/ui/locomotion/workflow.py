@@ -296,7 +296,9 @@ class Shot:
             reached = self.reaching.apply(self.frames, rotations, travelling, strains)
             self.reached, self.carried = reached
             busy = self._let_go(np.any(rotations != before, axis=-1), lying, late, misses)
-        if self.apart is not None and self.keep_apart:
+        too_many = self.apart.too_many(count) if self.apart is not None and self.keep_apart else ""
+        self.warnings.extend([too_many] * bool(too_many))
+        if self.apart is not None and self.keep_apart and not too_many:
             moved = kept_apart(
                 self.apart.bulk,
                 rotations,
