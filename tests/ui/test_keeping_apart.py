@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import live, workflow
+from octo_motion.ui.locomotion import apart, live, workflow
 from octo_motion.ui.locomotion.apart import DEEP
 from octo_motion.ui.locomotion.properties import locomotion_settings
 from tests.bench.apart import add_bumps
@@ -129,3 +129,13 @@ def test_switched_off_the_motion_is_the_gait_s_own(octopus: Any) -> None:
     again = computed(octopus, keep_apart=False)
     np.testing.assert_array_equal(again.rotations, shot.rotations)
     assert again.apart is None
+
+
+def test_too_many_arms_and_frames_are_told_and_left(
+    octopus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    without = computed(octopus, keep_apart=False)
+    monkeypatch.setattr(apart, "_MOST_PARTED", 1000)
+    left = computed(octopus, keep_apart=True)
+    np.testing.assert_array_equal(left.rotations, without.rotations)
+    assert any(told.startswith("Arms are not kept apart: 8 arms over ") for told in left.warnings)
