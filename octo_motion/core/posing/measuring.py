@@ -41,7 +41,9 @@ _FEW: Final = 12
 _ROUNDS: Final = 60
 _TRIED: Final = 3
 _LEAST: Final = float(np.radians(0.1))
-"""Radians below which a bend is none, and by which everything springs back."""
+"""Radians below which a bend is none."""
+_STIFFEST: Final = float(np.radians(0.5))
+"""Radians by which everything springs back, as clay does."""
 _CLEAR: Final = float(np.radians(1.0))
 """Radians that a hand means when it moves a limb."""
 _REST: Final = 0.1
@@ -104,7 +106,7 @@ def measure_bend(bend: Bend) -> Measured:
             "Pull harder, or let it bear less.",
         )
     # Without any spring at all, steps would have to be as short as it is stiff.
-    spring = max(bend.bends - bend.stays, _LEAST)
+    spring = max(bend.bends - bend.stays, _STIFFEST)
     reached = -np.expm1(-bend.seconds / bend.settles)
     stiffness = bend.torque * float(reached) / spring
     return Measured(
