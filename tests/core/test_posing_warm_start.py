@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.coupling import Grab
+from octo_motion.core.posing.coupling import Coupling, Grab
 from octo_motion.core.posing.figure import Figure, Limits
 from octo_motion.core.posing.newton import Start
 from octo_motion.core.posing.obstacles import Plane
@@ -128,3 +128,23 @@ def test_few_systems_a_step_are_enough_to_stay_sane():
         assert world.energy().total <= start * 1.01
     low = world.pose().positions[:, 2].min()
     assert low > 0.0
+
+
+def test_a_hand_that_suddenly_weakens_is_no_source_of_motion():
+    figure = replace(chain(3), elements=elements_for(chain(3), "doll"))
+    world = World(figure, posed(figure), WorldSettings(pinned=frozenset({0}), drag=2.0))
+    start = world.pose().positions[2]
+    strong = Coupling(1e4, 1e2, 10.0, 1.0, force_limit=50.0, torque_limit=1.0)
+    grab = world.grab(2, start, coupling=strong)
+    for _ in range(50):
+        world.pull(grab, start + np.array([0.0, 0.0, 1.0]))
+        world.step()
+    assert np.linalg.norm(grab.wrench[:3]) == pytest.approx(50.0, rel=1e-6)
+    grab.coupling = replace(strong, force_limit=0.5)
+    energy = world.energy().total
+    for _ in range(20):
+        world.step()
+        # Held at its new bound at once, whatever the solver began with.
+        assert np.linalg.norm(grab.wrench[:3]) <= 0.5 * (1.0 + 1e-6)
+        # No more than its force can do on the way: a tenth of a metre.
+        assert world.energy().total <= energy + 0.5 * 0.1

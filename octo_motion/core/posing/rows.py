@@ -363,7 +363,8 @@ class Rows:
             planes[count:] = held[:, None, None] * _UNIT
             if full:
                 pulls = answer.impulses[count:]
-                way = pulls / holds.bounds[:, None]
+                # Not by the bound: it may have changed since.
+                way = pulls / (np.sqrt((pulls * pulls) @ _ONES) + _TINY)[:, None]
                 part = np.where(held < 1.0, held, 0.0)[:, None] * way
                 planes[count:] -= part[:, :, None] * way[:, None, :]
                 rest = np.zeros((len(self), 3))
