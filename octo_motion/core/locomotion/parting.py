@@ -48,8 +48,8 @@ _MOSTLY: Final = 0.5
 """Share of all frames from which on two capsules that overlap belong together."""
 _SWIFT: Final = 1.2
 """How much faster than anything before an arm may turn to make way …"""
-_UNSEEN: Final = 0.25
-"""… or radians from one frame to the next, if that is more."""
+_UNSEEN: Final = 0.4
+"""… or radians from one frame to the next, if that is more: a walk has as much."""
 _SUNK: Final = 2e-3
 """Arm lengths that an arm may be pushed below where it was above the ground."""
 _REPEATS: Final = 3
