@@ -83,6 +83,7 @@ class Bridge:
         self.simulation: Simulation | None = None
         self._told = 0.0
         self._lag = 0.0
+        self._placed = 0
 
     @property
     def period(self) -> float:
@@ -147,6 +148,7 @@ class Bridge:
                 message.figure()  # refused here if it is none
                 self._figure, self.simulation = message, None
             case Place():
+                self._placed += 1
                 self._place(message)
             case Pins():
                 if simulation is not None:
@@ -207,18 +209,22 @@ class Bridge:
 
     def _tell_blender(self) -> None:
         simulation = self.simulation
-        if simulation is not None and simulation.changed:
-            simulation.changed = False
-            pose = simulation.world.pose()
-            self._blender.send(
-                PoseMessage(simulation.steps, simulation.time, pose.positions, pose.orientations),
-                droppable=True,
-            )
+        # Pointers first: who hears that a limb is held must not have seen yet that it moves.
         for pointer, told in self._heard.items():
             hand = simulation.hands.get(pointer) if simulation else None
             if hand is not None and hand.handle is not None:
                 self._lag += _LAG_SHARE * (time.perf_counter() - told.time - self._lag)
             self._blender.send(self._pointer(told, hand), droppable=True)
+        if simulation is not None and simulation.changed:
+            simulation.changed = False
+            pose = simulation.world.pose()
+            self._blender.send(
+                PoseMessage(
+                    *(self._placed, simulation.steps, simulation.time),
+                    *(pose.positions, pose.orientations),
+                ),
+                droppable=True,
+            )
 
     def _pointer(self, told: HandMessage, hand: Hand | None) -> PointerMessage:
         place, turn, body = told.position, told.orientation, -1

@@ -75,6 +75,8 @@ class Client:
     """To be shown, then cleared, by the caller."""
     heard: float = 0.0
     """``time.monotonic`` of the last word."""
+    _placed: int = 0
+    """How often the bridge was told where the puppet is."""
     _child: Child | None = None
     _arguments: tuple[str, ...] = ()
     _python: Path | None = None
@@ -101,7 +103,7 @@ class Client:
         self._arguments, self._python = tuple(arguments), python
         self._forget_devices()
         self.times = self.hello = None
-        self.lost_devices = 0
+        self.lost_devices = self._placed = 0
         self._child = Child.start(("bridge", *arguments), python, log_to)
         self.state = State.RUNNING
         self.heard = time.monotonic()
@@ -132,6 +134,7 @@ class Client:
         """Say something to the bridge; without one, nothing happens."""
         if self._child is None:
             return
+        self._placed += isinstance(message, Place)
         try:
             self._child.channel.send(message)
         except ChannelClosedError:
@@ -181,7 +184,7 @@ class Client:
         for message in messages:
             self.heard = time.monotonic()
             match message:
-                case PoseMessage():
+                case PoseMessage() if message.placed == self._placed:
                     self.pose = Pose(message.positions, message.orientations)
                     self.steps = message.step
                 case PointerMessage():

@@ -145,6 +145,8 @@ class PoseMessage(Message):
     """Bridge to Blender: the puppet stands like this."""
 
     KIND = 4
+    placed: Annotated[int, U32]
+    """How often it was put into a pose: what was said before the last one is out of date."""
     step: Annotated[int, U32]
     time: Annotated[float, F64]
     """s simulated since the figure came."""

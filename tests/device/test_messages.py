@@ -31,7 +31,7 @@ EXAMPLES: list[say.Message] = [
     say.Hello(123, "3.13.0", "real-time"),
     say.FigureMessage.of(FIGURE),
     say.Place(POSE.positions, POSE.orientations),
-    say.PoseMessage(7, 0.014, POSE.positions, POSE.orientations),
+    say.PoseMessage(2, 7, 0.014, POSE.positions, POSE.orientations),
     say.Pins((1, 0, 2)),
     say.Grab(1, grab=True),
     say.Settings(force=0.5, toggle=True),

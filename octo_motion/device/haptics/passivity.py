@@ -6,8 +6,8 @@ form: the device tells how it moved, and is given a force. The observer sums the
 did against the force of each period; this is exact, since the force is held while the hand moves.
 Where the sum would fall below zero, the controller adds damping, as much as brings it back.
 
-Three things beyond the source. The sum has a ceiling: energy spent long ago on bending a joint is no
-licence to shake the hand now, so what can ever come back is bounded by ``most``. And the damping
+Three things beyond the source. The sum has a ceiling: energy spent long ago on bending a joint is
+no licence to shake the hand now, so what can ever come back is bounded by ``most``. And the damping
 has one: a damper of α on a hand of mass m sampled every T is itself active from α T = 2 m on. Ten
 times the device's own damping calms all from 0.05 to 0.4 kg at eight times the passive stiffness.
 So damping alone cannot keep back a strong slow push, as of a puppet that was bent with more work
