@@ -134,6 +134,7 @@ class Newton:
         stack = self._stack(problem, 1 if corrections is None else 2)
         point, tangents = self._begin(problem, start)
         shift: Floats | None = None
+        origin = start.speeds
         miss = np.inf
         count = rounds = 0
         while True:
@@ -144,6 +145,9 @@ class Newton:
             end = self._at(problem, np.ascontiguousarray(solved[..., 0]))
             joints, pushes = _predicted(tangents, end)
             miss = _miss(end, joints, pushes)
+            if point is None and miss > _LOST:
+                # Begun in vain: no further than is better than where it came from.
+                point = self._at(problem, origin)
             if miss > self._tolerance and point is not None:
                 end = self._lowest(problem, point, end, joints, pushes)
             point = end
@@ -153,7 +157,7 @@ class Newton:
             # tangents stay the same: impulses change less than what they are asked for.
             if miss <= _NEARLY and rounds < _ROUNDS and self._follow(problem, end):
                 rounds += 1
-                point = None
+                point, origin = None, end.speeds
             elif miss <= self._tolerance:
                 break
             tangents = self._tangents(problem, end)
@@ -471,6 +475,8 @@ _ENOUGH = 0.1
 _SEARCHES = 6
 _ROUNDS = 2
 """In which contacts learn from each other how fast they slip."""
+_LOST = 1.0
+"""Miss at which tangents of the step before were none of this one's."""
 _NEARLY = 0.1
 """Miss at which they can: to settle before would be to settle what is asked anew."""
 _NO_ROWS = np.zeros((0, 3))
