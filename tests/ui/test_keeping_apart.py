@@ -50,7 +50,7 @@ def test_arms_pass_through_each_other_without_it_and_not_with_it(octopus: Any) -
     assert kept["SLIP"] <= without["SLIP"] + 2e-4
     assert kept["DEPTH"] <= without["DEPTH"] + 5e-4
     assert kept["STRAIN"] == pytest.approx(without["STRAIN"])
-    assert kept["TURN"] <= 1.1 * without["TURN"]
+    assert kept["TURN"] <= without["TURN"] + np.radians(3.0)
 
 
 def test_arms_that_rest_on_the_ground_rest_where_they_did(octopus: Any) -> None:
@@ -83,7 +83,7 @@ def test_hurried_arms_on_bumps_stay_out_of_each_other_and_of_the_body() -> None:
     without, kept = (figures(computed(armature, keep_apart=on)) for on in (False, True))
     assert without["OVERLAP"] > DEEP
     assert kept["OVERLAP"] <= DEEP
-    assert kept["TURN"] <= 1.1 * without["TURN"]
+    assert kept["TURN"] <= without["TURN"] + np.radians(3.0)
 
 
 def test_what_lives_keeps_apart_like_what_is_generated(octopus: Any) -> None:

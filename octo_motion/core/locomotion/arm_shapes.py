@@ -156,6 +156,17 @@ def _carry(frames: Floats, ways: Floats, seen: Floats) -> None:
     frames[..., 0, :, :] = ways
 
 
+def evened(directions: Floats, share: Floats) -> Floats:
+    """Directions (segments, 3, batch) between those before and after, by a share (segments, batch).
+
+    Sharp bends spread over neighbouring joints; the first and the last segment stay.
+    """
+    result = directions.copy()
+    mean = 0.5 * (directions[2:] + directions[:-2])
+    result[1:-1] += share[1:-1, None] * (mean - directions[1:-1])
+    return unit(result)
+
+
 def raised(
     directions: Floats,
     lengths: Floats,

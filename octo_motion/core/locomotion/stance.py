@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .arm_shapes import blended, curve, drawn, gentle, raised, smooth, unit
+from .arm_shapes import blended, curve, drawn, evened, gentle, raised, smooth, unit
 from .columns import dot
 from .foothold_places import PEELING
 from .footholds import UNROLLING, Footholds
@@ -28,6 +28,8 @@ from .limbs import Limbs, StanceSettings
 
 _STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised."""
+_EVENED: Final = 0.3
+"""Share of the mean of its neighbours that a segment takes on each time before it is raised."""
 _KEPT: Final = 0.3
 """Share of the gait's own shape in an arm that holds on."""
 _RAISED: Final = np.radians(12.0)
@@ -280,9 +282,11 @@ def _held(
     before = np.arange(len(lengths))[:, None] < held.touching
     to_goal = (before | held.by_tip).astype(np.float64)
 
-    for steps in _STEPS:
+    for number, steps in enumerate(_STEPS):
+        # The last time it only has to meet its goal.
+        softer = evened(own, _EVENED * free) if number < len(_STEPS) - 1 else own
         own = raised(
-            own,
+            softer,
             lengths,
             free=free,
             roots=batch.roots,
