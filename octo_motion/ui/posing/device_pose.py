@@ -3,16 +3,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
 from bpy.props import IntProperty
 
-from ...blender.armature import active_armature
-from ...core.errors import OctoMotionError, SettingsError
+from ...core.errors import SettingsError
 from ...device.client import Client, State
-from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room
@@ -20,12 +18,9 @@ from .device_ndof import GRAB_BUTTONS, KEY_BUTTONS, NAME, NdofHands
 from .device_overlay import device_lines
 from .device_settings import device_settings, message
 from .overlay import Overlay
-from .puppet_session import PuppetSession, active_session
+from .puppet_session import PuppetSession
+from .session_operator import SessionOperator, tell
 
-if TYPE_CHECKING:
-    from bpy.stub_internal.rna_enums import OperatorReturnItems
-
-_RATE: Final = 1.0 / 60.0
 HELP: Final = (
     ("First button or G", "grab"),
     ("Second button or K", "key touched"),
@@ -78,29 +73,17 @@ def start_bridge(settings: Any) -> Client:
     return client
 
 
-class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
     bl_idname = "octo_motion.pose_device"
     bl_label = "Pose with Device"
     bl_description = (
         "Take hold of the figure with a space mouse or a force device: the first button grabs the "
         "nearest limb, the second one sets keys. Enter keeps the pose, Esc leaves all as it was"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
-    _session: PuppetSession | None = None
     _hands: Hands | None = None
-    _overlay: Overlay | None = None
-    _timer: Any = None
     _size: float = 1.0
     """Of the figure, puppet metres."""
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        going_on = active_session()
-        if going_on is not None:
-            cls.poll_message_set(f"{going_on.puppet.name} is being posed already")
-            return False
-        return super().poll(context)
 
     def run(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         """Without a window nobody sees the pointer."""
@@ -109,70 +92,36 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
             "Click it in the panel Device; scripts have octo_motion.pose_script.",
         )
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
+    def take_up(self, context: bpy.types.Context, session: PuppetSession) -> Overlay:
         """Start the bridge, and take the armature into its hands."""
-        window_manager, scene, window = context.window_manager, context.scene, context.window
-        if window is None or bpy.app.background:
-            return self.execute(context)
-        assert window_manager is not None
-        assert scene is not None
-        settings = device_settings(window_manager)
+        settings = device_settings(context.window_manager)
+        client = start_bridge(settings)
+        self._size = session.size * session.unit
         try:
-            self._session = PuppetSession(active_armature(context), scene)
-            client = start_bridge(settings)
-        except OctoMotionError as error:
-            self._end(context, keep=False)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self._size = self._session.size * self._session.unit
-        try:
-            self._hands = DeviceHands(self._session, client, self._told(settings))
-            _going_on.append(self._hands)
-            self._overlay = Overlay(self._hands, device_lines)
-            self._timer = window_manager.event_timer_add(_RATE, window=window)
-            window_manager.modal_handler_add(self)
+            self._hands = DeviceHands(session, client, self._told(settings))
         except BaseException:
             client.stop()
-            self._end(context, keep=False)
             raise
-        return {"RUNNING_MODAL"}
+        _going_on.append(self._hands)
+        return Overlay(self._hands, device_lines)
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
-        """One event."""
+    def turn(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
         hands = self._hands
-        if hands is None or self._session is None or self._session.ended:
-            self._end(context, keep=True)
-            return {"CANCELLED"}
-        try:
-            if event.type == "TIMER":
-                self._tick(context, hands)
-                return {"PASS_THROUGH"}
-            if event.type.startswith("NDOF_"):
-                self._push(context, hands, event)
-                return {"RUNNING_MODAL"}
-            outcome = self._handle(hands, event)
-        except OctoMotionError as error:
-            self._end(context, keep=False)
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except BaseException:
-            self._end(context, keep=False)
-            raise
-        if outcome is Outcome.FINISH:
-            self._end(context, keep=True)
-            return {"FINISHED"}
-        if outcome is Outcome.CANCEL:
-            self._end(context, keep=False)
-            return {"CANCELLED"}
-        return {"RUNNING_MODAL"} if outcome is Outcome.TAKEN else {"PASS_THROUGH"}
+        assert hands is not None
+        if event.type == "TIMER":
+            self._tick(context, hands)
+            return Outcome.PASSED
+        if event.type.startswith("NDOF_"):
+            self._push(context, hands, event)
+            return Outcome.TAKEN
+        return self._handle(hands, event)
 
-    def cancel(self, context: bpy.types.Context) -> None:
-        """Blender's own end of it: another file is opened, or Blender quits."""
-        self._end(context, keep=False)
+    def put_down(self) -> None:
+        """Leave no process behind."""
+        hands, self._hands = self._hands, None
+        if hands is not None:
+            _going_on.remove(hands)
+            hands.stop()
 
     def _told(self, settings: Any) -> Any:
         assert self._session is not None
@@ -189,7 +138,7 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
             self._let_go(context, hands)
         for notice in hands.notices():
             self.report({"WARNING"}, f"{notice.problem} {notice.remedy}".strip())
-        self._tell(context, hands)
+        tell(context, line(hands), HELP)
 
     def _let_go(self, context: bpy.types.Context, hands: Hands) -> None:
         tools = context.scene.tool_settings if context.scene else None
@@ -274,44 +223,6 @@ class OCTO_MOTION_OT_pose_device(ArmatureOperator, bpy.types.Operator):
         else:
             hands.session.record()
             hands.said = "Recording while the frames go by: play, and drag"
-
-    @staticmethod
-    def _tell(context: bpy.types.Context, hands: Hands) -> None:
-        text = line(hands)
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "VIEW_3D":
-                area.header_text_set(text)
-                area.tag_redraw()
-        if context.workspace is not None:
-            context.workspace.status_text_set("    ".join(f"{keys}: {what}" for keys, what in HELP))
-
-    def _end(self, context: bpy.types.Context, *, keep: bool) -> None:
-        """Leave nothing on screen and no process behind; safe to call twice."""
-        session, self._session = self._session, None
-        hands, self._hands = self._hands, None
-        overlay, self._overlay = self._overlay, None
-        timer, self._timer = self._timer, None
-        try:
-            if hands is not None:
-                hands.stop()
-            if session is not None:
-                if keep:
-                    session.finish()
-                else:
-                    session.cancel()
-        finally:
-            if hands in _going_on:
-                _going_on.remove(hands)
-            if overlay is not None:
-                overlay.take_down()
-            if timer is not None and context.window_manager is not None:
-                context.window_manager.event_timer_remove(timer)
-            for area in context.screen.areas if context.screen else ():
-                if area.type == "VIEW_3D":
-                    area.header_text_set(None)
-                    area.tag_redraw()
-            if context.workspace is not None:
-                context.workspace.status_text_set(None)
 
 
 def _is_undo(event: Any) -> bool:

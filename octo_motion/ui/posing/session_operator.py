@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the operators share that pose an armature in the viewport until Enter or Esc."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Final, cast
+
+import bpy
+
+from ...blender.armature import active_armature
+from ...core.errors import OctoMotionError
+from ..armature_operator import ArmatureOperator
+from .controls import Outcome
+from .puppet_session import PuppetSession, active_session
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+    from .overlay import Overlay
+
+_RATE: Final = 1.0 / 60.0
+"""Seconds between two ticks."""
+
+
+class SessionOperator(ArmatureOperator):
+    """Mix-in: write ``take_up``, ``turn`` and ``put_down``. One session is one undo step."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    _session = cast("PuppetSession | None", None)
+    _overlay = cast("Overlay | None", None)
+    _timer = cast("Any", None)
+
+    def take_up(self, context: bpy.types.Context, session: PuppetSession) -> Overlay:
+        """Make ready what poses; may raise ``OctoMotionError``."""
+        raise NotImplementedError
+
+    def turn(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
+        """One event, the timer's among them; may raise ``OctoMotionError``."""
+        raise NotImplementedError
+
+    def put_down(self) -> None:
+        """Let go of what poses, if it was taken up: before the session ends, and only once."""
+        raise NotImplementedError
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        going_on = active_session()
+        if going_on is not None:
+            cls.poll_message_set(f"{going_on.puppet.name} is being posed already")  # type: ignore[attr-defined]
+            return False
+        return super().poll(context)
+
+    def invoke(
+        self,
+        context: bpy.types.Context,
+        event: bpy.types.Event,  # noqa: ARG002
+    ) -> set[OperatorReturnItems]:
+        """Take the armature into the hand."""
+        window_manager, scene, window = context.window_manager, context.scene, context.window
+        if window is None or bpy.app.background:
+            return self.execute(context)
+        assert window_manager is not None
+        assert scene is not None
+        try:
+            self._session = PuppetSession(active_armature(context), scene)
+            self._overlay = self.take_up(context, self._session)
+            self._timer = window_manager.event_timer_add(_RATE, window=window)
+            window_manager.modal_handler_add(cast("bpy.types.Operator", self))
+        except OctoMotionError as error:
+            return self._fail(context, error)
+        except BaseException:
+            self._end(context, keep=False)
+            raise
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
+        """One event."""
+        if self._session is None or self._session.ended:
+            # Another file was opened, or the extension switched off.
+            self._end(context, keep=True)
+            return {"CANCELLED"}
+        try:
+            outcome = self.turn(context, event)
+        except OctoMotionError as error:
+            return self._fail(context, error)
+        except BaseException:
+            self._end(context, keep=False)
+            raise
+        if outcome is Outcome.FINISH:
+            self._end(context, keep=True)
+            return {"FINISHED"}
+        if outcome is Outcome.CANCEL:
+            self._end(context, keep=False)
+            return {"CANCELLED"}
+        return {"RUNNING_MODAL"} if outcome is Outcome.TAKEN else {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender's own end of it: another file is opened, or Blender quits."""
+        self._end(context, keep=False)
+
+    def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
+        self._end(context, keep=False)
+        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+        return {"CANCELLED"}
+
+    def _end(self, context: bpy.types.Context, *, keep: bool) -> None:
+        """Leave nothing on screen; safe to call twice."""
+        session, self._session = self._session, None
+        overlay, self._overlay = self._overlay, None
+        timer, self._timer = self._timer, None
+        try:
+            try:
+                self.put_down()
+            finally:
+                if session is not None:
+                    session.finish() if keep else session.cancel()
+        finally:
+            if overlay is not None:
+                overlay.take_down()
+            if timer is not None and context.window_manager is not None:
+                context.window_manager.event_timer_remove(timer)
+            tell(context, None)
+
+
+def tell(
+    context: bpy.types.Context, line: str | None, keys: Iterable[tuple[str, str]] = ()
+) -> None:
+    """Show a line in the headers of 3D viewports, and what keys do in the status bar.
+
+    Args:
+        context: Blender's.
+        line: none to show Blender's own again.
+        keys: and what each does.
+    """
+    for area in context.screen.areas if context.screen else ():
+        if area.type == "VIEW_3D":
+            area.header_text_set(line)
+            area.tag_redraw()
+    if context.workspace is not None:
+        shown = "    ".join(f"{key}: {what}" for key, what in keys)
+        context.workspace.status_text_set(None if line is None else shown)
