@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -57,6 +58,12 @@ def hands() -> Iterator[DeviceHands]:
     yield hands
     hands.stop()
     session.cancel()
+
+
+def curves_of(action: Any) -> dict[tuple[str, int], Any]:
+    """The F-curves of an action's only layer, by path and index."""
+    bags = action.layers[0].strips[0].channelbags
+    return {(each.data_path, each.array_index): each for bag in bags for each in bag.fcurves}
 
 
 FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -138,6 +145,27 @@ def test_enter_keeps_pose_and_keys_and_escape_takes_them_back(hands: DeviceHands
     hands.session.cancel()
     assert abs(turn_of("bone2")[1:]).max() < 1e-6
     assert armature.animation_data is None or armature.animation_data.action is None
+
+
+def test_keys_set_with_a_device_are_in_the_file(hands: DeviceHands, tmp_path: Path) -> None:
+    bpy.context.scene.frame_set(7)
+    hands.tick(TOLD, room())
+    grabbed(hands)
+    wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
+    device_pose.OCTO_MOTION_OT_pose_device._key(hands, all_bones=False)
+    turn = turn_of("bone2")
+    hands.stop()
+    hands.session.finish()
+    path = tmp_path / "posed.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    animation: Any = the_arm().animation_data
+    curves = curves_of(animation.action)
+    found = [curves['pose.bones["bone2"].rotation_quaternion', part] for part in range(4)]
+    assert [len(each.keyframe_points) for each in found] == [1] * 4
+    assert {each.keyframe_points[0].co.x for each in found} == {7.0}
+    np.testing.assert_allclose([each.evaluate(7.0) for each in found], turn, atol=1e-5)
 
 
 def test_change_of_frame_counts_and_hands_let_go(hands: DeviceHands) -> None:
