@@ -52,6 +52,7 @@ from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import (
+    Travel,
     TravelSettings,
     duration,
     plan_travel,
@@ -131,6 +132,37 @@ class Summary:
         )
         fewer = f"{self.keys:,} keys instead of {self.dense_keys:,}."
         return " ".join([told, *([fewer] * (self.keys < self.dense_keys)), *self.notes])
+
+
+@dataclass(eq=False)
+class _Posed:
+    """The arms at all frames, while they are worked out."""
+
+    rotations: Floats
+    """(frames, bones, 4)"""
+    strains: Floats
+    """(frames, bones) by how much bones are longer than at rest, as a share."""
+    late: Floats
+    """(frames, arms) arm lengths to the foothold that an arm cannot reach."""
+    misses: Floats
+    """(frames, arms) arm lengths to the targets of the gait."""
+    lying: list[np.ndarray]
+    """For each arm (frames, joints) which rest on the ground."""
+    cycles: np.ndarray
+    """(frames, arms) number of each arm's cycle."""
+
+    @classmethod
+    def of(cls, frames: int, arms: Sequence[Arm]) -> _Posed:
+        """Arms that hold on to nothing."""
+        bones = sum(len(arm.bones) for arm in arms)
+        return cls(
+            rotations=np.empty((frames, bones, 4)),
+            strains=np.zeros((frames, bones)),
+            late=np.zeros((frames, len(arms))),
+            misses=np.zeros((frames, len(arms))),
+            lying=[np.zeros((frames, len(arm.bones) + 1), dtype=bool) for arm in arms],
+            cycles=np.zeros((frames, len(arms)), dtype=np.int64),
+        )
 
 
 @dataclass(eq=False)
@@ -220,128 +252,170 @@ class Shot:
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
-        standing = self.standing
-        table = standing.bearings if standing is not None else None
+        table = self.standing.bearings if self.standing is not None else None
         travel = plan_travel(self.route, self.travel, self.times, table)
-        if self.changing is not None:
-            places = self.changing.course.at(travel.distance)
-        elif standing is not None:
-            places = standing.place(travel)
-        else:
-            up = rotate(travel.rotations, _UP) if self.gait.on_ground else _UP
-            places = travel.positions + self.height * up, travel.rotations
-        locations, orientations = object_transforms(self.body, self.scale, *places)
+        places = self._places(travel)
         # In place the ground goes by, and arms are measured as if the body went along it.
-        going = locations, orientations
-        if self.in_place:
-            locations, orientations = self._in_place()
-        count, bones = len(self.frames), len(self.generator.bones)
-        rotations = np.empty((count, bones, 4))
-        strains, late = np.zeros((count, bones)), np.zeros((count, len(self.arms)))
-        misses = np.zeros((count, len(self.arms)))
-        lying = [np.zeros((count, len(arm.bones) + 1), dtype=bool) for arm in self.arms]
-        cycles = np.zeros((count, len(self.arms)), dtype=np.int64)
-        step = max(1, _BONES_AT_ONCE // max(bones, 1))
-        moving = 1.0 if self.tolerances is None else _MOVING
-        joints: list[list[Floats]] = []
-        shapes: list[tuple[Floats, ...]] = []
+        going = object_transforms(self.body, self.scale, *places)
+        self.locations, self.orientations = self._in_place() if self.in_place else going
+        posed = _Posed.of(len(self.frames), self.arms)
         if self.changing is not None:
-            for done in self.changing.compute(travel.distance, places, step):
-                if isinstance(done, Moved):
-                    rotations, strains, late, misses = (
-                        *(done.rotations, done.strains, done.late, done.misses),
-                    )
-                    lying, cycles = list(done.lying), done.cycles
-                else:
-                    yield moving * done
-            self.swimming = self.changing.swimming(travel.distance)
-        for start in range(0, 0 if self.changing else count, step):
-            part = slice(start, min(start + step, count))
-            if standing is not None:
-                stood = standing.pose(travel, part, places)
-                rotations[part], strains[part] = stood.rotations, stood.strains
-                late[part] = stood.misses
-                cycles[part] = stood.cycles
-                joints.append(standing.walk.by_arm(stood.joints))
-                shapes.append(stood.shapes)
-                for arm, rests in zip(lying, standing.walk.by_arm(stood.lying), strict=True):
-                    arm[part] = rests
-            else:
-                poses = self.generator.pose(travel.phase[part], travel.turn[part])
-                rotations[part] = poses.rotations
-                misses[part] = poses.misses.max(axis=2)
-            if part.stop < count:
-                yield moving * part.stop / count
-        if standing is not None and self.changing is None:
-
-            def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
-                """Some frames anew, with arms raised; others are left as they are."""
-                higher = Raise(lift, tuple(each[:, :, chosen] for each in asked))
-                stood = standing.pose(travel, chosen, places, higher)
-                late[np.ix_(chosen, higher.arms)] = stood.misses[:, higher.arms]
-                poses = Poses(stood.rotations, stood.strains, going[0][chosen], going[1][chosen])
-                return poses, standing.walk.by_arm(stood.joints, higher)
-
-            asked = [np.concatenate(each, axis=2) for each in zip(*shapes, strict=True)]
-            frames = _arm_frames(self.skeleton, self.arms, self.body)
-            course = Course(frames, standing.ground, self.scale, cyclic=self.in_place)
-            whole = Poses(rotations, strains, *going)
-            together = [np.concatenate(each) for each in zip(*joints, strict=True)]
-            raised = raised_between(course, whole, together, again)
-            rotations, strains = raised.rotations, raised.strains
-        busy = np.zeros((count, len(self.arms)), dtype=bool)
-        if self.reaching is not None:
-            travelling = Travelling(locations, orientations, self.scale)
-            before = rotations.copy()
-            reached = self.reaching.apply(self.frames, rotations, travelling, strains)
-            self.reached, self.carried = reached
-            busy = self._let_go(np.any(rotations != before, axis=-1), lying, late, misses)
-        too_many = self.apart.too_many(count) if self.apart is not None and self.keep_apart else ""
-        self.warnings.extend([too_many] * bool(too_many))
-        if self.apart is not None and self.keep_apart and not too_many:
-            moved = kept_apart(
-                self.apart.bulk,
-                rotations,
-                strains,
-                lying=lying,
-                busy=busy,
-                travel=going,
-                ground=self._ground(),
-                scale=self.scale,
-                frames_per_cycle=self.cycle,
-                cyclic=self.in_place,
-            )
-            rotations = rotations if moved is None else moved
-        separation, every = None, 1
-        if self.apart is not None and self.tell_overlaps:
-            separation, every = self.apart.measure(rotations, strains)
-            self.overlaps = self.apart.told(separation, every, self.frames)
-        if self.measure:
-            names = [arm.name for arm in self.arms]
-            frames = _arm_frames(self.skeleton, self.arms, self.body)
-            self.measured = Measured(
-                frames=self.frames,
-                arms=frames,
-                names=names,
-                poses=Poses(rotations, strains, *going),
-                misses=np.maximum(late, misses),
-                scale=self.scale,
-                ground=self._ground(),
-                lying=lying,
-                cycles=cycles,
-                separation=separation,
-                every=every,
-                halfway=automatic(Poses(rotations, strains, *going), cyclic=self.repeats),
-            )
-        self.rotations, self.misses = rotations, misses
-        self.strains, self.out_of_reach = strains, late
-        self.locations, self.orientations = locations, orientations
+            steps = self._change(self.changing, travel, places, posed)
+        elif self.standing is not None:
+            steps = self._stand(self.standing, travel, places, going, posed)
+        else:
+            steps = self._follow(travel, posed)
+        moving = 1.0 if self.tolerances is None else _MOVING
+        for share in steps:
+            yield moving * share
+        busy = self._reach(posed)
+        self._part(posed, busy, going)
+        self._look(posed, going)
+        self.rotations, self.misses = posed.rotations, posed.misses
+        self.strains, self.out_of_reach = posed.strains, posed.late
         if self.tolerances is not None:
             yield moving
             for share in self._reduce(self.tolerances):
                 yield moving + (1.0 - moving) * share
         self._tell_quality()
         yield 1.0
+
+    def _places(self, travel: Travel) -> tuple[Floats, Floats]:
+        """Centres (frames, 3) and orientations (frames, 4) of the body, world."""
+        if self.changing is not None:
+            return self.changing.course.at(travel.distance)
+        if self.standing is not None:
+            return self.standing.place(travel)
+        up = rotate(travel.rotations, _UP) if self.gait.on_ground else _UP
+        return travel.positions + self.height * up, travel.rotations
+
+    def _portions(self) -> Iterator[slice]:
+        """Frames that are worked on at a time."""
+        count = len(self.frames)
+        step = max(1, _BONES_AT_ONCE // max(len(self.generator.bones), 1))
+        return (slice(start, min(start + step, count)) for start in range(0, count, step))
+
+    def _follow(self, travel: Travel, posed: _Posed) -> Iterator[float]:
+        """Arms as the gait alone has them."""
+        count = len(self.frames)
+        for part in self._portions():
+            poses = self.generator.pose(travel.phase[part], travel.turn[part])
+            posed.rotations[part] = poses.rotations
+            posed.misses[part] = poses.misses.max(axis=2)
+            if part.stop < count:
+                yield part.stop / count
+
+    def _change(
+        self, changing: Changing, travel: Travel, places: tuple[Floats, Floats], posed: _Posed
+    ) -> Iterator[float]:
+        """Arms of a journey on which the gait changes."""
+        step = next(self._portions(), slice(0, 1)).stop
+        for done in changing.compute(travel.distance, places, step):
+            if isinstance(done, Moved):
+                posed.rotations, posed.strains = done.rotations, done.strains
+                posed.late, posed.misses = done.late, done.misses
+                posed.lying, posed.cycles = list(done.lying), done.cycles
+            else:
+                yield done
+        self.swimming = changing.swimming(travel.distance)
+
+    def _stand(
+        self,
+        standing: Standing,
+        travel: Travel,
+        places: tuple[Floats, Floats],
+        going: tuple[Floats, Floats],
+        posed: _Posed,
+    ) -> Iterator[float]:
+        """Arms that hold the ground, and do not dip into it between frames."""
+        count = len(self.frames)
+        joints: list[list[Floats]] = []
+        shapes: list[tuple[Floats, ...]] = []
+        for part in self._portions():
+            stood = standing.pose(travel, part, places)
+            posed.rotations[part], posed.strains[part] = stood.rotations, stood.strains
+            posed.late[part], posed.cycles[part] = stood.misses, stood.cycles
+            joints.append(standing.walk.by_arm(stood.joints))
+            shapes.append(stood.shapes)
+            for arm, rests in zip(posed.lying, standing.walk.by_arm(stood.lying), strict=True):
+                arm[part] = rests
+            if part.stop < count:
+                yield part.stop / count
+
+        def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
+            """Some frames anew, with arms raised; others are left as they are."""
+            higher = Raise(lift, tuple(each[:, :, chosen] for each in asked))
+            stood = standing.pose(travel, chosen, places, higher)
+            posed.late[np.ix_(chosen, higher.arms)] = stood.misses[:, higher.arms]
+            poses = Poses(stood.rotations, stood.strains, going[0][chosen], going[1][chosen])
+            return poses, standing.walk.by_arm(stood.joints, higher)
+
+        asked = [np.concatenate(each, axis=2) for each in zip(*shapes, strict=True)]
+        frames = _arm_frames(self.skeleton, self.arms, self.body)
+        course = Course(frames, standing.ground, self.scale, cyclic=self.in_place)
+        together = [np.concatenate(each) for each in zip(*joints, strict=True)]
+        whole = Poses(posed.rotations, posed.strains, *going)
+        raised = raised_between(course, whole, together, again)
+        posed.rotations, posed.strains = raised.rotations, raised.strains
+
+    def _reach(self, posed: _Posed) -> np.ndarray:
+        """Let arms reach; which of them do (frames, arms)."""
+        if self.reaching is None:
+            return np.zeros(posed.late.shape, dtype=bool)
+        assert self.locations is not None
+        assert self.orientations is not None
+        travelling = Travelling(self.locations, self.orientations, self.scale)
+        before = posed.rotations.copy()
+        reached = self.reaching.apply(self.frames, posed.rotations, travelling, posed.strains)
+        self.reached, self.carried = reached
+        return self._let_go(np.any(posed.rotations != before, axis=-1), posed)
+
+    def _part(self, posed: _Posed, busy: np.ndarray, going: tuple[Floats, Floats]) -> None:
+        """Let arms make way for each other, but for those that are busy (frames, arms)."""
+        if self.apart is None or not self.keep_apart:
+            return
+        too_many = self.apart.too_many(len(self.frames))
+        if too_many:
+            self.warnings.append(too_many)
+            return
+        moved = kept_apart(
+            self.apart.bulk,
+            posed.rotations,
+            posed.strains,
+            lying=posed.lying,
+            busy=busy,
+            travel=going,
+            ground=self._ground(),
+            scale=self.scale,
+            frames_per_cycle=self.cycle,
+            cyclic=self.in_place,
+        )
+        if moved is not None:
+            posed.rotations = moved
+
+    def _look(self, posed: _Posed, going: tuple[Floats, Floats]) -> None:
+        """Look where arms overlap, and keep what figures are taken from."""
+        separation, every = None, 1
+        if self.apart is not None and self.tell_overlaps:
+            separation, every = self.apart.measure(posed.rotations, posed.strains)
+            self.overlaps = self.apart.told(separation, every, self.frames)
+        if not self.measure:
+            return
+        poses = Poses(posed.rotations, posed.strains, *going)
+        self.measured = Measured(
+            frames=self.frames,
+            arms=_arm_frames(self.skeleton, self.arms, self.body),
+            names=[arm.name for arm in self.arms],
+            poses=poses,
+            misses=np.maximum(posed.late, posed.misses),
+            scale=self.scale,
+            ground=self._ground(),
+            lying=posed.lying,
+            cycles=posed.cycles,
+            separation=separation,
+            every=every,
+            halfway=automatic(poses, cyclic=self.repeats),
+        )
 
     def _tell_quality(self) -> None:
         """Measure what the keys play, where figures are wanted."""
@@ -372,27 +446,23 @@ class Shot:
                 return
             yield share
 
-    def _let_go(
-        self, moved: np.ndarray, lying: Sequence[np.ndarray], late: Floats, misses: Floats
-    ) -> np.ndarray:
-        """Note in place that arms which reach hold no ground and follow no gait.
+    def _let_go(self, moved: np.ndarray, posed: _Posed) -> np.ndarray:
+        """Note that arms which reach hold no ground and follow no gait.
 
         Returns:
             Which arms (frames, arms) these are.
 
         Args:
             moved: (frames, bones) which bones reach.
-            lying: for each arm (frames, joints) which rest on the ground.
-            late: (frames, arms) arm lengths to footholds.
-            misses: (frames, arms) arm lengths to targets.
+            posed: the arms; changed in place.
         """
-        start, busy = 0, np.zeros(late.shape, dtype=bool)
+        start, busy = 0, np.zeros(posed.late.shape, dtype=bool)
         for number, arm in enumerate(self.arms):
             own = moved[:, start : start + len(arm.bones)]
             start += len(arm.bones)
-            lying[number][:, 1:] &= ~np.logical_or.accumulate(own, axis=1)
+            posed.lying[number][:, 1:] &= ~np.logical_or.accumulate(own, axis=1)
             reaches = own.any(axis=1)
-            late[reaches, number] = misses[reaches, number] = 0.0
+            posed.late[reaches, number] = posed.misses[reaches, number] = 0.0
             busy[:, number] = reaches
         return busy
 
