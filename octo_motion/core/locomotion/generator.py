@@ -123,8 +123,8 @@ class ArmPoses:
     rotations: Floats
     """(frames, bones, 4) unit quaternions in each bone's rest frame (Blender's matrix_basis)."""
     misses: Floats
-    """(frames, arms, groups) distance of each group's end from its target, in arm lengths, less what
-    the setting ``give`` lets it and those before it reach beyond."""
+    """(frames, arms, groups) distance of each group's end from its target, in arm lengths, less
+    what the setting ``give`` lets it and those before it reach beyond."""
 
 
 @dataclass(frozen=True, eq=False)
