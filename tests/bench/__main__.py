@@ -9,7 +9,8 @@ measurement has a process of its own.
 
 "splicing" as the first word measures the quality of splices instead; its own --help tells more.
 "live" measures only how fast a walk follows a change, and what holding a ground costs.
-"apart" measures how far arms pass through each other, with Keep Apart and without.
+"apart" measures how far arms pass through each other, with Keep Apart and without; "keys" how many
+keys *Few* leaves of each gait.
 "device" measures how well the loop at the devices keeps time, "posing" how long a step of the
 plastic puppet takes.
 """
@@ -53,6 +54,11 @@ def main() -> None:
         from tests.bench import apart
 
         apart.main(sys.argv[2:])
+        return
+    if sys.argv[1:2] == ["keys"]:
+        from tests.bench import few_keys
+
+        few_keys.main(sys.argv[2:])
         return
     if sys.argv[1:2] == ["device"]:
         from tests.bench import device_loop

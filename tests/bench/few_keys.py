@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How many keys *Few* leaves of a motion, and how long it takes to find them.
+
+The default octopus moves along its default route with each gait of the add-on, at several
+tolerances of the bones' angle; the tips may be off by the default distance.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any, Final
+
+GAITS: Final = ("walk", "hurry", "prowl", "crawl", "swim", "settle")
+ANGLES: Final = (0.25, 0.5, 1.0, 2.0)
+"""Degrees."""
+
+
+def main(words: list[str]) -> None:
+    """Measure what the command line asks for, and print a table."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench keys", description=__doc__)
+    parser.add_argument("gaits", nargs="*", default=list(GAITS), help="of these only")
+    gaits = parser.parse_args(words).gaits
+
+    import bpy
+
+    import octo_motion
+
+    octo_motion.register()
+    try:
+        angles = "".join(f"{each:>8g}°" for each in ANGLES)
+        print(f"{'times fewer keys, bones within':<32}{angles}   seconds at 0.5°")
+        for gait in gaits:
+            found, seconds = zip(*(_measured(bpy, gait, angle) for angle in ANGLES), strict=True)
+            shares = "".join(f"{each:>9.1f}" for each in found)
+            print(f"{gait:<32}{shares}   {seconds[ANGLES.index(0.5)]:>10.1f}")
+    finally:
+        octo_motion.unregister()
+
+
+def _measured(bpy: Any, gait: str, degrees: float) -> tuple[float, float]:
+    """How many times fewer keys there are, and the seconds of making the motion with them."""
+    import numpy as np
+
+    from octo_motion.ui.locomotion.workflow import generate
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    armature = bpy.context.object
+    bpy.ops.octo_motion.add_route()
+    bpy.context.view_layer.objects.active = armature
+    settings = armature.octo_motion.locomotion
+    settings.gait, settings.keys, settings.key_angle = gait, "REDUCED", np.radians(degrees)
+    settings.tell_overlaps = False
+    start = time.perf_counter()
+    summary = generate(armature, bpy.context)
+    return summary.dense_keys / summary.keys, time.perf_counter() - start
