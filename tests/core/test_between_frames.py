@@ -9,8 +9,8 @@ from octo_motion.core.locomotion.between_frames import Course, raised_between
 from octo_motion.core.locomotion.figures import Poses
 from octo_motion.core.locomotion.grounded import Raise
 from octo_motion.core.locomotion.placement import object_transforms
-from octo_motion.core.rotations import Floats, rotate
-from tests.core.grounds import GROUNDS, Walker, walker
+from octo_motion.core.rotations import Floats, from_axis_angle, multiply, rotate
+from tests.core.grounds import GROUNDS, Walker, largest_turn, walker
 
 
 class Shot:
@@ -62,6 +62,21 @@ def test_on_bumps_at_a_fast_pace_arms_are_raised_at_the_frames_round_a_dip() -> 
     assert same.mean() > 0.1
     touched = np.unique(np.concatenate(shot.asked))
     assert np.all(same[np.setdiff1d(np.arange(len(same)), touched)])
+
+
+def test_an_arm_that_would_jerk_when_raised_is_left_as_it_was() -> None:
+    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 16)
+    poses, joints = shot.whole()
+
+    def jerky(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
+        raised, places = shot.again(chosen, lift)
+        aside = from_axis_angle(np.array([1.0, 0.0, 0.0]), 0.7 * (chosen % 2))
+        turned = multiply(raised.rotations, aside[:, None])
+        return Poses(turned, raised.strains, raised.locations, raised.orientations), places
+
+    after = raised_between(shot.course, poses, joints, jerky)
+    assert len(shot.asked) > 0
+    assert largest_turn(after.rotations) <= largest_turn(poses.rotations) + np.radians(5.0)
 
 
 def test_what_is_not_looked_at_cannot_dip() -> None:

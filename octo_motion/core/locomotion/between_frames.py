@@ -36,6 +36,8 @@ and with the whole arm as a lever, an eighth of what each of its bones' quaterni
 as that is half an angle, and half as there are two such frames."""
 _WIDTH: Final = 1
 """Frames of the means by which arms rise and sink again: smoothly, within six frames."""
+_JERK: Final = np.radians(5.0)
+"""How much farther a bone of an arm that is raised may turn within a frame."""
 _MOST: Final = 0.25
 """Arm lengths that an arm is raised at most: what needs more is no matter of frames."""
 
@@ -158,7 +160,8 @@ def raised_between(
 def _best(course: Course, tried: Sequence[tuple[Poses, Floats]], raised: np.ndarray) -> Poses:
     """Of several ways to raise arms, wherever one was raised, the one with the least dip.
 
-    A higher arm may dip the more, where it has to come down from there in a frame.
+    A higher arm may dip the more, where it has to come down from there in a frame. And one that
+    folds may jerk when it is raised: better it dips than that.
 
     Args:
         course: the arms.
@@ -172,11 +175,23 @@ def _best(course: Course, tried: Sequence[tuple[Poses, Floats]], raised: np.ndar
         for first, end in _runs(raised[:, number]):
             moments = slice(max(first - 1, 0), end)
             depths = [deep[moments, number].max(initial=0.0) for _, deep in tried]
-            poses, _ = tried[int(np.argmin(np.maximum(depths, _TOLERATED)))]
+            turns = [
+                _largest_turn(poses.rotations[max(first - 1, 0) : end + 1, bones])
+                for poses, _ in tried
+            ]
+            jerky = np.array(turns) > turns[0] + _JERK
+            badness = np.where(jerky, np.inf, np.maximum(depths, _TOLERATED))
+            poses, _ = tried[int(np.argmin(badness))]
             rotations[first:end, bones] = poses.rotations[first:end, bones]
             strains[first:end, bones] = poses.strains[first:end, bones]
     whole = tried[0][0]
     return Poses(rotations, strains, whole.locations, whole.orientations)
+
+
+def _largest_turn(rotations: Floats) -> float:
+    """Radians that a bone turns at most from one of the frames (frames, bones, 4) to the next."""
+    cosines = np.abs(np.einsum("fbi,fbi->fb", rotations[1:], rotations[:-1]))
+    return float(2.0 * np.arccos(np.minimum(cosines.min(initial=1.0), 1.0)))
 
 
 def _at_frames(halfway: Floats, *, cyclic: bool) -> Floats:
