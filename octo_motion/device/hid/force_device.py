@@ -10,7 +10,7 @@ from ...core.errors import DeviceError
 from ..driver import Description, DeviceLostError, Kind, Sample
 from ..spatial import ZERO, Vector
 from . import force_profile as profile
-from .system import Found, Handle, drain, open_device
+from .system import Found, Handle, Line, open_device
 
 
 def is_force_device(found: Found) -> bool:
@@ -22,7 +22,6 @@ class ForceDevice:
     """One force device."""
 
     def __init__(self, found: Found, handle: Handle, features: profile.Features) -> None:
-        self._handle: Handle | None = handle
         self._sequence = 0
         self._description = Description(
             name=found.name or "Force device",
@@ -32,6 +31,7 @@ class ForceDevice:
             buttons=tuple(f"Button {index + 1}" for index in range(features.buttons)),
             dynamics=features.dynamics,
         )
+        self._line = Line(handle, self._description.name)
 
     @classmethod
     def open(cls, found: Found) -> ForceDevice:
@@ -64,13 +64,7 @@ class ForceDevice:
         Raises:
             DeviceLostError: it was unplugged.
         """
-        if self._handle is None:
-            raise DeviceLostError(self._description.name)
-        try:
-            reports = drain(self._handle)
-        except (OSError, ValueError) as error:
-            raise DeviceLostError(self._description.name) from error
-        for report in reversed(reports):
+        for report in reversed(self._line.waiting()):
             with suppress(profile.ReportError):
                 state = profile.parse_state(report)
                 return Sample(
@@ -85,24 +79,15 @@ class ForceDevice:
         Raises:
             DeviceLostError: it was unplugged.
         """
-        if self._handle is None:
-            raise DeviceLostError(self._description.name)
         self._sequence += 1
         command = profile.Command(
             self._sequence, profile.WATCHDOG_MILLISECONDS, force != ZERO or torque != ZERO,
             force, torque,
         )  # fmt: skip
-        try:
-            written = self._handle.write(profile.pack_command(command))
-        except (OSError, ValueError) as error:
-            raise DeviceLostError(self._description.name) from error
-        if written < 0:
-            raise DeviceLostError(self._description.name)
+        self._line.write(profile.pack_command(command))
 
     def close(self) -> None:
         """Take force away and let the device go."""
-        if self._handle is not None:
-            with suppress(DeviceLostError, profile.ReportError):
-                self.send(ZERO, ZERO)
-            self._handle.close()
-            self._handle = None
+        with suppress(DeviceLostError, profile.ReportError):
+            self.send(ZERO, ZERO)
+        self._line.close()

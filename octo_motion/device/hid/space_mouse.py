@@ -7,13 +7,13 @@ import time
 from typing import Final
 
 from ..calibration import NONE
-from ..driver import Description, DeviceLostError, Kind, Sample
+from ..driver import Description, Kind, Sample
 from ..spatial import Vector
 from .descriptor import DescriptorError, Layout, parse
 from .models import USAGE, USAGE_PAGE, model_of
 from .multi_axis import MultiAxis, classic_layout
 from .response import Axes, Response
-from .system import Found, Handle, descriptor_of, drain, open_device
+from .system import Found, Handle, Line, descriptor_of, open_device
 
 _STILL: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _SILENCE: Final = 0.5
@@ -36,7 +36,6 @@ class SpaceMouse:
     def __init__(self, found: Found, handle: Handle, layout: Layout, response: Response) -> None:
         model = model_of(found.vendor, found.product)
         names = model.buttons if model else {}
-        self._handle: Handle | None = handle
         self._axes = MultiAxis(layout)
         self._heard = 0.0
         self.response = response
@@ -52,6 +51,7 @@ class SpaceMouse:
                 names.get(bit, f"Button {bit + 1}") for bit in range(max(names, default=1) + 1)
             ),
         )
+        self._line = Line(handle, self._description.name)
 
     @classmethod
     def open(cls, found: Found, response: Response | None = None) -> SpaceMouse:
@@ -84,12 +84,7 @@ class SpaceMouse:
         Raises:
             DeviceLostError: it was unplugged.
         """
-        if self._handle is None:
-            raise DeviceLostError(self._description.name)
-        try:
-            reports = drain(self._handle)
-        except (OSError, ValueError) as error:
-            raise DeviceLostError(self._description.name) from error
+        reports = self._line.waiting()
         now = time.perf_counter()
         known = [self._axes.feed(report) for report in reports]
         if any(known):
@@ -109,6 +104,4 @@ class SpaceMouse:
 
     def close(self) -> None:
         """Let the device go."""
-        if self._handle is not None:
-            self._handle.close()
-            self._handle = None
+        self._line.close()

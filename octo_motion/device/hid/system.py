@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 from ...core.errors import DeviceError
+from ..driver import DeviceLostError
 
 UDEV_FILE: Final = "/etc/udev/rules.d/70-octo-motion.rules"
 _MOST_REPORT_BYTES: Final = 256
+_MOST_REPORTS: Final = 64
 
 
 class Handle(Protocol):
@@ -160,16 +162,50 @@ def descriptor_of(device: Any) -> bytes | None:
         return None
 
 
-def drain(device: Handle) -> list[bytes]:
-    """All reports that wait, oldest first. More than 64 are the next call's.
+class Line:
+    """What a driver hears of an open device and says to it, until it is closed or pulled out."""
 
-    Raises:
-        OSError: the device is gone.
-    """
-    reports: list[bytes] = []
-    for _ in range(64):
-        data = device.read(_MOST_REPORT_BYTES)
-        if not data:
-            break
-        reports.append(bytes(data))
-    return reports
+    def __init__(self, handle: Handle, name: str) -> None:
+        self._handle: Handle | None = handle
+        self._name = name
+
+    def waiting(self) -> list[bytes]:
+        """All reports that wait, oldest first. More than 64 are the next call's.
+
+        Raises:
+            DeviceLostError: it was unplugged or closed.
+        """
+        reports: list[bytes] = []
+        for _ in range(_MOST_REPORTS):
+            try:
+                data = self._there().read(_MOST_REPORT_BYTES)
+            except (OSError, ValueError) as error:
+                raise DeviceLostError(self._name) from error
+            if not data:
+                break
+            reports.append(bytes(data))
+        return reports
+
+    def write(self, report: bytes) -> None:
+        """Send a report.
+
+        Raises:
+            DeviceLostError: it was unplugged or closed.
+        """
+        try:
+            written = self._there().write(report)
+        except (OSError, ValueError) as error:
+            raise DeviceLostError(self._name) from error
+        if written < 0:
+            raise DeviceLostError(self._name)
+
+    def close(self) -> None:
+        """Let the device go."""
+        if self._handle is not None:
+            self._handle.close()
+            self._handle = None
+
+    def _there(self) -> Handle:
+        if self._handle is None:
+            raise DeviceLostError(self._name)
+        return self._handle
