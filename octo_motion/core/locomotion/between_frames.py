@@ -59,6 +59,15 @@ class Course:
         ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)]).tolist()
         return [slice(start, end) for start, end in pairwise(ends)]
 
+    def joints(self, poses: Poses) -> list[Floats]:
+        """Joints of each arm (moments, joints, 3), world."""
+        found = []
+        for arm, own in zip(self.arms, self.bones, strict=True):
+            rotations = np.ascontiguousarray(poses.rotations[:, own])
+            joints = self.scale * arm.joints(arm.from_bones(rotations), poses.strains[:, own])
+            found.append(poses.locations[:, None] + rotate(poses.orientations[:, None], joints))
+        return found
+
     def clear(self, joints: Sequence[Floats], arms: Sequence[int] | None = None) -> Floats:
         """Arm lengths (frames, arms) that each arm's lowest joint is above the ground.
 

@@ -59,8 +59,8 @@ class Raise:
 
     lift: Floats
     """(frames, arms) arm lengths, where they do not lie."""
-    shapes: tuple[Floats, ...]
-    """``GroundedPoses.shapes`` of the same frames."""
+    shapes: tuple[Floats, ...] | None = None
+    """``GroundedPoses.shapes`` of the same frames, none where nobody has kept them."""
 
     @property
     def arms(self) -> list[int]:
@@ -223,11 +223,13 @@ class GroundedWalk:
                 joints.append(np.zeros((segments + 1, frames, 0, 3)))
                 lying.append(np.zeros((segments + 1, frames, 0), dtype=bool))
                 continue
-            if higher is None:
-                shapes, _ = generator.shapes(build, own, steering[:, columns])
+            if higher is None or higher.shapes is None:
+                every = list(build.arms)
+                shapes, _ = generator.shapes(build, angles[:, every], steering[:, every])
                 asked.append(shapes)
             else:
-                shapes = higher.shapes[number][..., chosen]
+                shapes = higher.shapes[number]
+            shapes = shapes[..., chosen]
             facing = multiply(orientations[:, None], generator.outward[columns]).reshape(batch, 4).T
             shapes = turned(facing, shapes.reshape(segments, 3, batch))
             roots = centres[:, None] + rotate(orientations[:, None], limbs.roots[chosen])

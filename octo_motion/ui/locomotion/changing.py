@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -25,7 +27,7 @@ from ...core.locomotion.course import Course, Line, SwumLine, WalkedLine
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Generator
-from ...core.locomotion.grounded import GroundedWalk
+from ...core.locomotion.grounded import GroundedWalk, Raise
 from ...core.locomotion.route import Route
 from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, travel_at
 from ...core.rotations import Floats
@@ -70,6 +72,67 @@ class Moved:
     cycles: np.ndarray
     """(frames, arms) number of each arm's cycle."""
 
+    @classmethod
+    def still(cls, frames: int, bones: Sequence[int]) -> Moved:
+        """Arms at rest that hold on to nothing.
+
+        Args:
+            frames: how many.
+            bones: how many bones each arm has.
+        """
+        rotations = np.zeros((frames, sum(bones), 4))
+        rotations[..., 0] = 1.0
+        return cls(
+            rotations=rotations,
+            strains=np.zeros((frames, sum(bones))),
+            late=np.zeros((frames, len(bones))),
+            misses=np.zeros((frames, len(bones))),
+            lying=[np.zeros((frames, each + 1), dtype=bool) for each in bones],
+            cycles=np.zeros((frames, len(bones)), dtype=np.int64),
+        )
+
+    def copy(self) -> Moved:
+        """The same, whose poses may be changed."""
+        return replace(
+            self,
+            rotations=self.rotations.copy(),
+            strains=self.strains.copy(),
+            late=self.late.copy(),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Journey:
+    """The arms on all legs of a journey, one for each way along it."""
+
+    changing: Changing
+    distance: Floats
+    """(frames,) metres along the route."""
+    places: tuple[Floats, Floats]
+    """Centres (frames, 3) and orientations (frames, 4) of the body."""
+    legs: tuple[Moved, ...]
+
+    @cached_property
+    def moved(self) -> Moved:
+        """The arms."""
+        return self.changing.joined(self.legs, self.distance)
+
+    def higher(self, chosen: np.ndarray, lift: Floats) -> tuple[Floats, Floats, Floats]:
+        """Some frames anew, with arms that are higher.
+
+        Args:
+            chosen: (n,) frames.
+            lift: (n, arms) arm lengths by which they are to be higher than they have to be.
+
+        Returns:
+            Rotations (n, bones, 4), strains (n, bones), and arm lengths (n, arms) from arms to
+            footholds that they cannot reach.
+        """
+        legs = [self.changing.again(leg, self, chosen, lift) for leg in range(len(self.legs))]
+        # All frames, so that bones turn the same way round from one leg to the next as they did.
+        moved = self.changing.joined(legs, self.distance)
+        return moved.rotations[chosen], moved.strains[chosen], moved.late[chosen]
+
 
 @dataclass(frozen=True, eq=False)
 class Changing:
@@ -91,7 +154,7 @@ class Changing:
 
     def compute(
         self, distance: Floats, places: tuple[Floats, Floats], step: int
-    ) -> Iterator[Moved | float]:
+    ) -> Iterator[Journey | float]:
         """Yield the share that is done, and in the end the arms.
 
         Args:
@@ -99,79 +162,138 @@ class Changing:
             places: centres (frames, 3) and orientations (frames, 4) of the body.
             step: frames to be worked on at a time.
         """
-        count, arms = len(distance), len(self.bones)
-        total = sum(self.bones)
-        result: Moved | None = None
-        for number in range(len(self.changes) + 1):
-            # The way before the first change, and then the one after each.
-            way = self.changes[number - 1].way if number else 0
-            if number:
-                shares = self._shares(number - 1, distance)
-                begin = float(self.windows[number - 1].start.min())
-            else:
-                shares, begin = np.ones((count, arms)), -np.inf
-            end = np.inf
-            if number < len(self.changes):
-                end = float(self.windows[number].end.max())
-            part = np.flatnonzero((distance >= begin) & (distance <= end))
-            moved = Moved(
-                np.zeros((count, total, 4)),
-                np.zeros((count, total)),
-                np.zeros((count, arms)),
-                np.zeros((count, arms)),
-                [np.zeros((count, bones + 1), dtype=bool) for bones in self.bones],
-                np.zeros((count, arms), dtype=np.int64),
-            )
-            moved.rotations[..., 0] = 1.0
+        legs: list[Moved] = []
+        count = len(self.changes) + 1
+        for leg in range(count):
+            part = np.flatnonzero(self._within(leg, distance))
+            moved = Moved.still(len(distance), self.bones)
             for start in range(0, len(part), step):
                 chosen = part[start : start + step]
-                self._pose(way, distance, places, chosen, moved)
-                yield 0.9 * (number + start / max(len(part), 1)) / (len(self.changes) + 1)
-            self._calm(number, way, distance, moved)
-            result = moved if result is None else self._joined(result, moved, shares)
-        assert result is not None
-        yield result
+                self._pose(self._way(leg), distance, places, chosen, moved)
+                yield 0.9 * (leg + start / max(len(part), 1)) / count
+            self._calm(leg, distance, np.arange(len(distance)), moved)
+            legs.append(moved)
+        yield Journey(self, distance, places, tuple(legs))
 
-    def _calm(self, number: int, way: int, distance: Floats, moved: Moved) -> None:
+    def _way(self, leg: int) -> int:
+        """The way before the first change, and then the one after each."""
+        return self.changes[leg - 1].way if leg else 0
+
+    def _within(self, leg: int, distance: Floats) -> np.ndarray:
+        """At which distances (frames,) any arm goes this way."""
+        begin = float(self.windows[leg - 1].start.min()) if leg else -np.inf
+        end = float(self.windows[leg].end.max()) if leg < len(self.changes) else np.inf
+        return (distance >= begin) & (distance <= end)
+
+    def _calm(
+        self,
+        leg: int,
+        distance: Floats,
+        frames: np.ndarray,
+        moved: Moved,
+        lift: Floats | None = None,
+    ) -> None:
         """Let arms that are about to go over, or have just done so, come to rest in their way.
 
         The body turns meanwhile as no walking body does: what an arm on the ground would make of
         that is wild. So an arm goes over from the pose in which it let go.
+
+        Args:
+            leg: which of the ways along the journey.
+            distance: (frames,) metres along the route.
+            frames: (n,) which of them are looked at.
+            moved: the arms on this leg; changed in place.
+            lift: (n, arms) arm lengths by which arms are to be higher, and nothing happens to the
+                others; none for all of them as high as they have to be.
         """
-        walk = self.walks[way]
+        walk = self.walks[self._way(leg)]
         if walk is None:
             return
-        ends = np.cumsum([0, *self.bones])
-        for change, leaving in ((number, True), (number - 1, False)):
+        bones = self._bones_of
+        for change, leaving in ((leg, True), (leg - 1, False)):
             if not 0 <= change < len(self.changes):
                 continue
             window = self.windows[change]
             within = _CALM * (self.changes[change].end - self.changes[change].start)
             asked: list[tuple[int, np.ndarray, np.ndarray, slice]] = []
-            places: list[Floats] = []
+            stops: list[Floats] = []
             for arm in range(len(self.bones)):
                 start, end = window.start[arm], window.end[arm]
-                chosen = np.flatnonzero((distance > start) & (distance < end))
-                here = distance[chosen]
+                inside = (distance[frames] > start) & (distance[frames] < end)
+                if lift is not None:
+                    inside &= lift[:, arm] > 0.0
+                own = np.flatnonzero(inside)
+                higher = np.zeros(len(own)) if lift is None else lift[own, arm]
+                here = distance[frames[own]]
                 if leaving:
                     here = start + slowing(here - start, within)
                 else:
                     here = end - slowing(end - here, within)
                 # At rest it is in the same pose from frame to frame.
-                here, again = np.unique(here, return_inverse=True)
-                count = sum(len(each) for each in places)
-                places.append(here)
-                asked.append((arm, chosen, again, slice(count, count + len(here))))
-            here = np.concatenate(places)
+                both = np.stack([here, higher], axis=1)
+                single, again = np.unique(both, axis=0, return_inverse=True)
+                count = sum(len(each) for each in stops)
+                stops.append(single)
+                part = slice(count, count + len(single))
+                asked.append((arm, frames[own], again.reshape(-1), part))
+            here, higher = np.concatenate(stops).T
             if not len(here):
                 continue
-            travel = self._travel(way, here)
-            stood = walk.pose(travel.phase, travel.turn, *self.course.at(here))
+            raised = None
+            if lift is not None:
+                raised = Raise(np.zeros((len(here), len(self.bones))))
+                for arm, _, _, part in asked:
+                    raised.lift[part, arm] = higher[part]
+            travel = self._travel(self._way(leg), here)
+            stood = walk.pose(travel.phase, travel.turn, *self.course.at(here), raised)
             for arm, chosen, again, part in asked:
-                bones = slice(int(ends[arm]), int(ends[arm + 1]))
-                moved.rotations[chosen, bones] = stood.rotations[part, bones][again]
-                moved.strains[chosen, bones] = stood.strains[part, bones][again]
+                moved.rotations[chosen, bones[arm]] = stood.rotations[part, bones[arm]][again]
+                moved.strains[chosen, bones[arm]] = stood.strains[part, bones[arm]][again]
                 moved.late[chosen, arm] = 0.0
+
+    def again(self, leg: int, journey: Journey, chosen: np.ndarray, lift: Floats) -> Moved:
+        """The arms on one leg of a journey, higher at some frames.
+
+        Args:
+            leg: which of the ways along the journey.
+            journey: as it was.
+            chosen: (n,) frames.
+            lift: (n, arms) arm lengths by which they are to be higher.
+        """
+        distance, places, before = journey.distance, journey.places, journey.legs[leg]
+        walk, inside = self.walks[self._way(leg)], self._within(leg, distance[chosen])
+        if walk is None or not np.any(lift[inside]):
+            return before
+        moved = before.copy()
+        raised, frames = Raise(lift[inside]), chosen[inside]
+        travel = self._travel(self._way(leg), distance[frames])
+        stood = walk.pose(travel.phase, travel.turn, places[0][frames], places[1][frames], raised)
+        for arm in raised.arms:
+            bones, higher = self._bones_of[arm], raised.lift[:, arm] > 0.0
+            own = frames[higher]
+            moved.rotations[own, bones] = stood.rotations[higher, bones]
+            moved.strains[own, bones] = stood.strains[higher, bones]
+            moved.late[own, arm] = stood.misses[higher, arm]
+        self._calm(leg, distance, chosen, moved, lift)
+        return moved
+
+    @cached_property
+    def _bones_of(self) -> list[slice]:
+        """Which bones of all arms' are those of each."""
+        ends = np.cumsum([0, *self.bones]).tolist()
+        return [slice(start, end) for start, end in pairwise(ends)]
+
+    def joined(self, legs: Sequence[Moved], distance: Floats) -> Moved:
+        """The whole journey (frames, …) of the arms on each of its legs.
+
+        Args:
+            legs: one after the other.
+            distance: (frames,) metres along the route.
+        """
+        result = legs[0]
+        for change, leg in enumerate(legs[1:]):
+            result = self._joined(result, leg, self._shares(change, distance))
+        return result
 
     def _shares(self, change: int, distance: Floats) -> Floats:
         """How far each arm (frames, arms) has gone over at a change."""

@@ -65,7 +65,7 @@ from ...core.skeleton import Skeleton
 from ..plain import plain
 from .apart import Apart, read_apart
 from .arm_items import bones_of, write_arms, write_body
-from .changing import Changing, Moved, Way, gaits_of, read_changes
+from .changing import Changing, Journey, Way, gaits_of, read_changes
 from .changing import plan as plan_changes
 from .in_place import breathing_channels
 from .keyed import Rig, as_keyed
@@ -260,7 +260,7 @@ class Shot:
         self.locations, self.orientations = self._in_place() if self.in_place else going
         posed = _Posed.of(len(self.frames), self.arms)
         if self.changing is not None:
-            steps = self._change(self.changing, travel, places, posed)
+            steps = self._change(self.changing, travel, places, going, posed)
         elif self.standing is not None:
             steps = self._stand(self.standing, travel, places, going, posed)
         else:
@@ -306,18 +306,41 @@ class Shot:
                 yield part.stop / count
 
     def _change(
-        self, changing: Changing, travel: Travel, places: tuple[Floats, Floats], posed: _Posed
+        self,
+        changing: Changing,
+        travel: Travel,
+        places: tuple[Floats, Floats],
+        going: tuple[Floats, Floats],
+        posed: _Posed,
     ) -> Iterator[float]:
-        """Arms of a journey on which the gait changes."""
+        """Arms of a journey on which the gait changes, and that do not dip between frames."""
         step = next(self._portions(), slice(0, 1)).stop
+        self.swimming = changing.swimming(travel.distance)
+        journey: Journey | None = None
         for done in changing.compute(travel.distance, places, step):
-            if isinstance(done, Moved):
-                posed.rotations, posed.strains = done.rotations, done.strains
-                posed.late, posed.misses = done.late, done.misses
-                posed.lying, posed.cycles = list(done.lying), done.cycles
+            if isinstance(done, Journey):
+                journey = done
             else:
                 yield done
-        self.swimming = changing.swimming(travel.distance)
+        assert journey is not None
+        moved = journey.moved
+        posed.rotations, posed.strains = moved.rotations, moved.strains
+        posed.late, posed.misses = moved.late, moved.misses
+        posed.lying, posed.cycles = list(moved.lying), moved.cycles
+        ground = self._ground()
+        if ground is None:
+            return
+
+        def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
+            """Some frames anew, with arms raised; others are left as they are."""
+            rotations, strains, posed.late[chosen] = journey.higher(chosen, lift)
+            poses = Poses(rotations, strains, going[0][chosen], going[1][chosen])
+            return poses, course.joints(poses)
+
+        course = Course(_arm_frames(self.skeleton, self.arms, self.body), ground, self.scale)
+        whole = Poses(posed.rotations, posed.strains, *going)
+        raised = raised_between(course, whole, course.joints(whole), again)
+        posed.rotations, posed.strains = raised.rotations, raised.strains
 
     def _stand(
         self,
@@ -468,9 +491,12 @@ class Shot:
 
     def _ground(self) -> Ground | None:
         """What the arms stand on, where they do."""
+        return next((each.ground for each in self._stands()), None)
+
+    def _stands(self) -> list[Standing]:
+        """What holds the ground, of every way that does."""
         ways = self.changing.ways if self.changing is not None else ()
-        stands = [each for each in (self.standing, *(way.standing for way in ways)) if each]
-        return stands[0].ground if stands else None
+        return [each for each in (self.standing, *(way.standing for way in ways)) if each]
 
     def write(self, *, unedited: bool = False) -> Summary:
         """Give the armature its action, in place of the one that was generated before.
@@ -588,7 +614,8 @@ class Shot:
         return np.tile(location, (count, 1)), np.tile(orientation, (count, 1))
 
     def _stretch(self, armature: bpy.types.Object) -> list[actions.Channel]:
-        if self.standing is None or not self.standing.stretching:
+        # A swim that becomes a walk stretches there.
+        if not any(each.stretching for each in self._stands()):
             return []
         assert self.strains is not None
         return stretch_channels(armature, [arm.bones for arm in self.arms], self.strains)
