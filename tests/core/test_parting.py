@@ -32,11 +32,11 @@ def touches(gap: Floats, side: Floats, radius: float = 0.5) -> Touches:
         arms=(whole, whole + 1),
         segments=(whole, whole),
         shares=(none, none),
-        gap=gap,
+        gap=gap.T,
         distance=np.linalg.norm(gap, axis=1),
         wide=none + 2.0 * radius,
         thin=none + radius,
-        side=np.broadcast_to(side, gap.shape),
+        side=np.broadcast_to(side, gap.shape).T,
         pair=whole,
     )
 
@@ -49,8 +49,8 @@ def test_two_that_overlap_are_asked_to_go_as_far_as_it_takes(seed: int) -> None:
     gap = random.normal(size=(40, 3))
     gap *= (random.uniform(0.0, 0.98, 40) / np.linalg.norm(gap, axis=1))[:, None]
     way, far = aside(touches(gap, side))
-    np.testing.assert_allclose(np.linalg.norm(way, axis=1), 1.0, atol=1e-9)
-    after = np.linalg.norm(gap + far[:, None] * way, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(way, axis=0), 1.0, atol=1e-9)
+    after = np.linalg.norm(gap.T + far * way, axis=0)
     # Radius 0.5: what may be left is twice what flesh gives.
     assert np.all((1.0 - after) / 0.5 <= 2.0 * GIVEN)
 
@@ -73,7 +73,7 @@ def test_an_arm_that_passes_through_another_is_pushed_to_one_side_all_the_while(
     through = np.linspace(1.2, -0.4, 400)
     gap = np.stack([through, *random.uniform(-0.5, 0.5, (2, 1)) + 0.0 * through], axis=1)
     way, far = aside(touches(gap, side))
-    push = far[:, None] * way
+    push = (far * way).T
     assert np.all(push[far > 0.0] @ side > 0.0)
     # It changes by about as much as the arm has moved.
     steps = np.linalg.norm(np.diff(push, axis=0), axis=1)

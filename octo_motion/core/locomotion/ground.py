@@ -7,6 +7,7 @@ table, for all frames, arms and joints at once. Heights between the samples are 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
@@ -84,9 +85,18 @@ class HeightField:
 
     def height(self, points: Floats) -> Floats:
         """World Z (…,)."""
-        (low, low_y), (high, high_y), x, y = self._around(points)
-        lower = low + y * (low_y - low)
-        return lower + x * (high + y * (high_y - high) - lower)
+        ny = self.heights.shape[1]
+        x, column = self._place(points, 0)
+        y, row = self._place(points, 1)
+        # The first of the four samples round each point.
+        column *= ny
+        column += row
+        flat = self.heights.ravel()
+        low, high = _along(flat, column, y), _along(flat[ny:], column, y)
+        high -= low
+        high *= x
+        high += low
+        return high
 
     def slope(self, points: Floats) -> Floats:
         """Rise (…, 2), taken over a sample's width to either side, so that it does not jump."""
@@ -95,19 +105,26 @@ class HeightField:
         across = [self.height(at + each) - self.height(at - each) for each in step]
         return np.stack(across, axis=-1) * (0.5 / self.spacing)
 
-    def _around(
-        self, points: Floats
-    ) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats], Floats, Floats]:
-        """Heights of the four samples round each point, and how far it lies between them."""
-        nx, ny = self.heights.shape
-        x = np.clip((points[..., 0] - self.origin[0]) / self.spacing, 0.0, nx - 1.0)
-        y = np.clip((points[..., 1] - self.origin[1]) / self.spacing, 0.0, ny - 1.0)
-        column = np.minimum(x.astype(np.int64), nx - 2)
-        row = np.minimum(y.astype(np.int64), ny - 2)
-        flat, first = self.heights.ravel(), column * ny + row
-        low = flat.take(first), flat.take(first + 1)
-        high = flat.take(first + ny), flat.take(first + ny + 1)
-        return low, high, x - column, y - row
+    def _place(self, points: Floats, axis: int) -> tuple[Floats, np.ndarray]:
+        """How far points are beyond the sample before them along an axis, and its number."""
+        place = np.array(points[..., axis], dtype=np.float64)
+        place -= self.origin[axis]
+        place *= 1.0 / self.spacing
+        np.maximum(place, 0.0, out=place)
+        # There is a sample after it.
+        np.minimum(place, math.nextafter(self.heights.shape[axis] - 1.0, 0.0), out=place)
+        number = place.astype(np.intp)
+        place -= number
+        return place, number
+
+
+def _along(heights: Floats, first: np.ndarray, share: Floats) -> Floats:
+    """Heights by a share of the way from a sample to the next."""
+    low, rise = heights.take(first), heights[1:].take(first)
+    rise -= low
+    rise *= share
+    rise += low
+    return rise
 
 
 def sampled(

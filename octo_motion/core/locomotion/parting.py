@@ -12,6 +12,7 @@ other after these could not be parted, and move as if nobody had asked.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -19,9 +20,10 @@ import numpy as np
 from ..rotations import Floats
 from .arm_shapes import drawn, smooth
 from .chain_turning import joints_of, turned_towards
+from .columns import dot
 from .over_time import blurred, covered, reach, widened
 from .separation import Capsules
-from .touching import NEAR, Crowd, Touches, Touching, aside
+from .touching import Crowd, Touches, Touching, aside
 
 _ROUNDS: Final = 8
 _BOLDLY: Final = 1.3
@@ -90,7 +92,8 @@ def parted(
     every = np.arange(len(crowd.joints))
     if not len(every):
         return None
-    touches = Touching(crowd, still, every, 0.0).at(crowd.joints)
+    touching = Touching(crowd, still)
+    touches = touching.now()
     chosen = touches.depth > _DONE
     pairs, counts = np.unique(touches.pair[chosen], return_counts=True)
     # What overlaps nearly all the while is the creature's own form, and not in anybody's way.
@@ -100,22 +103,30 @@ def parted(
     if not deep.any():
         return None
     # Who makes way may be in the way of others then, but not for ever.
-    around = np.flatnonzero(widened(deep, _AROUND * reach(width), cyclic=cyclic))
-    touching = Touching(crowd, still, around, NEAR, own_form)
-    return _Parting(crowd, touching, floor, width, cyclic=cyclic).run()
+    around = widened(deep, _AROUND * reach(width), cyclic=cyclic) > 0.0
+    touching.look_at(around, own_form)
+    return _Parting(crowd, touching, np.flatnonzero(around), floor, width, cyclic=cyclic).run()
 
 
 class _Parting:
     """One crowd, as it makes way."""
 
     def __init__(
-        self, crowd: Crowd, touching: Touching, floor: Floor | None, width: int, *, cyclic: bool
+        self,
+        crowd: Crowd,
+        touching: Touching,
+        around: np.ndarray,
+        floor: Floor | None,
+        width: int,
+        *,
+        cyclic: bool,
     ) -> None:
         self._crowd, self._touching, self._floor = crowd, touching, floor
+        self._around = around
         self._width, self._cyclic = width, cyclic
         self._joints = crowd.joints.copy()
         steps = np.diff(crowd.joints, axis=2)
-        self._lengths = np.linalg.norm(steps, axis=-1)
+        self._lengths = _length(steps)
         self._before = steps / np.maximum(self._lengths, _TINY)[..., None]
         self._directions = self._before.copy()
         self._length = float(self._lengths.sum(axis=2).mean())
@@ -136,7 +147,7 @@ class _Parting:
             if np.max(touches.depth, initial=0.0) <= _DONE and not sunk:
                 break
             wanted = self._spread(self._wanted(touches))
-            chosen = np.nonzero(np.any(wanted != 0.0, axis=(2, 3)))
+            chosen = np.nonzero(_differ(wanted, 0.0))
             if len(chosen[0]):
                 self._move(chosen, wanted[chosen])
         given_up = np.zeros(self._held.shape)
@@ -167,7 +178,7 @@ class _Parting:
         shape = self._crowd.joints.shape[:3]
         allowed, room = np.full(shape, -np.inf), np.full(shape, np.inf)
         if self._floor is not None:
-            frames = self._touching.frames
+            frames = self._around
             points = self._crowd.joints[frames].reshape(-1, shape[2], 3)
             height = self._floor.clearance(np.repeat(frames, shape[1]), points)
             height = height.reshape(len(frames), *shape[1:])
@@ -182,61 +193,72 @@ class _Parting:
         shape = self._joints.shape
         way, far = aside(touches)
         chosen = np.flatnonzero(far > 1e-6 * touches.thin)
-        way, far, frame = way[chosen], far[chosen], touches.frame[chosen]
+        way, far, touches = way[:, chosen], far[chosen], touches.part(chosen)
         ways = way, -way
-        can = [self._can(touches, which, chosen, ways[which]) for which in (0, 1)]
+        can = [self._can(touches, which, ways[which]) for which in (0, 1)]
         whole = can[0] + can[1] + _LITTLE
-        size = int(np.prod(shape[:3]))
-        moved, weights = np.zeros((size, 3)), np.zeros((size, 1))
+        places, weights, pushes = [], [], []
         for which in (0, 1):
-            arm, segment = touches.arms[which][chosen], touches.segments[which][chosen]
-            share = touches.shares[which][chosen]
-            own = arm < shape[1]
-            push = (_BOLDLY * far * can[which] / whole)[:, None] * ways[which]
+            own = touches.arms[which] < shape[1]
+            arm, share = touches.arms[which][own], touches.shares[which][own]
+            push = ((_BOLDLY * far * can[which] / whole) * ways[which])[:, own]
+            first = touches.frame[own] * shape[1] + arm
+            first = first * shape[2] + touches.segments[which][own]
             for joint, part in ((0, 1.0 - share), (1, share)):
-                at = ((frame * shape[1] + arm) * shape[2] + segment + joint)[own]
-                weight = (far * part)[own, None]
-                moved += _summed(at, weight * push[own], size)
-                weights += _summed(at, weight, size)
-        wanted = (moved / (weights + _LITTLE * self._scale)).reshape(shape)
-        soft = _LITTLE * self._scale
-        sunk = np.maximum(-self._room - 1e-9 * self._length, 0.0)
-        sunk = np.where(sunk > soft, sunk, sunk * sunk / soft)
-        return wanted + sunk[..., None] * self._crowd.up[:, None, None]
+                places.append(first + joint)
+                weights.append(far[own] * part)
+                pushes.append(weights[-1] * push)
+        place, weight = np.concatenate(places), np.concatenate(weights)
+        size = int(np.prod(shape[:3]))
+        whole = np.bincount(place, weight, size) + _LITTLE * self._scale
+        wanted = np.empty((size, 3))
+        for axis, each in enumerate(np.concatenate(pushes, axis=1)):
+            wanted[:, axis] = np.bincount(place, each, size) / whole
+        wanted = wanted.reshape(shape)
+        slack = 1e-9 * self._length
+        if self._room.min() < -slack:
+            where = np.nonzero(self._room < -slack)
+            sunk, soft = -self._room[where] - slack, _LITTLE * self._scale
+            sunk = np.where(sunk > soft, sunk, sunk * sunk / soft)
+            wanted[where] += sunk[:, None] * self._crowd.up[where[0]]
+        return wanted
 
-    def _can(self, touches: Touches, which: int, chosen: np.ndarray, way: Floats) -> Floats:
+    def _can(self, touches: Touches, which: int, way: Floats) -> Floats:
         """How far (touches,) the one or the other can make way, 0…1."""
-        arm = touches.arms[which][chosen]
+        arm = touches.arms[which]
         own = arm < self._joints.shape[1]
-        frame, arm = touches.frame[chosen], np.where(own, arm, 0)
-        segment = np.where(own, touches.segments[which][chosen], 0)
-        share = touches.shares[which][chosen]
+        frame, arm = touches.frame, np.where(own, arm, 0)
+        segment, share = np.where(own, touches.segments[which], 0), touches.shares[which]
         can = (1.0 - share) * self._loose[frame, arm, segment]
         can += share * self._loose[frame, arm, segment + 1]
         can *= 1.0 - _STEADY * self._held[frame, arm]
         # What is on the ground already is not pushed down.
         room = np.minimum(self._room[frame, arm, segment], self._room[frame, arm, segment + 1])
         radius = np.maximum(self._crowd.radii[arm, segment], _TINY)
-        down = np.maximum(-np.einsum("ci,ci->c", way, self._crowd.up[frame]), 0.0)
+        down = np.maximum(-dot(way, self._crowd.up[frame].T), 0.0)
         return own * can * (1.0 - down * (1.0 - smooth(room / (2.0 * radius))))
 
     def _spread(self, wanted: Floats) -> Floats:
         """The same, begun in time and ended late: as far as is asked, and smoothly."""
-        flat = wanted.reshape(len(wanted), -1, 3)
-        result = np.zeros(flat.shape)
-        size = np.linalg.norm(flat, axis=2)
-        columns = np.flatnonzero(size.max(axis=0) > 1e-6 * self._scale)
-        if len(columns):
-            size = size[:, columns]
-            mean = blurred(flat[:, columns], self._width, cyclic=self._cyclic)
-            length = np.linalg.norm(mean, axis=2)
-            # Where it is asked to go now one way and now the other, it stays between them.
-            mean_size = blurred(size, self._width, cyclic=self._cyclic)
-            agreed = smooth(2.0 * length / np.maximum(mean_size, _TINY))
-            whole = self._covered(size) * agreed
-            whole[whole < 1e-5 * self._scale] = 0.0
-            result[:, columns] = (whole / np.maximum(length, _TINY))[..., None] * mean
-        return result.reshape(wanted.shape) * self._loose[..., None]
+        result = np.zeros(wanted.shape)
+        flat, spread = wanted.reshape(len(wanted), -1, 3), result.reshape(len(wanted), -1, 3)
+        asked = (wanted.reshape(len(wanted), -1) != 0.0).any(axis=0)
+        asked = np.flatnonzero(asked.reshape(-1, 3).any(axis=1))
+        size = _length(flat[:, asked])
+        some = size.max(axis=0, initial=0.0) > 1e-6 * self._scale
+        columns, size = asked[some], size[:, some]
+        if not len(columns):
+            return result
+        mean = blurred(flat[:, columns], self._width, cyclic=self._cyclic)
+        length = _length(mean)
+        # Where it is asked to go now one way and now the other, it stays between them.
+        mean_size = blurred(size, self._width, cyclic=self._cyclic)
+        agreed = smooth(2.0 * length / np.maximum(mean_size, _TINY))
+        whole = self._covered(size) * agreed
+        whole[whole < 1e-5 * self._scale] = 0.0
+        whole *= self._loose.reshape(len(wanted), -1)[:, columns]
+        spread[:, columns] = (whole / np.maximum(length, _TINY))[..., None] * mean
+        return result
 
     def _move(self, chosen: tuple[np.ndarray, ...], wanted: Floats) -> None:
         """Turn the segments of some arms at some frames.
@@ -246,7 +268,7 @@ class _Parting:
             wanted: (items, joints, 3) by how much their joints are to move.
         """
         lengths, free = self._lengths[chosen], self._free[chosen]
-        size = np.linalg.norm(wanted[:, 1:], axis=2)
+        size = _length(wanted[:, 1:])
         joints = np.arange(1, lengths.shape[1] + 1)
         pinned = self._held[chosen][:, None] * (joints == self._anchor[chosen][:, None])
         weights = size / (size + 0.1 * self._scale) * (1.0 - pinned) + _PINNED * pinned
@@ -287,7 +309,7 @@ class _Parting:
             steps=_STEPS,
         )
         back = np.moveaxis(back, -1, 0)
-        missed = np.linalg.norm(joints_of(roots, back, lengths)[rows, anchor] - goal, axis=1)
+        missed = _length(joints_of(roots, back, lengths)[rows, anchor] - goal)
         torn = np.clip(missed / (_TORN * self._length) - 1.0, 0.0, 1.0)[:, None, None]
         back = np.where(torn > 0.0, back + torn * (self._before[items] - back), back)
         result = directions.copy()
@@ -309,18 +331,29 @@ class _Parting:
             np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
         low, high = _HOPELESS
         result = smooth((worst[:, :arms] - low) / (high - low))
-        before, after = _turns(self._before), _turns(self._directions)
-        most = max(_SWIFT * float(before.max(initial=0.0)), _UNSEEN)
-        swift = after > most
+        changed = self._changed()
+        most = max(_SWIFT * float(self._turns_before.max(initial=0.0)), _UNSEEN)
+        swift = self._turns_before > most
+        # Between two frames of which neither has changed it turns as it did.
+        anew = np.nonzero(changed[:-1] | changed[1:])
+        ends = self._directions[:-1][anew], self._directions[1:][anew]
+        swift[anew] = _turns(*ends) > most
         result[1:][swift] = result[:-1][swift] = 1.0
         result[self._room.min(axis=2) < -_SUNK * self._length] = 1.0
-        changed = np.any(self._directions != self._before, axis=(2, 3))
         return np.where(changed | (result < 1.0), result, 0.0)
+
+    def _changed(self) -> np.ndarray:
+        """Which arms (frames, arms) have made way."""
+        return _differ(self._directions, self._before)
+
+    @cached_property
+    def _turns_before(self) -> Floats:
+        """How far (frames − 1, arms) they turned before anything was moved."""
+        return _turns(self._before[:-1], self._before[1:])
 
     def _give_up(self, share: Floats) -> None:
         """Let arms (frames, arms) move as they did before, by some share."""
-        changed = np.any(self._directions != self._before, axis=(2, 3))
-        chosen = np.nonzero((share > 1e-9) & changed)
+        chosen = np.nonzero((share > 1e-9) & self._changed())
         back = share[chosen][:, None, None]
         before, after = self._before[chosen], self._directions[chosen]
         mixed = _unit(after + back * (before - after))
@@ -328,20 +361,28 @@ class _Parting:
         self._put(chosen, mixed)
 
 
-def _turns(directions: Floats) -> Floats:
-    """How far (frames − 1, arms) a segment turns against the one before it at most, radians."""
-    first, second = directions[:-1], directions[1:]
+def _turns(first: Floats, second: Floats) -> Floats:
+    """How far (…) a segment turns at most against the one before it, radians.
+
+    Args:
+        first: (…, segments, 3) directions at a frame.
+        second: (…, segments, 3) at the next.
+    """
+    one, other = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
     # The one before, turned the shortest way to where it is a frame later, takes the next along.
-    start, end = first[:, :, :-1], second[:, :, :-1]
-    axis = np.cross(start, end)
-    cosine = np.sum(start * end, axis=-1, keepdims=True)
-    along = first[:, :, 1:]
-    across = np.cross(axis, along)
-    taken = along + across + np.cross(axis, across) / np.maximum(1.0 + cosine, 1e-6)
-    own = np.linalg.norm(second[:, :, :1] - first[:, :, :1], axis=-1)
-    return np.concatenate([own, np.linalg.norm(second[:, :, 1:] - taken, axis=-1)], axis=2).max(
-        axis=2
+    (sx, sy, sz), (ex, ey, ez), (x, y, z) = one[..., :-1], other[..., :-1], one[..., 1:]
+    ax, ay, az = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
+    beyond = 1.0 / np.maximum(1.0 + sx * ex + sy * ey + sz * ez, 1e-6)
+    cx, cy, cz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+    taken = (
+        x + cx + (ay * cz - az * cy) * beyond,
+        y + cy + (az * cx - ax * cz) * beyond,
+        z + cz + (ax * cy - ay * cx) * beyond,
     )
+    left = [end - start for end, start in zip(other[..., 1:], taken, strict=True)]
+    squares = left[0] * left[0] + left[1] * left[1] + left[2] * left[2]
+    own = _length(second[..., 0, :] - first[..., 0, :])
+    return np.maximum(own, np.sqrt(squares.max(axis=-1, initial=0.0)))
 
 
 def _anchors(lying: np.ndarray) -> np.ndarray:
@@ -367,11 +408,17 @@ def _freedom(lying: np.ndarray) -> tuple[Floats, Floats]:
     return segments, smooth(np.minimum(np.minimum(onward, back), numbers) / _BORDER)
 
 
+def _differ(one: Floats, other: Floats | float) -> np.ndarray:
+    """Where (frames, arms) any of (frames, arms, …) is not the same."""
+    # One axis is much quicker gone through than two.
+    return (one != other).reshape(*one.shape[:2], -1).any(axis=2)
+
+
+def _length(vectors: Floats) -> Floats:
+    """Lengths (…) of vectors (…, 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return np.sqrt(x * x + y * y + z * z)
+
+
 def _unit(vectors: Floats) -> Floats:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
-
-
-def _summed(at: np.ndarray, values: Floats, size: int) -> Floats:
-    """Sums (size, components) of values (n, components) by place (n,)."""
-    columns = [np.bincount(at, weights=each, minlength=size) for each in values.T]
-    return np.stack(columns, axis=1)
+    return vectors / np.maximum(_length(vectors), _TINY)[..., None]

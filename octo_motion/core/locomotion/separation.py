@@ -16,10 +16,13 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
+from .columns import dot
 
 _TINY: Final = 1e-12
-_AT_ONCE: Final = 8_000_000
-"""Distances that are looked at in one go: some tens of megabytes."""
+_AT_ONCE: Final = 250_000
+"""Distances that are looked at in one go: what the processor keeps at hand."""
+_ROUNDED: Final = 1e-4
+"""Share of a distance in single precision by which it may be wrong."""
 _BUILT_SO: Final = 0.02
 """Share of the smaller radius by which capsules may overlap at rest and still count."""
 
@@ -78,8 +81,8 @@ def measure(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) -> Separ
         return Separation(np.zeros(0), ())
     parts = parts_of(every)
     one, other = pairs_of(every, len(chains))
-    depths = np.zeros(len(parts.starts))
-    number, pair = near(parts, one, other)
+    depths = np.zeros(parts.starts.shape[1])
+    number, pair, _ = near(parts, one, other)
     found = _depths(parts, (number, one[pair], other[pair]))
     touching = found > 0.0
     number, pair, found = number[touching], pair[touching], found[touching]
@@ -93,9 +96,9 @@ class Parts:
     """The capsules of all chains, one after the other."""
 
     starts: Floats
-    """(frames, capsules, 3)"""
+    """(3, frames, capsules)"""
     ends: Floats
-    """(frames, capsules, 3)"""
+    """(3, frames, capsules)"""
     radii: tuple[Floats, Floats]
     """(capsules,) at starts and at ends."""
     owner: np.ndarray
@@ -104,14 +107,22 @@ class Parts:
 
 def parts_of(chains: Sequence[Capsules]) -> Parts:
     """The capsules of chains that all have as many frames."""
+    owner = np.repeat(np.arange(len(chains)), [len(each.radii) - 1 for each in chains])
+    ends = np.empty((2, 3, len(chains[0].joints), len(owner)))
+    done = 0
+    for each in chains:
+        joints = np.moveaxis(each.joints, -1, 0)
+        own = slice(done, done + joints.shape[2] - 1)
+        ends[0, ..., own], ends[1, ..., own] = joints[..., :-1], joints[..., 1:]
+        done = own.stop
     return Parts(
-        np.concatenate([each.joints[:, :-1] for each in chains], axis=1),
-        np.concatenate([each.joints[:, 1:] for each in chains], axis=1),
+        ends[0],
+        ends[1],
         (
             np.concatenate([each.radii[:-1] for each in chains]),
             np.concatenate([each.radii[1:] for each in chains]),
         ),
-        np.repeat(np.arange(len(chains)), [len(each.radii) - 1 for each in chains]),
+        owner,
     )
 
 
@@ -135,7 +146,7 @@ def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.nd
 
 def near(
     parts: Parts, one: np.ndarray, other: np.ndarray, margin: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Numbers of frames and of pairs whose bounding spheres touch.
 
     Args:
@@ -143,33 +154,48 @@ def near(
         one: (pairs,) capsules …
         other: (pairs,) … and others.
         margin: radii by which they may be further apart.
+
+    Returns:
+        Frames and pairs, and how far apart the middle lines of the two are at least.
     """
     if len(one) == 0:
-        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
-    middles = (0.5 * (parts.starts + parts.ends)).astype(np.float32)
-    half = 0.5 * np.sqrt(np.max(np.sum((parts.ends - parts.starts) ** 2, axis=-1), axis=0))
-    size = half + (1.0 + margin) * np.maximum(*parts.radii)
-    # Around its middle a scene's rounding in single precision is least.
-    middles -= middles.mean(axis=(0, 1))
+        none = np.zeros(0, dtype=np.intp)
+        return none, none, np.zeros(0)
+    middles = np.empty((*parts.starts.shape[1:], 3), dtype=np.float32)
+    whole = np.zeros(parts.starts.shape[1:])
+    for axis, (start, end) in enumerate(zip(parts.starts, parts.ends, strict=True)):
+        middle = 0.5 * (start + end)
+        # Around its middle a scene's rounding in single precision is least.
+        middles[..., axis] = middle - middle.mean()
+        whole += (end - start) ** 2
+    longest = 0.5 * np.sqrt(whole.max(axis=0))
     squares = np.einsum("fsi,fsi->fs", middles, middles)
-    limit = np.full((len(size), len(size)), -np.inf, dtype=np.float32)
-    limit[one, other] = ((size[one] + size[other]) * (1.0 + 1e-4)) ** 2 + 1e-6 * squares.max()
+    rounding = 1e-6 * squares.max()
+    apart = longest[one] + longest[other]
+    size = longest + (1.0 + margin) * np.maximum(*parts.radii)
+    limit = np.full((len(longest), len(longest)), -np.inf, dtype=np.float32)
+    limit[one, other] = ((size[one] + size[other]) * (1.0 + _ROUNDED)) ** 2 + rounding
     place = np.full(limit.shape, -1)
     place[one, other] = np.arange(len(one))
+    place = place.ravel()
     # |a − b|² = |a|² + |b|² − 2 a · b, all of it in one product.
     one_more, own = np.ones_like(squares)[..., None], squares[..., None]
     first = np.concatenate([-2.0 * middles, own, one_more], axis=2)
     second = np.concatenate([middles, one_more, own], axis=2).transpose(0, 2, 1)
     step = max(1, _AT_ONCE // limit.size)
-    found: list[tuple[np.ndarray, np.ndarray]] = []
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for begin in range(0, len(middles), step):
         part = slice(begin, begin + step)
         # Squared distances of all from all.
         products = np.matmul(first[part], second[part])
         # Several times faster than where a row, a column and a frame are found at once.
-        frame, spot = np.divmod(np.flatnonzero(products <= limit), limit.size)
-        found.append((frame + begin, place.ravel()[spot]))
-    return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
+        spots = np.flatnonzero(products <= limit)
+        frame, spot = np.divmod(spots, limit.size)
+        pair = place[spot]
+        square = np.maximum(products.ravel()[spots] - rounding, 0.0)
+        found.append((frame + begin, pair, (1.0 - _ROUNDED) * np.sqrt(square) - apart[pair]))
+    frames, pairs, least = (np.concatenate(each) for each in zip(*found, strict=True))
+    return frames, pairs, least
 
 
 def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Floats:
@@ -180,44 +206,46 @@ def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> 
         chosen: frame, one capsule and the other of each pair.
     """
     frame, one, other = chosen
-    starts, ends, radii = parts.starts, parts.ends, parts.radii
-    p, q = starts[frame, one], starts[frame, other]
-    u, v = ends[frame, one] - p, ends[frame, other] - q
-    s, t = nearest(p, u, q, v)
-    gap = p - q + s[:, None] * u - t[:, None] * v
+    capsules = len(parts.owner)
+    starts, ends = parts.starts.reshape(3, -1), parts.ends.reshape(3, -1)
+    radii, first, second = parts.radii, frame * capsules + one, frame * capsules + other
+    p, q = starts.take(first, axis=1), starts.take(second, axis=1)
+    u, v = ends.take(first, axis=1) - p, ends.take(second, axis=1) - q
+    s, t, gap = nearest(p, u, q, v)
     here = (1.0 - s) * radii[0][one] + s * radii[1][one]
     there = (1.0 - t) * radii[0][other] + t * radii[1][other]
-    return (here + there - np.sqrt(_dot(gap, gap))) / np.maximum(np.minimum(here, there), _TINY)
+    return (here + there - np.sqrt(dot(gap, gap))) / np.maximum(np.minimum(here, there), _TINY)
 
 
-def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
     """Where two line segments are nearest to each other.
 
     Args:
-        p: (pairs, 3) start of the one.
-        u: (pairs, 3) from its start to its end.
-        q: (pairs, 3) start of the other.
-        v: (pairs, 3)
+        p: (3, pairs) start of the one.
+        u: (3, pairs) from its start to its end.
+        q: (3, pairs) start of the other.
+        v: (3, pairs)
 
     Returns:
-        Shares (pairs,) of the way from start to end on the one and on the other.
+        Shares (pairs,) of the way from start to end on the one and on the other, and the way
+        (3, pairs) from there on the other to there on the one.
     """
     w = p - q
-    a, b, e = _dot(u, u), _dot(u, v), _dot(v, v)
-    c, f = _dot(u, w), _dot(v, w)
+    a, b, e = dot(u, u), dot(u, v), dot(v, v)
+    c, f = dot(u, w), dot(v, w)
     room = a * e - b * b
+    whole = 1.0 / np.maximum(a, _TINY)
     s = np.where(room > _TINY, (b * f - c * e) / np.maximum(room, _TINY), 0.0)
     # A capsule that is a ball is nearest to one point of the other.
-    s = np.where(e > _TINY, s, -c / np.maximum(a, _TINY))
-    s = np.clip(s, 0.0, 1.0)
+    s = np.where(e > _TINY, s, -c * whole)
+    np.clip(s, 0.0, 1.0, out=s)
     t = (b * s + f) / np.maximum(e, _TINY)
-    s = np.where(t < 0.0, np.clip(-c / np.maximum(a, _TINY), 0.0, 1.0), s)
-    s = np.where(t > 1.0, np.clip((b - c) / np.maximum(a, _TINY), 0.0, 1.0), s)
-    return s, np.clip(t, 0.0, 1.0)
-
-
-def _dot(first: Floats, second: Floats) -> Floats:
-    return np.einsum("pi,pi->p", first, second)
+    s = np.where(t < 0.0, np.clip(-c * whole, 0.0, 1.0), s)
+    s = np.where(t > 1.0, np.clip((b - c) * whole, 0.0, 1.0), s)
+    np.clip(t, 0.0, 1.0, out=t)
+    w += s * u
+    w -= t * v
+    return s, t, w
 
 
 def _pairs(

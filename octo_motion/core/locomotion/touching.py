@@ -18,6 +18,7 @@ import numpy as np
 
 from ..rotations import Floats
 from .arm_shapes import smooth
+from .columns import dot
 from .separation import Capsules, near, nearest, pairs_of, parts_of
 
 GIVEN: Final = 0.05
@@ -63,14 +64,14 @@ class Touches:
     shares: tuple[Floats, Floats]
     """Where on the segment, 0…1."""
     gap: Floats
-    """(touches, 3) from the other to the one."""
+    """(3, touches) from the other to the one."""
     distance: Floats
     wide: Floats
     """Sum of the radii there."""
     thin: Floats
     """The smaller of them."""
     side: Floats
-    """(touches, 3) on which side of the other the one belongs, unit."""
+    """(3, touches) on which side of the other the one belongs, unit."""
     pair: np.ndarray
     """(touches,) a number for each two capsules, the same at all frames."""
 
@@ -79,85 +80,130 @@ class Touches:
         """(touches,) by how much they overlap, as a share of the thinner radius."""
         return (self.wide - self.distance) / self.thin
 
+    def part(self, chosen: np.ndarray) -> Touches:
+        """Some of them."""
+        return Touches(
+            frame=self.frame[chosen],
+            arms=(self.arms[0][chosen], self.arms[1][chosen]),
+            segments=(self.segments[0][chosen], self.segments[1][chosen]),
+            shares=(self.shares[0][chosen], self.shares[1][chosen]),
+            gap=self.gap[:, chosen],
+            distance=self.distance[chosen],
+            wide=self.wide[chosen],
+            thin=self.thin[chosen],
+            side=self.side[:, chosen],
+            pair=self.pair[chosen],
+        )
+
 
 class Touching:
-    """The capsules that are so near to each other at some frames that they may ever touch.
+    """The capsules that are so near to each other that they may ever touch, at all frames.
 
     Args:
         crowd: the arms.
         still: parts of the body, one frame each.
-        frames: (some,) numbers of those that matter.
-        margin: sums of radii between them up to which they are near.
-        without: pairs of capsules (``Touches.pair``) that are left as they are.
     """
 
-    def __init__(
-        self,
-        crowd: Crowd,
-        still: Sequence[Capsules],
-        frames: np.ndarray,
-        margin: float,
-        without: np.ndarray | None = None,
-    ) -> None:
-        _, arms, joints, _ = crowd.joints.shape
+    def __init__(self, crowd: Crowd, still: Sequence[Capsules]) -> None:
+        frames, arms, joints, _ = crowd.joints.shape
         chains = [
-            Capsules("", crowd.joints[frames, arm], crowd.radii[arm], crowd.at_rest[arm])
+            Capsules("", crowd.joints[:, arm], crowd.radii[arm], crowd.at_rest[arm])
             for arm in range(arms)
         ]
         body = [
-            Capsules("", np.repeat(each.joints, len(frames), axis=0), each.radii, each.at_rest)
-            for each in still
+            Capsules("", np.broadcast_to(each.joints, (frames, *each.joints.shape[1:])), *rest)
+            for each, rest in ((each, (each.radii, each.at_rest)) for each in still)
         ]
         parts = parts_of([*chains, *body])
-        self.frames = frames
-        self._arms, self._segments = arms, joints - 1
-        own = arms * self._segments
-        self._body = parts.starts[:1, own:], parts.ends[:1, own:]
+        self._crowd, self._parts = crowd, parts
+        self._arms, self._joints = arms, joints
         self._radii, self._owner = parts.radii, parts.owner
-        self._places = _places(crowd, len(body))
+        self._sides = _sides(_places(crowd, len(body)))
+        own = arms * (joints - 1)
+        # Points of the body after those of all arms: where a capsule starts and, next, ends.
+        self._body = np.stack([parts.starts[:, 0, own:], parts.ends[:, 0, own:]], axis=2)
         one, other = pairs_of([*chains, *body], arms)
-        if without is not None:
-            asked = ~np.isin(one * len(parts.owner) + other, without)
-            one, other = one[asked], other[asked]
-        frame, pair = near(parts, one, other, margin)
-        self._frame, self._one, self._other = frames[frame], one[pair], other[pair]
-        seen = self.at(crowd.joints)
+        frame, pair, self._least = near(parts, one, other, NEAR)
+        self._frame, self._one, self._other = frame, one[pair], other[pair]
+        widest = np.maximum(*parts.radii)
+        self._wide = (widest[one] + widest[other])[pair]
+
+    def now(self) -> Touches:
+        """What touches while nobody has made way yet."""
+        chosen = np.flatnonzero(self._least <= self._wide)
+        rows = self._frame[chosen], self._one[chosen], self._other[chosen]
+        return self._at(self._crowd.joints, *rows)
+
+    def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:
+        """Look from now on only at what is near enough for arms that make way.
+
+        Args:
+            frames: (frames,) whether anybody may have to, then.
+            without: pairs of capsules (``Touches.pair``) that are left as they are.
+        """
+        chosen = frames[self._frame]
+        if len(without):
+            chosen &= ~np.isin(self._one * len(self._owner) + self._other, without)
         # On its own side an arm has less far to be looked for.
-        wrong = np.einsum("ci,ci->c", seen.gap, seen.side) < 0.0
-        chosen = seen.distance <= (1.0 + np.where(wrong, margin, _BESIDE * margin)) * seen.wide
-        self._frame = self._frame[chosen]
-        self._one, self._other = self._one[chosen], self._other[chosen]
+        far = np.flatnonzero(chosen & (self._least > (1.0 + _BESIDE * NEAR) * self._wide))
+        chosen[far] = self._may_be_wrong(self._frame[far], self._one[far], self._other[far])
+        rows = np.flatnonzero(chosen)
+        frame, one, other = self._frame[rows], self._one[rows], self._other[rows]
+        seen = self._at(self._crowd.joints, frame, one, other)
+        wrong = dot(seen.gap, seen.side) < 0.0
+        kept = seen.distance <= (1.0 + np.where(wrong, NEAR, _BESIDE * NEAR)) * seen.wide
+        self._frame, self._one, self._other = frame[kept], one[kept], other[kept]
+
+    def _may_be_wrong(self, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Which may be on the wrong side of each other, told from where their middles are."""
+        starts, ends = self._parts.starts, self._parts.ends
+        middles, steps = (0.5 * (starts + ends)).reshape(3, -1), ends - starts
+        half = 0.5 * np.sqrt(dot(*[np.moveaxis(steps, 0, -2)] * 2)).ravel()
+        first, second = frame * len(self._owner) + one, frame * len(self._owner) + other
+        apart = middles.take(first, axis=1) - middles.take(second, axis=1)
+        return dot(apart, self._side(one, other)) <= half[first] + half[second]
+
+    def _side(self, one: np.ndarray, other: np.ndarray) -> Floats:
+        """On which side (3, capsules) of others some belong."""
+        chains = self._owner[one] * self._sides.shape[2] + self._owner[other]
+        return self._sides.reshape(3, -1).take(chains, axis=1)
 
     def at(self, joints: Floats) -> Touches:
         """What is near to what, for joints (frames, arms, joints, 3)."""
-        flat = len(joints), self._arms * self._segments, 3
-        starts, ends = (
-            np.concatenate(
-                [moved.reshape(flat), np.broadcast_to(body, (len(joints), *body.shape[1:]))], axis=1
-            )
-            for moved, body in zip((joints[:, :, :-1], joints[:, :, 1:]), self._body, strict=True)
+        return self._at(joints, self._frame, self._one, self._other)
+
+    def _at(self, joints: Floats, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Touches:
+        """The same of some capsules."""
+        arms = self._owner[one], self._owner[other]
+        each = self._joints - 1
+        moving = joints.shape[0] * self._arms * self._joints
+        points = np.empty((3, moving + self._body.shape[1] * 2))
+        points[:, :moving] = joints.reshape(moving, 3).T
+        points[:, moving:] = self._body.reshape(3, -1)
+        # Of each arm there is a joint more than there are segments; of the body, pairs of points.
+        first = (frame * self._arms + arms[0]) * self._joints + one - each * arms[0]
+        second = np.where(
+            arms[1] < self._arms,
+            (frame * self._arms + arms[1]) * self._joints + other - each * arms[1],
+            moving + 2 * (other - each * self._arms),
         )
-        frame, one, other = self._frame, self._one, self._other
-        p, q = starts[frame, one], starts[frame, other]
-        u, v = ends[frame, one] - p, ends[frame, other] - q
-        s, t = nearest(p, u, q, v)
-        gap = p - q + s[:, None] * u - t[:, None] * v
+        p, q = points.take(first, axis=1), points.take(second, axis=1)
+        u, v = points.take(first + 1, axis=1) - p, points.take(second + 1, axis=1) - q
+        s, t, gap = nearest(p, u, q, v)
         here, there = (
             (1.0 - share) * self._radii[0][which] + share * self._radii[1][which]
             for share, which in ((s, one), (t, other))
         )
-        arms = self._owner[one], self._owner[other]
-        side = self._places[arms[0]] - self._places[arms[1]]
         return Touches(
             frame=frame,
             arms=arms,
-            segments=(one % self._segments, other % self._segments),
+            segments=(one % each, other % each),
             shares=(s, t),
             gap=gap,
-            distance=_length(gap),
+            distance=np.sqrt(dot(gap, gap)),
             wide=here + there,
             thin=np.maximum(np.minimum(here, there), _TINY),
-            side=side / np.maximum(_length(side), _TINY)[:, None],
+            side=self._side(one, other),
             pair=one * len(self._owner) + other,
         )
 
@@ -170,22 +216,28 @@ def _places(crowd: Crowd, body: int) -> Floats:
     return places - (places @ crowd.upward)[:, None] * crowd.upward
 
 
+def _sides(places: Floats) -> Floats:
+    """On which side of each chain (3, chains, chains), the second, each one, the first, belongs."""
+    apart = places.T[:, :, None] - places.T[:, None]
+    return apart / np.maximum(np.sqrt(np.sum(apart * apart, axis=0)), _TINY)
+
+
 def aside(touches: Touches) -> tuple[Floats, Floats]:
     """How the one of each pair has to move against the other for them to touch no more.
 
     Returns:
-        Unit vectors (touches, 3) which way, and how far (touches,), 0 where they are apart.
+        Unit vectors (3, touches) which way, and how far (touches,), 0 where they are apart.
     """
     apart = touches.distance / touches.wide
-    straight = touches.gap / np.maximum(touches.distance, _TINY)[:, None]
-    wrong = np.maximum(-np.einsum("ci,ci->c", straight, touches.side), 0.0)
+    straight = touches.gap / np.maximum(touches.distance, _TINY)
+    wrong = np.maximum(-dot(straight, touches.side), 0.0)
     # From too far it is not to be told whether they have passed through each other at all.
     told = smooth((1.0 + NEAR - apart) / NEAR)
     back = np.maximum(1.0 - apart, 0.0) + wrong * told
-    way = np.minimum(apart, 1.0)[:, None] * (straight + wrong[:, None] * touches.side)
-    way += back[:, None] * touches.side
-    way /= np.maximum(_length(way), _TINY)[:, None]
-    along = np.einsum("ci,ci->c", touches.gap, way)
+    inside = np.minimum(apart, 1.0)
+    way = inside * straight + (inside * wrong + back) * touches.side
+    way /= np.maximum(np.sqrt(dot(way, way)), _TINY)
+    along = dot(touches.gap, way)
     # |gap + far · way| is to be as long as that.
     least = touches.wide - GIVEN * touches.thin
     across = touches.distance**2 - along**2
@@ -193,7 +245,3 @@ def aside(touches: Touches) -> tuple[Floats, Floats]:
     soft = _SOFT * touches.thin
     far = np.where(far > soft, far, np.maximum(far + soft, 0.0) ** 2 / (4.0 * soft))
     return way, told * far
-
-
-def _length(vectors: Floats) -> Floats:
-    return np.sqrt(np.einsum("ci,ci->c", vectors, vectors))
