@@ -50,7 +50,23 @@ def cycle_pixels(
         view: from where.
         size: of one picture, in pixels.
     """
-    frames = performance.cycle(_PHASES)
+    pictures = cycle_pictures(performance, view, size, _PHASES)
+    return joined([pictures[at : at + _COLUMNS] for at in range(0, _PHASES, _COLUMNS)])
+
+
+def cycle_pictures(
+    performance: Performance, view: View, size: tuple[int, int], phases: int, name: str = ""
+) -> list[Pixels]:
+    """Some phases of one cycle, a picture each.
+
+    Args:
+        performance: who moves.
+        view: from where.
+        size: of one picture, in pixels.
+        phases: how many.
+        name: what is written into the pictures, with the phase; none for all there is to say.
+    """
+    frames = performance.cycle(phases)
     points = stage.skin_points(performance.octopus, frames)
     bodies, axes = _travel(performance.octopus, frames, view)
     # Right, up and back from the body, as this view has them: (frames, points, 3).
@@ -69,12 +85,13 @@ def cycle_pixels(
         stage.go_to(frame)
         stage.look(camera, -axes[number][:, 2], axes[number][:, 1])
         camera.location = Vector(bodies[number] + axes[number] @ middle)
-        phase = f"{360 * number // _PHASES}°"
-        note = f"{performance.shot.gait}, {view.name}, {phase}, frame {frame:.0f}"
+        phase = f"{360 * number // phases}°"
+        whole = f"{performance.shot.gait}, {view.name}, {phase}, frame {frame:.0f}"
+        note = f"{name}, {phase}" if name else whole
         pictures.append(stage.render_pixels(*size, note=note))
     bpy.data.objects.remove(camera)
     scene.camera = usual
-    return joined([pictures[at : at + _COLUMNS] for at in range(0, _PHASES, _COLUMNS)])
+    return pictures
 
 
 def _travel(

@@ -20,6 +20,7 @@ import plot
 import puppet_curves
 import puppets
 import reaching
+import setups
 import shots
 import stage
 from stage import Pixels
@@ -145,6 +146,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "walk_route": along_route(_FAR_WALK, 4),
     "swim_route": along_route(shots.SWIM, 5),
     "ground": grounds.sheet,
+    "setups": setups.gallery,
     "rig": rig,
     "gaits": gaits,
     "reach": reaching.reach,

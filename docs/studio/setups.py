@@ -35,6 +35,10 @@ _RISING: Final = ((-3.6, 0.6, 0.9), (-1.2, -1.5, 0.6), (0.9, 1.8, 1.8), (3.6, 0.
 _LENGTH: Final = 0.58
 """Metres that an arm of the add-on's octopus is long: what the routes are made for."""
 _THUMBNAIL: Final = 160
+_OBLIQUE: Final = contact_sheet.View("above the side", np.radians(22.0))
+_CELL: Final = (180, 135)
+_STRIP: Final = 4
+"""Pictures of a cycle beside each other."""
 _BACKGROUND: Final = (0.06, 0.06, 0.065)
 
 
@@ -184,6 +188,15 @@ def add_bumps(points: Points, unit: float, height: float = BUMPS) -> bpy.types.O
     ground = bpy.data.objects.new("Bumps", mesh)
     stage.the_scene().collection.objects.link(ground)
     return ground
+
+
+def gallery() -> Pixels:
+    """All set-ups that come with the add-on, four phases of each, two to a row."""
+    strips = []
+    for name in ours.ORDER:
+        pictures = contact_sheet.cycle_pictures(perform(name), _OBLIQUE, _CELL, _STRIP, name)
+        strips.append(contact_sheet.joined([pictures]))
+    return contact_sheet.joined([strips[at : at + 2] for at in range(0, len(strips), 2)])
 
 
 def _sheet(performance: shots.Performance) -> Pixels:
