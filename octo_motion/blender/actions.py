@@ -12,6 +12,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from operator import itemgetter
 from typing import Final
 
 import bpy
@@ -406,6 +407,7 @@ def _write_curves(
     # Everything goes through the same few buffers: memory stays modest, however many the bones.
     points = np.empty((len(times), 2), dtype=np.float32)
     points[:, 0] = times
+    flat = points.ravel()
     # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
     generated = _filled(len(times), "type", "GENERATED")
     kinds = np.stack(
@@ -418,8 +420,10 @@ def _write_curves(
             if curve is None:
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
             keys = curve.keyframe_points
+            interpolation, handles_are = _kind_of(keys)
+            own_handles = interpolation == "BEZIER" and handles_are != "AUTO"
             # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
-            regrouped = _has_own_handles(curve) != (channel.keys is not None)
+            regrouped = own_handles != (channel.keys is not None)
             if curve.group is None or (regrouped and curve.group.name != channel.group):
                 group = channelbag.groups.get(channel.group)
                 curve.group = group or channelbag.groups.new(channel.group)
@@ -427,14 +431,14 @@ def _write_curves(
             if channel.keys is not None:
                 digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
                 continue
-            alike = len(keys) == len(times) and (
-                _has_automatic_handles(curve) if automatic else keys[0].interpolation == "LINEAR"
-            )
-            if len(keys) != len(times):
+            as_many = len(keys) == len(times)
+            alike = as_many and interpolation == ("BEZIER" if automatic else "LINEAR")
+            alike = alike and (handles_are == "AUTO" or not automatic)
+            if not as_many:
                 keys.clear()
                 keys.add(len(times))
             points[:, 1] = channel.values[:, component]
-            keys.foreach_set("co", points.ravel())
+            keys.foreach_set("co", flat)
             if not alike:
                 keys.foreach_set("interpolation", kinds[0])
                 keys.foreach_set("type", generated)
@@ -484,19 +488,18 @@ def _write_bezier(
     return _keys_digest(coordinates, np.stack([bezier, generated])), _handles(curve)
 
 
+def _kind_of(keys: bpy.types.FCurveKeyframePoints) -> tuple[str, str]:
+    """Interpolation and left handle's type of a curve's first key, both "" where there is none."""
+    if not len(keys):
+        return "", ""
+    first = keys[0]
+    return first.interpolation, first.handle_left_type
+
+
 def _has_own_handles(curve: bpy.types.FCurve) -> bool:
     """Whether its handles were set, rather than left to Blender, or to nobody."""
-    keys = curve.keyframe_points
-    if len(keys) == 0 or keys[0].interpolation != "BEZIER":
-        return False
-    return keys[0].handle_left_type != "AUTO"
-
-
-def _has_automatic_handles(curve: bpy.types.FCurve) -> bool:
-    keys = curve.keyframe_points
-    return (
-        len(keys) > 0 and keys[0].interpolation == "BEZIER" and keys[0].handle_left_type == "AUTO"
-    )
+    interpolation, handles_are = _kind_of(curve.keyframe_points)
+    return interpolation == "BEZIER" and handles_are != "AUTO"
 
 
 def _handles(curve: bpy.types.FCurve) -> np.ndarray:
@@ -590,17 +593,48 @@ def _fingerprint(
     add([(marker.name, marker.frame) for marker in action.pose_markers])
     add([slot.handle for slot in action.slots])
     add([len(layer.strips) for layer in action.layers])
-    for curve in _sorted_curves(action):
-        add(curve.data_path, curve.array_index, curve.extrapolation, curve.mute, curve.lock)
+    buffer = np.empty((0, 2), dtype=np.float32)
+    for path, index, state, curve in _told(action):
         keys = curve.keyframe_points
-        add(len(keys), len(curve.modifiers))
+        count = len(keys)
+        digest.update(f"({path!r}, {index}, {state}({count}, {len(curve.modifiers)})".encode())
         if known is not None:
-            digest.update(known[curve.data_path, curve.array_index])
+            digest.update(known[path, index])
             continue
-        points = np.empty((len(keys), 2), dtype=np.float32)
-        keys.foreach_get("co", points.ravel())
-        digest.update(_keys_digest(points, _kinds(keys)))
+        if len(buffer) != count:
+            buffer = np.empty((count, 2), dtype=np.float32)
+        keys.foreach_get("co", buffer.ravel())
+        digest.update(_keys_digest(buffer, _kinds(keys)))
     return digest.hexdigest()
+
+
+def _told(action: bpy.types.Action) -> list[tuple[str, int, str, bpy.types.FCurve]]:
+    """Path, component, state as text and curve of all curves, by path and component: an artist may
+    move channels up and down in the list.
+    """
+    found: list[tuple[str, int, str, bpy.types.FCurve]] = []
+    for channelbag in _channelbags(action):
+        curves = channelbag.fcurves
+        # What can be read of all at once is.
+        index, extrapolation = np.empty((2, len(curves)), dtype=np.int32)
+        mute, lock = np.empty((2, len(curves)), dtype=bool)
+        curves.foreach_get("array_index", index)
+        curves.foreach_get("extrapolation", extrapolation)
+        curves.foreach_get("mute", mute)
+        curves.foreach_get("lock", lock)
+        states = zip(extrapolation.tolist(), mute.tolist(), lock.tolist(), strict=True)
+        texts = [f"{_extrapolation(kind)!r}, {off}, {locked})" for kind, off, locked in states]
+        paths = [curve.data_path for curve in curves]
+        found.extend(zip(paths, index.tolist(), texts, curves, strict=True))
+    return sorted(found, key=itemgetter(0, 1))
+
+
+@cache
+def _extrapolation(number: int) -> str:
+    """Name of the way in which a curve goes on beyond its keys."""
+    definition = bpy.types.FCurve.bl_rna.properties["extrapolation"]
+    assert isinstance(definition, bpy.types.EnumProperty)
+    return next(each.identifier for each in definition.enum_items if each.value == number)
 
 
 def _kinds(keys: bpy.types.FCurveKeyframePoints) -> np.ndarray:

@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import bpy
 import numpy as np
 
 from ..core.errors import RigError
+from ..core.remembered import Remembered
 from ..core.rotations import Floats
 from ..core.skeleton import Skeleton
 from . import versions
 
 SUCKER_PROPERTY = "octo_motion_sucker"
 """Custom property of a bone: the local axis its suckers face, such as "-Z"."""
+
+_known: Final[Remembered[Skeleton]] = Remembered(4)
 
 
 def active_armature(context: bpy.types.Context) -> bpy.types.Object:
@@ -74,7 +79,7 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
         )
     driven = _driven_bones(armature)
     weighted = _vertex_group_names(armature)
-    return Skeleton(
+    skeleton = Skeleton(
         names=tuple(bone.name for bone in bones),
         parents=tuple(index[bone.parent.name] if bone.parent else -1 for bone in bones),
         rest_matrices=matrices,
@@ -87,6 +92,8 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
         bendy_segments=tuple(bone.bbone_segments for bone in bones),
         sucker_axes=tuple(str(bone.get(SUCKER_PROPERTY, "")) for bone in bones),
     )
+    # What was worked out of the same bones before stays with them.
+    return _known.get(skeleton.content, lambda: skeleton)
 
 
 def selected_bones(armature: bpy.types.Object) -> tuple[str, ...]:

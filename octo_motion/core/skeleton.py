@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
 
+from .remembered import key_of
 from .rotations import Floats, from_matrix, multiply, rotate
 
 
@@ -40,6 +41,11 @@ class Skeleton:
     def __len__(self) -> int:
         """Number of bones."""
         return len(self.names)
+
+    @cached_property
+    def content(self) -> bytes:
+        """A key of all of it (``remembered.key_of``)."""
+        return key_of(*(getattr(self, each.name) for each in fields(self)))
 
     @cached_property
     def index(self) -> dict[str, int]:

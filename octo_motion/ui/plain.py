@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import bpy
 
 _PASSED = frozenset({"rna_type"})
+
+_known: WeakKeyDictionary[type, list[tuple[str, str, bool]]] = WeakKeyDictionary()
+"""The properties of each kind of group, as long as it is registered."""
 
 
 def plain(group: Any, *, without: frozenset[str] = frozenset()) -> dict[str, Any]:
@@ -18,21 +22,34 @@ def plain(group: Any, *, without: frozenset[str] = frozenset()) -> dict[str, Any
         without: names that are left out, at every level.
     """
     result: dict[str, Any] = {}
-    for definition in group.bl_rna.properties:
-        name = definition.identifier
-        if name in without or name in _PASSED:
+    for name, kind, is_array in _properties(type(group), group):
+        if name in without:
             continue
         value = getattr(group, name)
-        if definition.type == "COLLECTION":
+        if kind == "COLLECTION":
             result[name] = [plain(each, without=without) for each in value]
         elif isinstance(value, bpy.types.ID):
             result[name] = value.name
-        elif definition.type == "POINTER":
+        elif kind == "POINTER":
             result[name] = None if value is None else plain(value, without=without)
-        elif getattr(definition, "is_array", False):
+        elif is_array:
             result[name] = list(value)
         elif isinstance(value, set):
             result[name] = sorted(value)
         else:
             result[name] = value
     return result
+
+
+def _properties(kind: type, group: Any) -> list[tuple[str, str, bool]]:
+    """Name, type and whether it is an array of each property that groups of a kind have.
+
+    Blender takes longer to tell than all of their values.
+    """
+    if kind not in _known:
+        _known[kind] = [
+            (each.identifier, each.type, getattr(each, "is_array", False))
+            for each in group.bl_rna.properties
+            if each.identifier not in _PASSED
+        ]
+    return _known[kind]

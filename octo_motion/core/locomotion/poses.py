@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from ..remembered import Remembered, key_of
 from ..rotations import Floats, conjugate, multiply, normalized, rotate
 from ..skeleton import Skeleton
 from .chains import AXES, joint_positions
@@ -21,6 +22,8 @@ from .columns import cross, dot, product, smallest_arc, turned
 
 _NO_SIDE: Final = 0.1
 """Length of what is across a segment, of a unit vector that does not tell which side is which."""
+_MOST_KNOWN: Final = 128
+"""Arms whose rest is kept for the next time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +41,21 @@ class ArmRest:
     bone that does not inherit rotation nothing at all."""
 
 
+_rests: Final[Remembered[ArmRest]] = Remembered(_MOST_KNOWN)
+_sides: Final[Remembered[Floats]] = Remembered(_MOST_KNOWN)
+
+
 def arm_rest(skeleton: Skeleton, bones: Sequence[str]) -> ArmRest:
     """The rest pose of a chain; helper bones within it ride along rigidly.
 
     Raises:
         RigError: a bone does not exist.
     """
+    key = key_of(skeleton, tuple(bones))
+    return _rests.get(key, lambda: _arm_rest(skeleton, bones))
+
+
+def _arm_rest(skeleton: Skeleton, bones: Sequence[str]) -> ArmRest:
     joints = joint_positions(skeleton, bones)
     order = [skeleton.index[name] for name in bones]
     rest = skeleton.rest_rotations[order]
@@ -81,6 +93,11 @@ def sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Floa
         bones: of an arm.
         down: (3,) armature space.
     """
+    key = key_of(skeleton, tuple(bones), down)
+    return _sides.get(key, lambda: _sucker_sides(skeleton, bones, down))
+
+
+def _sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Floats:
     rest = arm_rest(skeleton, bones)
     order = [skeleton.index[name] for name in bones]
     looking = rotate(conjugate(skeleton.rest_rotations[order]), down)
