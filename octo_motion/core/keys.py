@@ -46,6 +46,8 @@ _CHOOSING: Final = 0.8
 """Share of the work that it takes to choose key frames; the rest is for their handles."""
 _PULL: Final = 0.01
 """Weight, against that of a frame, of the wish that handles follow the motion's slope."""
+_GENTLE_PULL: Final = 1e-3
+"""The same where there is but a moment between two keys."""
 _SPARE: Final = 0.998
 """Share of the bounds that is used up before values are rounded."""
 _KEPT: Final = 0.999
@@ -172,9 +174,17 @@ def reduce_keys(frames: Floats, limbs: Sequence[Limb]) -> list[list[BezierKeys]]
 
 
 def reducing(
-    frames: Floats, limbs: Sequence[Limb]
+    frames: Floats, limbs: Sequence[Limb], *, every: int = 1, all_of_them: bool = False
 ) -> Generator[float, None, list[list[BezierKeys]]]:
-    """The same in steps, yielding the share that is done: 0…1. May be dropped between any two."""
+    """The same in steps, yielding the share that is done: 0…1. May be dropped between any two.
+
+    Args:
+        frames: (frames,) ascending, as Blender keeps them.
+        limbs: any number; those that are alike are worked on together.
+        every: at every how many of the frames there may be a key, from the first to the last one;
+            those in between are moments at which the bounds hold too.
+        all_of_them: whether there is a key wherever there may be one.
+    """
     for limb in limbs:
         check_bounds(limb.angle, limb.distance)
     times = np.asarray(frames, dtype=np.float32).astype(np.float64)
@@ -188,7 +198,8 @@ def reducing(
     done, whole = 0, max(sum(tracks), 1)
     for numbers in alike.values():
         own = sum(tracks[number] for number in numbers)
-        steps = _Work(times, [limbs[number] for number in numbers]).reduced()
+        own_limbs = [limbs[number] for number in numbers]
+        steps = _Work(times, own_limbs, every).reduced(all_of_them=all_of_them)
         while True:
             try:
                 share = next(steps)
@@ -241,8 +252,8 @@ class _Spans:
 class _Work:
     """Limbs that are alike: as many tracks of the same kinds, the same chain."""
 
-    def __init__(self, times: Floats, limbs: Sequence[Limb]) -> None:
-        self._times = times
+    def __init__(self, times: Floats, limbs: Sequence[Limb], every: int = 1) -> None:
+        self._times, self._every = times, every
         self._kinds = [track.kind for track in limbs[0].tracks]
         self._widths = [track.values.shape[1] for track in limbs[0].tracks]
         ends = np.cumsum([0, *self._widths])
@@ -269,12 +280,18 @@ class _Work:
             self._rotations.reshape(numbers.size * len(times), -1, 4),
         ).reshape(*exact.shape[:2], -1)
 
-    def reduced(self) -> Generator[float, None, list[list[BezierKeys]]]:
+    def reduced(
+        self, *, all_of_them: bool = False
+    ) -> Generator[float, None, list[list[BezierKeys]]]:
         """The keys of each limb's tracks, in steps that yield the share that is done."""
         last = len(self._times) - 1
         keyed = np.zeros(self._values.shape[:2], dtype=bool)
         keyed[:, (0, last)] = True
-        if last > 0:
+        if self._every > 1 and last > 0:
+            self._let_go()
+        if all_of_them:
+            keyed[:, :: self._every] = True
+        elif last > 0:
             for share in self._choose(keyed):
                 yield _CHOOSING * share
         return (yield from self._written(keyed))
@@ -288,18 +305,20 @@ class _Work:
         keyed[limbs, starts] = True
         # Of each stretch: the last key, the furthest frame that it can span, the nearest that it
         # cannot, and how far to look next.
+        every = self._every
+        starts, ends = starts // every, ends // every
         at, good, bad = starts.copy(), starts + 1, ends + 1
         guess = np.minimum(starts + 8, ends)
         while len(at):
             probed = guess > good
-            spans = _Spans(limbs[probed], at[probed], guess[probed])
+            spans = _Spans(limbs[probed], every * at[probed], every * guess[probed])
             fits = np.ones(len(at), dtype=bool)
             fits[probed] = self._fitted(spans) <= _SPARE
             length = guess - at
             good = np.where(fits, np.maximum(guess, good), good)
             bad = np.where(fits, bad, guess)
             found = good + 1 >= bad
-            keyed[limbs[found], good[found]] = True
+            keyed[limbs[found], every * good[found]] = True
             step = good - at
             at = np.where(found, good, at)
             # The next span is looked for at the length of this one, a longer one by doubling.
@@ -324,6 +343,7 @@ class _Work:
         around = np.arange(-_STRETCH // 4, _STRETCH // 4)
         windows = nominal[:, None] + around
         cuts = windows[:, 0] + bend[:, windows].argmax(axis=2)
+        cuts -= cuts % self._every
         rows = len(self._values)
         edges = np.column_stack(
             [np.zeros(rows, dtype=np.intp), cuts, np.full(rows, count - 1, dtype=np.intp)]
@@ -346,6 +366,19 @@ class _Work:
             size = np.linalg.norm(bend[..., columns], axis=2) * (1.0 + (kind == "QUATERNION"))
             kinks[..., track] = size > _KINK * bound[:, None]
         return kinks
+
+    def _let_go(self) -> None:
+        """Let the motion have a corner wherever it does not keep to its slope for a frame.
+
+        From one key to the next there are moments in between then, and none to put a key at.
+        """
+        rows, count = self._values.shape[:2]
+        starts = np.arange(0, count - 1, self._every)
+        limbs, starts = np.repeat(np.arange(rows), len(starts)), np.tile(starts, rows)
+        spans = _Spans(limbs, starts, starts + self._every)
+        off = self._fitted(spans) > _SPARE
+        self._loose[limbs[off], starts[off]] = True
+        self._loose[limbs[off], starts[off] + self._every] = True
 
     def _fitted(self, spans: _Spans) -> Floats:
         """Give spans the handles that fit best; the errors that remain, as shares of the bounds."""
@@ -370,9 +403,12 @@ class _Work:
         rest -= weights[0][:, None] * first[owner] + weights[3][:, None] * last[owner]
         one, two = weights[1], weights[2]
         sums = np.add.reduceat(np.column_stack([one * one, one * two, two * two]), heads)
-        ones = np.add.reduceat(one[:, None] * rest, heads) + _PULL * wanted_out
-        twos = np.add.reduceat(two[:, None] * rest, heads) + _PULL * wanted_into
-        sums += (_PULL, 0.0, _PULL)
+        # A single moment in between has little to say against it.
+        single = (ends - starts == self._every) & (self._every > 1)
+        pull = np.where(single, _GENTLE_PULL, _PULL)[:, None]
+        ones = np.add.reduceat(one[:, None] * rest, heads) + pull * wanted_out
+        twos = np.add.reduceat(two[:, None] * rest, heads) + pull * wanted_into
+        sums += pull * (1.0, 0.0, 1.0)
         a, b, c = sums.T[:, :, None]
         scale = a * c - b * b
         out, into = (c * ones - b * twos) / scale, (a * twos - b * ones) / scale
@@ -465,10 +501,11 @@ class _Work:
             self._fitted(spans)
             self._round(spans)
             limbs, starts, ends = spans.limbs, spans.starts, spans.ends
-            split = self._broken(spans) & (ends - starts > 1)
+            split = self._broken(spans) & (ends - starts > self._every)
             if not split.any():
                 return self._as_keys(spans, keyed, self._joined(spans))
-            keyed[limbs[split], (starts + ends)[split] // 2] = True
+            middles = (starts + ends)[split] // 2
+            keyed[limbs[split], middles - middles % self._every] = True
             yield _CHOOSING
 
     def _joined(self, spans: _Spans) -> Booleans:

@@ -73,15 +73,23 @@ class Motion:
 
 
 def reduced(
-    frames: Floats, body: Body, motion: Motion, tolerances: Tolerances
+    frames: Floats,
+    body: Body,
+    motion: Motion,
+    tolerances: Tolerances,
+    *,
+    every: int = 1,
+    dense: bool = False,
 ) -> Generator[float, None, list[actions.Channel]]:
     """The channels with few keys, grouped by arm, in steps that yield the share that is done.
 
     Args:
-        frames: (frames,) at which the channels have their values.
+        frames: (moments,) at which the channels have their values.
         body: its arms and mantle are those of the channels, in their order.
         motion: the channels.
         tolerances: how far they may be off.
+        every: at every how many of these moments there is a frame, from the first to the last.
+        dense: whether there is a key on every frame all the same.
 
     Raises:
         SettingsError: without tolerance, no key can be left out.
@@ -114,9 +122,9 @@ def reduced(
         bound = _STRETCH_SHARE * tolerances.distance / _length(body.skeleton, arm)
         parts.append([replace(each, group=arm.name) for each in part])
         limbs.append(Limb([Track(each.values, LOCATION) for each in part], np.pi, bound))
-    found = yield from reducing(frames, limbs)
+    found = yield from reducing(frames, limbs, every=every, all_of_them=dense)
     return [
-        replace(channel, keys=keys)
+        replace(channel, values=channel.values[::every], keys=keys)
         for part, each in zip(parts, found, strict=True)
         for channel, keys in zip(part, each, strict=True)
     ]

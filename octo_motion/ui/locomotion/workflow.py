@@ -13,6 +13,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Final, cast
 
 import bpy
@@ -92,6 +93,15 @@ _ROUTE_SAMPLES: Final = 257
 _UNEQUAL: Final = 1e-3
 _MOVING: Final = 0.4
 """Share of the work that is over when the motion is there, but not yet its few keys."""
+_HASTY: Final = 40.0
+"""Frames of a cycle below which the motion is worked out half way between them, too: keys that
+lead on from frame to frame by themselves would let arms slide and dip there."""
+_QUICKLY: Final = 8_000
+"""Bones times frames of the same up to which that is soon done."""
+_EXACT_ANGLE: Final = np.radians(0.5)
+"""Radians that keys on every frame may be off there …"""
+_EXACT_DISTANCE: Final = 0.002
+"""… and arm lengths of an arm's tip."""
 _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
 
@@ -164,6 +174,33 @@ class _Posed:
             cycles=np.zeros((frames, len(arms)), dtype=np.int64),
         )
 
+    def at_every(self, count: int) -> _Posed:
+        """The same at every so many of these frames, from the first on."""
+        return _Posed(
+            rotations=self.rotations[::count],
+            strains=self.strains[::count],
+            late=self.late[::count],
+            misses=self.misses[::count],
+            lying=[each[::count] for each in self.lying],
+            cycles=self.cycles[::count],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Moving:
+    """What gets keys, at all moments at which it is worked out."""
+
+    rotations: Floats
+    """(moments, bones, 4)"""
+    strains: Floats
+    """(moments, bones)"""
+    locations: Floats
+    """(moments, 3)"""
+    orientations: Floats
+    """(moments, 4)"""
+    swimming: Floats | None
+    """(moments,) how far the body swims, 0…1, where the gait changes."""
+
 
 @dataclass(eq=False)
 class Shot:
@@ -199,6 +236,9 @@ class Shot:
     """(bones, 4) how, the same at every frame."""
     tolerances: Tolerances | None
     """How far few keys may be off, none for a key on every frame."""
+    hasty: bool
+    """Whether a cycle has so few frames that the motion is worked out half way between them, too,
+    for its keys to keep to that."""
     in_place: bool
     """Whether nothing travels: the motion is a loop."""
     repeats: bool
@@ -247,38 +287,71 @@ class Shot:
     """What the figures are taken from, none where they are not wanted."""
     figures: tuple[Figure, ...] = ()
     """The worst of each kind."""
+    moving: _Moving | None = None
     few: list[actions.Channel] | None = None
-    """The channels with few keys, where there are tolerances."""
+    """The channels with keys of their own: few, or with handles of their own."""
+
+    @property
+    def every(self) -> int:
+        """At every how many moments that are worked out there is a frame."""
+        return 2 if self.hasty else 1
+
+    @cached_property
+    def moments(self) -> Floats:
+        """(moments,) frames at which the motion is worked out, which need not be whole."""
+        return _with_halves(self.frames) if self.hasty else self.frames
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
         table = self.standing.bearings if self.standing is not None else None
-        travel = plan_travel(self.route, self.travel, self.times, table)
+        times = _with_halves(self.times) if self.hasty else self.times
+        travel = plan_travel(self.route, self.travel, times, table)
         places = self._places(travel)
         # In place the ground goes by, and arms are measured as if the body went along it.
         going = object_transforms(self.body, self.scale, *places)
         self.locations, self.orientations = self._in_place() if self.in_place else going
-        posed = _Posed.of(len(self.frames), self.arms)
+        posed = _Posed.of(len(self.moments), self.arms)
         if self.changing is not None:
             steps = self._change(self.changing, travel, places, going, posed)
         elif self.standing is not None:
             steps = self._stand(self.standing, travel, places, going, posed)
         else:
             steps = self._follow(travel, posed)
-        moving = 1.0 if self.tolerances is None else _MOVING
+        reducing = self.tolerances is not None or self.hasty
+        moving = _MOVING if reducing else 1.0
         for share in steps:
             yield moving * share
         busy = self._reach(posed)
         self._part(posed, busy, going)
+        posed, going = self._keep(posed, going)
         self._look(posed, going)
         self.rotations, self.misses = posed.rotations, posed.misses
         self.strains, self.out_of_reach = posed.strains, posed.late
-        if self.tolerances is not None:
+        if reducing:
             yield moving
-            for share in self._reduce(self.tolerances):
+            for share in self._reduce():
                 yield moving + (1.0 - moving) * share
         self._tell_quality()
         yield 1.0
+
+    def _keep(
+        self, posed: _Posed, going: tuple[Floats, Floats]
+    ) -> tuple[_Posed, tuple[Floats, Floats]]:
+        """Keep what moves at all moments for its keys; the arms and the travel on frames."""
+        assert self.locations is not None
+        assert self.orientations is not None
+        self.moving = _Moving(
+            rotations=posed.rotations,
+            strains=posed.strains,
+            locations=self.locations,
+            orientations=self.orientations,
+            swimming=self.swimming,
+        )
+        every = self.every
+        self.locations, self.orientations = self.locations[::every], self.orientations[::every]
+        if self.swimming is not None:
+            self.swimming = self.swimming[::every]
+        return posed.at_every(every), (going[0][::every], going[1][::every])
 
     def _places(self, travel: Travel) -> tuple[Floats, Floats]:
         """Centres (frames, 3) and orientations (frames, 4) of the body, world."""
@@ -291,13 +364,13 @@ class Shot:
 
     def _portions(self) -> Iterator[slice]:
         """Frames that are worked on at a time."""
-        count = len(self.frames)
+        count = len(self.moments)
         step = max(1, _BONES_AT_ONCE // max(len(self.generator.bones), 1))
         return (slice(start, min(start + step, count)) for start in range(0, count, step))
 
     def _follow(self, travel: Travel, posed: _Posed) -> Iterator[float]:
         """Arms as the gait alone has them."""
-        count = len(self.frames)
+        count = len(self.moments)
         for part in self._portions():
             poses = self.generator.pose(travel.phase[part], travel.turn[part])
             posed.rotations[part] = poses.rotations
@@ -351,7 +424,7 @@ class Shot:
         posed: _Posed,
     ) -> Iterator[float]:
         """Arms that hold the ground, and do not dip into it between frames."""
-        count = len(self.frames)
+        count = len(self.moments)
         joints: list[list[Floats]] = []
         shapes: list[tuple[Floats, ...]] = []
         for part in self._portions():
@@ -397,7 +470,7 @@ class Shot:
         """Let arms make way for each other, but for those that are busy (frames, arms)."""
         if self.apart is None or not self.keep_apart:
             return
-        too_many = self.apart.too_many(len(self.frames))
+        too_many = self.apart.too_many(len(self.moments))
         if too_many:
             self.warnings.append(too_many)
             return
@@ -410,7 +483,7 @@ class Shot:
             travel=going,
             ground=self._ground(),
             scale=self.scale,
-            frames_per_cycle=self.cycle,
+            frames_per_cycle=self.every * self.cycle,
             cyclic=self.in_place,
         )
         if moved is not None:
@@ -456,11 +529,19 @@ class Shot:
             self.measured = as_keyed(self.measured, rig, self.few)
         self.figures = figures(self.measured)
 
-    def _reduce(self, tolerances: Tolerances) -> Iterator[float]:
-        """Find few keys, in steps that yield the share that is done."""
+    def _reduce(self) -> Iterator[float]:
+        """Find keys with handles of their own, in steps that yield the share that is done."""
         armature = _local_object(self.armature)
         body = Body(*(armature, self.scale, self.skeleton, self.arms, self.mantle, self.root_bone))
-        steps = reduced(self.frames, body, self._motion(armature), tolerances)
+        exact = Tolerances(_EXACT_ANGLE, _EXACT_DISTANCE * self.generator.arm_length)
+        steps = reduced(
+            self.moments,
+            body,
+            self._motion(armature),
+            self.tolerances or exact,
+            every=self.every,
+            dense=self.tolerances is None,
+        )
         while True:
             try:
                 share = next(steps)
@@ -573,31 +654,30 @@ class Shot:
         return [*few, *self.breath]
 
     def _motion(self, armature: bpy.types.Object) -> Motion:
-        """What was computed, as channels with a key on every frame."""
-        assert self.rotations is not None
-        assert self.locations is not None
-        assert self.orientations is not None
-        held = np.tile(self.mantle_rotations, (len(self.frames), 1, 1))
-        if self.swimming is not None:
+        """What was computed, as channels with a key at every moment."""
+        moving = self.moving
+        assert moving is not None
+        held = np.tile(self.mantle_rotations, (len(self.moments), 1, 1))
+        if moving.swimming is not None:
             rest = np.broadcast_to(IDENTITY, held.shape)
-            held = between(rest, held, np.repeat(self.swimming[:, None], held.shape[1], axis=1))
+            held = between(rest, held, np.repeat(moving.swimming[:, None], held.shape[1], axis=1))
         if self.in_place and not self.root_bone:
             travel = []
         elif self.root_bone:
             locations, rotations = root_bone_transforms(
-                self.skeleton, self.root_bone, self.world, self.locations, self.orientations
+                self.skeleton, self.root_bone, self.world, moving.locations, moving.orientations
             )
             travel = [
                 actions.location_channel(armature, self.root_bone, locations),
                 *actions.rotation_channels(armature, [self.root_bone], rotations[:, None]),
             ]
         else:
-            travel = actions.object_channels(armature, self.locations, self.orientations)
+            travel = actions.object_channels(armature, moving.locations, moving.orientations)
         return Motion(
             travel=travel,
-            arms=actions.rotation_channels(armature, self.generator.bones, self.rotations),
+            arms=actions.rotation_channels(armature, self.generator.bones, moving.rotations),
             mantle=actions.rotation_channels(armature, self.mantle, held),
-            stretch=self._stretch(armature),
+            stretch=self._stretch(armature, moving.strains),
         )
 
     def _in_place(self) -> tuple[Floats, Floats]:
@@ -610,15 +690,14 @@ class Shot:
         raised = lift * up if self.root_bone and self.gait.on_ground else 0.0 * up
         location = self.world[:3, 3] + self.world[:3, :3] @ raised
         orientation = from_matrix(self.world[:3, :3] / self.scale)
-        count = len(self.frames)
+        count = len(self.moments)
         return np.tile(location, (count, 1)), np.tile(orientation, (count, 1))
 
-    def _stretch(self, armature: bpy.types.Object) -> list[actions.Channel]:
+    def _stretch(self, armature: bpy.types.Object, strains: Floats) -> list[actions.Channel]:
         # A swim that becomes a walk stretches there.
         if not any(each.stretching for each in self._stands()):
             return []
-        assert self.strains is not None
-        return stretch_channels(armature, [arm.bones for arm in self.arms], self.strains)
+        return stretch_channels(armature, [arm.bones for arm in self.arms], strains)
 
     def _missed(self) -> list[str]:
         assert self.misses is not None
@@ -812,6 +891,10 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     tell_overlaps = settings.tell_overlaps and not live
     if settings.keep_apart or tell_overlaps:
         apart = read_apart(armature, skeleton, arms, body, live=live)
+    cycle = (len(frames) - 1) / max(strides(route, travel), 1e-9)
+    reaching = read_reaches(armature, settings, at_rest, arms, body=rest_body, frames=frames)
+    grounded = standing is not None or changing is not None
+    soon = len(frames) * len(generator.bones) <= _QUICKLY
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -835,6 +918,8 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         mantle=mantle,
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
         tolerances=None if live else _tolerances(settings, generator.arm_length),
+        # What is reached for is known on frames alone.
+        hasty=grounded and cycle < _HASTY and reaching is None and (soon or not live),
         in_place=in_place,
         repeats=in_place and settings.repeat,
         breath=breath,
@@ -845,9 +930,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         apart=apart,
         keep_apart=settings.keep_apart,
         tell_overlaps=tell_overlaps,
-        cycle=(len(frames) - 1) / max(strides(route, travel), 1e-9),
+        cycle=cycle,
         measure=not live,
-        reaching=read_reaches(armature, settings, at_rest, arms, body=rest_body, frames=frames),
+        reaching=reaching,
         note=settings_note(settings),
         # Detection has looked for constraints itself.
         warnings=[
@@ -900,6 +985,13 @@ def _check_route_stays(settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.
                 "Clear its parent (Alt P).",
             )
         child = child.parent
+
+
+def _with_halves(values: Floats) -> Floats:
+    """Values (frames,) with those half way in between (2 frames − 1,)."""
+    result = np.empty(2 * len(values) - 1)
+    result[::2], result[1::2] = values, 0.5 * (values[:-1] + values[1:])
+    return result
 
 
 # --- The rig ---------------------------------------------------------------------------------
