@@ -273,6 +273,25 @@ def test_what_is_wrong_is_told_in_the_panel_and_the_motion_stays(octopus: Any) -
     assert motion(octopus) != before
 
 
+@pytest.mark.parametrize("frame", [1, 12])
+def test_an_action_that_is_edited_while_its_route_is_dragged_is_left_alone(
+    octopus: Any, frame: int
+) -> None:
+    for _ in range(2):
+        drag_route(octopus)
+        assert settle()
+    curve = next(iter(action_of(octopus).layers[0].strips[0].channelbags[0].fcurves))
+    curve.keyframe_points[3].co.y += 0.5
+    curve.update()
+    edited = motion(octopus)
+    # Whether it is told at once, or together with another frame.
+    bpy.context.scene.frame_set(frame)
+    drag_route(octopus)
+    settle()
+    assert motion(octopus) == edited
+    assert not settings_of(octopus).live
+
+
 def test_an_action_that_was_edited_is_left_alone(octopus: Any) -> None:
     action = action_of(octopus)
     curve = next(iter(action.layers[0].strips[0].channelbags[0].fcurves))

@@ -10,6 +10,7 @@ touched. What our own writing changes is let through Blender's update before we 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final, cast
@@ -32,6 +33,8 @@ _SOON: Final = 0.03
 """Seconds from a change to the new motion at least: what changes together is made together."""
 _LATER: Final = 0.3
 """Seconds until it is tried again, while Blender renders or a tool of ours runs."""
+_TRUSTED: Final = 1.0
+"""Seconds within which an action that Blender has told no change of is not looked at again."""
 _NO_MATTER: Final = RESULTS | {
     *("contacts", "active_arm", "active_reach", "active_curve", "active_change", "shown_angle"),
     *("keys", "key_angle", "key_distance", "tell_overlaps"),
@@ -48,12 +51,16 @@ class _State:
         """What each live armature's motion was made from, by the object's name."""
         self.changed: dict[str, bool] = {}
         """Armatures to look at, and whether it is known already that they changed."""
+        self.looked: dict[str, float] = {}
+        """When all keys of an armature's action were last looked at; no action was changed since
+        but by us."""
         self.rate = 0.0
         """Frames per second."""
         self.busy = False
 
     def clear(self) -> None:
         self.seen.clear()
+        self.looked.clear()
         self.changed.clear()
         self.busy = False
 
@@ -133,6 +140,8 @@ def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             _look_at(each)
     if not _state.seen:
         return
+    if any(isinstance(each, bpy.types.Action) for each in touched):
+        _state.looked.clear()
     rate = scene.render.fps / scene.render.fps_base
     another_rate, _state.rate = rate != _state.rate and _state.rate > 0.0, rate
     marked = {_marked(each) for each in touched if isinstance(each, bpy.types.Object)}
@@ -159,6 +168,8 @@ def _after_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             elif not pending():
                 # It moves with every frame: now and then is enough to see whether it is set anew.
                 _soon(each.name, certain=False, wait=_LATER)
+    if any(isinstance(each, bpy.types.Action) for each in touched):
+        _state.looked.clear()
     still = {each for each in touched if not _is_animated(each)}
     for name in list(_state.seen):
         armature = _armature(name)
@@ -198,8 +209,8 @@ def _look_at(armature: bpy.types.Object) -> None:
     """Begin or cease to follow an armature, or see whether its settings have changed."""
     name = armature.name
     if not _is_live(armature):
-        _state.seen.pop(name, None)
-        _state.changed.pop(name, None)
+        for known in (_state.seen, _state.changed, _state.looked):
+            known.pop(name, None)
     elif name in _state.seen:
         _soon(name, certain=False)
     else:
@@ -333,7 +344,7 @@ def _follow(name: str, *, certain: bool) -> None:
 
 
 def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
-    kept = _whose(armature, settings)
+    kept = "" if _is_trusted(armature, settings) else _whose(armature, settings)
     if kept:
         settings.live = False
         settings.live_error = kept
@@ -345,6 +356,19 @@ def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> No
     shot.write(unedited=True)
     if settings.live_error:
         settings.live_error = ""
+    _state.looked.setdefault(armature.name, time.monotonic())
+
+
+def _is_trusted(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> bool:
+    """Whether an armature's action is ours for certain, without a look at each of its keys.
+
+    While something is dragged nobody edits an action, and Blender would have told.
+    """
+    fresh = time.monotonic() - _state.looked.get(armature.name, -np.inf) < _TRUSTED
+    if fresh and settings.result is not None and settings.result == playing_action(armature):
+        return True
+    _state.looked.pop(armature.name, None)
+    return False
 
 
 def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
