@@ -14,36 +14,68 @@ to search. How long each hold and each pause lasts is drawn from a seeded stream
 from __future__ import annotations
 
 from dataclasses import dataclass
-from heapq import heapify, heappop, heappush
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SettingsError
-from ..rotations import Floats
+from ..rotations import Floats, normalized
+from .elbow_room import Outline, clearance
 
 _BEFORE: Final = 1.5
 """Arm lengths before the start at which the crawl begins, so that arms hold when it is seen."""
+_TRIED: Final = 16
+"""Lengths of a hold from which the longest is taken that the arm can keep …"""
+_LOOKED_AT: Final = (0.0, 0.25, 0.75, 1.0)
+"""… which is looked at when such a share of it is over."""
+_SLACK: Final = 0.02
+"""Arm lengths by which a hold may be nearer or farther than it should."""
+_OVERLAP: Final = 0.03
+"""Arm lengths before the last arms let go at which another takes hold in their place."""
+_LYING: Final = (0.4, 0.65)
+"""Shares of a hold that are over where an arm of a body that stands may be: it lies unrolled, and
+is hardly peeled off yet. The first is where it is before the body gets going, the other where it
+is once it has come to rest."""
+_LET_GO: Final = (0.04, 0.30)
+"""Arm lengths from the start within which arms that lay there let go, one after the other."""
+_LAST: Final = (0.14, 0.10)
+"""Arm lengths that an arm takes at least, before the body comes to rest, to swing and to lie down:
+the body is slow there."""
+_LONGER: Final = 0.06
+"""Arm lengths by which a hold may be too long where the body comes to rest in it."""
+_TURNS: Final = np.array([0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0])
+"""Shares of the most that an arm turns aside, which it tries."""
+_ASIDE: Final = 0.15
+"""How much clearance, as a share of what is wanted, turning aside all the way must be worth."""
 
 
 @dataclass(frozen=True)
 class CrawlSettings:
     """How a crawl is made. Lengths in arm lengths, angles in radians."""
 
-    near: float = 0.25
+    near: float = 0.47
     """From an arm's root to where it takes hold to push."""
-    far: float = 0.45
+    far: float = 0.78
     """From there to where it lets go."""
+    lies: float = 0.3
+    """Part of an arm that lies on the ground beyond that place."""
     pushing: float = np.radians(70.0)
     """Largest angle between an arm's push and the way to go of an arm that pushes."""
     astray: float = np.radians(25.0)
     """Angle by which a hold may come to lie beside the arm's own direction before it lets go."""
-    pause: tuple[float, float] = (0.12, 0.25)
-    """Shortest and longest way between two holds of an arm that pushes."""
-    search: tuple[float, float] = (0.2, 0.5)
+    aside: float = np.radians(20.0)
+    """Largest angle by which an arm takes hold beside its own direction to keep clear of others."""
+    clear: float = 0.13
+    """How far from each other arms that hold on should be, from the middle of one to the other's.
+    """
+    shortest: float = 0.16
+    """Way that a hold lasts at least: in less an arm would hardly have lain down."""
+    pause: tuple[float, float] = (0.2, 0.45)
+    """Shortest and longest way between two holds of an arm that pushes: time to swing."""
+    search: tuple[float, float] = (0.3, 0.8)
     """Shortest and longest way between two holds of an arm that does not."""
-    hold: tuple[float, float] = (0.5, 1.0)
+    hold: tuple[float, float] = (0.7, 1.0)
     """Shares of the longest possible hold after which an arm lets go."""
     least: int = 3
     """Arms that hold on at any time, if the body has as many."""
@@ -51,7 +83,9 @@ class CrawlSettings:
 
     def __post_init__(self) -> None:
         pairs = (self.pause, self.search, self.hold)
-        numbers = (self.near, self.far, self.pushing, self.astray, *(x for p in pairs for x in p))
+        lengths = (self.near, self.far, self.lies, self.clear, self.shortest)
+        angles = (self.pushing, self.astray, self.aside)
+        numbers = (*lengths, *angles, *(x for p in pairs for x in p))
         if not np.all(np.isfinite(numbers)) or min(numbers) <= 0.0:
             raise SettingsError("A setting of the crawl is not a number above 0.", "Set it anew.")
         if self.near >= self.far:
@@ -79,6 +113,8 @@ class Journey:
     """(samples, 2) unit: where the body goes."""
     length: float
     """Of an arm."""
+    stands: tuple[bool, bool] = (False, False)
+    """Whether the body stands at the start, and at the end, with all its arms on the ground."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +129,10 @@ class Holds:
     """(holds,) and at which it lets go."""
     place: Floats
     """(holds, 2) world XY."""
+    turn: Floats
+    """(holds,) radians anticlockwise from the arm's own direction, half way through, to there …"""
+    away: Floats
+    """(holds,) … and metres from its root."""
     pushes: NDArray[np.bool_]
     """(holds,) whether the arm pushes, or only supports."""
 
@@ -115,6 +155,22 @@ def plan_crawl(journey: Journey, settings: CrawlSettings) -> Holds:
     return _Crawl(journey, settings).run()
 
 
+@dataclass(frozen=True, eq=False)
+class _Hold:
+    """One hold, metres."""
+
+    arm: int
+    start: float
+    end: float
+    place: Floats
+    """(2,) where the arm meets the ground …"""
+    tip: Floats
+    """(2,) … and where it ends there."""
+    turn: float
+    away: float
+    pushes: bool
+
+
 class _Crawl:
     """One journey, hold by hold in the order in which they begin."""
 
@@ -126,133 +182,207 @@ class _Crawl:
         self._streams = [
             np.random.default_rng([settings.seed, 7919, arm]) for arm in range(self._arms)
         ]
-        self._holds: list[tuple[int, float, float, float, float, bool]] = []
-        self._ends = np.full(self._arms, -np.inf)
-        """Where each arm's latest hold ends."""
-        self._pushed = np.zeros(self._arms, dtype=np.bool_)
-        """Whether each arm pushes in its latest hold."""
+        self._holds: list[_Hold] = []
+        self._latest: dict[int, _Hold] = {}
+        """Of each arm."""
+        first, last = float(journey.distance[0]), float(journey.distance[-1])
+        starts, stops = journey.stands
+        self._first = first if starts else -np.inf
+        self._last = last if stops else np.inf
+        """Where the body stands."""
 
     def run(self) -> Holds:
         distance, unit = self._journey.distance, self._unit
-        first, last = float(distance[0]) - _BEFORE * unit, float(distance[-1])
-        # Arms begin at different places: else they would all let go together for a while.
-        waiting = [
-            (first + unit * float(stream.uniform(0.0, 0.6)), arm)
-            for arm, stream in enumerate(self._streams)
-        ]
-        heapify(waiting)
-        while waiting and waiting[0][0] <= last:
-            at, arm = heappop(waiting)
-            end = self._take_hold(arm, self._not_too_few(arm, at), waiting)
-            heappush(waiting, (end + self._rest(arm, end), arm))
-        return self._sorted()
+        first, last = float(distance[0]), float(distance[-1])
+        if np.isfinite(self._first):
+            planned = [end + self._rest(arm, end) for arm, end in enumerate(self._get_going())]
+        else:
+            # Arms begin at different places: else they would all let go together for a while.
+            planned = [
+                first + unit * (float(stream.uniform(0.0, 0.6)) - _BEFORE)
+                for stream in self._streams
+            ]
+        while True:
+            starts = self._not_too_few(planned)
+            arm = min(range(self._arms), key=lambda each: (starts[each], planned[each]))
+            if starts[arm] > last:
+                return self._sorted()
+            end = self._take_hold(arm, starts[arm])
+            planned[arm] = end + self._rest(arm, end)
 
-    def _not_too_few(self, arm: int, planned: float) -> float:
-        """When an arm takes hold: earlier than planned if else too few would hold on before."""
-        others = np.sort(np.delete(self._ends, arm))
-        least = min(self._settings.least, self._arms - 1)
-        # From when on fewer than enough arms would hold, or none would push.
-        alone = float(others[-least]) if least > 0 else np.inf
-        if self._pushes(arm, planned):
-            pushers = [other for other in range(self._arms) if other != arm and self._pushed[other]]
-            alone = min(alone, max((float(self._ends[other]) for other in pushers), default=alone))
-        overlap = 0.5 * self._settings.pause[0] * self._unit
-        if not np.isfinite(alone):
-            return planned
-        shortest = self._settings.pause[0] * self._unit
-        return max(float(self._ends[arm]) + shortest, min(planned, alone - overlap))
+    def _get_going(self) -> Floats:
+        """Let all arms lie where the body stands, and let go one after the other (arms,)."""
+        order = np.random.default_rng([self._settings.seed, 7920]).permutation(self._arms)
+        low, high = _LET_GO
+        ends = self._first + self._unit * (low + (high - low) * (order + 0.5) / self._arms)
+        for arm, end in enumerate(ends.tolist()):
+            way = min(end, self._last) - self._first
+            self._add(arm, end - way / (1.0 - _LYING[0]), end)
+        return ends
+
+    def _not_too_few(self, planned: list[float]) -> list[float]:
+        """When each arm would take hold next: earlier than planned if else too few hold on."""
+        ends = sorted(each.end for each in self._latest.values())
+        least, overlap = min(self._settings.least, self._arms - 1), _OVERLAP * self._unit
+        pause = self._settings.pause[0] * self._unit
+        # From when on fewer than enough arms would hold, and none would push.
+        few = ends[-least] - overlap if 0 < least <= len(ends) else np.inf
+        none = max((each.end for each in self._latest.values() if each.pushes), default=np.inf)
+        starts = []
+        for arm, start in enumerate(planned):
+            wanted = min(start, few)
+            if none - overlap < wanted and self._pushes(arm, wanted):
+                wanted = none - overlap
+            if arm in self._latest:
+                wanted = max(wanted, self._latest[arm].end + pause)
+            starts.append(min(wanted, start))
+        return starts
 
     def _pushes(self, arm: int, at: float) -> bool:
         """Whether an arm's push points along the way."""
-        _, outward, ahead = self._at(arm, at)
-        return -float(outward @ ahead) >= np.cos(self._settings.pushing)
+        _, outward, ahead = self._at(arm, np.array([at]))
+        return -float(np.sum(outward * ahead)) >= np.cos(self._settings.pushing)
 
-    def _take_hold(self, arm: int, at: float, waiting: list[tuple[float, int]]) -> float:
+    def _take_hold(self, arm: int, at: float) -> float:
+        """Let an arm take hold at a distance; where it lets go."""
         settings, unit = self._settings, self._unit
-        root, outward, ahead = self._at(arm, at)
-        middle = 0.5 * (settings.near + settings.far) * unit
-        half = 0.5 * (settings.far - settings.near) * unit
-        # A rear arm takes hold near and lets go far, a front arm the other way round, one at the
-        # side first ahead and then behind.
-        place = root + middle * outward + half * ahead
-        pushes = self._pushes(arm, at)
-        longest = self._lasts(arm, at, place)
+        longest = self._longest(arm, at)
         share = self._streams[arm].uniform(*settings.hold)
-        end = at + share * longest
+        lasts = max(share * longest, min(settings.shortest * unit, longest))
         # Nobody else to take over yet: hold on for as long as it goes.
-        others = np.delete(self._ends, arm) > end
-        coming = np.array([start <= end for start, other in waiting if other != arm])
-        if np.count_nonzero(others) + np.count_nonzero(coming) < settings.least:
-            end = at + longest
-        end = max(end, at + 1e-3 * unit)
-        self._holds.append((arm, at, end, float(place[0]), float(place[1]), pushes))
-        self._ends[arm], self._pushed[arm] = end, pushes
+        others = [each for each in self._latest.values() if each.arm != arm]
+        pause = settings.pause[0] * unit
+        there = sum(each.end > at + lasts or each.end + pause < at + lasts for each in others)
+        if there + self._arms - 1 - len(others) < settings.least:
+            lasts = longest
+        return self._add(arm, at, self._in_time(at, at + lasts, at + longest))
+
+    def _in_time(self, at: float, end: float, latest: float) -> float:
+        """The end of a hold, with time for another one before the body stands, or beyond that."""
+        if end + sum(_LAST) * self._unit <= self._last:
+            return end
+        if latest + _LONGER * self._unit >= self._last:
+            return at + max(self._last - at, 1e-3 * self._unit) / _LYING[1]
+        return min(end, self._last - sum(_LAST) * self._unit)
+
+    def _add(self, arm: int, start: float, end: float) -> float:
+        """Note a hold, at a place that is clear of the other arms' where there is one."""
+        settings = self._settings
+        seen = max(start, self._first), min(end, self._last)
+        turn, places = 0.0, self._places(arm, sum(seen) / 2.0, np.zeros(1))
+        others = [each for each in self._latest.values() if each.arm != arm and each.end > seen[0]]
+        if others:
+            wanted = settings.clear * self._unit
+            clear = self._clearance(arm, seen, places, others)[0]
+            if clear < wanted:
+                turns = np.append(0.0, settings.aside * _TURNS)
+                tried = self._places(arm, sum(seen) / 2.0, turns)
+                clears = self._clearance(arm, seen, tried, others) / wanted
+                good = np.minimum(clears, 1.0) - _ASIDE * np.abs(turns) / settings.aside
+                best = int(np.argmax(good))
+                turn, places = turns[best], (tried[0][best : best + 1], tried[1][best : best + 1])
+        place, tip = places[0][0], places[1][0]
+        root, outward, _ = (each[0] for each in self._at(arm, np.array([0.5 * (start + end)])))
+        reach = place - root
+        across = outward[0] * reach[1] - outward[1] * reach[0]
+        turn = float(np.arctan2(across, outward @ reach))
+        away = float(np.hypot(*reach))
+        hold = _Hold(arm, start, end, place, tip, turn, away, self._pushes(arm, seen[0]))
+        self._holds.append(hold)
+        self._latest[arm] = hold
         return end
 
-    def _lasts(self, arm: int, at: float, place: Floats) -> float:
-        """How far the body can go until the arm has to let go of a place."""
-        settings, distance, unit = self._settings, self._journey.distance, self._unit
-        later = np.searchsorted(distance, at, "right")
-        root = self._journey.roots[later:, arm]
-        outward = self._journey.outward[later:, arm]
-        if at < distance[0]:
-            # Before the start the body comes straight on.
-            lead = np.arange(at, distance[0], 0.05 * unit)
-            before = (
-                self._journey.roots[0, arm]
-                + (lead - distance[0])[:, None] * (self._journey.ahead[0])
-            )
-            root = np.concatenate([before, root])
-            outward = np.concatenate(
-                [np.tile(self._journey.outward[0, arm], (len(lead), 1)), outward]
-            )
-            along = np.concatenate([lead, distance[later:]])
-        else:
-            along = distance[later:]
-        reach = place - root
-        away = np.hypot(reach[:, 0], reach[:, 1])
-        inwards = np.sum(reach * outward, axis=1)
-        slack = 1e-6 * unit
-        kept = (away <= settings.far * unit * 1.05 + slack) & (
-            inwards >= np.cos(settings.astray) * away - slack
+    def _clearance(
+        self,
+        arm: int,
+        seen: tuple[float, float],
+        places: tuple[Floats, Floats],
+        others: list[_Hold],
+    ) -> Floats:
+        """Metres (places,) that an arm is clear of others, in the time that both hold on."""
+        times = np.array([[seen[0], min(seen[1], each.end)] for each in others])
+        own, _, _ = self._at(arm, times.reshape(-1))
+        theirs = np.stack(
+            [self._at(each.arm, at)[0] for each, at in zip(others, times, strict=True)]
         )
-        kept &= away >= 0.9 * settings.near * unit - slack
-        lost = np.flatnonzero(~kept)
-        stop = along[lost[0]] if len(lost) else (along[-1] if len(along) else at) + unit
-        return float(stop - at)
+        mine = Outline(
+            own.reshape(*times.shape, 2), places[0][:, None, None], places[1][:, None, None]
+        )
+        yours = Outline(
+            theirs,
+            np.stack([each.place for each in others])[:, None],
+            np.stack([each.tip for each in others])[:, None],
+        )
+        return clearance(mine, yours).min(axis=(-2, -1))
+
+    def _places(self, arm: int, middle: float, turns: Floats) -> tuple[Floats, Floats]:
+        """Where an arm meets the ground and where it ends (turns, 2), as the body passes.
+
+        A rear arm takes hold near and lets go far, a front arm the other way round, one at the
+        side first ahead and then behind.
+        """
+        settings, unit = self._settings, self._unit
+        root, outward, _ = self._at(arm, np.array([middle]))
+        x, y = outward[0]
+        cosine, sine = np.cos(turns), np.sin(turns)
+        way = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+        place = root + 0.5 * (settings.near + settings.far) * unit * way
+        return place, place + settings.lies * unit * way
+
+    def _longest(self, arm: int, at: float) -> float:
+        """How far the body can go while an arm keeps a hold that begins at a distance."""
+        settings, unit = self._settings, self._unit
+        most = settings.far - settings.near
+        lasts = unit * np.linspace(min(settings.shortest, most), most, _TRIED)
+        root, outward, _ = self._at(arm, at + 0.5 * lasts)
+        place = root + 0.5 * (settings.near + settings.far) * unit * outward
+        kept = np.ones(_TRIED, dtype=np.bool_)
+        for share in _LOOKED_AT:
+            root, outward, _ = self._at(arm, at + share * lasts)
+            reach = place - root
+            away = np.hypot(reach[:, 0], reach[:, 1])
+            kept &= away >= (settings.near - _SLACK) * unit
+            kept &= away <= (settings.far + _SLACK) * unit
+            kept &= np.sum(reach * outward, axis=1) >= np.cos(settings.astray) * away
+        # The longest of those that are kept from the shortest on.
+        return float(lasts[max(int(np.argmin(np.append(kept, False))) - 1, 0)])
 
     def _rest(self, arm: int, at: float) -> float:
         """How far the body goes before an arm takes hold again."""
         limits = self._settings.pause if self._pushes(arm, at) else self._settings.search
-        return self._unit * float(self._streams[arm].uniform(*limits))
+        planned = float(self._streams[arm].uniform(*limits))
+        swing, lie = _LAST
+        left = (self._last - at) / self._unit
+        return self._unit * max(min(planned, left - lie), swing)
 
-    def _at(self, arm: int, at: float) -> tuple[Floats, Floats, Floats]:
-        """Root and direction of an arm, and the way to go, at a distance, also before the start."""
+    def _at(self, arm: int, at: Floats) -> tuple[Floats, Floats, Floats]:
+        """Roots and directions of an arm and the way to go (n, 2), at distances (n,).
+
+        Before the start and after the end the body goes straight on, if it does not stand there.
+        """
         journey = self._journey
         distance = journey.distance
-        right = int(np.clip(np.searchsorted(distance, at), 1, len(distance) - 1))
+        at = np.clip(at, self._first, self._last)
+        right = np.clip(np.searchsorted(distance, at), 1, len(distance) - 1)
         left = right - 1
         share = np.clip((at - distance[left]) / (distance[right] - distance[left]), 0.0, 1.0)
 
         def between(values: Floats) -> Floats:
-            return (1.0 - share) * values[left] + share * values[right]
+            return values[left] + share[:, None] * (values[right] - values[left])
 
-        ahead = _unit(between(journey.ahead))
-        beyond = min(at - float(distance[0]), 0.0) + max(at - float(distance[-1]), 0.0)
-        root = between(journey.roots[:, arm]) + beyond * ahead
-        return root, _unit(between(journey.outward[:, arm])), ahead
+        ahead = normalized(between(journey.ahead))
+        beyond = at - np.clip(at, distance[0], distance[-1])
+        root = between(journey.roots[:, arm]) + beyond[:, None] * ahead
+        return root, normalized(between(journey.outward[:, arm])), ahead
 
     def _sorted(self) -> Holds:
-        holds = sorted(self._holds)
-        columns = np.array(holds, dtype=np.float64).reshape(len(holds), 6)
+        holds = sorted(self._holds, key=lambda each: (each.arm, each.start))
         return Holds(
-            arm=columns[:, 0].astype(np.intp),
-            start=columns[:, 1],
-            end=columns[:, 2],
-            place=columns[:, 3:5],
-            pushes=columns[:, 5] > 0.5,
+            arm=np.array([each.arm for each in holds], dtype=np.intp),
+            start=np.array([each.start for each in holds]),
+            end=np.array([each.end for each in holds]),
+            place=np.array([each.place for each in holds]).reshape(-1, 2),
+            turn=np.array([each.turn for each in holds]),
+            away=np.array([each.away for each in holds]),
+            pushes=np.array([each.pushes for each in holds], dtype=np.bool_),
         )
-
-
-def _unit(vector: Floats) -> Floats:
-    return vector / max(float(np.hypot(*vector)), 1e-12)

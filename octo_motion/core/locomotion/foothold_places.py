@@ -40,6 +40,10 @@ _CLOSEST: Final = 0.05
 """The same where there is no other way."""
 _SHORTENED: Final = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
 """Shares of its time that a hold may be cut down to where the body moves on too far."""
+_NEAR, _NEARER = 0.60, 0.17
+_FAR, _FARTHER = 0.94, 0.43
+"""Shares of the free part of an arm between which a place may be that it pushes away from, and by
+how much more these are for each length that it may get longer by."""
 _ROUNDS: Final = 3
 """How often a foothold is moved, and the ground under it looked at again."""
 
@@ -81,6 +85,17 @@ class Passing:
         """The same as the hold begins, as peeling begins, and as the hold ends."""
 
 
+def span(settings: StanceSettings, *, may_stretch: bool) -> tuple[float, float]:
+    """From where to where, seen from its root, an arm holds on with ease while the body passes.
+
+    Arm lengths. Nearer an arm folds, farther it cannot; one that may get longer need not begin as
+    near.
+    """
+    free = 1.0 - settings.planted
+    longer = settings.stretch * may_stretch
+    return (_NEAR + _NEARER * longer) * free, (_FAR + _FARTHER * longer) * free
+
+
 def hold_times(settings: StanceSettings) -> tuple[tuple[float, float, float], ...]:
     """Times that :func:`spots` wants to know the roots at, for holds cut down more and more."""
     return tuple(
@@ -94,7 +109,9 @@ def spots(
     ground: Ground,
     settings: StanceSettings,
     passings: Iterable[Passing],
+    *,
     aim: Floats,
+    away: Floats,
 ) -> Spots:
     """Footholds as far out as an arm holds on with ease, and near enough to be kept.
 
@@ -104,13 +121,15 @@ def spots(
         settings: how they hold on.
         passings: the body's, for each of :func:`hold_times`.
         aim: (arms, cycles, 2) unit vectors in which the arms are to touch, world.
+        away: (arms, cycles) metres from the root, seen from above, at which they are to do so if
+            they can; nan for where it is easy.
     """
     reach = _reach(limbs, settings)
     shape = aim.shape[:2]
     distance, half, short = np.zeros(shape), np.zeros(shape), np.full(shape, np.inf)
     undecided = np.ones(shape, dtype=bool)
     for times, passing in zip(hold_times(settings), passings, strict=False):
-        found, lack = _spot(ground, reach, passing, aim)
+        found, lack = _spot(ground, reach, passing, aim, away)
         better = undecided & (lack < short)
         distance = np.where(better, found, distance)
         half = np.where(better, times[2], half)
@@ -136,7 +155,9 @@ def _reach(limbs: Limbs, settings: StanceSettings) -> _Reach:
     )
 
 
-def _spot(ground: Ground, reach: _Reach, passing: Passing, aim: Floats) -> tuple[Floats, Floats]:
+def _spot(
+    ground: Ground, reach: _Reach, passing: Passing, aim: Floats, away: Floats
+) -> tuple[Floats, Floats]:
     """Distances from the root, and metres that these are wrong by, both (arms, cycles)."""
     roots, nearest = passing.middle, _NEAREST * reach.whole
     taut = _TAUT * reach.longer
@@ -165,7 +186,8 @@ def _spot(ground: Ground, reach: _Reach, passing: Passing, aim: Floats) -> tuple
             largest = np.sqrt(np.maximum(inside, 0.0)) - onto - beyond
             lack = np.maximum(lack, np.where(inside < 0.0, reach.whole, least - largest))
             farthest = np.minimum(farthest, largest)
-        limit = np.minimum(np.sqrt(np.maximum(easy, nearest**2)), farthest)
+        easily = np.sqrt(np.maximum(easy, nearest**2))
+        limit = np.minimum(np.where(np.isnan(away), easily, away), farthest)
         # What is too near looks bad, but what is too far slides.
         found = np.minimum(np.maximum(limit, least), np.maximum(farthest, _CLOSEST * reach.whole))
     return found, lack

@@ -138,13 +138,14 @@ def lay(
         return centres + rotate(rotations, limbs.roots[:, None]), rotations
 
     roots, rotations = roots_at(shift)
-    aim, lie = _ahead(limbs, rotations)
+    aside, away = rhythm.aims(limbs.arms, numbers)
+    aim, lie = (_turned(each, aside) for each in _ahead(limbs, rotations))
     # One after the other, for the first will do for nearly all.
     passings = (
         Passing(roots, [roots_at(shift + each)[0] for each in times])
         for times in hold_times(settings)
     )
-    found = spots(limbs, ground, settings, passings, aim)
+    found = spots(limbs, ground, settings, passings, aim=aim, away=away)
     spot = roots.copy()
     spot[..., :2] += found.distance[..., None] * aim
     side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if alike else numbers, seed)
@@ -216,6 +217,13 @@ def _ahead(limbs: Limbs, rotations: Floats) -> tuple[Floats, Floats]:
     ahead = rotate(rotations[:, :, None], ahead[:, None])[..., :2]
     ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
     return ahead[:, :, 0], ahead[:, :, 1]
+
+
+def _turned(ways: Floats, angles: Floats) -> Floats:
+    """Directions (…, 2) turned anticlockwise by angles (…,)."""
+    cosine, sine = np.cos(angles), np.sin(angles)
+    x, y = ways[..., 0], ways[..., 1]
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
 
 
 def _hash(arms: np.ndarray, cycles: np.ndarray, seed: int) -> Floats:

@@ -9,9 +9,9 @@ of the distance travelled alone, so that any frame can be computed without those
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,15 @@ class Rhythm(Protocol):
         """Distances (arms, …) at which some arms have come through so many cycles (arms, …)."""
         ...
 
+    def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """Where arms are to take hold in cycles whose numbers are (cycles,), seen from above.
+
+        Returns:
+            Radians (arms, cycles) anticlockwise from an arm's own direction, and metres (arms,
+            cycles) from its root half way through the hold, nan for where it holds on with ease.
+        """
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Even:
@@ -78,6 +87,11 @@ class Even:
         """(arms, …)."""
         ahead = self.offsets[list(arms)] / _CYCLE
         return self.stride * (cycles - ahead.reshape(-1, *[1] * (cycles.ndim - 1)))
+
+    def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """(arms, cycles) both: none."""
+        shape = len(arms), len(cycles)
+        return np.zeros(shape), np.full(shape, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +115,11 @@ class Tabled:
         return np.stack(
             [self.tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
         )
+
+    def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """(arms, cycles) both."""
+        found = np.stack([self.tables[arm].aims_in(cycles) for arm in arms])
+        return found[..., 0], found[..., 1]
 
 
 def free(holds: Holds, arms: int, *, middle: float, duty: float) -> Tabled:
@@ -157,6 +176,7 @@ def crawling(
     reach: float,
     middle: float,
     duty: float,
+    stands: tuple[bool, bool] = (False, False),
 ) -> Tabled:
     """The rhythm of a body that crawls.
 
@@ -168,21 +188,12 @@ def crawling(
         reach: metres that its arms are long.
         middle: phase of the gait half way through a hold, radians.
         duty: share of a cycle that a hold takes in the gait.
+        stands: whether it stands at the start of its way, and at the end, with all arms down.
     """
     length = line.route.length
-    count = max(2, int(np.ceil(length / reach * _PER_REACH)) + 1)
-    distance = np.linspace(0.0, length, count)
-    centres, rotations = line.at(distance)
-    directions = rotate(multiply(rotations[:, None], outward), np.array([1.0, 0.0, 0.0]))[..., :2]
-    places = centres[:, None] + rotate(rotations[:, None], roots)
-    ahead = np.gradient(centres[:, :2], axis=0)
-    journey = Journey(
-        distance=distance,
-        roots=places[..., :2],
-        outward=normalized(directions),
-        ahead=normalized(ahead),
-        length=reach,
-    )
+    distance = _samples(length, reach)
+    way = line.at(distance)
+    journey = _journey(distance, way, roots, outward, reach=reach, stands=stands)
     return free(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
 
 
@@ -211,32 +222,61 @@ def crawling_in_place(
         duty: share of a cycle that a hold takes in the gait.
     """
     loop = line.route.length
-    centres, rotations = line.at(np.array([0.0, loop]))
-    ahead = normalized((centres[1] - centres[0])[:2])
     whole = loop + _SPARE * reach
-    distance = np.linspace(0.0, whole, int(np.ceil(whole / reach * _PER_REACH)) + 1)
-    many = len(distance)
-    directions = rotate(multiply(rotations[0], outward), np.array([1.0, 0.0, 0.0]))[:, :2]
-    places = (centres[0] + rotate(rotations[0], roots))[:, :2]
-    journey = Journey(
-        distance=distance,
-        roots=places + distance[:, None, None] * ahead,
-        outward=np.tile(normalized(directions), (many, 1, 1)),
-        ahead=np.tile(ahead, (many, 1)),
-        length=reach,
-    )
+    distance = _samples(whole, reach)
+    (start, end), (turned, _) = line.at(np.array([0.0, loop]))
+    centres = start + distance[:, None] / loop * (end - start)
+    way = centres, np.tile(turned, (len(distance), 1))
+    journey = _journey(distance, way, roots, outward, reach=reach)
     holds = plan_crawl(journey, settings)
     cuts = [
         [_cut(holds, arm, loop, start) for arm in range(len(roots))]
         for start in np.linspace(0.25, 0.5, _CUTS) * (whole - loop)
     ]
     best = max(cuts, key=lambda arms: _support(arms, loop))
-    tables = [_looped(start, end, loop, duty) for start, end in best]
-    return Tabled(tables, middle, rounds=[len(start) for start, _ in best])
+    tables = [_looped(*holds, loop, duty) for holds in best]
+    return Tabled(tables, middle, rounds=[len(start) for start, _, _ in best])
 
 
-def _cut(holds: Holds, arm: int, loop: float, start: float) -> tuple[Floats, Floats]:
-    """Starts and ends of an arm's holds in a loop that is cut at a distance."""
+def _samples(length: float, reach: float) -> Floats:
+    """Distances along a way at which its journey is looked at."""
+    return np.linspace(0.0, length, max(2, int(np.ceil(length / reach * _PER_REACH)) + 1))
+
+
+def _journey(
+    distance: Floats,
+    way: tuple[Floats, Floats],
+    roots: Floats,
+    outward: Floats,
+    *,
+    reach: float,
+    stands: tuple[bool, bool] = (False, False),
+) -> Journey:
+    """What a crawl is planned from.
+
+    Args:
+        distance: (samples,) along the way.
+        way: the body's centres (samples, 3) and orientations (samples, 4) there.
+        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
+        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
+        reach: metres that its arms are long.
+        stands: whether it stands at the start, and at the end.
+    """
+    centres, rotations = way
+    directions = rotate(multiply(rotations[:, None], outward), np.array([1.0, 0.0, 0.0]))
+    places = centres[:, None] + rotate(rotations[:, None], roots)
+    return Journey(
+        distance=distance,
+        roots=places[..., :2],
+        outward=normalized(directions[..., :2]),
+        ahead=normalized(np.gradient(centres[:, :2], axis=0)),
+        length=reach,
+        stands=stands,
+    )
+
+
+def _cut(holds: Holds, arm: int, loop: float, start: float) -> tuple[Floats, Floats, Floats]:
+    """Starts, ends and aims of an arm's holds in a loop that is cut at a distance."""
     own = np.flatnonzero(holds.arm == arm)
     own = own[np.searchsorted(holds.start[own], start) :]
     begins, ends = holds.start[own], holds.end[own]
@@ -247,27 +287,33 @@ def _cut(holds: Holds, arm: int, loop: float, start: float) -> tuple[Floats, Flo
     return (
         first + factor * (begins[:many] - begins[0]),
         first + factor * (ends[:many] - begins[0]),
+        _aims(holds, own[:many]),
     )
 
 
-def _support(arms: Sequence[tuple[Floats, Floats]], loop: float) -> tuple[int, int]:
+def _aims(holds: Holds, chosen: NDArray[Any]) -> Floats:
+    """Angles and distances of some holds (…, 2)."""
+    return np.stack([holds.turn[chosen], holds.away[chosen]], axis=-1)
+
+
+def _support(arms: Sequence[tuple[Floats, Floats, Floats]], loop: float) -> tuple[int, int]:
     """How many arms hold on in a loop at least, and in all."""
     at = np.linspace(0.0, loop, 96, endpoint=False)
     holding = np.zeros(len(at), dtype=np.int64)
-    for start, end in arms:
+    for start, end, _ in arms:
         since = np.mod(at[:, None] - start, loop)
         holding += np.any(since < end - start, axis=1)
     return int(holding.min()), int(holding.sum())
 
 
-def _looped(start: Floats, end: Floats, loop: float, duty: float) -> Table:
+def _looped(start: Floats, end: Floats, aims: Floats, loop: float, duty: float) -> Table:
     """The table of an arm whose holds come again after a loop."""
     many = len(start)
     turns = np.arange(-_LOOPS, _LOOPS + 2)
     at = (loop * turns[:, None, None] + np.stack([start, end], axis=1)).ravel()
     number = many * turns[:, None] + np.arange(many, dtype=np.float64)
     values = (number[..., None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
-    return Table(at, values, _monotone(at, values))
+    return Table(at, values, _monotone(at, values), aims=aims, repeats=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,6 +330,18 @@ class Table:
     """Whether there is nothing before its first knot: the body stands …"""
     stops: bool = False
     """… and nothing after its last one."""
+    aims: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    """(holds, 2) where the arm is to take hold, as of :meth:`Rhythm.aims`, from hold 0 on …"""
+    repeats: bool = False
+    """… and whether it does so again after that."""
+
+    def aims_in(self, cycles: NDArray[np.int64]) -> Floats:
+        """Of holds by their number (cycles, 2)."""
+        many = len(self.aims)
+        if self.repeats:
+            return self.aims[np.mod(cycles, many)]
+        known = np.concatenate([self.aims, [[0.0, np.nan]]])
+        return known[np.where((cycles >= 0) & (cycles < many), cycles, many)]
 
     def cycles(self, distance: Floats) -> Floats:
         """At distances (…,)."""
@@ -347,7 +405,7 @@ def _table(holds: Holds, arm: int, duty: float) -> Table:
     values = np.concatenate(
         [values[0] - np.array([1.0, swing]), values, values[-1] + np.array([swing, 1.0])]
     )
-    return Table(at, values, _monotone(at, values))
+    return Table(at, values, _monotone(at, values), aims=_aims(holds, own))
 
 
 def _rested(table: Table, length: float, duty: float, *, start: bool, end: bool) -> Table:

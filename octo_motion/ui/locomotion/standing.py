@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import bpy
@@ -17,6 +18,7 @@ from ...core.locomotion.body_line import BodyLine, body_line, leaning
 from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.course import Line
 from ...core.locomotion.crawl import CrawlSettings
+from ...core.locomotion.foothold_places import span
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.generator import Arm, Generator
 from ...core.locomotion.ground import Ground, Plane, along_path, passes_over_itself, sampled
@@ -169,15 +171,17 @@ def read_standing(
         lean=stance.lean,
         smoothing=stance.smoothing,
     )
+    stretch = [may_stretch(armature, arm.bones) for arm in arms]
     rhythm = None
     gait = generator.settings.gait
     if gait.manner == "CRAWL":
-        make = crawling_in_place if alike else crawling
+        near, far = span(stance, may_stretch=any(stretch))
+        make = crawling_in_place if alike else partial(crawling, stands=rest)
         rhythm = make(
             line,
             generator.roots * scale,
             generator.outward,
-            CrawlSettings(seed=generator.settings.seed),
+            CrawlSettings(near, far, lies=stance.planted, seed=generator.settings.seed),
             reach=reach,
             middle=gait.power_phase,
             duty=stance.duty,
@@ -191,8 +195,6 @@ def read_standing(
             middle=gait.power_phase,
             duty=stance.duty,
         )
-    stretch = [may_stretch(armature, arm.bones) for arm in arms]
-
     def build(along: Line, wished: Sequence[Wish]) -> GroundedWalk:
         return GroundedWalk(
             skeleton,
