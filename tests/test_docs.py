@@ -393,7 +393,7 @@ NOT_IN_THE_PANELS = (
     # Limits of the properties keep these from happening.
     *("A setting of the gait is not a number.", "A setting of the travel is not a number."),
     *("A joint's weight is not between 0 and 1.", "The contraction is ….", "The softness is …."),
-    "The give is ….",
+    *("The give is ….", "Steady is … cycles."),
     *("The stride is … m.", "The burst is ….", "The body looks … strides ahead."),
     *("A corner is turned within … strides.", "The speed is … m/s.", "… is …."),
     *("A setting of the ground is not a number.", "Arms hold on for … of the cycle."),

@@ -102,10 +102,10 @@ def test_a_tip_that_lies_down_does_not_twitch() -> None:
     cosines = np.sum(segments[:, :, 1:] * segments[:, :, :-1], axis=-1)
     bends = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))[:, :, -3:]
     landings = np.argwhere(lying[1:] & ~lying[:-1])
-    landed = landings[landings[:, 0] > count // 12]
+    landed = landings[landings[:, 0] > count // 8]
     assert len(landed) >= 6
     for frame, arm in landed:
-        while_it_comes_down = bends[frame - count // 12 : frame + 1, arm]
+        while_it_comes_down = bends[frame - count // 8 : frame + 1, arm]
         again = while_it_comes_down - np.minimum.accumulate(while_it_comes_down, axis=0)
         assert while_it_comes_down[0].max() > 10.0
         assert again.max() < 1.0

@@ -23,7 +23,7 @@ NAMES = {
     *("route", "spline", "speed_mode", "ease_in", "ease_out"),
     *("heading", "heading_angle", "keep_upright", "look_ahead", "corner"),
     *("height_mode", "height", "stand", "ground"),
-    *("gait", "table", "contraction", "softness", "give", "sway", "phase_spread"),
+    *("gait", "table", "contraction", "softness", "give", "steady", "sway", "phase_spread"),
     *("turning", "change", "burst", "streamline", "bank_in_turns"),
     *("variation_min", "variation_max", "seed"),
     *("weight_root", "weight_tip", "use_weight_curve", "weight_curve"),

@@ -56,6 +56,27 @@ class GaitCurve:
         start, end = self.phases[knot], self.phases[knot + 1]
         return knot, (inside - start) / (end - start)
 
+    def rounding(self, phase: Floats, steady: float) -> Floats:
+        """What rounds corners off at phases (…): evens out what is linear between knots over time.
+
+        The mean of a straight line over a window is the line itself. So the weighted mean over so
+        many cycles before and after, with weights that fall off evenly to nothing, differs from
+        what has corners by one such part for each corner: h (1 − |t| / h)³ / 6 of its change of
+        slope, at a time t away within a window of h.
+
+        Args:
+            phase: radians.
+            steady: cycles, half at most.
+
+        Returns:
+            (…, knots − 1) radians, for the change of slope at each knot but the last, which is
+            the first again.
+        """
+        within = steady * CYCLE
+        away = phase[..., None] - self.phases[:-1]
+        away -= CYCLE * np.rint(away / CYCLE)
+        return within / 6.0 * np.maximum(1.0 - np.abs(away) / within, 0.0) ** 3
+
 
 @dataclass(frozen=True)
 class GaitTable:
@@ -104,20 +125,30 @@ class GaitTable:
         )
 
 
-def evaluate(table: GaitTable, phases: Floats, pairs: tuple[int, ...]) -> Floats:
+def evaluate(
+    table: GaitTable, phases: Floats, pairs: tuple[int, ...], *, steady: float = 0.0
+) -> Floats:
     """Angles of all arms.
 
     Args:
         table: the gait.
         phases: (frames, arms) radians, each arm's own offset included.
         pairs: pair of each arm.
+        steady: cycles before and after each moment over which it is evened out
+            (:meth:`GaitCurve.rounding`).
 
     Returns:
         (frames, arms, links, angles) radians.
     """
     result = np.empty((*phases.shape, LINKS, len(ANGLES)))
     for pair, columns in _columns_by_curve(table, pairs).items():
-        result[:, columns] = table.curve(pair).evaluate(phases[:, columns])
+        curve, own = table.curve(pair), phases[:, columns]
+        result[:, columns] = curve.evaluate(own)
+        if steady > 0.0:
+            slopes = np.diff(curve.angles, axis=0) / np.diff(curve.phases)[:, None, None]
+            corners = slopes - np.roll(slopes, 1, axis=0)
+            rounding = curve.rounding(own, steady)
+            result[:, columns] += np.einsum("fak,klc->falc", rounding, corners)
     return result
 
 
@@ -129,6 +160,7 @@ def variation(
     seed: int,
     *,
     period: int | Sequence[int] = 0,
+    steady: float = 0.0,
 ) -> Floats:
     """Random additions to the angles: R(j, k) of [Octopus, §3.4].
 
@@ -144,6 +176,7 @@ def variation(
         limits: j and k, radians.
         seed: any whole number ≥ 0.
         period: cycles after which the numbers come again, 0 for never; or each arm's own.
+        steady: as of :func:`evaluate`.
 
     Returns:
         (frames, arms, links, angles) radians.
@@ -154,29 +187,39 @@ def variation(
         return result
     cycles = np.floor_divide(phases, CYCLE).astype(np.int64)
     rounds = np.broadcast_to(np.asarray(period, dtype=np.int64), phases.shape[1:])
-    drawn, after = (
-        np.where(rounds > 0, each % np.maximum(rounds, 1), each) for each in (cycles, cycles + 1)
-    )
-    first, last = int(min(drawn.min(), after.min())), int(max(drawn.max(), after.max()))
+    first, last = int(cycles.min()) - 1, int(cycles.max()) + 2
+    every = np.arange(first, last + 1)[:, None]
+    # (cycles, arms) numbers of the cycles whose draws count.
+    drawn = np.where(rounds > 0, every % np.maximum(rounds, 1), every)
+    kept = {int(each) for each in np.unique(drawn)}
     for pair, columns in _columns_by_curve(table, pairs).items():
-        curve = table.curve(pair)
+        curve, own = table.curve(pair), phases[:, columns]
         knots = len(curve.phases) - 1
-        draws = np.stack(
+        draws = {each: _draw_cycle(seed, each, len(pairs), knots) for each in kept}
+        values = np.array(
             [
-                _draw_cycle(seed, cycle, len(pairs), knots)[columns]
-                for cycle in range(first, last + 1)
+                [draws[number][arm] for arm, number in zip(columns, numbers, strict=True)]
+                for numbers in drawn[:, columns].tolist()
             ]
         )
-        draws = low + (high - low) * draws
-        knot, share = curve.locate(phases[:, columns])
-        here = drawn[:, columns]
-        then = np.where(knot + 1 < len(curve.phases) - 1, here, after[:, columns])
-        arms = np.arange(len(columns))[None, :]
+        # One cycle after the other, (knots, arms, links, 2).
+        values = np.moveaxis(low + (high - low) * values, 2, 1).reshape(-1, len(columns), LINKS, 2)
+        knot, share = curve.locate(own)
+        place = (cycles[:, columns] - first) * knots + knot
+        arms = np.arange(len(columns))
         share = share[..., None, None]
-        result[:, columns, :, :2] = (1.0 - share) * draws[here - first, arms, knot]
-        result[:, columns, :, :2] += (
-            share * draws[then - first, arms, (knot + 1) % (len(curve.phases) - 1)]
-        )
+        result[:, columns, :, :2] = (1.0 - share) * values[place, arms]
+        result[:, columns, :, :2] += share * values[place + 1, arms]
+        if steady > 0.0:
+            apart = np.tile(np.diff(curve.phases), len(every))[:-1, None, None, None]
+            slopes = np.diff(values, axis=0) / apart
+            corners = np.zeros_like(values)
+            corners[1:-1] = np.diff(slopes, axis=0)
+            rounding = curve.rounding(own, steady)
+            for number in range(knots):
+                nearest = np.rint((own - curve.phases[number]) / CYCLE).astype(np.int64) - first
+                corner = corners[nearest * knots + number, arms]
+                result[:, columns, :, :2] += rounding[..., number, None, None] * corner
     return result
 
 

@@ -27,6 +27,9 @@ from .gait import GaitCurve, GaitTable, evaluate, variation
 from .poses import ArmRest, arm_rest, bone_rotations
 from .targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
 
+MOST_STEADY: Final = 0.25
+"""Cycles over which movement may be evened out: more, and it is no longer there."""
+
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _CHUNK: Final = 4096
 """Arms solved at a time, counted over frames: what stays within a processor's cache."""
@@ -86,6 +89,9 @@ class GaitSettings:
     """Cycles after which the random additions come again, 0 for never."""
     turning: float = 0.5
     """Share of the turn that lies ahead which the arms take on as pitch [Octopus, §3.5]."""
+    steady: float = 0.0
+    """Cycles before and after each moment over which movement is evened out in time; 0 leaves the
+    table's corners, as the source does."""
     stand: bool = False
     """WALK: whether targets that lie deeper than most are raised to a floor where most are, so
     that many arms stand on the ground together, and not the tip of one. The source's walk, whose
@@ -94,7 +100,7 @@ class GaitSettings:
     def __post_init__(self) -> None:
         numbers = (
             *(self.contraction, self.softness, self.give, self.sway, self.phase_spread),
-            *(self.turning, *self.weights, *self.variation),
+            *(self.turning, self.steady, *self.weights, *self.variation),
         )
         if not np.all(np.isfinite(numbers)):
             raise SettingsError("A setting of the gait is not a number.", "Set it anew.")
@@ -114,6 +120,10 @@ class GaitSettings:
             raise SettingsError(f"The softness is {self.softness:g}.", "Give a value from 0 to 1.")
         if not 0.0 <= self.give <= 1.0:
             raise SettingsError(f"The give is {self.give:g}.", "Give a value from 0 to 1.")
+        if not 0.0 <= self.steady <= MOST_STEADY:
+            raise SettingsError(
+                f"Steady is {self.steady:g} cycles.", f"Give a value from 0 to {MOST_STEADY:g}."
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +233,8 @@ class Generator:
             chosen = [arms[0] for arms in alike.values()]
             part = Build(tuple(chosen), build.chain, build.widths)
             own = np.repeat(phases[:, None], len(chosen), axis=1)
-            angles = evaluate(gait, own, tuple(self._pairs[arm] for arm in chosen))
+            pairs = tuple(self._pairs[arm] for arm in chosen)
+            angles = evaluate(gait, own, pairs, steady=self._settings.steady)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
             directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
@@ -289,13 +300,15 @@ class Generator:
                 same for all.
         """
         settings = self._settings
-        angles = evaluate(settings.gait, phases, self._pairs) + variation(
+        steady = settings.steady
+        angles = evaluate(settings.gait, phases, self._pairs, steady=steady) + variation(
             settings.gait,
             phases,
             self._pairs,
             settings.variation,
             settings.seed,
             period=settings.period if period is None else period,
+            steady=steady,
         )
         # Towards the goal: by the part of the turn that lies across the arm.
         across = rotate(self._outward, np.array([0.0, 1.0, 0.0]))[:, :2]

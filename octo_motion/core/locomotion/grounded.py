@@ -11,6 +11,7 @@ import numpy as np
 
 from ..rotations import Floats, conjugate, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
+from .arm_shapes import unit
 from .chains import BodyFrame
 from .columns import turned
 from .course import Line
@@ -20,7 +21,8 @@ from .ground import Ground
 from .limbs import Limbs, StanceSettings
 from .poses import Facing, bone_rotations, sucker_sides
 from .rhythm import Even, Rhythm
-from .stance import Batch, hold, stand
+from .stance import Batch, hold, pulled, stand, unheld
+from .steady import Steady
 
 _CYCLE: Final = 2.0 * np.pi
 _ASKEW: Final = np.radians(35.0)
@@ -51,6 +53,22 @@ class GroundedPoses:
     """(frames, arms) number of the cycle that each arm is in."""
     shapes: tuple[Floats, ...]
     """For each build (segments, 3, frames, arms): the gait's own, in the arms' frames."""
+    evened: tuple[Floats, ...]
+    """For each build (segments, 3, frames, arms): what evening out over time has added to the arms'
+    directions, world; empty where nothing was evened out."""
+
+    def part(self, frames: slice) -> GroundedPoses:
+        """Some of the frames."""
+        return GroundedPoses(
+            self.rotations[frames],
+            self.strains[frames],
+            self.misses[frames],
+            tuple(each[frames] for each in self.joints),
+            tuple(each[frames] for each in self.lying),
+            self.cycles[frames],
+            tuple(each[:, :, frames] for each in self.shapes),
+            tuple(each[:, :, frames] for each in self.evened),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +79,8 @@ class Raise:
     """(frames, arms) arm lengths, where they do not lie."""
     shapes: tuple[Floats, ...] | None = None
     """``GroundedPoses.shapes`` of the same frames, none where nobody has kept them."""
+    evened: tuple[Floats, ...] = ()
+    """``GroundedPoses.evened`` of the same frames."""
 
     @property
     def arms(self) -> list[int]:
@@ -191,6 +211,8 @@ class GroundedWalk:
         centres: Floats,
         orientations: Floats,
         higher: Raise | None = None,
+        *,
+        steady: Steady | None = None,
     ) -> GroundedPoses:
         """The arms at some frames.
 
@@ -201,6 +223,9 @@ class GroundedWalk:
             orientations: (frames, 4) of the canonical body, world.
             higher: which arms are to be higher, and nothing is said of the others; none for all
                 of them, as high as they have to be.
+            steady: how arms in the air are evened out over frames that follow one another, none
+                for each frame by itself. Those that are within its reach of an end that is none of
+                the motion's own are of no use.
         """
         generator = self._generator
         frames, count = len(phase), len(generator.arms)
@@ -212,7 +237,7 @@ class GroundedWalk:
         rotations = np.zeros((frames, ends[-1], 4))
         strains = np.zeros((frames, ends[-1]))
         misses = np.zeros((frames, count))
-        joints, lying, asked = [], [], []
+        joints, lying, asked, evened = [], [], [], []
         to_armature = multiply(self._body_turn, conjugate(orientations))
         for number, (build, limbs, footholds) in enumerate(self._limbs):
             chosen = [place for place, arm in enumerate(build.arms) if arm in wanted]
@@ -247,7 +272,16 @@ class GroundedWalk:
                 cycles[:, columns].reshape(batch),
                 since[:, columns].reshape(batch),
             )
-            stood = stand(held_by, shapes, held, self._ground, self._settings)
+            longer, ways = pulled(held_by, shapes, held, self._ground, self._settings)
+            each_frame = segments, 3, frames, many
+            if higher is not None and higher.evened:
+                added = higher.evened[number][..., chosen].reshape(ways.shape)
+                ways = unit(ways + added)
+            elif higher is None and steady is not None:
+                before, share = ways, unheld(held).reshape(frames, many)
+                ways = steady.evened(ways.reshape(each_frame), share).reshape(ways.shape)
+                evened.append((ways - before).reshape(each_frame))
+            stood = stand(held_by, (longer, ways), held, self._ground, self._settings)
             back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
             in_armature = turned(back, stood.directions)
             towards = turned(back, -held.upwards(segments)).reshape(segments, 3, frames, many)
@@ -276,6 +310,7 @@ class GroundedWalk:
             tuple(np.moveaxis(each, 0, 2) for each in lying),
             cycles,
             tuple(asked),
+            tuple(evened),
         )
 
     @staticmethod

@@ -69,8 +69,16 @@ _SOFT: Final = 0.25
 _OVER: Final = 0.03
 """Arm lengths that joints which do not lie keep between their skin and the ground: between two of
 them the skin is lower, where the ground is bent upwards or the arm sideways."""
-_AT_ONCE: Final = 20.0
-"""How much faster than its hold an arm loses its stiffness against the ground."""
+_AT_ONCE: Final = 40.0
+"""How much faster than its hold an arm loses its stiffness against the ground: so it does not pass
+through it …"""
+_LETTING_GO: Final = 2.0
+"""… and how much faster it comes to keep its distance from it, where it has lain: without a jerk.
+"""
+_UNHELD: Final = 0.2
+"""Share of its hold that an arm in the air has lost when all its movement is evened out."""
+_EARLIER: Final = 0.5
+"""Share of its way to the ground before its end from which on an arm unrolls."""
 _TINY: Final = 1e-12
 
 
@@ -187,7 +195,8 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
     at = batch.arms, cycles - footholds.first
     on, off = footholds.on[at], footholds.off[at]
     touching, whole = batch.reach[footholds.touching], batch.reach[-1]
-    down = smooth((since - on) / (UNROLLING * (off - on)))
+    earlier = _EARLIER * (on + 0.5)
+    down = smooth((since - on + earlier) / (UNROLLING * (off - on) + earlier))
     gone = smooth((since - footholds.peeled()[at]) / (PEELING * (off - on)))
     landing = gentle((since + 0.5) / (on + 0.5))
     leaving = gentle((0.5 - since) / (0.5 - off))
@@ -211,10 +220,12 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
     )
 
 
-def stand(
+def pulled(
     batch: Batch, shapes: Floats, held: Hold, ground: Ground, settings: StanceSettings
-) -> Stood:
-    """Arms with their gait's shapes, brought to their footholds and off the ground.
+) -> tuple[Floats, Floats]:
+    """Strains (segments, batch) and directions (segments, 3, batch) of arms.
+
+    Arms with their gait's shapes, brought to their footholds; in the air they may be in the ground.
 
     Args:
         batch: the arms.
@@ -223,28 +234,55 @@ def stand(
         ground: what it must not pass through.
         settings: how arms hold on.
     """
-    weight, reach = held.weight, batch.reach
     strains, standing = _held(batch, shapes, held, ground, settings)
+    return strains, blended(batch.outward, standing, shapes, 1.0 - held.weight)
+
+
+def unheld(held: Hold) -> Floats:
+    """How far the movement of arms (batch,) is to be evened out over time: 0 while they hold on."""
+    return np.minimum((1.0 - held.weight) / _UNHELD, 1.0)
+
+
+def stand(
+    batch: Batch,
+    pose: tuple[Floats, Floats],
+    held: Hold,
+    ground: Ground,
+    settings: StanceSettings,
+) -> Stood:
+    """Arms that are in the air brought off the ground.
+
+    Args:
+        batch: the arms.
+        pose: strains and directions, as :func:`pulled` returns them.
+        held: how each one holds on.
+        ground: what it must not pass through.
+        settings: how arms hold on.
+    """
+    (strains, directions), weight, reach = pose, held.weight, batch.reach
     lengths = batch.lengths * (1.0 + strains)
-    directions = blended(batch.outward, standing, shapes, 1.0 - weight)
     swinging = np.flatnonzero(weight < 1.0)
     if len(swinging):
         part, own = batch.part(swinging), held.part(swinging)
         away = 1.0 - own.weight
-        let_go = smooth(_AT_ONCE * away)
+        let_go, at_once = smooth(_LETTING_GO * away), smooth(_AT_ONCE * away)
         free = _freedom(part, own)
         whole = part.reach[-1]
-        needed = part.radii + ((settings.lift * away**2 + _OVER) * whole + part.lift)
+        # What has lain is as high as its skin is thick, and no higher yet.
+        rising = (settings.lift * away**2 + _OVER * let_go) * whole + part.lift
+        most = np.max(part.radii, axis=0) + rising
+        soft = _SOFT * (part.radii + let_go * (most - part.radii)) + _TINY
+        directions = directions.copy()
         directions[..., swinging] = raised(
             directions[..., swinging],
             lengths[:, swinging],
-            free=free + (1.0 - free) * let_go,
+            free=free + (1.0 - free) * at_once,
             roots=part.roots,
-            needed=needed,
-            loose=let_go * _out(part.reach),
+            needed=part.radii + rising - (1.0 - let_go) * soft,
+            loose=at_once * _out(part.reach),
             ground=ground,
             rounds=_RAISES,
-            soft=_SOFT * np.max(needed, axis=0) + _TINY,
+            soft=soft,
         )
     joints = np.concatenate([batch.roots[None], lengths[:, None] * directions]).cumsum(axis=0)
     goal = np.where(held.by_tip, held.joints[-1], held.joints[0])

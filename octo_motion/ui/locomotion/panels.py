@@ -301,6 +301,7 @@ class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
             layout.label(text="The curve is gone: switch it off and on.", icon="ERROR")
         layout.prop(settings, "softness")
         layout.prop(settings, "give")
+        layout.prop(settings, "steady")
         layout.prop(settings, "sway")
 
 

@@ -25,7 +25,7 @@ from ...blender.armature import armature_data
 from ...blender.weight_curve import ensure_weight_curve
 from ...core.errors import GaitError
 from ...core.locomotion.gait import GaitTable
-from ...core.locomotion.generator import GaitSettings
+from ...core.locomotion.generator import MOST_STEADY, GaitSettings
 from ...core.locomotion.travel import TravelSettings
 from .apart import KeepingApart
 from .arm_properties import ArmItem
@@ -299,6 +299,18 @@ class OCTO_MOTION_PG_locomotion(
         min=0.0,
         max=1.0,
         soft_max=0.3,
+        override=OVERRIDE,
+    )
+    steady: FloatProperty(
+        name="Steady",
+        description="How much of a cycle movement is evened out over, before and after each "
+        "moment: arms in the air move smoothly. 0 keeps every corner of the gait's table",
+        default=0.08,
+        min=0.0,
+        max=MOST_STEADY,
+        soft_max=0.15,
+        step=1,
+        precision=3,
         override=OVERRIDE,
     )
     sway: FloatProperty(

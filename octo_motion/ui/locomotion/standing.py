@@ -25,6 +25,7 @@ from ...core.locomotion.ground import Ground, Plane, along_path, passes_over_its
 from ...core.locomotion.grounded import GroundedPoses, GroundedWalk, Raise
 from ...core.locomotion.rhythm import Even, at_rest, crawling, crawling_in_place
 from ...core.locomotion.route import Route
+from ...core.locomotion.steady import Steady, around
 from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, strides, walked_at
 from ...core.remembered import Remembered, key_of
 from ...core.rotations import Floats
@@ -91,6 +92,32 @@ class Standing:
         centres, orientations = places
         phase, turn = travel.phase[part], travel.turn[part]
         return self.walk.pose(phase, turn, centres[part], orientations[part], higher)
+
+    def pose_steadily(
+        self,
+        travel: Travel,
+        part: slice,
+        places: tuple[Floats, Floats],
+        steady: Steady | None,
+        *,
+        cyclic: bool,
+    ) -> GroundedPoses:
+        """The arms at frames that follow one another, evened out over time in the air.
+
+        Args:
+            travel: the body's.
+            part: which frames, from one to another.
+            places: of all frames.
+            steady: how they are evened out, none for each frame by itself.
+            cyclic: whether the last frame is the first again.
+        """
+        if steady is None:
+            return self.pose(travel, part, places)
+        centres, orientations = places
+        frames, own = around(part, steady.reach, len(centres), cyclic=cyclic)
+        phase, turn = travel.phase[frames], travel.turn[frames]
+        stood = self.walk.pose(phase, turn, centres[frames], orientations[frames], steady=steady)
+        return stood.part(own)
 
 
 def resting(settings: OCTO_MOTION_PG_locomotion) -> tuple[bool, bool]:
@@ -195,6 +222,7 @@ def read_standing(
             middle=gait.power_phase,
             duty=stance.duty,
         )
+
     def build(along: Line, wished: Sequence[Wish]) -> GroundedWalk:
         return GroundedWalk(
             skeleton,

@@ -52,6 +52,7 @@ from ...core.locomotion.loops import route_in_place, travel_in_place, whole_fram
 from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
+from ...core.locomotion.steady import Steady
 from ...core.locomotion.travel import (
     Travel,
     TravelSettings,
@@ -427,12 +428,15 @@ class Shot:
         count = len(self.moments)
         joints: list[list[Floats]] = []
         shapes: list[tuple[Floats, ...]] = []
+        evened: list[tuple[Floats, ...]] = []
+        steady = self._steady()
         for part in self._portions():
-            stood = standing.pose(travel, part, places)
+            stood = standing.pose_steadily(travel, part, places, steady, cyclic=self.in_place)
             posed.rotations[part], posed.strains[part] = stood.rotations, stood.strains
             posed.late[part], posed.cycles[part] = stood.misses, stood.cycles
             joints.append(standing.walk.by_arm(stood.joints))
             shapes.append(stood.shapes)
+            evened.append(stood.evened)
             for arm, rests in zip(posed.lying, standing.walk.by_arm(stood.lying), strict=True):
                 arm[part] = rests
             if part.stop < count:
@@ -440,19 +444,27 @@ class Shot:
 
         def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
             """Some frames anew, with arms raised; others are left as they are."""
-            higher = Raise(lift, tuple(each[:, :, chosen] for each in asked))
+            known = (tuple(each[:, :, chosen] for each in of) for of in (asked, added))
+            higher = Raise(lift, *known)
             stood = standing.pose(travel, chosen, places, higher)
             posed.late[np.ix_(chosen, higher.arms)] = stood.misses[:, higher.arms]
             poses = Poses(stood.rotations, stood.strains, going[0][chosen], going[1][chosen])
             return poses, standing.walk.by_arm(stood.joints, higher)
 
-        asked = [np.concatenate(each, axis=2) for each in zip(*shapes, strict=True)]
+        asked, added = (
+            [np.concatenate(each, axis=2) for each in zip(*of, strict=True)]
+            for of in (shapes, evened)
+        )
         frames = _arm_frames(self.skeleton, self.arms, self.body)
         course = Course(frames, standing.ground, self.scale, cyclic=self.in_place)
         together = [np.concatenate(each) for each in zip(*joints, strict=True)]
         whole = Poses(posed.rotations, posed.strains, *going)
         raised = raised_between(course, whole, together, again)
         posed.rotations, posed.strains = raised.rotations, raised.strains
+
+    def _steady(self) -> Steady | None:
+        """How arms in the air are evened out over time, if at all."""
+        return Steady.over(self.generator.settings.steady, self.every * self.cycle)
 
     def _reach(self, posed: _Posed) -> np.ndarray:
         """Let arms reach; which of them do (frames, arms)."""
@@ -1208,6 +1220,7 @@ def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> Gait
         weights=weights,
         softness=settings.softness,
         give=settings.give,
+        steady=settings.steady,
         sway=settings.sway,
         phase_spread=settings.phase_spread,
         variation=(settings.variation_min, settings.variation_max),
