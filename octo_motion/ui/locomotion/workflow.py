@@ -71,6 +71,7 @@ from .changing import Changing, Journey, Way, gaits_of, read_changes
 from .changing import plan as plan_changes
 from .in_place import breathing_channels
 from .keyed import Rig, as_keyed
+from .pace import pace_of, too_few_frames
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
 from .quality_report import write_figures
 from .reach_motion import Carried, Reaching, Travelling, read_reaches, write_carried
@@ -94,11 +95,8 @@ _ROUTE_SAMPLES: Final = 257
 _UNEQUAL: Final = 1e-3
 _MOVING: Final = 0.4
 """Share of the work that is over when the motion is there, but not yet its few keys."""
-_HASTY: Final = 40.0
-"""Frames of a cycle below which the motion is worked out half way between them, too: keys that
-lead on from frame to frame by themselves would let arms slide and dip there."""
-_QUICKLY: Final = 8_000
-"""Bones times frames of the same up to which that is soon done."""
+_QUICKLY: Final = 12_000
+"""Bones times frames up to which it is soon done to look between frames, too."""
 _EXACT_ANGLE: Final = np.radians(0.5)
 """Radians that keys on every frame may be off there …"""
 _EXACT_DISTANCE: Final = 0.002
@@ -903,7 +901,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     tell_overlaps = settings.tell_overlaps and not live
     if settings.keep_apart or tell_overlaps:
         apart = read_apart(armature, skeleton, arms, body, live=live)
-    cycle = (len(frames) - 1) / max(strides(route, travel), 1e-9)
+    pace = pace_of(route, travel, seconds * scene.render.fps / scene.render.fps_base)
     reaching = read_reaches(armature, settings, at_rest, arms, body=rest_body, frames=frames)
     grounded = standing is not None or changing is not None
     soon = len(frames) * len(generator.bones) <= _QUICKLY
@@ -931,7 +929,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
         tolerances=None if live else _tolerances(settings, generator.arm_length),
         # What is reached for is known on frames alone.
-        hasty=grounded and cycle < _HASTY and reaching is None and (soon or not live),
+        hasty=grounded and pace.hasty and reaching is None and (soon or not live),
         in_place=in_place,
         repeats=in_place and settings.repeat,
         breath=breath,
@@ -942,7 +940,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         apart=apart,
         keep_apart=settings.keep_apart,
         tell_overlaps=tell_overlaps,
-        cycle=cycle,
+        cycle=pace.mean,
         measure=not live,
         reaching=reaching,
         note=settings_note(settings),
@@ -952,6 +950,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
             *_warnings(settings, armature, skeleton),
             *_displaced(settings, armature, arms, carriers),
             *(standing.warnings if standing else ()),
+            *(too_few_frames(settings, pace, scene.render) if grounded else ()),
         ],
     )
 
