@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .columns import dot, smallest_arc, turned
+from .columns import dot, running, smallest_arc, turned
 from .ground import Ground
 
 _WEAK: Final = 0.02
@@ -27,6 +27,8 @@ _BOLD: Final = 0.6
 """Radians that a segment turns at a step of Newton's at most."""
 _FIRM: Final = 1e-4
 """What keeps the steps finite where an arm is straight, as a share of its own stiffness."""
+_MANY: Final = 0.5
+"""Share of a batch from which on all of it is raised, rather than those that are too low."""
 _TINY: Final = 1e-12
 
 
@@ -163,7 +165,9 @@ def evened(directions: Floats, share: Floats) -> Floats:
     """
     result = directions.copy()
     mean = 0.5 * (directions[2:] + directions[:-2])
-    result[1:-1] += share[1:-1, None] * (mean - directions[1:-1])
+    mean -= directions[1:-1]
+    mean *= share[1:-1, None]
+    result[1:-1] += mean
     return unit(result)
 
 
@@ -199,44 +203,71 @@ def raised(
     gentle, loosened = 0.25 / soft, free * lengths
     weak = _WEAK * lengths[0] ** 2
     joints = np.empty((len(lengths) + 1, *roots.shape))
-    for _ in range(rounds):
+    result = directions
+    for number in range(rounds):
         joints[0] = roots
-        np.multiply(lengths[:, None], directions, out=joints[1:])
-        np.cumsum(joints, axis=0, out=joints)
+        np.multiply(lengths[:, None], result, out=joints[1:])
+        running(joints)
         below = ground.height(np.moveaxis(joints, 1, -1)) - joints[:, 2]
         below += needed
         near = np.maximum(below + soft, 0.0)
         below = np.where(below > soft, below, near * near * gentle)
         below *= loose
+        if number == 0:
+            low = np.flatnonzero(below.any(axis=0))
+            if len(low) < _MANY * len(below[0]):
+                # Those that are high enough stay as they are, in all rounds.
+                result = directions.copy()
+                result[..., low] = raised(
+                    directions[..., low],
+                    lengths[:, low],
+                    free=free[:, low],
+                    roots=roots[:, low],
+                    needed=needed[:, low],
+                    loose=loose[:, low],
+                    ground=ground,
+                    rounds=rounds if len(low) else 0,
+                    soft=soft[..., low],
+                )
+                return result
+            result = directions.copy()
         weights = below * below
         weights *= 1.0 / (np.sum(weights, axis=0) + least)
         wanted = np.einsum("sb,sb->b", weights, below)
         # Share of the weights beyond each segment: what is raised by turning it.
-        carried = weights[:0:-1].cumsum(axis=0)[::-1]
-        z = directions[:, 2]
+        carried = running(weights[:0:-1].copy())[::-1]
+        z = result[:, 2]
         level = 1.0 - z * z
         turn = loosened * carried
         carried = carried * lengths
         carried *= level
         turn *= wanted / (np.einsum("sb,sb->b", turn, carried) + weak)
-        directions = _turned_up(directions, turn, level)
-    return directions
+        _turn_up(result, turn, level)
+    return result
 
 
-def _turned_up(directions: Floats, turn: Floats, level: Floats) -> Floats:
-    """Directions (segments, 3, batch) turned towards z.
+def _turn_up(directions: Floats, turn: Floats, level: Floats) -> None:
+    """Turn directions (segments, 3, batch) in place towards z.
 
     Args:
         directions: unit.
         turn: (segments, batch) how much of z is added to each; changed in place.
         level: (segments, batch) square of what is level of each direction.
     """
-    turn *= 1.0 / np.sqrt(1.0 + np.max(turn * turn * level, axis=0) / _BOLD**2)
+    square = turn * turn
+    square *= level
+    less = 1.0 / (1.0 + np.max(square, axis=0) / _BOLD**2)
+    turn *= np.sqrt(less)
+    square *= less
+    square += 1.0
     # Only what of z is across a direction turns it.
-    size = 1.0 / np.sqrt(1.0 + turn * turn * level)
-    result = directions * (size * (1.0 - turn * directions[:, 2]))[:, None]
-    result[:, 2] += size * turn
-    return result
+    size = np.reciprocal(np.sqrt(square, out=square), out=square)
+    left = turn * directions[:, 2]
+    np.subtract(1.0, left, out=left)
+    left *= size
+    directions *= left[:, None]
+    turn *= size
+    directions[:, 2] += turn
 
 
 def drawn(
@@ -267,23 +298,35 @@ def drawn(
     turning = reach * free
     stiffness = turning * lengths
     base = (1.0 + _FIRM) * (np.sum(stiffness, axis=0) + _TINY)
+    squared, way = turning * turning, goal - roots
+    result = directions.copy()
+    weighted = np.empty_like(result)
     for _ in range(steps):
-        ends = roots + np.einsum("sb,scb->cb", reach, directions)
-        weighted = stiffness[:, None] * directions
+        left = way - np.einsum("sb,scb->cb", reach, result)
+        np.multiply(stiffness[:, None], result, out=weighted)
         xx, xy, xz, yy, yz, zz = (
-            np.einsum("sb,sb->b", weighted[:, one], directions[:, other])
+            np.einsum("sb,sb->b", weighted[:, one], result[:, other])
             for one, other in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
         )
-        pull = _solved((base - xx, -xy, -xz, base - yy, -yz, base - zz), goal - ends)
+        pull = _solved((base - xx, -xy, -xz, base - yy, -yz, base - zz), left)
         # Only what of it is across a segment turns that.
-        along = np.einsum("scb,cb->sb", directions, pull)
-        across = np.maximum(np.einsum("cb,cb->b", pull, pull) - along * along, 0.0)
-        most = np.max(turning * turning * across, axis=0)
-        turn = turning * (1.0 / np.sqrt(1.0 + most / _BOLD**2))
-        size = 1.0 / np.sqrt(1.0 + turn * turn * across)
-        directions = directions * (size * (1.0 - turn * along))[:, None]
-        directions += (size * turn)[:, None] * pull
-    return directions
+        along = np.einsum("scb,cb->sb", result, pull)
+        square = along * along
+        np.subtract(np.einsum("cb,cb->b", pull, pull), square, out=square)
+        np.maximum(square, 0.0, out=square)
+        square *= squared
+        less = 1.0 / (1.0 + np.max(square, axis=0) / _BOLD**2)
+        turn = turning * np.sqrt(less)
+        square *= less
+        square += 1.0
+        size = np.reciprocal(np.sqrt(square, out=square), out=square)
+        along *= turn
+        np.subtract(1.0, along, out=along)
+        along *= size
+        result *= along[:, None]
+        turn *= size
+        result += np.multiply(turn[:, None], pull, out=weighted)
+    return result
 
 
 def _solved(matrix: tuple[Floats, ...], right: Floats) -> Floats:

@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .columns import smallest_arc, turned
+from .columns import running, smallest_arc, turned
 
 SWEEPS: Final = 4
 SOFTENINGS: Final = 4
@@ -286,7 +286,7 @@ def raised(heights: Floats, floor: Floats) -> Floats:
 
 def lifted(directions: Floats, lengths: Floats, floor: Floats) -> Floats:
     """An arm whose joints below a floor are raised to it; lengths are kept, ends may move."""
-    above = np.cumsum(lengths[:, None] * directions[:, 2], axis=0)
+    above = running(lengths[:, None] * directions[:, 2])
     above -= floor
     lift = 0.5 * (np.sqrt(above * above + _FLOOR_ROUNDING**2) - above)
     lift[1:] -= lift[:-1].copy()

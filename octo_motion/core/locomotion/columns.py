@@ -27,6 +27,16 @@ def dot(first: Floats, second: Floats) -> Floats:
     return total
 
 
+def running(values: Floats) -> Floats:
+    """Sums of the first, the first two … rows (n, …) of values, which are changed in place.
+
+    Long rows are added several times faster than ``numpy.cumsum`` adds along them.
+    """
+    for row in range(1, len(values)):
+        values[row] += values[row - 1]
+    return values
+
+
 def cross(first: Floats, second: Floats) -> Floats:
     """Vector product (…, 3, batch)."""
     a, b = first, second
