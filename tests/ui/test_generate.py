@@ -154,9 +154,13 @@ def test_every_preset_moves_every_bone_of_the_arms(octopus: Any, gait: str) -> N
         assert np.ptp(values, axis=0).max() > 0.01
 
 
-def test_fps_does_not_change_the_motion_in_seconds(octopus: Any) -> None:
+@pytest.mark.parametrize(("steady", "tolerance"), [(0.0, 2e-5), (0.08, 1e-3)])
+def test_fps_does_not_change_the_motion_in_seconds(
+    octopus: Any, steady: float, tolerance: float
+) -> None:
+    """Evened out over time it is the same but for how well the frames resolve it."""
     settings = settings_of(octopus)
-    settings.timing, settings.cycle_time = "CADENCE", 1.5
+    settings.timing, settings.cycle_time, settings.steady = "CADENCE", 1.5, steady
     render = bpy.context.scene.render
     reference = None
     times = np.array([0.0, 0.5, 1.0, 2.5, 4.0])
@@ -166,7 +170,7 @@ def test_fps_does_not_change_the_motion_in_seconds(octopus: Any) -> None:
         generate(octopus)
         seen = np.array([joints_in_world(octopus, 1 + t * fps / base) for t in times])
         reference = seen if reference is None else reference
-        np.testing.assert_allclose(seen, reference, atol=2e-5)
+        np.testing.assert_allclose(seen, reference, atol=tolerance)
 
 
 def test_fractional_fps_gives_the_same_motion_between_its_keys(octopus: Any) -> None:

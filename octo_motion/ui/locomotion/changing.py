@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from ...core.errors import SettingsError
+from ...core.locomotion.body_line import BodyLine
 from ...core.locomotion.changes import (
     Change,
     Windows,
@@ -28,7 +29,9 @@ from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Generator
 from ...core.locomotion.grounded import GroundedWalk, Raise
+from ...core.locomotion.off_ground import afloat
 from ...core.locomotion.route import Route
+from ...core.locomotion.steady import Steady, around
 from ...core.locomotion.travel import Travel, TravelSettings, bearings_of, travel_at
 from ...core.rotations import Floats
 from .change_properties import OCTO_MOTION_PG_change
@@ -39,6 +42,8 @@ _SAMPLES: Final = 40
 _CALM: Final = 0.2
 """Share of a change within which an arm that goes over comes to rest."""
 _APART: Final = 1_000_000
+_SETTLING: Final = 0.3
+"""Share of the height of a body that walks within which one that swims comes down to it."""
 _CYCLE: Final = 2.0 * np.pi
 
 
@@ -71,6 +76,8 @@ class Moved:
     """For each arm (frames, joints) which rest on the ground."""
     cycles: np.ndarray
     """(frames, arms) number of each arm's cycle."""
+    evened: list[Floats] = field(default_factory=list)
+    """For each build of the way's walk (segments, 3, frames, arms): ``GroundedPoses.evened``."""
 
     @classmethod
     def still(cls, frames: int, bones: Sequence[int]) -> Moved:
@@ -153,7 +160,11 @@ class Changing:
         return weights[:, [not way.gait.on_ground for way in self.ways]].sum(axis=1)
 
     def compute(
-        self, distance: Floats, places: tuple[Floats, Floats], step: int
+        self,
+        distance: Floats,
+        places: tuple[Floats, Floats],
+        step: int,
+        frames_per_metre: float,
     ) -> Iterator[Journey | float]:
         """Yield the share that is done, and in the end the arms.
 
@@ -161,15 +172,19 @@ class Changing:
             distance: (frames,) metres along the route.
             places: centres (frames, 3) and orientations (frames, 4) of the body.
             step: frames to be worked on at a time.
+            frames_per_metre: on the way.
         """
         legs: list[Moved] = []
         count = len(self.changes) + 1
         for leg in range(count):
             part = np.flatnonzero(self._within(leg, distance))
             moved = Moved.still(len(distance), self.bones)
+            way = self.ways[self._way(leg)]
+            cycle = frames_per_metre * way.travel.stride
+            steady = Steady.over(way.generator.settings.steady, cycle)
             for start in range(0, len(part), step):
-                chosen = part[start : start + step]
-                self._pose(self._way(leg), distance, places, chosen, moved)
+                chosen = slice(start, min(start + step, len(part)))
+                self._pose(leg, distance, places, moved, frames=part, part=chosen, steady=steady)
                 yield 0.9 * (leg + start / max(len(part), 1)) / count
             self._calm(leg, distance, np.arange(len(distance)), moved)
             legs.append(moved)
@@ -265,7 +280,8 @@ class Changing:
         if walk is None or not np.any(lift[inside]):
             return before
         moved = before.copy()
-        raised, frames = Raise(lift[inside]), chosen[inside]
+        frames = chosen[inside]
+        raised = Raise(lift[inside], evened=tuple(each[:, :, frames] for each in before.evened))
         travel = self._travel(self._way(leg), distance[frames])
         stood = walk.pose(travel.phase, travel.turn, places[0][frames], places[1][frames], raised)
         for arm in raised.arms:
@@ -295,6 +311,13 @@ class Changing:
             result = self._joined(result, leg, self._shares(change, distance))
         return result
 
+    def afloat(self, distance: Floats) -> Floats:
+        """How far arms (frames, arms) are to be kept off a ground that their gait knows not."""
+        legs = range(len(self.changes) + 1)
+        swims = [self.walks[self._way(leg)] is None for leg in legs]
+        shares = [self._shares(change, distance) for change in range(len(self.changes))]
+        return afloat(swims, shares)
+
     def _shares(self, change: int, distance: Floats) -> Floats:
         """How far each arm (frames, arms) has gone over at a change."""
         found = self.windows[change]
@@ -311,23 +334,39 @@ class Changing:
 
     def _pose(
         self,
-        number: int,
+        leg: int,
         distance: Floats,
         places: tuple[Floats, Floats],
-        chosen: np.ndarray,
         moved: Moved,
+        *,
+        frames: np.ndarray,
+        part: slice,
+        steady: Steady | None,
     ) -> None:
-        way, walk = self.ways[number], self.walks[number]
-        travel = self._travel(number, distance[chosen])
+        """Pose the arms at a part of the frames of a leg."""
+        number = self._way(leg)
+        way, walk, chosen = self.ways[number], self.walks[number], frames[part]
         if walk is not None:
-            stood = walk.pose(travel.phase, travel.turn, places[0][chosen], places[1][chosen])
+            inside, own = around(part, steady.reach if steady else 0, len(frames), cyclic=False)
+            wide = frames[inside]
+            travel = self._travel(number, distance[wide])
+            where = places[0][wide], places[1][wide]
+            stood = walk.pose(travel.phase, travel.turn, *where, steady=steady).part(own)
             moved.rotations[chosen], moved.strains[chosen] = stood.rotations, stood.strains
+            if not moved.evened:
+                count = len(distance)
+                moved.evened.extend(
+                    np.zeros((*each.shape[:2], count, each.shape[3])) for each in stood.evened
+                )
+            for whole, each in zip(moved.evened, stood.evened, strict=True):
+                whole[:, :, chosen] = each
             moved.late[chosen] = stood.misses
             # Ways have cycles of their own.
             moved.cycles[chosen] = stood.cycles + _APART * number
             for arm, rests in zip(moved.lying, walk.by_arm(stood.lying), strict=True):
                 arm[chosen] = rests
         else:
+            travel = self._travel(number, distance[chosen])
             posed = way.generator.pose(travel.phase, travel.turn)
             moved.rotations[chosen] = posed.rotations
             moved.misses[chosen] = posed.misses.max(axis=2)
@@ -415,7 +454,8 @@ def plan(
     bones: Sequence[int],
 ) -> Changing:
     """Lay all footholds of a journey, and find when each arm goes over."""
-    lines = [_line(way, number, changes, route) for number, way in enumerate(ways)]
+    floor = next((way.standing.line for way in ways if way.standing is not None), None)
+    lines = [_line(way, number, changes, route, floor) for number, way in enumerate(ways)]
     course = Course(lines, changes)
     asked: list[list[Wish]] = [list(wishes) if number == 0 else [] for number in range(len(ways))]
     walks = _walks(ways, course, asked)
@@ -441,7 +481,9 @@ def plan(
     return Changing(ways, changes, found, course, _walks(ways, course, asked), bones)
 
 
-def _line(way: Way, number: int, changes: Sequence[Change], route: Route) -> Line:
+def _line(
+    way: Way, number: int, changes: Sequence[Change], route: Route, floor: BodyLine | None
+) -> Line:
     if way.standing is not None:
         return way.standing.line
     bearings = bearings_of(route, way.travel)
@@ -449,7 +491,8 @@ def _line(way: Way, number: int, changes: Sequence[Change], route: Route) -> Lin
         return WalkedLine(route, way.travel, bearings, way.height)
     # The stroke that takes it off the ground, or the first one.
     start = next((each.middle for each in changes if each.way == number), 0.0)
-    return SwumLine(route, way.travel, bearings, start, way.height)
+    soft = _SETTLING * floor.clearance if floor is not None else 0.0
+    return SwumLine(route, way.travel, bearings, start, way.height, floor, soft)
 
 
 def _walks(

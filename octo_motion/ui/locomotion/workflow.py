@@ -389,7 +389,8 @@ class Shot:
         step = next(self._portions(), slice(0, 1)).stop
         self.swimming = changing.swimming(travel.distance)
         journey: Journey | None = None
-        for done in changing.compute(travel.distance, places, step):
+        per_metre = self.every * self.cycle / self.travel.stride
+        for done in changing.compute(travel.distance, places, step, per_metre):
             if isinstance(done, Journey):
                 journey = done
             else:
