@@ -55,6 +55,10 @@ class SwumLine:
     """Metres along the route at which it is in the middle of a stroke."""
     height: float = 0.0
     """Metres above the route."""
+    floor: Line | None = None
+    """What it does not come below of: the way of a body that walks, none for no ground."""
+    softness: float = 0.0
+    """Metres within which it comes near to that."""
 
     def phase(self, distance: Floats) -> Floats:
         """Phase of the gait (…,), radians."""
@@ -75,6 +79,11 @@ class SwumLine:
         wanted = np.asarray(distance, dtype=np.float64)
         travel = self.travel(wanted.reshape(-1))
         positions = travel.positions + np.array([0.0, 0.0, self.height])
+        if self.floor is not None:
+            over = positions[:, 2] - self.floor.at(travel.distance)[0][:, 2]
+            # The greater of 0 and what it is over, without a corner.
+            higher = 0.5 * (np.sqrt(over * over + self.softness * self.softness) - over)
+            positions[:, 2] += higher
         return positions.reshape(*wanted.shape, 3), travel.rotations.reshape(*wanted.shape, 4)
 
 

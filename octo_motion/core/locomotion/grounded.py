@@ -323,6 +323,16 @@ class GroundedWalk:
         return (higher.lift[:, columns] * limbs.reach[-1, chosen]).reshape(-1)
 
     @property
+    def radii(self) -> list[Floats]:
+        """For each arm (joints,) metres from each joint to the skin below it."""
+        places = {
+            arm: limbs.radii[:, place]
+            for build, limbs, _ in self._limbs
+            for place, arm in enumerate(build.arms)
+        }
+        return [places[arm] for arm in sorted(places)]
+
+    @property
     def builds(self) -> tuple[tuple[int, ...], ...]:
         """Numbers of the arms of each build, in the order of ``GroundedPoses.joints``."""
         return tuple(build.arms for build, _, _ in self._limbs)

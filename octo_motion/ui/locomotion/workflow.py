@@ -50,6 +50,7 @@ from ...core.locomotion.grounded import Raise
 from ...core.locomotion.keeping_apart import kept_apart
 from ...core.locomotion.loops import route_in_place, travel_in_place, whole_frames
 from ...core.locomotion.mantle import find_mantle, stretched
+from ...core.locomotion.off_ground import off_ground
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
 from ...core.locomotion.steady import Steady
@@ -404,14 +405,21 @@ class Shot:
         if ground is None:
             return
 
+        def kept_off(poses: Poses, loose: Floats) -> Poses:
+            """The same with arms off the ground that know of none."""
+            return replace(poses, rotations=off_ground(course, poses, radii, loose))
+
         def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
             """Some frames anew, with arms raised; others are left as they are."""
             rotations, strains, posed.late[chosen] = journey.higher(chosen, lift)
             poses = Poses(rotations, strains, going[0][chosen], going[1][chosen])
+            poses = kept_off(poses, loose[chosen])
             return poses, course.joints(poses)
 
         course = Course(_arm_frames(self.skeleton, self.arms, self.body), ground, self.scale)
-        whole = Poses(posed.rotations, posed.strains, *going)
+        radii = next(each.walk.radii for each in self._stands())
+        loose = changing.afloat(travel.distance)
+        whole = kept_off(Poses(posed.rotations, posed.strains, *going), loose)
         raised = raised_between(course, whole, course.joints(whole), again)
         posed.rotations, posed.strains = raised.rotations, raised.strains
 
