@@ -40,8 +40,8 @@ _CLOSEST: Final = 0.05
 """The same where there is no other way."""
 _SHORTENED: Final = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
 """Shares of its time that a hold may be cut down to where the body moves on too far."""
-_NEAR, _NEARER = 0.60, 0.17
-_FAR, _FARTHER = 0.94, 0.43
+_NEAR, _NEARER = 0.60, 0.28
+_FAR, _FARTHER = 0.94, 0.47
 """Shares of the free part of an arm between which a place may be that it pushes away from, and by
 how much more these are for each length that it may get longer by."""
 _ROUNDS: Final = 3

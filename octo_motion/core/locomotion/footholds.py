@@ -17,6 +17,7 @@ import numpy as np
 
 from ..rotations import Floats, rotate
 from .course import Line
+from .draping import settled, turned
 from .foothold_places import PEELING, Passing, hold_times, laid, peeled_to, spots
 from .ground import Ground, normals
 from .limbs import Limbs, StanceSettings
@@ -139,7 +140,11 @@ def lay(
 
     roots, rotations = roots_at(shift)
     aside, away = rhythm.aims(limbs.arms, numbers)
-    aim, lie = (_turned(each, aside) for each in _ahead(limbs, rotations))
+    aim, lie = (turned(each, aside) for each in _ahead(limbs, rotations))
+    joint = limbs.touching(settings.planted)
+    sizes = np.stack([limbs.reach[-1], limbs.reach[-1] - limbs.reach[joint]], axis=-1)
+    aside, farther = settled(ground, roots, aim, lie, away, sizes=sizes)
+    aim, lie, away = turned(aim, aside), turned(lie, aside), away + farther
     # One after the other, for the first will do for nearly all.
     passings = (
         Passing(roots, [roots_at(shift + each)[0] for each in times])
@@ -149,7 +154,6 @@ def lay(
     spot = roots.copy()
     spot[..., :2] += found.distance[..., None] * aim
     side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if alike else numbers, seed)
-    joint = limbs.touching(settings.planted)
     heading = np.where(wanted.turned, wanted.headings, np.arctan2(lie[..., 1], lie[..., 0]))
     joints = laid(
         limbs,
@@ -217,13 +221,6 @@ def _ahead(limbs: Limbs, rotations: Floats) -> tuple[Floats, Floats]:
     ahead = rotate(rotations[:, :, None], ahead[:, None])[..., :2]
     ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
     return ahead[:, :, 0], ahead[:, :, 1]
-
-
-def _turned(ways: Floats, angles: Floats) -> Floats:
-    """Directions (…, 2) turned anticlockwise by angles (…,)."""
-    cosine, sine = np.cos(angles), np.sin(angles)
-    x, y = ways[..., 0], ways[..., 1]
-    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
 
 
 def _hash(arms: np.ndarray, cycles: np.ndarray, seed: int) -> Floats:
