@@ -19,6 +19,8 @@ import numpy as np
 
 from ..rotations import Floats, rotate
 from .arm_frames import ArmFrames
+from .arms_together import ArmsTogether, alike
+from .columns import turned
 from .figures import Poses, automatic
 from .ground import Ground
 from .over_time import covered
@@ -68,6 +70,11 @@ class Course:
             found.append(poses.locations[:, None] + rotate(poses.orientations[:, None], joints))
         return found
 
+    @cached_property
+    def _alike(self) -> list[tuple[list[int], ArmsTogether]]:
+        """The arms by how many bones they have."""
+        return alike(self.arms)
+
     def clear(self, joints: Sequence[Floats], arms: Sequence[int] | None = None) -> Floats:
         """Arm lengths (frames, arms) that each arm's lowest joint is above the ground.
 
@@ -91,27 +98,37 @@ class Course:
             clear: (frames, all arms) arm lengths that they are above the ground there.
             arms: which are looked at, none for all.
         """
-        numbers = range(len(self.arms)) if arms is None else arms
-        found = np.zeros((len(poses.rotations) - 1, len(numbers)))
-        for place, number in enumerate(numbers):
-            arm, own = self.arms[number], self.bones[number]
-            rotations = np.ascontiguousarray(poses.rotations[:, own])
-            astray = _bends(rotations).sum(axis=1)
-            least = np.minimum(clear[:-1, number], clear[1:, number])
-            chosen = np.flatnonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + _TOLERATED)
-            if not len(chosen):
+        frames, count = poses.rotations.shape[:2]
+        found = np.zeros((frames - 1, len(self.arms)))
+        for numbers, together in self._alike:
+            wanted = [place for place, each in enumerate(numbers) if arms is None or each in arms]
+            if not wanted:
+                continue
+            own, place = [numbers[each] for each in wanted], np.array(wanted)
+            bones = np.concatenate([np.arange(count)[self.bones[each]] for each in own])
+            rotations = poses.rotations[:, bones]
+            astray = _bends(rotations).reshape(frames, len(own), -1).sum(axis=2)
+            least = np.minimum(clear[:-1, own], clear[1:, own])
+            # Half way between which frames, and which arm.
+            moment, arm = np.nonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + _TOLERATED)
+            if not len(moment):
                 continue
             half = automatic(
-                Poses(rotations, poses.strains[:, own], poses.locations, poses.orientations),
+                Poses(rotations, poses.strains[:, bones], poses.locations, poses.orientations),
                 cyclic=self.cyclic,
             )
-            frames = arm.from_bones(half.rotations[chosen])
-            joints = self.scale * arm.joints(frames, half.strains[chosen])[:, 1:]
-            world = rotate(half.orientations[chosen, None], joints)
-            world += half.locations[chosen, None]
-            below = self.ground.height(world) - world[..., 2]
-            found[chosen, place] = below.max(axis=1) / (arm.length * self.scale)
-        return found
+            shape = frames - 1, len(own), len(together.lengths)
+            turns = half.rotations.reshape(*shape, 4)[moment, arm]
+            strains = half.strains.reshape(shape)[moment, arm]
+            which = place[arm]
+            there = together.orientations(np.moveaxis(turns, 0, 2), which)
+            joints = self.scale * together.joints(there, which, strains.T)[1:]
+            world = turned(np.ascontiguousarray(half.orientations[moment].T), joints)
+            world += half.locations[moment].T
+            below = self.ground.height(np.moveaxis(world, 1, -1)) - world[:, 2]
+            lengths = np.array([self.arms[each].length for each in own])[arm]
+            found[moment, np.array(own)[arm]] = below.max(axis=0) / (lengths * self.scale)
+        return found if arms is None else found[:, list(arms)]
 
 
 def _bends(values: Floats) -> Floats:
@@ -119,7 +136,8 @@ def _bends(values: Floats) -> Floats:
     last = [2 * values[:1] - values[1:2], values, 2 * values[-1:] - values[-2:-1]]
     around = np.concatenate(last)
     second = around[2:] - 2.0 * values + around[:-2]
-    return np.sqrt(np.einsum("fbc,fbc->fb", second, second))
+    w, x, y, z = np.moveaxis(second, -1, 0)
+    return np.sqrt(w * w + x * x + y * y + z * z)
 
 
 def raised_between(

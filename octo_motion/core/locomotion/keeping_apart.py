@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from ..rotations import Floats, conjugate, multiply, normalized, rotate, shortest_arc
+from ..rotations import Floats, conjugate, normalized, rotate, shortest_arc
 from .arm_frames import ArmFrames
+from .arms_together import ArmsTogether, alike
+from .columns import product
 from .ground import Ground
 from .parting import parted
 from .separation import Capsules
@@ -100,21 +101,19 @@ def kept_apart(
         cyclic: whether the last frame is the first again.
     """
     ends = np.cumsum([0, *(len(arm.bones) for arm in bulk.arms)])
-    columns = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-    frames = [
-        arm.from_bones(rotations[:, own]) for arm, own in zip(bulk.arms, columns, strict=True)
-    ]
     some = [joints_that_count(len(arm.bones)) for arm in bulk.arms]
     most = max(len(each) for each in some)
     # Arms with fewer joints than others end in the same one several times.
-    chosen = [np.pad(each, (0, most - len(each)), mode="edge") for each in some]
-    joints = [
-        arm.joints(own, strains[:, part])[:, which]
-        for arm, own, part, which in zip(bulk.arms, frames, columns, chosen, strict=True)
+    chosen = [np.append(each, np.repeat(each[-1:], most - len(each))) for each in some]
+    posed = [
+        _Posed.of(numbers, together, ends, rotations) for numbers, together in alike(bulk.arms)
     ]
+    joints = np.empty((len(rotations), len(bulk.arms), most, 3))
+    for each in posed:
+        joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
     locations, orientations = travel
     crowd = Crowd(
-        joints=np.stack(joints, axis=1),
+        joints=joints,
         radii=np.stack([own[which] for own, which in zip(bulk.radii, chosen, strict=True)]),
         at_rest=np.stack(
             [arm.joints(arm.at_rest)[which] for arm, which in zip(bulk.arms, chosen, strict=True)]
@@ -131,16 +130,70 @@ def kept_apart(
     if moved is None:
         return None
     result = rotations.copy()
-    for number, (arm, own, which) in enumerate(zip(bulk.arms, columns, some, strict=True)):
-        before, after = (
-            normalized(np.diff(each[:, number, : len(which)], axis=1))
-            for each in (crowd.joints, moved)
-        )
-        turned = np.flatnonzero(np.any(before != after, axis=(1, 2)))
-        turns = shortest_arc(before[turned], after[turned])
-        per_bone = np.repeat(turns, np.diff(which), axis=1)
-        result[turned, own] = arm.to_bones(multiply(per_bone, frames[number][turned]))
+    for each in posed:
+        each.turn(result, crowd.joints, moved, some[each.numbers[0]])
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """Arms of as many bones each, at all frames."""
+
+    numbers: list[int]
+    """Which of all arms they are."""
+    together: ArmsTogether
+    columns: np.ndarray
+    """(arms, bones) which of all bones are theirs."""
+    orientations: Floats
+    """(bones, 4, frames × arms)"""
+
+    @classmethod
+    def of(
+        cls, numbers: list[int], together: ArmsTogether, ends: np.ndarray, rotations: Floats
+    ) -> _Posed:
+        """Some arms, as the rotations (frames, bones, 4) of all have them.
+
+        Args:
+            numbers: which arms.
+            together: these arms.
+            ends: (all arms + 1,) where each arm's bones begin.
+            rotations: (frames, bones, 4) of all.
+        """
+        columns = ends[numbers][:, None] + np.arange(len(together.lengths))
+        own = np.moveaxis(rotations[:, columns], (2, 3), (0, 1))
+        arm = np.tile(np.arange(len(numbers)), len(rotations))
+        turned = together.orientations(own.reshape(*own.shape[:2], -1), arm)
+        return cls(numbers, together, columns, turned)
+
+    def joints(self, strains: Floats) -> Floats:
+        """(frames, arms, bones + 1, 3) for strains (frames, all bones)."""
+        count, bones = self.columns.shape
+        own = np.moveaxis(strains[:, self.columns], 2, 0).reshape(bones, -1)
+        arm = np.tile(np.arange(count), len(strains))
+        found = self.together.joints(self.orientations, arm, own)
+        return np.moveaxis(found.reshape(bones + 1, 3, -1, count), (0, 1), (2, 3))
+
+    def turn(self, rotations: Floats, before: Floats, after: Floats, which: np.ndarray) -> None:
+        """Turn bones along with their segments, by the smallest turn.
+
+        Args:
+            rotations: (frames, all bones, 4), changed in place.
+            before: (frames, all arms, joints, 3)
+            after: the same, as they are to be.
+            which: numbers of the joints that stand for all of these arms.
+        """
+        count = len(self.columns)
+        start, end = (each[:, self.numbers, : len(which)] for each in (before, after))
+        frame, arm = np.nonzero((start != end).reshape(len(start), count, -1).any(axis=2))
+        first, second = (normalized(np.diff(each[frame, arm], axis=1)) for each in (start, end))
+        turned = np.flatnonzero((first != second).reshape(len(first), -1).any(axis=1))
+        frame, arm = frame[turned], arm[turned]
+        turns = shortest_arc(first[turned], second[turned])
+        per_bone = np.repeat(np.moveaxis(turns, 0, 2), np.diff(which), axis=0)
+        own = self.orientations[..., frame * count + arm]
+        moved = np.stack([product(turn, each) for turn, each in zip(per_bone, own, strict=True)])
+        fresh = self.together.rotations(moved, arm)
+        rotations[frame[:, None], self.columns[arm]] = np.moveaxis(fresh, 2, 0)
 
 
 def _lying(joints: np.ndarray, which: np.ndarray) -> np.ndarray:
