@@ -10,7 +10,9 @@ import pytest
 from octo_motion.core.locomotion.travel import plan_travel
 from octo_motion.ui.locomotion.properties import locomotion_settings
 from octo_motion.ui.locomotion.workflow import prepare
+from tests.blender.test_ground import make_mesh
 from tests.ui.rig import click
+from tests.ui.test_quality_report import measured_joints, played_joints
 
 RISING = {"b0": (-2.5, 0, 0), "b1": (-0.5, 0, -0.1), "b2": (-0.2, 0.3, 0.1), "b3": (2.2, 0, 1.6)}
 HUMP = {"b0": (-3.0, 0, 0), "b1": (-1.0, 0, 2.2), "b2": (1.0, 0, 2.2), "b3": (3.0, 0, 0)}
@@ -155,3 +157,78 @@ def test_unknown_gait_is_not_added_as_a_change(settings: Any) -> None:
     with pytest.raises(RuntimeError, match="There is no gait 'fly'"):
         bpy.ops.octo_motion.change_add(gait="fly")
     assert len(settings.change.places) == 0
+
+
+def figures_of(shot: Any) -> dict[str, float]:
+    return {figure.kind: figure.value for figure in shot.figures}
+
+
+def bumps() -> Any:
+    """Hills of 0.2 metres from valley to top under a route, in faces of some centimetres."""
+    steps = np.arange(-6.0, 6.01, 0.08)
+    x, y = np.meshgrid(steps, steps, indexing="ij")
+    z = 0.1 * np.sin(2.0 * np.pi * x / 1.4) * np.cos(2.0 * np.pi * y / 1.2)
+    count = len(steps)
+    corner = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    faces = np.stack([corner, corner + count, corner + count + 1, corner + 1], axis=1)
+    return make_mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3).tolist(), faces.tolist())
+
+
+@pytest.mark.parametrize("rough", [False, True])
+@pytest.mark.parametrize("between", ["crawl", "swim"])
+def test_at_no_change_arms_slide_or_dip_into_the_ground(
+    settings: Any, between: str, *, rough: bool
+) -> None:
+    bpy.ops.octo_motion.add_route()
+    bpy.context.view_layer.objects.active = settings.id_data
+    bpy.ops.octo_motion.change_add(gait=between, position=0.33)
+    bpy.ops.octo_motion.change_add(gait="walk", position=0.66)
+    if rough:
+        settings.ground.object = bumps()
+    found = figures_of(computed(settings))
+    assert found["SLIP"] < 0.01
+    assert found["DEPTH"] < 0.001
+
+
+def test_what_takes_off_by_height_leaves_the_ground_with_all_arms(settings: Any) -> None:
+    """An arm that pushes off does not then swing through the ground."""
+    for route in (RISING, HUMP):
+        bpy.ops.octo_motion.add_route(**route)
+        bpy.context.view_layer.objects.active = settings.id_data
+        settings.change.by = "HEIGHT"
+        assert figures_of(computed(settings))["DEPTH"] < 0.001
+
+
+def test_in_a_hurry_arms_that_would_dip_between_frames_are_raised(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route()
+    bpy.context.view_layer.objects.active = settings.id_data
+    bpy.ops.octo_motion.change_add(gait="prowl", position=0.5)
+    settings.ground.object = bumps()
+    settings.timing, settings.frame_end = "RANGE", 150
+    found = figures_of(computed(settings))
+    assert found["SLIP"] < 0.01
+    assert found["DEPTH"] < 0.005
+
+
+@pytest.mark.parametrize("keys", ["DENSE", "REDUCED"])
+def test_what_swims_and_then_walks_is_measured_as_blender_plays_it(
+    settings: Any, keys: str
+) -> None:
+    """With its arms stretched where it walks, and half way between frames."""
+    bpy.ops.octo_motion.add_route(**RISING)
+    armature = bpy.context.view_layer.objects.active = settings.id_data
+    settings.gait, settings.keys = "swim", keys
+    bpy.ops.octo_motion.change_add(gait="walk", position=0.4)
+    settings.timing, settings.frame_end = "RANGE", 180
+    shot = computed(settings)
+    shot.write()
+    measured = shot.measured
+    assert measured is not None
+    assert measured.halfway is not None
+    assert np.abs(measured.poses.strains).max() > 0.05
+    chosen = np.arange(100, 178, 6)
+    for poses, later in ((measured.poses, 0.0), (measured.halfway, 0.5)):
+        seen = measured_joints(measured, poses)[chosen]
+        played = played_joints(armature, shot, shot.frames[chosen] + later)
+        # The object's Euler angles do not go quite the way of its quaternions.
+        np.testing.assert_allclose(seen, played, atol=1e-3 if later else 1e-4)

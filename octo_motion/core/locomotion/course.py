@@ -56,9 +56,11 @@ class SwumLine:
     height: float = 0.0
     """Metres above the route."""
     floor: Line | None = None
-    """What it does not come below of: the way of a body that walks, none for no ground."""
+    """Where it would walk, none if there is no ground."""
+    room: float = 0.0
+    """Metres above that, below which it does not come …"""
     softness: float = 0.0
-    """Metres within which it comes near to that."""
+    """… and within which it comes near to that."""
 
     def phase(self, distance: Floats) -> Floats:
         """Phase of the gait (…,), radians."""
@@ -80,7 +82,7 @@ class SwumLine:
         travel = self.travel(wanted.reshape(-1))
         positions = travel.positions + np.array([0.0, 0.0, self.height])
         if self.floor is not None:
-            over = positions[:, 2] - self.floor.at(travel.distance)[0][:, 2]
+            over = positions[:, 2] - self.floor.at(travel.distance)[0][:, 2] - self.room
             # The greater of 0 and what it is over, without a corner.
             higher = 0.5 * (np.sqrt(over * over + self.softness * self.softness) - over)
             positions[:, 2] += higher

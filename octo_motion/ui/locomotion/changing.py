@@ -42,8 +42,10 @@ _SAMPLES: Final = 40
 _CALM: Final = 0.2
 """Share of a change within which an arm that goes over comes to rest."""
 _APART: Final = 1_000_000
-_SETTLING: Final = 0.3
-"""Share of the height of a body that walks within which one that swims comes down to it."""
+_ROOM: Final = 0.5
+"""Arm lengths that a body swims higher than it walks at least: room for its arms …"""
+_SETTLING: Final = 0.1
+"""… and within which it comes down to that."""
 _CYCLE: Final = 2.0 * np.pi
 
 
@@ -491,8 +493,17 @@ def _line(
         return WalkedLine(route, way.travel, bearings, way.height)
     # The stroke that takes it off the ground, or the first one.
     start = next((each.middle for each in changes if each.way == number), 0.0)
-    soft = _SETTLING * floor.clearance if floor is not None else 0.0
-    return SwumLine(route, way.travel, bearings, start, way.height, floor, soft)
+    reach = way.travel.stride / way.gait.stride
+    return SwumLine(
+        route,
+        way.travel,
+        bearings,
+        start,
+        height=way.height,
+        floor=floor,
+        room=_ROOM * reach,
+        softness=_SETTLING * reach,
+    )
 
 
 def _walks(
