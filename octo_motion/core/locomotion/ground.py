@@ -30,6 +30,10 @@ _MOST_SAMPLES: Final = 4_000_000
 """Samples of a ground; a longer route is sampled more coarsely."""
 
 
+_ONE: Final = 1e-4
+"""Share of a sample's width within which faces are at one height."""
+
+_single_known: Final[Remembered[HeightField | None]] = Remembered(3)
 _extents: Final[Remembered[tuple[Floats, Floats]]] = Remembered(3)
 
 
@@ -164,21 +168,26 @@ def sampled(
     low, high = block * np.floor(low / block), block * np.ceil(high / block)
     shape = tuple(int(each) + 1 for each in np.rint((high - low) / spacing))
     grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
-    coarse = _near_path(grid, path, reach)
     if content is None:
         content = key_of(triangles)
     key = key_of(content, grid.origin, spacing, shape)
     lowest, highest = _extents.get(key, lambda: _extent(triangles, grid))
-    heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
+    single = _single_known.get(key, lambda: _single(grid, lowest, highest))
+    if single is not None:
+        # There is nothing to choose between.
+        heights = highest
+    else:
+        coarse = _near_path(grid, path, reach)
+        heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
     inside = np.flatnonzero(needed)
-    bare = np.isnan(heights[_nearest(grid, path[inside])])
+    bare = ~np.isfinite(heights[_nearest(grid, path[inside])])
     if np.any(bare):
         share = float(np.flatnonzero(bare)[0]) / max(len(inside) - 1, 1)
         raise GroundError(
             f"The route leaves the ground after {100.0 * share:.0f} % of its length.",
             "Move the route, or make the ground larger.",
         )
-    return HeightField(grid.origin, spacing, _filled(heights))
+    return single or HeightField(grid.origin, spacing, _filled(heights))
 
 
 def along_path(path: Floats, *, reach: float, spacing: float, softness: float) -> Ground:
@@ -246,6 +255,15 @@ def _extent(triangles: Floats, grid: HeightField) -> tuple[Floats, Floats]:
         np.minimum.at(lowest, place, z)
         np.maximum.at(highest, place, z)
     return lowest.reshape(grid.heights.shape), highest.reshape(grid.heights.shape)
+
+
+def _single(grid: HeightField, lowest: Floats, highest: Floats) -> HeightField | None:
+    """The ground, if no two faces are above each other; arguments as :func:`_extent` returns."""
+    there = np.isfinite(highest)
+    # Where two faces meet, both are there.
+    if np.max(highest[there] - lowest[there], initial=0.0) > _ONE * grid.spacing:
+        return None
+    return HeightField(grid.origin, grid.spacing, _filled(np.where(there, highest, np.nan)))
 
 
 def _beneath(
