@@ -21,11 +21,8 @@ _STEPS: Final = np.array([0.0, -0.04, 0.04, -0.08, 0.08, -0.12, 0.12])
 """… and nearer or farther, in arm lengths."""
 _ASTRAY: Final = np.array([0.25, 0.15])
 """How much worse the farthest of these are, as a share of what a bend of a radian is …"""
-_BEND: Final = np.radians(18.0)
+_BEND: Final = np.radians(14.0)
 """… more than this, by which the ground falls away under an arm that lies on it."""
-_LEVEL: Final = (0.06, 0.2)
-"""Arm lengths from an arm's root down to its place: an arm that comes from well above lies down
-over a crest with ease, one that does not has to be bent over it."""
 _POINTS: Final = np.linspace(0.0, 1.0, 8)
 
 
@@ -60,12 +57,10 @@ def settled(
         along = (lying[chosen][extra] * _POINTS.reshape(-1, *[1] * (turn.ndim + 1)))[..., None]
         height = ground.height(place + along * turned(lies[at][extra], turn))
         slope = np.arctan(np.diff(height, axis=0) / (lying[chosen][extra] * _POINTS[1]))
-        # By how much it falls away beyond its steepest rise so far.
-        falls = np.max(np.maximum.accumulate(slope, axis=0) - slope, axis=0)
-        above = (root[..., 2] - height[0]) / length
-        low, high = _LEVEL
-        level = np.clip((high - above) / (high - low), 0.0, 1.0)
-        return level * np.maximum(falls - _BEND, 0.0)
+        # The arm comes down to its place, and from there on the ground falls away more.
+        comes = np.arctan2(height[0] - root[..., 2], away[at][extra] + step * length)
+        falls = np.max(np.maximum.accumulate(np.maximum(slope, comes), axis=0) - slope, axis=0)
+        return np.maximum(falls - _BEND, 0.0)
 
     if not len(arm):
         return turns, farther
