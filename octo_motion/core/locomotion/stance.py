@@ -77,7 +77,7 @@ _LETTING_GO: Final = 2.0
 """
 _UNHELD: Final = 0.2
 """Share of its hold that an arm in the air has lost when all its movement is evened out."""
-_EARLIER: Final = 0.5
+_EARLIER: Final = 0.2
 """Share of its way to the ground before its end from which on an arm unrolls."""
 _TINY: Final = 1e-12
 
