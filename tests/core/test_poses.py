@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bones follow their segments whatever their axes, and twist by bank alone."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -105,6 +107,43 @@ def test_a_bone_turns_no_further_than_its_segment_does(seed: int) -> None:
     after = rotate(rotations, rest.segments[:, None])
     between = np.arccos(np.clip(np.sum(after * rest.segments[:, None], axis=-1), -1.0, 1.0))
     assert np.allclose(turned, between, atol=1e-6)
+
+
+@given(seeds)
+def test_segments_are_met_by_way_of_outward_too_and_rest_stays_rest(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    skeleton, chain = a_chain(random, imported=True, not_inheriting=("bone2",))
+    rest = replace(arm_rest(skeleton, chain), outward=normalized(random.normal(size=3)))
+    wanted = wanted_directions(random, len(chain))
+    order = [skeleton.index[name] for name in chain]
+    at_rest = rotate(skeleton.rest_rotations[order], rest.segments)[:, None]
+
+    rotations = rotations_of(rest, wanted, np.zeros(wanted.shape[:2]))
+    unmoved = rotations_of(rest, at_rest, np.zeros(at_rest.shape[:2]))
+
+    assert np.allclose(posed_segments(skeleton, chain, rotations), wanted[:-1], atol=1e-6)
+    assert np.allclose(posed_segments(skeleton, chain, unmoved), at_rest[:-1], atol=1e-6)
+
+
+@given(seeds)
+def test_an_arm_that_hangs_at_rest_rears_up_without_a_snap(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    matrices = [np.eye(4)] + [
+        bone_matrix(np.array([0.0, 0.0, -each]), np.array([0.0, 0.0, -1.0]), random.uniform(0, 6))
+        for each in range(4)
+    ]
+    names = ["body", *(f"bone{each}" for each in range(4))]
+    skeleton = skeleton_of(names, [-1, 0, 1, 2, 3], matrices, [1.0] * 5)
+    rest = replace(arm_rest(skeleton, names[1:]), outward=np.array([1.0, 0.0, 0.0]))
+    # Past straight up, a little to one side: opposite to how it hangs.
+    steps = np.radians(np.arange(60.0, 121.0))
+    way = np.stack([np.cos(steps), np.full(len(steps), 0.01), np.sin(steps)], axis=-1)
+    wanted = np.broadcast_to(normalized(way), (4, len(steps), 3))
+
+    rotations = rotations_of(rest, wanted, np.zeros((4, len(steps))))
+
+    # A step of the direction is 1°; three times that leaves room for what a way round costs.
+    assert np.degrees(angle_between(rotations[:, 1:], rotations[:, :-1]).max()) <= 3.0
 
 
 @given(seeds)

@@ -9,7 +9,7 @@ arm for unit; so neither rest pose nor bone roll nor scale of the rig matters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -164,7 +164,6 @@ class Generator:
         _check_disjoint(self._arms)
         for arm in self._arms:
             chain_of(skeleton, arm.bones)
-        self._rests = [arm_rest(skeleton, arm.bones) for arm in self._arms]
         joints = [body.to_body(joint_positions(skeleton, arm.bones)) for arm in self._arms]
         segments = [np.linalg.norm(np.diff(each, axis=0), axis=1) for each in joints]
         self._lengths = np.array([float(each.sum()) for each in segments])
@@ -174,6 +173,12 @@ class Generator:
         self._outward = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
         # From an arm's own frame to armature space.
         self._to_armature = multiply(from_matrix(body.rotation), self._outward)
+        self._rests = [
+            replace(arm_rest(skeleton, arm.bones), outward=outward)
+            for arm, outward in zip(
+                self._arms, rotate(self._to_armature, np.array([1.0, 0.0, 0.0])), strict=True
+            )
+        ]
         self._hands = np.array([arm.handedness for arm in self._arms])
         self._pairs = tuple(arm.pair for arm in self._arms)
         gait = settings.gait

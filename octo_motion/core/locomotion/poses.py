@@ -4,6 +4,11 @@
 A bone that follows its segment by the smallest rotation from where its parent carries it gains no
 twist of its own. So twist is a channel by itself: bank, and nothing else: the
 source's first open problem was arms that wring themselves, and suckers that face the sky.
+
+The smallest rotation is indefinite, and jumps, where a bone points opposite to its rest. Arms of
+many rigs hang straight down at rest, and rear up straight when they move. So what the body carries
+is turned to where its arm points out of the body first, and from there to its segment: an arm that
+points straight into its own body is nowhere to be seen.
 """
 
 from __future__ import annotations
@@ -39,6 +44,8 @@ class ArmRest:
     follows: tuple[bool, ...]
     """(bones,) whether the bone before turns this one. The first follows the body instead, and a
     bone that does not inherit rotation nothing at all."""
+    outward: Floats | None = None
+    """(3,) unit: straight out of the body, armature space; none for bones that are no arm."""
 
 
 _rests: Final[Remembered[ArmRest]] = Remembered(_MOST_KNOWN)
@@ -141,8 +148,7 @@ def bone_rotations(
             carried = product(orientation, carried)
         elif np.any(follows):
             carried = np.where(np.tile(follows, frames), product(orientation, carried), carried)
-        backwards = carried * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
-        turn = smallest_arc(segment, turned(backwards, wanted[bone]))
+        turn = _swing(rests, bone, carried, wanted[bone])
         twisted = half[bone]
         if facing is not None:
             side = _tiled([each[bone] for each in facing.sides], frames)
@@ -159,6 +165,36 @@ def bone_rotations(
         orientation = product(carried, turn)
         result[:, :, bone] = turn.T.reshape(frames, arms, 4)
     return result
+
+
+def _swing(rests: Sequence[ArmRest], bone: int, carried: Floats, wanted: Floats) -> Floats:
+    """Quaternions (4, batch), in the bone's rest frame, that bring its segment where it is wanted.
+
+    Args:
+        rests: the arms.
+        bone: which bone of theirs.
+        carried: (4, batch) where it is carried, armature space.
+        wanted: (3, batch) unit, armature space.
+    """
+    frames = wanted.shape[-1] // len(rests)
+    segment = _tiled([rest.segments[bone] for rest in rests], frames)
+    goal = turned(_inverse(carried), wanted)
+    if all(rest.follows[bone] or rest.outward is None for rest in rests):
+        return smallest_arc(segment, goal)
+    # Of bones that follow the one before it is the segment itself: there is nothing in between.
+    between = [
+        rest.segments[bone]
+        if rest.follows[bone] or rest.outward is None
+        else rotate(conjugate(rest.carried[bone]), rest.outward)
+        for rest in rests
+    ]
+    first = smallest_arc(_tiled([rest.segments[bone] for rest in rests], 1), _tiled(between, 1))
+    return product(smallest_arc(_tiled(between, frames), goal), np.tile(first, (1, frames)))
+
+
+def _inverse(turns: Floats) -> Floats:
+    """The opposite turns (4, batch)."""
+    return turns * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
 
 
 def _tiled(each: Sequence[Floats], frames: int) -> Floats:
