@@ -15,16 +15,19 @@ from .. import rotations
 from ..rotations import Floats
 
 _TINY: Final = 1e-12
+_HAMILTON: Final = (
+    ((0, 0), (1, 1, np.subtract), (2, 2, np.subtract), (3, 3, np.subtract)),
+    ((0, 1), (1, 0, np.add), (2, 3, np.add), (3, 2, np.subtract)),
+    ((0, 2), (2, 0, np.add), (3, 1, np.add), (1, 3, np.subtract)),
+    ((0, 3), (3, 0, np.add), (1, 2, np.add), (2, 1, np.subtract)),
+)
+"""Which components of two quaternions make each of their product's: those that are multiplied, and
+whether that is added or taken off."""
 
 
 def dot(first: Floats, second: Floats) -> Floats:
     """Scalar product (…, batch) of vectors of any number of components."""
-    products = first * second
-    # Adding a few long rows is faster than a reduction along them.
-    total = products[..., 0, :] + products[..., 1, :]
-    for component in range(2, products.shape[-2]):
-        total += products[..., component, :]
-    return total
+    return np.einsum("...cb,...cb->...b", first, second)
 
 
 def running(values: Floats) -> Floats:
@@ -41,9 +44,12 @@ def cross(first: Floats, second: Floats) -> Floats:
     """Vector product (…, 3, batch)."""
     a, b = first, second
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    result[..., 0, :] = a[..., 1, :] * b[..., 2, :] - a[..., 2, :] * b[..., 1, :]
-    result[..., 1, :] = a[..., 2, :] * b[..., 0, :] - a[..., 0, :] * b[..., 2, :]
-    result[..., 2, :] = a[..., 0, :] * b[..., 1, :] - a[..., 1, :] * b[..., 0, :]
+    lost = np.empty((*result.shape[:-2], result.shape[-1]))
+    for axis, (one, other) in enumerate(((1, 2), (2, 0), (0, 1))):
+        part = result[..., axis, :]
+        np.multiply(a[..., one, :], b[..., other, :], out=part)
+        np.multiply(a[..., other, :], b[..., one, :], out=lost)
+        np.subtract(part, lost, out=part)
     return result
 
 
@@ -75,8 +81,12 @@ def matrices(turn: Floats) -> Floats:
 def product(first: Floats, second: Floats) -> Floats:
     """Quaternions (4, batch) that turn by the second and then by the first."""
     result = np.empty(np.broadcast_shapes(first.shape, second.shape))
-    result[0] = first[0] * second[0] - dot(first[1:], second[1:])
-    result[1:] = first[0] * second[1:] + second[0] * first[1:] + cross(first[1:], second[1:])
+    a, b, part = list(first), list(second), np.empty(result.shape[1:])
+    for total, (begin, *rest) in zip(result, _HAMILTON, strict=True):
+        np.multiply(a[begin[0]], b[begin[1]], out=total)
+        for one, other, add in rest:
+            np.multiply(a[one], b[other], out=part)
+            add(total, part, out=total)
     return result
 
 
