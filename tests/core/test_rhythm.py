@@ -2,6 +2,7 @@
 """When arms are where in their cycles: in step, or each by its own holds."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import given
@@ -100,6 +101,33 @@ def test_in_between_arms_that_start_and_end_at_rest_keep_their_rhythm() -> None:
     steps = np.diff(own.phases(np.linspace(0.0, LENGTH, 2000)), axis=0) * 2000.0 / LENGTH
     # Four times its pace at most, and that only while the body is slow.
     assert steps.max() < 4.0 * 2.0 * np.pi / 0.8
+
+
+def test_each_cycle_of_a_crawl_knows_where_its_hold_is() -> None:
+    rhythm, holds = crawl()
+    turns, away = rhythm.aims(range(8), np.arange(-1, 40))
+    for arm in range(8):
+        own = holds.arm == arm
+        np.testing.assert_array_equal(turns[arm, 1 : 1 + own.sum()], holds.turn[own])
+        np.testing.assert_array_equal(away[arm, 1 : 1 + own.sum()], holds.away[own])
+        assert np.isnan(away[arm, [0, -1]]).all()
+    # A walk leaves it to each arm, straight ahead.
+    turns, away = Even(0.8, np.zeros(8)).aims([1, 3], np.arange(4))
+    assert not turns.any()
+    assert np.isnan(away).all()
+
+
+def test_a_crawl_that_is_planned_from_rest_to_rest_is_left_as_it_was_planned() -> None:
+    for seed in range(4):
+        way = replace(journey(), stands=(True, True))
+        length = float(way.distance[-1])
+        holds = plan_crawl(way, CrawlSettings(seed=seed))
+        planned = free(holds, 8, middle=MIDDLE, duty=DUTY)
+        own = at_rest(planned, length, start=True, end=True, middle=MIDDLE, duty=DUTY)
+        distance = np.linspace(0.0, length, 500)
+        # But for how the phase rises through the first and the last hold: no arm is hurried.
+        late = np.abs(own.phases(distance) - planned.phases(distance)) / (2.0 * np.pi)
+        assert late.max() < 0.03
 
 
 def test_an_arm_without_a_hold_has_a_phase_all_the_same() -> None:

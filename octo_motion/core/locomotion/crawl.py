@@ -13,6 +13,7 @@ to search. How long each hold and each pause lasts is drawn from a seeded stream
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Final
 
@@ -185,7 +186,11 @@ class _Crawl:
         self._holds: list[_Hold] = []
         self._latest: dict[int, _Hold] = {}
         """Of each arm."""
-        first, last = float(journey.distance[0]), float(journey.distance[-1])
+        self._distances: list[float] = journey.distance.tolist()
+        along = np.sum(journey.outward * journey.ahead[:, None], axis=-1)
+        self._pushing = -along >= np.cos(settings.pushing)
+        """(samples, arms)"""
+        first, last = self._distances[0], self._distances[-1]
         starts, stops = journey.stands
         self._first = first if starts else -np.inf
         self._last = last if stops else np.inf
@@ -240,8 +245,8 @@ class _Crawl:
 
     def _pushes(self, arm: int, at: float) -> bool:
         """Whether an arm's push points along the way."""
-        _, outward, ahead = self._at(arm, np.array([at]))
-        return -float(np.sum(outward * ahead)) >= np.cos(self._settings.pushing)
+        sample = bisect_right(self._distances, at) - 1
+        return bool(self._pushing[max(sample, 0), arm])
 
     def _take_hold(self, arm: int, at: float) -> float:
         """Let an arm take hold at a distance; where it lets go."""
@@ -282,7 +287,7 @@ class _Crawl:
                 best = int(np.argmax(good))
                 turn, places = turns[best], (tried[0][best : best + 1], tried[1][best : best + 1])
         place, tip = places[0][0], places[1][0]
-        root, outward, _ = (each[0] for each in self._at(arm, np.array([0.5 * (start + end)])))
+        root, outward = (each[0] for each in self._at(arm, np.array([0.5 * (start + end)])))
         reach = place - root
         across = outward[0] * reach[1] - outward[1] * reach[0]
         turn = float(np.arctan2(across, outward @ reach))
@@ -301,15 +306,14 @@ class _Crawl:
     ) -> Floats:
         """Metres (places,) that an arm is clear of others, in the time that both hold on."""
         times = np.array([[seen[0], min(seen[1], each.end)] for each in others])
-        own, _, _ = self._at(arm, times.reshape(-1))
-        theirs = np.stack(
-            [self._at(each.arm, at)[0] for each, at in zip(others, times, strict=True)]
-        )
+        own, _ = self._at(arm, times.reshape(-1))
+        numbers = np.repeat([each.arm for each in others], 2)
+        theirs, _ = self._at(numbers, times.reshape(-1))
         mine = Outline(
             own.reshape(*times.shape, 2), places[0][:, None, None], places[1][:, None, None]
         )
         yours = Outline(
-            theirs,
+            theirs.reshape(*times.shape, 2),
             np.stack([each.place for each in others])[:, None],
             np.stack([each.tip for each in others])[:, None],
         )
@@ -322,7 +326,7 @@ class _Crawl:
         side first ahead and then behind.
         """
         settings, unit = self._settings, self._unit
-        root, outward, _ = self._at(arm, np.array([middle]))
+        root, outward = self._at(arm, np.array([middle]))
         x, y = outward[0]
         cosine, sine = np.cos(turns), np.sin(turns)
         way = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
@@ -334,11 +338,11 @@ class _Crawl:
         settings, unit = self._settings, self._unit
         most = settings.far - settings.near
         lasts = unit * np.linspace(min(settings.shortest, most), most, _TRIED)
-        root, outward, _ = self._at(arm, at + 0.5 * lasts)
+        root, outward = self._at(arm, at + 0.5 * lasts)
         place = root + 0.5 * (settings.near + settings.far) * unit * outward
         kept = np.ones(_TRIED, dtype=np.bool_)
         for share in _LOOKED_AT:
-            root, outward, _ = self._at(arm, at + share * lasts)
+            root, outward = self._at(arm, at + share * lasts)
             reach = place - root
             away = np.hypot(reach[:, 0], reach[:, 1])
             kept &= away >= (settings.near - _SLACK) * unit
@@ -355,25 +359,27 @@ class _Crawl:
         left = (self._last - at) / self._unit
         return self._unit * max(min(planned, left - lie), swing)
 
-    def _at(self, arm: int, at: Floats) -> tuple[Floats, Floats, Floats]:
-        """Roots and directions of an arm and the way to go (n, 2), at distances (n,).
+    def _at(self, arm: int | NDArray[np.intp], at: Floats) -> tuple[Floats, Floats]:
+        """Roots and directions (n, 2) of an arm, or of one each (n,), at distances (n,).
 
         Before the start and after the end the body goes straight on, if it does not stand there.
         """
         journey = self._journey
         distance = journey.distance
-        at = np.clip(at, self._first, self._last)
-        right = np.clip(np.searchsorted(distance, at), 1, len(distance) - 1)
-        left = right - 1
-        share = np.clip((at - distance[left]) / (distance[right] - distance[left]), 0.0, 1.0)
-
-        def between(values: Floats) -> Floats:
-            return values[left] + share[:, None] * (values[right] - values[left])
-
-        ahead = normalized(between(journey.ahead))
-        beyond = at - np.clip(at, distance[0], distance[-1])
-        root = between(journey.roots[:, arm]) + beyond[:, None] * ahead
-        return root, normalized(between(journey.outward[:, arm])), ahead
+        at = np.minimum(np.maximum(at, self._first), self._last)
+        right = np.minimum(np.searchsorted(distance, at), len(distance) - 1)
+        left = np.maximum(right - 1, 0)
+        right = left + 1
+        inside = np.minimum(np.maximum(at, distance[0]), distance[-1])
+        share = ((inside - distance[left]) / (distance[right] - distance[left]))[:, None]
+        root, outward = (
+            (1.0 - share) * each[left, arm] + share * each[right, arm]
+            for each in (journey.roots, journey.outward)
+        )
+        beyond = at - inside
+        if beyond.any():
+            root += beyond[:, None] * journey.ahead[np.where(beyond < 0.0, 0, -1)]
+        return root, normalized(outward)
 
     def _sorted(self) -> Holds:
         holds = sorted(self._holds, key=lambda each: (each.arm, each.start))
