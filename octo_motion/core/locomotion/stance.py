@@ -72,7 +72,7 @@ them the skin is lower, where the ground is bent upwards or the arm sideways."""
 _AT_ONCE: Final = 40.0
 """How much faster than its hold an arm loses its stiffness against the ground: so it does not pass
 through it …"""
-_LETTING_GO: Final = 2.0
+_LETTING_GO: Final = 3.0
 """… and how much faster it comes to keep its distance from it, where it has lain: without a jerk.
 """
 _UNHELD: Final = 0.2
