@@ -29,7 +29,7 @@ from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from .wishes import gathered
 from .workflow import RESULTS, playing_action, prepare, previous_action
 
-_SOON: Final = 0.03
+_SOON: Final = 0.01
 """Seconds from a change to the new motion at least: what changes together is made together."""
 _LATER: Final = 0.3
 """Seconds until it is tried again, while Blender renders or a tool of ours runs."""
