@@ -39,6 +39,12 @@ def may_stretch(armature: bpy.types.Object, bones: Sequence[str]) -> bool:
     return True
 
 
+def hands_on(armature: bpy.types.Object, bones: Sequence[str]) -> list[bool]:
+    """Of each bone of an arm, root to tip, whether the one before makes it longer with itself."""
+    data = armature_data(armature).bones
+    return [bool(place) and data[name].inherit_scale == ALIGNED for place, name in enumerate(bones)]
+
+
 def stretch_channels(
     armature: bpy.types.Object, arms: Sequence[Sequence[str]], strains: Floats
 ) -> list[Channel]:
@@ -53,15 +59,15 @@ def stretch_channels(
         Channels of those bones whose scale differs from 1 at some frame.
     """
     assert armature.pose is not None
-    data = armature_data(armature).bones
     channels: list[Channel] = []
     start = 0
     for bones in arms:
         longer = 1.0 + strains[:, start : start + len(bones)]
         start += len(bones)
+        handed = hands_on(armature, bones)
         for place, name in enumerate(bones):
             along = longer[:, place]
-            if place and data[name].inherit_scale == ALIGNED:
+            if handed[place]:
                 along = along / longer[:, place - 1]
             if np.abs(along - 1.0).max() <= _UNUSED:
                 continue
@@ -89,13 +95,11 @@ def strains_of(
     Returns:
         (moments, bones) of all arms, one after the other.
     """
-    data = armature_data(armature).bones
     strains = []
     for bones in arms:
         longer = np.ones(count)
-        for place, name in enumerate(bones):
+        for name, handed in zip(bones, hands_on(armature, bones), strict=True):
             own = alongs.get(name, 1.0)
-            handed_on = place and data[name].inherit_scale == ALIGNED
-            longer = longer * own if handed_on else np.ones(count) * own
+            longer = longer * own if handed else np.ones(count) * own
             strains.append(longer - 1.0)
     return np.stack(strains, axis=1)

@@ -2,7 +2,8 @@
 """How many keys *Few* leaves of a motion, and how long it takes to find them.
 
 The default octopus moves along its default route with each gait of the add-on, at several
-tolerances of the bones' angle; the tips may be off by the default distance.
+tolerances of the bones' angle and of the tips' distance, with key frames for each bone and for
+each arm.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from typing import Any, Final
 GAITS: Final = ("walk", "hurry", "prowl", "crawl", "swim", "settle")
 ANGLES: Final = (0.25, 0.5, 1.0, 2.0)
 """Degrees."""
+DISTANCES: Final = (0.005, 0.01)
+"""Arm lengths."""
+COLUMNS: Final = {"BONE": "each bone", "ARM": "each arm"}
 
 
 def main(words: list[str]) -> None:
@@ -28,18 +32,26 @@ def main(words: list[str]) -> None:
 
     octo_motion.register()
     try:
-        angles = "".join(f"{each:>8g}°" for each in ANGLES)
+        angles = "".join(f"{each:>7g}°" for each in ANGLES)
         print(f"{'times fewer keys, bones within':<32}{angles}   seconds at 0.5°")
         for gait in gaits:
-            found, seconds = zip(*(_measured(bpy, gait, angle) for angle in ANGLES), strict=True)
-            shares = "".join(f"{each:>9.1f}" for each in found)
-            print(f"{gait:<32}{shares}   {seconds[ANGLES.index(0.5)]:>10.1f}")
+            for columns, name in COLUMNS.items():
+                for distance in DISTANCES:
+                    found, seconds = zip(
+                        *(_measured(bpy, gait, angle, distance, columns) for angle in ANGLES),
+                        strict=True,
+                    )
+                    label = f"{gait}, {name}, tips {distance:g}"
+                    shares = "".join(f"{each:>8.1f}" for each in found)
+                    print(f"{label:<32}{shares}   {seconds[ANGLES.index(0.5)]:>10.1f}", flush=True)
     finally:
         octo_motion.unregister()
 
 
-def _measured(bpy: Any, gait: str, degrees: float) -> tuple[float, float]:
-    """How many times fewer keys there are, and the seconds of making the motion with them."""
+def _measured(
+    bpy: Any, gait: str, degrees: float, distance: float, columns: str
+) -> tuple[float, float]:
+    """How many times fewer keys there are, and the seconds that it takes to find them."""
     import numpy as np
 
     from octo_motion.ui.locomotion.workflow import generate
@@ -50,8 +62,13 @@ def _measured(bpy: Any, gait: str, degrees: float) -> tuple[float, float]:
     bpy.ops.octo_motion.add_route()
     bpy.context.view_layer.objects.active = armature
     settings = armature.octo_motion.locomotion
-    settings.gait, settings.keys, settings.key_angle = gait, "REDUCED", np.radians(degrees)
-    settings.tell_overlaps = False
-    start = time.perf_counter()
-    summary = generate(armature, bpy.context)
-    return summary.dense_keys / summary.keys, time.perf_counter() - start
+    settings.gait, settings.tell_overlaps = gait, False
+    seconds = []
+    for keys in ("DENSE", "REDUCED"):
+        settings.keys = keys
+        settings.key_angle, settings.key_distance = np.radians(degrees), distance
+        settings.key_columns = columns
+        start = time.perf_counter()
+        summary = generate(armature, bpy.context)
+        seconds.append(time.perf_counter() - start)
+    return summary.dense_keys / summary.keys, seconds[1] - seconds[0]

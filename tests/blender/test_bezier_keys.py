@@ -35,7 +35,9 @@ def places(count: int = COUNT) -> Floats:
     return np.stack([40.0 + time, np.sin(time), 0.1 * np.abs(np.sin(3.0 * time))], axis=1)
 
 
-def channels_of(obj: bpy.types.Object, *, reduced: bool = True, group: str = "") -> list[Channel]:
+def channels_of(
+    obj: bpy.types.Object, *, reduced: bool = True, group: str = "", angle: float = ANGLE
+) -> list[Channel]:
     """A travel and three bones, in the rotation modes that the bones have."""
     names = [bone.name for bone in pose_bones(obj)]
     turned = actions.rotation_channels(obj, names, swinging(bones=len(names)))
@@ -47,7 +49,7 @@ def channels_of(obj: bpy.types.Object, *, reduced: bool = True, group: str = "")
     arm, travel = reduce_keys(
         FRAMES,
         [
-            Limb(tracks, ANGLE, 1e9),
+            Limb(tracks, angle, 1e9),
             Limb([Track(moved.values, "LOCATION")], ANGLE, DISTANCE),
         ],
     )
@@ -107,7 +109,8 @@ def test_between_frames_curves_stay_beside_the_dense_motion() -> None:
 
 def test_handles_are_free_at_corners_and_aligned_elsewhere() -> None:
     obj = make_armature()
-    channels = channels_of(obj)
+    # So tight that there are keys between the jolts.
+    channels = channels_of(obj, angle=0.02 * ANGLE)
     action = actions.write_action(obj, "Walk", FRAMES, channels, previous=None)
     kinds = set()
     for channel in channels:

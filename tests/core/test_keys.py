@@ -1,13 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Few keys that stay within their bounds at every frame, as Blender will play them back."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.keys import BezierKeys, Chain, Limb, Track, chain_to_tip, reduce_keys
+from octo_motion.core.keys import (
+    LOCATION,
+    SCALE,
+    BezierKeys,
+    Chain,
+    Limb,
+    Track,
+    chain_to_tip,
+    reduce_keys,
+)
 from octo_motion.core.rotations import (
     Floats,
     angle_between,
@@ -174,19 +186,25 @@ def test_bounds_hold_where_single_precision_frames_are_coarse(start: float) -> N
 
 
 @settings(max_examples=40)
-@given(seeds, st.integers(2, 100))
-def test_keys_are_poses_of_the_motion_shared_by_the_whole_limb(seed: int, count: int) -> None:
+@given(seed=seeds, count=st.integers(2, 100), shared=st.booleans())
+def test_keys_stand_on_frames_and_the_motion_begins_and_ends_exactly(
+    *, seed: int, count: int, shared: bool
+) -> None:
     frames = np.arange(1.0, count + 1.0)
     motion = wandering(np.random.default_rng(seed), count, 3, 0.5)
-    (keys,) = reduce_keys(frames, [limb_of(motion)])
+    columns = None if shared else range(3)
+    (keys,) = reduce_keys(frames, [replace(limb_of(motion), columns=columns)])
     for bone, track in enumerate(keys):
-        np.testing.assert_array_equal(track.frames, keys[0].frames)
+        if shared:
+            np.testing.assert_array_equal(track.frames, keys[0].frames)
         places = np.searchsorted(frames, track.frames)
         np.testing.assert_array_equal(frames[places], track.frames)
-        np.testing.assert_array_equal(track.values, motion[places, bone].astype(np.float32))
-    assert keys[0].frames[0] == frames[0]
-    assert keys[0].frames[-1] == frames[-1]
-    assert (np.diff(keys[0].frames) > 0.0).all()
+        assert angle_between(normalized(track.values), motion[places, bone]).max() <= LIMIT
+        ends = motion[[0, -1], bone].astype(np.float32)
+        np.testing.assert_array_equal(track.values[[0, -1]], ends)
+        assert track.frames[0] == frames[0]
+        assert track.frames[-1] == frames[-1]
+        assert (np.diff(track.frames) > 0.0).all()
 
 
 @settings(max_examples=40)
@@ -259,6 +277,124 @@ def test_wider_bounds_have_no_more_keys() -> None:
     ]
     assert counts == sorted(counts, reverse=True)
     assert counts[0] > counts[-1]
+
+
+def test_bones_with_key_frames_of_their_own_have_fewer_keys() -> None:
+    turns = np.sin(2.0 * np.pi * (np.arange(241)[:, None] / [40.0, 67.0, 96.0] + [0.0, 0.3, 0.7]))
+    motion = from_axis_angle([1.0, 0.0, 0.0], 0.6 * turns)
+    limb = limb_of(motion)
+    (arm,) = reduce_keys(np.arange(241.0), [limb])
+    (bones,) = reduce_keys(np.arange(241.0), [replace(limb, columns=range(3))])
+    assert sum(map(len, bones)) < 0.75 * sum(map(len, arm))
+    assert len({len(each) for each in bones}) > 1
+
+
+def test_bones_make_up_for_each_other_at_the_tip() -> None:
+    """With bounds for its bones alone a tip would be off by more than half as much again."""
+    random = np.random.default_rng(3)
+    skeleton, bones, chain = an_arm(random)
+    frames = np.arange(161.0)
+    phases = random.uniform(0.0, 6.0, (len(bones), 3))
+    turn = 0.4 * np.sin(0.2 * frames[:, None, None] + phases)
+    motion = continuous(from_rotation_vector(turn))
+    free = replace(limb_of(motion), chain=chain, columns=range(len(bones)))
+
+    def off(keys: list[BezierKeys]) -> float:
+        kept = np.stack([normalized(played(track, frames)) for track in keys], axis=1)
+        gone = tips(skeleton, bones, kept) - tips(skeleton, bones, motion)
+        return float(np.linalg.norm(gone, axis=1).max())
+
+    (loose,) = reduce_keys(frames, [replace(free, chain=None)])
+    bound = 0.6 * off(loose)
+    (tight,) = reduce_keys(frames, [replace(free, distance=bound)])
+    assert off(tight) <= bound * (1.0 + 1e-6)
+    assert sum(map(len, tight)) < 1.15 * sum(map(len, loose))
+
+
+# --- Stretching and loops -------------------------------------------------------------------------
+
+
+@settings(max_examples=20)
+@given(seeds, st.floats(1e-3, 0.05))
+def test_what_stretches_keeps_its_tip_and_its_scales(seed: int, distance: float) -> None:
+    random = np.random.default_rng(seed)
+    skeleton, bones, chain = an_arm(random, joints=4)
+    frames = np.arange(70.0)
+    motion = wandering(random, 70, len(bones), 0.2)
+    along = 1.0 + 0.4 * np.sin(0.2 * frames[:, None] + random.uniform(0.0, 6.0, len(bones)))
+    scales = np.stack([along**-0.5, along, along**-0.5], axis=2)
+    handed = [bool(each) for each in random.random(len(bones)) < 0.5]
+    count = len(bones)
+    chain = replace(chain, scaled=tuple(range(count, 2 * count)), handed=tuple(handed))
+    limb = limb_of(motion, angle=0.02, distance=distance)
+    tracks = [*limb.tracks, *(Track(scales[:, bone], SCALE) for bone in range(count))]
+    limb = replace(limb, tracks=tracks, chain=chain, columns=range(2 * count))
+    (keys,) = reduce_keys(frames, [limb])
+    now = [played(track, frames) for track in keys]
+    for bone in range(count):
+        assert np.abs(now[count + bone] - scales[:, bone]).max() <= 0.02 * (1.0 + 1e-5)
+    kept = np.stack([normalized(each) for each in now[:count]], axis=1)
+    few = stretched_tips(skeleton, bones, kept, np.stack(now[count:], axis=1)[..., 1], handed)
+    off = np.linalg.norm(few - stretched_tips(skeleton, bones, motion, along, handed), axis=1)
+    assert off.max() <= distance * (1.0 + 1e-5)
+
+
+def stretched_tips(
+    skeleton: Skeleton, bones: list[str], rotations: Floats, along: Floats, handed: Sequence[bool]
+) -> Floats:
+    """By the skeleton's forward kinematics: the steps between joints, each as long as it is."""
+    basis = np.tile([1.0, 0.0, 0.0, 0.0], (len(rotations), len(skeleton), 1))
+    order = [skeleton.index[name] for name in bones]
+    basis[:, order] = rotations
+    _, heads = skeleton.pose(basis)
+    points = np.concatenate([heads[:, order], tips(skeleton, bones, rotations)[:, None]], axis=1)
+    total, longer = np.zeros((len(rotations), 3)), np.ones(len(rotations))
+    for bone in range(len(bones)):
+        longer = along[:, bone] * (longer if handed[bone] else 1.0)
+        total += (points[:, bone + 1] - points[:, bone]) * longer[:, None]
+    return total
+
+
+def test_a_bound_may_change_from_frame_to_frame() -> None:
+    frames = np.arange(120.0)
+    places = np.stack([np.sin(0.15 * frames), np.cos(0.4 * frames), 0.0 * frames], axis=1)
+    bound = np.where(frames < 60.0, 0.05, 0.002)
+    ((keys,),) = reduce_keys(frames, [Limb([Track(places, LOCATION)], 1.0, bound)])
+    off = np.linalg.norm(played(keys, frames) - places, axis=1)
+    assert (off <= bound * (1.0 + 1e-5)).all()
+
+
+@settings(max_examples=20)
+@given(seed=seeds, count=st.integers(20, 90), shared=st.booleans())
+def test_a_loop_meets_in_position_and_slope(*, seed: int, count: int, shared: bool) -> None:
+    random = np.random.default_rng(seed)
+    phase = 2.0 * np.pi * np.arange(count + 1)[:, None, None] / count
+    turn = 0.5 * np.sin(phase * [1, 2, 1] + random.uniform(0.0, 6.0, (2, 3)))
+    motion = continuous(from_rotation_vector(turn))
+    motion[-1] = motion[0]
+    limb = replace(limb_of(motion), columns=None if shared else range(2))
+    (keys,) = reduce_keys(np.arange(count + 1.0), [limb], loops=True)
+    for track in keys:
+        np.testing.assert_array_equal(track.values[0], track.values[-1])
+        start = (track.right[0, :, 1] - track.values[0]) / (track.right[0, :, 0] - track.frames[0])
+        end = (track.values[-1] - track.left[-1, :, 1]) / (track.frames[-1] - track.left[-1, :, 0])
+        # Single precision of values about 1, over a frame or more.
+        np.testing.assert_allclose(start, end, atol=2e-6)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_keys_stand_on_whole_frames_where_motion_is_known_between_them(*, exact: bool) -> None:
+    frames = np.arange(0.0, 60.5, 0.5)
+    motion = swing(len(frames), 37.0)
+    ((keys,),) = reduce_keys(frames, [limb_of(motion)], every=2, all_of_them=exact)
+    np.testing.assert_array_equal(keys.frames, np.round(keys.frames))
+    off = angle_between(normalized(played(keys, frames)), motion[:, 0])
+    assert off.max() <= LIMIT * (1.0 + 1e-6)
+    if exact:
+        np.testing.assert_array_equal(keys.frames, np.arange(61.0))
+        np.testing.assert_array_equal(keys.values, motion[::2, 0].astype(np.float32))
+    else:
+        assert len(keys) < 25
 
 
 # --- Many at once ---------------------------------------------------------------------------------

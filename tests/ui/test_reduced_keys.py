@@ -103,17 +103,25 @@ def test_other_rotation_modes_are_kept_and_within_the_tolerance(octopus: Any) ->
     assert np.linalg.norm(few_tips - tips, axis=-1).max() <= 0.005 + 1e-5
 
 
-def test_an_arm_has_its_keys_at_the_same_frames_in_one_group(octopus: Any) -> None:
-    settings_of(octopus).keys = "REDUCED"
+@pytest.mark.parametrize("columns", ["ARM", "BONE"])
+def test_an_arm_has_its_keys_in_one_group_at_the_same_frames_if_wanted(
+    octopus: Any, columns: str
+) -> None:
+    settings_of(octopus).keys, settings_of(octopus).key_columns = "REDUCED", columns
     action = generate(octopus)
     bag = action.layers[0].strips[0].channelbags[0]
     assert [group.name for group in bag.groups] == [
         *("Object Transforms", "Arm 1 L", "Arm 1 R", "Arm 2 L", "Arm 2 R"),
     ]
-    for group in bag.groups:
-        columns = {tuple(key.co.x for key in curve.keyframe_points) for curve in group.channels}
-        assert len(columns) == 1
-        assert len(next(iter(columns))) < 60
+    for group in bag.groups[1:]:
+        frames: dict[str, set[tuple[float, ...]]] = {}
+        for curve in group.channels:
+            own = tuple(key.co.x for key in curve.keyframe_points)
+            frames.setdefault(curve.data_path, set()).add(own)
+            assert len(own) < 60
+        # Whatever is shared beyond, a bone's own channels have theirs in common.
+        assert all(len(each) == 1 for each in frames.values())
+        assert (len(set.union(*frames.values())) == 1) == (columns == "ARM")
     counts = [len(group.channels) for group in bag.groups]
     assert counts == [6, 24, 24, 24, 24]
 
@@ -223,3 +231,31 @@ def test_finding_few_keys_shows_progress_and_can_be_stopped(octopus: Any) -> Non
     assert shares[-1] == 1.0
     # What is left to do is only to hand them to Blender.
     assert shot.few is not None
+
+
+@pytest.mark.parametrize(("columns", "times"), [("BONE", 8.0), ("ARM", 5.0)])
+def test_the_default_walk_has_many_times_fewer_keys_that_keep_its_pace(
+    columns: str, times: float
+) -> None:
+    click("add_octopus", with_mesh=False)
+    octopus: Any = bpy.context.object
+    give_route(octopus)
+    settings = settings_of(octopus)
+    settings.keys, settings.key_columns, settings.tell_overlaps = "REDUCED", columns, False
+    summary = workflow.generate(octopus, bpy.context)
+    assert summary.dense_keys > times * summary.keys
+
+
+def test_stretching_arms_keep_their_tips_where_they_are(octopus: Any) -> None:
+    """Bones of which each makes the next longer too, and holds the ground meanwhile."""
+    settings = settings_of(octopus)
+    for bone in octopus.data.bones:
+        bone.inherit_scale = "ALIGNED"
+    settings.keys = "DENSE"
+    generate(octopus)
+    assert any("scale" in path for path, _ in keys(octopus.animation_data.action))
+    tips, _ = seen(octopus)
+    settings.keys = "REDUCED"
+    generate(octopus)
+    few_tips, _ = seen(octopus)
+    assert np.linalg.norm(few_tips - tips, axis=-1).max() <= 0.005 + 1e-5

@@ -28,7 +28,8 @@ NAMES = {
     *("variation_min", "variation_max", "seed"),
     *("weight_root", "weight_tip", "use_weight_curve", "weight_curve"),
     *("timing", "cycle_time", "speed", "frame_start", "frame_end"),
-    *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "result"),
+    *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),
+    "result",
 }
 
 

@@ -37,7 +37,7 @@ _TRUSTED: Final = 1.0
 """Seconds within which an action that Blender has told no change of is not looked at again."""
 _NO_MATTER: Final = RESULTS | {
     *("contacts", "active_arm", "active_reach", "active_curve", "active_change", "shown_angle"),
-    *("keys", "key_angle", "key_distance", "tell_overlaps"),
+    *("keys", "key_angle", "key_distance", "key_columns", "tell_overlaps"),
 }
 """Settings that the motion does not depend on while it is live; contacts are looked at otherwise.
 """

@@ -341,6 +341,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             column = layout.column(align=True)
             column.prop(settings, "key_angle", text="Tolerance Angle")
             column.prop(settings, "key_distance")
+            layout.row().prop(settings, "key_columns", expand=True)
         layout.prop(settings, "keep_apart")
         layout.prop(settings, "tell_overlaps")
         row = layout.row(align=True)

@@ -541,6 +541,26 @@ class OCTO_MOTION_PG_locomotion(
         precision=4,
         override=OVERRIDE,
     )
+    key_columns: EnumProperty(
+        name="Columns",
+        description="Which channels have their keys at the same frames, where there are few keys",
+        items=(
+            (
+                "ARM",
+                "Each Arm",
+                "An arm's pose is one column, easy to retime. Some two thirds more keys",
+                0,
+            ),
+            (
+                "BONE",
+                "Each Bone",
+                "Each bone has keys where it needs them: the fewest. Arms stay channel groups",
+                1,
+            ),
+        ),
+        default="BONE",
+        override=OVERRIDE,
+    )
     result: PointerProperty(
         name="Result",
         description="The action that was generated last. It is made anew in place until you edit "

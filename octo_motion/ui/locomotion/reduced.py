@@ -11,18 +11,28 @@ import bpy
 import numpy as np
 
 from ...blender import actions
-from ...core.keys import LOCATION, Limb, Track, chain_to_tip, reducing
+from ...blender.stretching import hands_on
+from ...core.key_errors import Errors
+from ...core.keys import (
+    LOCATION,
+    SCALE,
+    BezierKeys,
+    Chain,
+    Limb,
+    Track,
+    chain_to_tip,
+    reduce_keys,
+    reducing,
+)
 from ...core.locomotion.generator import Arm
+from ...core.played import values_at
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
 
 MANTLE_GROUP: Final = "Mantle"
 
 _TRAVEL_SHARE: Final = 0.25
-"""Of the distance that a tip may be off, what travel may take; the rest is the arm's own."""
-
-_STRETCH_SHARE: Final = 0.25
-"""Of the same distance, what the length of stretching bones may take."""
+"""Of the distance that a tip may be off, what travel may take at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +43,8 @@ class Tolerances:
     """Radians, of each bone against its parent."""
     distance: float
     """Of each arm's tip, in the armature's units."""
+    by_bone: bool = True
+    """Whether each bone has key frames of its own, rather than each arm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +92,7 @@ def reduced(
     *,
     every: int = 1,
     dense: bool = False,
+    loops: bool = False,
 ) -> Generator[float, None, list[actions.Channel]]:
     """The channels with few keys, grouped by arm, in steps that yield the share that is done.
 
@@ -90,39 +103,44 @@ def reduced(
         tolerances: how far they may be off.
         every: at every how many of these moments there is a frame, from the first to the last.
         dense: whether there is a key on every frame all the same.
+        loops: whether the motion goes on from its last frame to its first.
 
     Raises:
         SettingsError: without tolerance, no key can be left out.
     """
     parts: list[Sequence[actions.Channel]] = []
     limbs: list[Limb] = []
+    found: list[list[BezierKeys]] = []
+    distance: float | Floats = tolerances.distance
     if motion.travel:
+        travel, unit = _travel(body, motion, tolerances)
+        found += reduce_keys(frames, [travel], every=every, all_of_them=dense, loops=loops)
         parts.append(motion.travel)
-        limbs.append(_travel(body, motion, tolerances))
+        # What it does not take is left to the arms, frame by frame.
+        played = [values_at(keys, frames)[None] for keys in found[0]]
+        distance = distance - Errors([travel]).measure(played)[1][0] * travel.distance / unit
     rest = iter(motion.arms)
     for arm in body.arms:
-        part = [replace(next(rest), group=arm.name) for _ in arm.bones]
-        parts.append(part)
+        turned = [next(rest) for _ in arm.bones]
+        stretched = [each for each in motion.stretch if each.group in arm.bones]
+        tracks = _tracks(turned, body.modes(arm.bones))
+        tracks += [Track(each.values, SCALE) for each in stretched]
+        parts.append([replace(each, group=arm.name) for each in (*turned, *stretched)])
         limbs.append(
             Limb(
-                tracks=_tracks(part, body.modes(arm.bones)),
+                tracks=tracks,
                 angle=tolerances.angle,
-                distance=(1.0 - _TRAVEL_SHARE - _STRETCH_SHARE * bool(motion.stretch))
-                * tolerances.distance,
-                chain=chain_to_tip(body.skeleton, arm.bones),
+                distance=distance,
+                chain=_chain(body, arm, [each.group for each in stretched]),
+                columns=range(len(tracks)) if tolerances.by_bone else None,
             )
         )
     if body.mantle:
-        part = [replace(each, group=MANTLE_GROUP) for each in motion.mantle]
-        parts.append(part)
-        tracks = _tracks(part, body.modes(body.mantle))
-        limbs.append(Limb(tracks, tolerances.angle, tolerances.distance))
-    for arm, part in _by_arm(body.arms, motion.stretch):
-        # A share of a bone's length: of all of them together, that share of the arm's.
-        bound = _STRETCH_SHARE * tolerances.distance / _length(body.skeleton, arm)
-        parts.append([replace(each, group=arm.name) for each in part])
-        limbs.append(Limb([Track(each.values, LOCATION) for each in part], np.pi, bound))
-    found = yield from reducing(frames, limbs, every=every, all_of_them=dense)
+        parts.append([replace(each, group=MANTLE_GROUP) for each in motion.mantle])
+        tracks = _tracks(motion.mantle, body.modes(body.mantle))
+        columns = range(len(tracks)) if tolerances.by_bone else None
+        limbs.append(Limb(tracks, tolerances.angle, tolerances.distance, columns=columns))
+    found += yield from reducing(frames, limbs, every=every, all_of_them=dense, loops=loops)
     return [
         replace(channel, values=channel.values[::every], keys=keys)
         for part, each in zip(parts, found, strict=True)
@@ -130,15 +148,17 @@ def reduced(
     ]
 
 
-def _by_arm(
-    arms: Sequence[Arm], channels: Sequence[actions.Channel]
-) -> list[tuple[Arm, list[actions.Channel]]]:
-    """Channels of bones, by the arm that the bones belong to."""
-    owners = {bone: arm.name for arm in arms for bone in arm.bones}
-    found: dict[str, list[actions.Channel]] = {arm.name: [] for arm in arms}
-    for channel in channels:
-        found[owners[channel.group]].append(channel)
-    return [(arm, found[arm.name]) for arm in arms if found[arm.name]]
+def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> Chain:
+    """An arm's chain, of which some bones stretch: their tracks come after those of all turns."""
+    chain = chain_to_tip(body.skeleton, arm.bones)
+    if not stretched:
+        return chain
+    tracks = {name: len(arm.bones) + place for place, name in enumerate(stretched)}
+    return replace(
+        chain,
+        scaled=tuple(tracks.get(name, -1) for name in arm.bones),
+        handed=tuple(hands_on(body.armature, arm.bones)),
+    )
 
 
 def _length(skeleton: Skeleton, arm: Arm) -> float:
@@ -149,8 +169,8 @@ def _tracks(channels: Sequence[actions.Channel], kinds: Sequence[str]) -> list[T
     return [Track(channel.values, kind) for channel, kind in zip(channels, kinds, strict=True)]
 
 
-def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> Limb:
-    """The body's travel, whose turns carry the tips of the arms."""
+def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> tuple[Limb, float]:
+    """The body's travel, whose turns carry the tips of the arms; the armature's unit in its own."""
     if body.travel_bone:
         (mode,) = body.modes([body.travel_bone])
         pivot = body.skeleton.heads[body.skeleton.index[body.travel_bone]]
@@ -160,12 +180,13 @@ def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> Limb:
         pivot = np.zeros(3)
         # The armature's unit, as the object's location has it.
         unit = body.scale / actions.channel_unit(body.armature)
-    return Limb(
+    limb = Limb(
         tracks=_tracks(motion.travel, [LOCATION, mode]),
         angle=tolerances.angle,
         distance=_TRAVEL_SHARE * tolerances.distance * unit,
         lever=max(_reach(body.skeleton, arm, pivot) for arm in body.arms) * unit,
     )
+    return limb, unit
 
 
 def _reach(skeleton: Skeleton, arm: Arm, pivot: Floats) -> float:

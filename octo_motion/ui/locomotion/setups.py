@@ -59,7 +59,7 @@ APART: Final = frozenset(
         ),
         *("ground.start_at_rest", "ground.come_to_rest", "ground.rest_within"),
         *("heading", "heading_angle", "gait", "timing", "speed", "frame_start", "frame_end"),
-        *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance"),
+        *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),
     }
 )
 """Settings of the rig, the shot and the keys: no set-up of a motion changes them. The table of the

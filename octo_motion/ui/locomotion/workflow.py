@@ -560,6 +560,7 @@ class Shot:
             self.tolerances or exact,
             every=self.every,
             dense=self.tolerances is None,
+            loops=self.in_place,
         )
         while True:
             try:
@@ -1264,7 +1265,9 @@ def _tolerances(settings: OCTO_MOTION_PG_locomotion, arm_length: float) -> Toler
     if settings.keys != "REDUCED":
         return None
     check_bounds(settings.key_angle, settings.key_distance)
-    return Tolerances(settings.key_angle, settings.key_distance * arm_length)
+    return Tolerances(
+        settings.key_angle, settings.key_distance * arm_length, settings.key_columns == "BONE"
+    )
 
 
 def _height(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, clearance: float) -> float:
