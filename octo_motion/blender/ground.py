@@ -15,7 +15,7 @@ from ..core.remembered import Remembered, key_of
 from ..core.rotations import Floats
 from ..core.skeleton import Skeleton
 
-_MOST_POINTS: Final = 1500
+_MOST_POINTS: Final = 6000
 """Points of a skin that are looked at; an arm's thickness needs no more."""
 _THICKEST: Final = 0.2
 """Arm lengths from an arm's middle line: what is further away is not its skin."""
@@ -23,8 +23,13 @@ _SLENDER: Final = (0.03, 0.008)
 """Radius of an arm without a skin at its root and at its tip, in arm lengths."""
 _ROUNDED: Final = 1e-5
 """Share of an armature's size, and of 1, to which it is known where its skin is."""
-_SHARE: Final = 0.7
-"""Of the points round a joint, the share that lies nearer to it than its radius."""
+_SHARE: Final = 0.9
+"""Of the points round a joint, the share that lies nearer to it than its radius: an arm lies on its
+suckers, and on what comes out at bends …"""
+_STANDS_OUT: Final = 1.25
+"""… unless they are so many times as far away as half of them: webs and fins are no thickness …"""
+_AT_LEAST: Final = 0.7
+"""… but then this share lies nearer."""
 
 
 _radii_known: Final[Remembered[list[Floats]]] = Remembered(4)
@@ -173,7 +178,8 @@ def _radii(distance: Floats, along: Floats, otherwise: Floats) -> Floats:
     for joint in places:
         near = distance[np.abs(along - joint) <= 0.5]
         if len(near):
-            radii[joint] = np.quantile(near, _SHARE)
+            half, many, most = np.quantile(near, [0.5, _AT_LEAST, _SHARE])
+            radii[joint] = max(many, min(most, _STANDS_OUT * half))
     known = np.isfinite(radii)
     if not np.any(known):
         return otherwise

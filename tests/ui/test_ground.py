@@ -13,6 +13,7 @@ from octo_motion.core.errors import GroundError
 from octo_motion.core.locomotion import quality
 from octo_motion.core.locomotion.ground import Plane
 from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.ui.locomotion.properties import locomotion_settings
 from octo_motion.ui.locomotion.wishes import Wanted, changed_by_hand, gathered, store
 from octo_motion.ui.locomotion.workflow import prepare
 from tests.blender.test_ground import make_mesh, make_square
@@ -330,3 +331,48 @@ def test_there_are_no_contacts_to_show_of_a_swim(octopus: Any) -> None:
     octopus.octo_motion.locomotion.gait = "swim"
     with pytest.raises(RuntimeError, match="has no contacts with the ground"):
         click("contacts_show")
+
+
+def test_the_skin_of_the_default_octopus_stays_out_of_bumpy_ground() -> None:
+    """Its bones do, and between two joints it bends: half a hundredth of an arm is left to it."""
+    bpy.ops.octo_motion.add_octopus()
+    armature = next(each for each in bpy.data.objects if each.type == "ARMATURE")
+    bpy.ops.octo_motion.add_route()
+    bpy.context.view_layer.objects.active = armature
+    settings = locomotion_settings(armature)
+    settings.tell_overlaps = False
+    shot = prepare(armature, bpy.context)
+    reach = shot.generator.arm_length * shot.scale
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=300, y_subdivisions=300, size=24.0 * reach)
+    ground: Any = bpy.context.object
+    points = np.empty((len(ground.data.vertices), 3), dtype=np.float32)
+    ground.data.vertices.foreach_get("co", points.ravel())
+    x, y = 2.0 * np.pi * points[:, 0] / 1.4 / reach, 2.0 * np.pi * points[:, 1] / 1.2 / reach
+    points[:, 2] = 0.15 * reach * np.sin(x) * np.cos(y)
+    ground.data.vertices.foreach_set("co", points.ravel())
+    ground.data.update()
+    settings.ground.object = ground
+    bpy.context.view_layer.objects.active = armature
+
+    shot = prepare(armature, bpy.context)
+    for _ in shot.compute():
+        pass
+    shot.write()
+
+    assert shot.standing is not None
+    skin = next(each for each in bpy.data.objects if each.find_armature() == armature)
+    deepest = []
+    for frame in range(160, 600, 12):
+        bpy.context.scene.frame_set(frame)
+        seen = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        mesh: Any = seen.to_mesh()
+        places = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+        mesh.vertices.foreach_get("co", places.ravel())
+        world = np.array(seen.matrix_world)
+        seen.to_mesh_clear()
+        placed = places.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+        below = (shot.standing.ground.height(placed) - placed[:, 2]) / reach
+        deepest.append(float(below.max()))
+    assert max(deepest) < 0.005
+    # Arms that lie touch it.
+    assert min(deepest) > -0.001

@@ -236,7 +236,8 @@ def laid(
     radii, lengths = limbs.radii[joint:], limbs.lengths[joint:]
     span = np.maximum(lengths.sum(axis=0), 1e-12)
     place = spot.copy()
-    place[..., 2] = _resting(ground, spot, radii[0][:, None])
+    first = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    place[..., 2] = _resting(ground, spot, radii[0][:, None], lengths[0][:, None], first)
     joints, passed = [place], np.zeros(heading.shape[:1])
     for number, length in enumerate(lengths):
         middle = (passed + 0.5 * length) / span
@@ -247,7 +248,9 @@ def laid(
         rise = np.zeros(heading.shape)
         for _ in range(4):
             level = place[..., :2] + step[..., None] * onward
-            rise = _resting(ground, level, radii[number + 1][:, None]) - place[..., 2]
+            bones = lengths[number : number + 2].max(axis=0)[:, None]
+            rise = _resting(ground, level, radii[number + 1][:, None], bones, onward)
+            rise -= place[..., 2]
             step = step * length[:, None] / np.sqrt(step * step + rise * rise)
         ahead = np.concatenate([step[..., None] * onward, rise[..., None]], axis=-1)
         ahead *= (length[:, None] / np.sqrt(step * step + rise * rise))[..., None]
@@ -257,7 +260,27 @@ def laid(
     return np.stack(joints, axis=2)
 
 
-def _resting(ground: Ground, points: Floats, radius: Floats) -> Floats:
-    """Height (…,) of a joint whose skin lies on the ground."""
+def _resting(
+    ground: Ground, points: Floats, radius: Floats, bones: Floats, ahead: Floats
+) -> Floats:
+    """Height (…,) of a joint such that the skin of the bones at it lies on the ground.
+
+    Between its ends a bone is straight. Over a crest both are higher, by what it would cut off.
+
+    Args:
+        ground: what it lies on.
+        points: (…, 2 or 3) where the joint is.
+        radius: (…,) metres from it to the skin below.
+        bones: (…,) metres that these bones are long.
+        ahead: (…, 2) unit: which way they lie.
+    """
+    points = points[..., :2]
     slope = ground.slope(points)
-    return ground.height(points) + radius * np.sqrt(1.0 + np.sum(slope * slope, axis=-1))
+    height = ground.height(points)
+    half = 0.5 * bones[..., None] * ahead
+    chord = 0.5 * (ground.height(points + half) + ground.height(points - half))
+    return (
+        height
+        + np.maximum(height - chord, 0.0)
+        + radius * np.sqrt(1.0 + np.sum(slope * slope, axis=-1))
+    )
