@@ -22,7 +22,7 @@ from ..skeleton import Skeleton
 from .arm import GROUPS, group_lengths, split_groups
 from .ccd import Chain, asked_shape, overreach, raised, solve
 from .chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
-from .columns import turned
+from .columns import running, turned
 from .gait import GaitCurve, GaitTable, evaluate, variation
 from .poses import ArmRest, arm_rest, bone_rotations
 from .targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
@@ -244,7 +244,7 @@ class Generator:
             # Not from what is kept: that does not know the floor.
             directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
             # Up is the same for the arm's frame and the body's.
-            climbs = np.cumsum(build.chain.lengths[:, None, None] * directions[:, 2], axis=0)
+            climbs = running(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)
             for place, arms in enumerate(alike.values()):
                 low = lowest[:_CYCLE_SAMPLES, place, None]
@@ -431,7 +431,7 @@ class Generator:
             give=self._settings.give,
             floor=floor,
         )
-        joints = np.cumsum(build.chain.lengths[:, None, None] * directions, axis=0)
+        joints = running(build.chain.lengths[:, None, None] * directions)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
         missed = np.linalg.norm(ends - targets[1:], axis=1)
         if self._settings.give > 0.0:
