@@ -39,16 +39,19 @@ _RAISES_BETWEEN: Final = 2
 """How often the lowest joints of an arm are raised, in the air and before it is drawn down."""
 _FALLING: Final = 0.2
 """Share of downward in the way that a slack arm comes to the ground."""
-_KNEE: Final = 2
-"""Free segments that have one joint between them: it must point up, or it is in the way."""
-_KNEE_UP: Final = np.radians(50.0)
-_KNEE_DOWN: Final = 0.8
-"""How much more such an arm rises, and the tangent of how steeply it comes down."""
+_KNEE: Final = 2.8
+"""Fewer segments than as many of equal length are as good as two with one joint between them: it
+must point up, or it is in the way, and would snap from one side to the other."""
+_STRAIGHT: Final = 0.999
+"""Cosine of what is left of the knee's bend where the foothold is as far as it reaches."""
 _ARCHED: Final = np.radians(15.0)
 _ARCHING: Final = 0.5
 """How much more where it is slack, and over what share of its length that comes."""
 _CURLED: Final = np.radians(85.0)
 """How far the tip stands up before it is unrolled."""
+_FOLDED: Final = np.radians(110.0)
+"""How far the first bone of it is bent back at most from the one before: further on, which way it
+has turned on itself is not definite."""
 _BORDER: Final = 1.6
 """Segments before the ground over which an arm is less and less free to turn."""
 _EASY: Final = 0.88
@@ -327,7 +330,7 @@ def _held(
     short = (over - _REST * np.tanh(over / _REST)) / np.maximum(ratio, _TINY)
     goal = held.carried + np.where(held.by_tip, held.joints[-1], held.joints[0]) - short * chord
     # Some of the gait stays, but for what lies or unrolls.
-    kept = _KEPT if held.touching > _KNEE else 0.0
+    kept = np.where(_kneed(batch, held), 0.0, _KEPT)
     own = unit(guess + (kept * free)[:, None] * (shapes - guess))
     before = np.arange(len(lengths))[:, None] < held.touching
     to_goal = (before | held.by_tip).astype(np.float64)
@@ -372,6 +375,42 @@ def _held(
     )
     strains[:, chosen], directions[..., chosen] = strain * held.weight, own
     return strains, directions
+
+
+def _kneed(batch: Batch, held: Hold) -> np.ndarray:
+    """Which arms (batch,) have one joint that counts before they touch."""
+    free = batch.limbs.lengths[: held.touching]
+    alone = np.sum(free, axis=0) ** 2 < _KNEE * np.sum(free * free, axis=0)
+    return alone[batch.arms] & (held.touching > 1)
+
+
+def _knee(batch: Batch, held: Hold, chord: Floats, longer: Floats) -> Floats:
+    """Directions (segments, 3, batch) of arms with a single knee, as two sides of a triangle.
+
+    It stands over the way to the ground, up and out: whichever way the body goes, its plane turns
+    no faster than that way does.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        chord: (3, batch) from each one's root to where it meets the ground.
+        longer: (batch,) factor by which it is stretched.
+    """
+    reach = batch.reach
+    inner = reach[1 : held.touching]
+    knee = 1 + np.argmin(np.abs(inner - 0.5 * reach[held.touching]), axis=0)
+    upper = longer * np.take_along_axis(reach, knee[None], axis=0)[0]
+    lower = longer * held.lies_from - upper
+    away = np.maximum(np.sqrt(dot(chord, chord)), _TINY)
+    along = chord / away
+    side = batch.outward + batch.upward
+    side = unit(side - dot(side, along) * along)
+    cosine = (upper * upper + away * away - lower * lower) / (2.0 * upper * away)
+    cosine = np.clip(cosine, -_STRAIGHT, _STRAIGHT)
+    thigh = cosine * along + np.sqrt(1.0 - cosine * cosine) * side
+    shin = unit(chord - upper * thigh)
+    before = np.arange(len(batch.lengths))[:, None, None] < knee
+    return np.where(before, thigh, shin)
 
 
 def _freedom(batch: Batch, held: Hold) -> Floats:
@@ -431,9 +470,6 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
     # Slack, it comes down rather than back from under the body.
     falling = _FALLING * smooth((_EASY - ratio) / _ARCHING)
     arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
-    if held.touching <= _KNEE:
-        rising = rising + _KNEE_UP
-        arriving = unit(arriving - _KNEE_DOWN * batch.upward)
     leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
     size = held.lies_from * (1.0 + strain[0])
     middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
@@ -446,12 +482,18 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
         middles=middles,
         parts=parts,
     )
+    if np.any(kneed := _kneed(batch, held)):
+        directions = np.where(kneed, _knee(batch, held, chord, 1.0 + strain[0]), directions)
     through = np.clip((held.lies_from - reach[first:-1]) / lengths[first:], 0.0, 1.0)[:, None]
     directions[first:] = through * directions[first:] + (1.0 - through) * lying
     # Not unrolled yet: the part beyond stands up, the more, the further out.
     span = reach[-1] - reach[first]
     beyond = np.maximum(reach[first + 1 :] - held.lies_to, 0.0) / span
-    angle = (_CURLED * beyond * np.sqrt(beyond))[:, None]
+    angle = _CURLED * beyond * np.sqrt(beyond)
+    # It folds back no further than what comes before it leaves room for.
+    bend = np.arccos(np.clip(dot(directions[first - 1], lying[0]), -1.0, 1.0))
+    room = np.maximum(_FOLDED - bend, _TINY) / np.maximum(angle[0], _TINY)
+    angle = (angle * room * np.tanh(1.0 / room))[:, None]
     up = np.zeros_like(lying)
     up[:, 2] = 1.0
     up = unit(up - dot(up, lying)[:, None] * lying)
