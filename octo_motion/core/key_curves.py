@@ -28,7 +28,7 @@ _Array = TypeVar("_Array", Floats, Singles)
 
 _CEILING: Final = 30.0
 """Squared share above which it weighs no more."""
-_RIDGE: Final = 0.2
+_RIDGE: Final = 0.07
 """Weight, against what is seen of them, of changes that are not seen: of a quaternion's length."""
 _PULL: Final = 0.01
 """Weight, against that of a frame, of the wish that handles follow the motion's slope."""

@@ -19,7 +19,7 @@ import numpy as np
 from .key_limbs import LOCATION, Booleans, Integers, Limb
 from .rotations import Floats, from_axis_angle, from_euler, normalized
 
-_STRETCH: Final = 256
+_STRETCH: Final = 1024
 """Frames that are worked on at once; stretches meet where a key is needed anyway."""
 _ROWS: Final = 8192
 """Frames times rows measured at a time: what stays within a processor's cache."""

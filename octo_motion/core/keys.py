@@ -39,7 +39,7 @@ __all__ = [
     "reducing",
 ]
 
-_SLACK: Final = 1.2
+_SLACK: Final = 1.15
 """Bounds within which key frames are chosen: what fitting makes up for afterwards."""
 _LEVERAGE: Final = 2.5
 """Distances of the tip, as shares of the chain's length, that a bone may be turned away when key
