@@ -41,6 +41,13 @@ def steps(rotations: np.ndarray) -> np.ndarray:
     return np.degrees(2.0 * np.arccos(cosine))
 
 
+def test_route_that_never_rises_is_walked_all_the_way(settings: Any) -> None:
+    bpy.ops.octo_motion.add_route()
+    settings.change.by = "HEIGHT"
+    shot = computed(settings)
+    assert not shot.swimming.any()
+
+
 def test_route_that_rises_is_walked_and_then_swum_mantle_first(settings: Any) -> None:
     bpy.ops.octo_motion.add_route(**RISING)
     settings.change.by = "HEIGHT"

@@ -94,6 +94,8 @@ RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
 _WEIGHT_SAMPLES: Final = 33
 _ROUTE_SAMPLES: Final = 257
 _UNEQUAL: Final = 1e-3
+_HEADING_STEP: Final = 0.2
+"""Radians: no arm that stands half way between two others is a matter of rounding."""
 _MOVING: Final = 0.4
 """Share of the work that is over when the motion is there, but not yet its few keys."""
 _QUICKLY: Final = 12_000
@@ -418,7 +420,8 @@ class Shot:
 
         course = Course(_arm_frames(self.skeleton, self.arms, self.body), ground, self.scale)
         radii = next(each.walk.radii for each in self._stands())
-        loose = changing.afloat(travel.distance)
+        # On a journey on which the gait never changes, one number stands for all.
+        loose = np.broadcast_to(changing.afloat(travel.distance), posed.late.shape)
         whole = kept_off(Poses(posed.rotations, posed.strains, *going), loose)
         raised = raised_between(course, whole, course.joints(whole), again)
         posed.rotations, posed.strains = raised.rotations, raised.strains
@@ -1236,8 +1239,16 @@ def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> Gait
         seed=settings.seed,
         period=settings.cycles if settings.travel_on == "NONE" else 0,
         turning=settings.turning,
+        heading=_heading(settings),
         stand=settings.stand,
     )
+
+
+def _heading(settings: OCTO_MOTION_PG_locomotion) -> float:
+    """Radians from the way that the body goes to its front, in steps in which arms change roles."""
+    if settings.heading != "ALONG":
+        return 0.0
+    return _HEADING_STEP * round(settings.heading_angle / _HEADING_STEP)
 
 
 def _travel_settings(
