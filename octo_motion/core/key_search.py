@@ -18,7 +18,7 @@ from .key_errors import Errors
 from .key_limbs import BezierKeys, Booleans, Integers, Limb
 from .rotations import Floats
 
-_POWERS: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+_POWERS: Final = (0.0, 0.5, 1.0, 1.5, 2.0, 2.0, 2.0)
 """Of the weights in rounds of fitting: towards an even spread of the errors."""
 _STEPS: Final = 4
 """Of conjugate gradients in a round."""
