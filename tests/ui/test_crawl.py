@@ -88,3 +88,16 @@ def test_arms_hold_on_long_enough_to_be_seen_to_hold(octopus: Any) -> None:
         lasts = np.diff(changes)[0 if held[changes[0] + 1] else 1 :: 2]
         assert lasts.min() >= 11
         assert np.median(lasts) >= 17
+
+
+@pytest.mark.parametrize("heading", np.radians([90.0, -90.0, 180.0]))
+def test_a_walk_sideways_or_backwards_does_not_step_on_its_own_arms(
+    octopus: Any, heading: float
+) -> None:
+    settings = octopus.octo_motion.locomotion
+    settings.gait = "walk"
+    figures = worst(crawled(octopus, 0, heading))
+    # Arms in front of the way were those of the sides, and passed through each other.
+    assert figures["OVERLAP"] < 0.13
+    assert figures["TURN"] < np.radians(26.0)
+    assert figures["SLIP"] < 0.004

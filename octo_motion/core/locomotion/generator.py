@@ -92,6 +92,9 @@ class GaitSettings:
     steady: float = 0.0
     """Cycles before and after each moment over which movement is evened out in time; 0 leaves the
     table's corners, as the source does."""
+    heading: float = 0.0
+    """WALK: radians anticlockwise from the way that the body goes to its front: arms take their
+    phases from the gait by where they are seen from that way."""
     stand: bool = False
     """WALK: whether targets that lie deeper than most are raised to a floor where most are, so
     that many arms stand on the ground together, and not the tip of one. The source's walk, whose
@@ -99,7 +102,14 @@ class GaitSettings:
 
     def __post_init__(self) -> None:
         numbers = (
-            *(self.contraction, self.softness, self.give, self.sway, self.phase_spread),
+            *(
+                self.heading,
+                self.contraction,
+                self.softness,
+                self.give,
+                self.sway,
+                self.phase_spread,
+            ),
             *(self.turning, self.steady, *self.weights, *self.variation),
         )
         if not np.all(np.isfinite(numbers)):
@@ -183,6 +193,8 @@ class Generator:
         self._pairs = tuple(arm.pair for arm in self._arms)
         gait = settings.gait
         spread = [gait.offset(arm.side, arm.pair, max(self._pairs)) for arm in self._arms]
+        if gait.on_ground and settings.heading != 0.0:
+            spread = [spread[other] for other in _instead(azimuths, settings.heading)]
         self._offsets = settings.phase_spread * np.array(spread) + [arm.phase for arm in arms]
         sway = np.array([_across(gait.curve(pair)) for pair in self._pairs])
         sway[:, PITCH] *= self._hands
@@ -492,6 +504,22 @@ def _check_disjoint(arms: Sequence[Arm]) -> None:
                     "Remove one of the two from the list.",
                 )
             owner[bone] = arm.name
+
+
+def _instead(azimuths: Floats, heading: float) -> list[int]:
+    """For each arm the one that stands where it does, seen from the way that the body goes.
+
+    Of a body that goes sideways other arms are in front. In their own order neighbours that go
+    across the way would step on each other.
+
+    Args:
+        azimuths: (arms,) radians from the front, anticlockwise.
+        heading: radians from the way to the front, anticlockwise.
+    """
+    apart = azimuths + heading - azimuths[:, None]
+    nearest = np.abs(np.angle(np.exp(1j * apart)))
+    # Of two that are as near always the same one, whatever the rounding.
+    return np.argmin(np.round(nearest, 3), axis=0).tolist()
 
 
 def _across(curve: GaitCurve) -> Floats:
