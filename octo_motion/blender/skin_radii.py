@@ -18,6 +18,10 @@ _FEW: Final = 4
 """Vertices of a bone that do not yet tell its thickness."""
 _MOST: Final = 0.75
 """Share of a bone's vertices that lie within its radius: suckers stand out a little."""
+_REACHED: Final = 0.02
+"""Share of a part's vertices at either end that stand out of it."""
+_MUCH: Final = 1.5
+"""How much larger a part about its bone may be than one about its own longest way."""
 _ROUNDED: Final = 1e-6
 """To which a skin's place on its armature is known."""
 _BONE_ROOT, _BONE_TIP = 0.06, 0.012
@@ -49,6 +53,60 @@ def skin_radii(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> l
         distances.setdefault(name, []).append(np.linalg.norm(off, axis=1))
     measured = {name: np.concatenate(each) for name, each in distances.items()}
     return [_of_chain(bones, chain, measured) for chain in chains]
+
+
+def skin_parts(
+    armature: bpy.types.Object, names: Sequence[str]
+) -> list[tuple[str, Floats, Floats]]:
+    """Parts of a body as thick and as long as the skin that follows single bones.
+
+    A bone's own ends tell little of that: a head is round about a bone of any length, and files
+    of other programs know no tails. So a part reaches as far as its skin does along its bone, or
+    along the skin's own longest way if that makes it much smaller. Bones that no skin follows are
+    none.
+
+    Args:
+        armature: the armature object.
+        names: of the bones.
+
+    Returns:
+        Name, ends (2, 3) and radii (2,) of each part, armature space.
+    """
+    assert isinstance(armature.data, bpy.types.Armature)
+    bones = armature.data.bones
+    found: dict[str, list[Floats]] = {name: [] for name in names}
+    for name, points in _followers(armature):
+        if name in found:
+            found[name].append(points)
+    parts: list[tuple[str, Floats, Floats]] = []
+    for name, each in found.items():
+        points = np.concatenate([np.zeros((0, 3)), *each])
+        if len(points) < _FEW:
+            continue
+        head, tail = (np.array(end) for end in (bones[name].head_local, bones[name].tail_local))
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        own = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
+        along = (tail - head) / max(float(np.linalg.norm(tail - head)), 1e-12)
+        part, other = _part(points, head, along), _part(points, middle, own)
+        ends, radius = part if _volume(*part) <= _MUCH * _volume(*other) else other
+        parts.append((name, ends, np.full(2, radius)))
+    return parts
+
+
+def _part(points: Floats, start: Floats, along: Floats) -> tuple[Floats, float]:
+    """Ends (2, 3) and radius of the capsule about a line that points (n, 3) lie round."""
+    seen = points - start
+    height = seen @ along
+    radius = float(np.quantile(np.linalg.norm(seen - height[:, None] * along, axis=1), _MOST))
+    low, high = np.quantile(height, [_REACHED, 1.0 - _REACHED])
+    middle = 0.5 * (low + high)
+    reached = np.array([min(low + radius, middle), max(high - radius, middle)])
+    return start + reached[:, None] * along, radius
+
+
+def _volume(ends: Floats, radius: float) -> float:
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    return radius * radius * (length + 4.0 / 3.0 * radius)
 
 
 def skin_key(armature: bpy.types.Object) -> bytes:

@@ -105,3 +105,20 @@ def test_coarse_bounds_miss_nothing() -> None:
     arms = posed_arms("walk_literal", 8)
     shifted = [Capsules(each.name, each.joints + 1000.0, each.radii, each.at_rest) for each in arms]
     np.testing.assert_allclose(measure(shifted).depths, measure(arms).depths, atol=1e-6)
+
+
+def test_next_to_what_is_built_together_there_is_no_room_to_keep() -> None:
+    # Two arms of two bones that spring from one place, side by side: their second bones are apart
+    # at rest, by less than they are thick.
+    ends = np.array([[0.0, 0.0, 0.0], [1.0, 0.25, 0.0], [2.0, 0.25, 0.0]])
+    mirrored = ends * (1.0, -1.0, 1.0)
+    joints = np.stack([ends, ends])
+    joints[1, 1:, 1] = -0.1
+    one = Capsules("one", joints, np.full(3, 0.2), ends)
+    two = Capsules("two", np.stack([mirrored, mirrored]), np.full(3, 0.2), mirrored)
+
+    assert measure([one, two]).worst is None
+    # The same bones that spring from nowhere near do count.
+    apart = [Capsules(each.name, each.joints, each.radii, each.at_rest) for each in (one, two)]
+    apart[1] = Capsules("two", two.joints, two.radii, mirrored - 3.0 * np.eye(3)[1])
+    assert measure(apart).depths[1] > 1.0

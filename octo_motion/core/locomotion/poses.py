@@ -8,7 +8,9 @@ source's first open problem was arms that wring themselves, and suckers that fac
 The smallest rotation is indefinite, and jumps, where a bone points opposite to its rest. Arms of
 many rigs hang straight down at rest, and rear up straight when they move. So what the body carries
 is turned to where its arm points out of the body first, and from there to its segment: an arm that
-points straight into its own body is nowhere to be seen.
+points straight into its own body is nowhere to be seen. Likewise its further bones go by way of
+where they would go straight on from the one before: the last bone of imported rigs, whose files
+know no tails, may stand across its arm.
 """
 
 from __future__ import annotations
@@ -46,6 +48,16 @@ class ArmRest:
     bone that does not inherit rotation nothing at all."""
     outward: Floats | None = None
     """(3,) unit: straight out of the body, armature space; none for bones that are no arm."""
+
+    def straight_on(self, bone: int) -> Floats:
+        """(3,) unit, in its rest frame: where a bone points by way of which it is turned.
+
+        It goes on from the bone before, or out of the body: at rest it may be bent far from that.
+        """
+        if self.outward is None:
+            return self.segments[bone]
+        back = conjugate(self.carried[bone])
+        return rotate(back, self.segments[bone - 1] if self.follows[bone] else self.outward)
 
 
 _rests: Final[Remembered[ArmRest]] = Remembered(_MOST_KNOWN)
@@ -179,15 +191,9 @@ def _swing(rests: Sequence[ArmRest], bone: int, carried: Floats, wanted: Floats)
     frames = wanted.shape[-1] // len(rests)
     segment = _tiled([rest.segments[bone] for rest in rests], frames)
     goal = turned(_inverse(carried), wanted)
-    if all(rest.follows[bone] or rest.outward is None for rest in rests):
+    if all(rest.outward is None for rest in rests):
         return smallest_arc(segment, goal)
-    # Of bones that follow the one before it is the segment itself: there is nothing in between.
-    between = [
-        rest.segments[bone]
-        if rest.follows[bone] or rest.outward is None
-        else rotate(conjugate(rest.carried[bone]), rest.outward)
-        for rest in rests
-    ]
+    between = [rest.straight_on(bone) for rest in rests]
     first = smallest_arc(_tiled([rest.segments[bone] for rest in rests], 1), _tiled(between, 1))
     return product(smallest_arc(_tiled(between, frames), goal), np.tile(first, (1, frames)))
 

@@ -4,7 +4,9 @@
 Arms are chains of capsules: a bone's length, with the skin's radius at its two ends. First spheres
 round the capsules tell which can touch at all; only these are measured, by the nearest points of
 two line segments (Ericson, Real-Time Collision Detection, 2005, 5.1.9). Capsules that overlap at
-rest are built so: at the crown, where arms stand side by side, there is nothing to report.
+rest are built so: at the crown, where arms stand side by side, there is nothing to report. Nor is
+there of those next to them that have less than their own thickness between them: where arms spring
+from one place, no pose can keep these apart.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ _ROUNDED: Final = 1e-4
 """Share of a distance in single precision by which it may be wrong."""
 _BUILT_SO: Final = 0.02
 """Share of the smaller radius by which capsules may overlap at rest and still count."""
+_CROWDED: Final = 1.0
+"""The same by which capsules are apart at rest that are still crowded, next to such as overlap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +133,8 @@ def parts_of(chains: Sequence[Capsules]) -> Parts:
 def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (pairs,) and (pairs,) of the capsules that must not overlap.
 
-    They are of two chains, of which one at least moves, and are apart at rest.
+    They are of two chains, of which one at least moves, and are apart at rest, and no longer
+    crowded there.
 
     Args:
         chains: those that move first.
@@ -140,7 +145,16 @@ def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.nd
     one, other = np.triu_indices(len(parts.owner), 1)
     asked = (parts.owner[one] != parts.owner[other]) & (parts.owner[one] < moving)
     one, other = one[asked], other[asked]
-    apart = _depths(parts, (np.zeros_like(one), one, other)) <= _BUILT_SO
+    depths = _depths(parts, (np.zeros_like(one), one, other))
+    built = np.zeros((len(parts.owner), len(parts.owner)), dtype=bool)
+    built[one, other] = depths > _BUILT_SO
+    built |= built.T
+    # The capsule before each in its chain; of a chain's first that is itself.
+    before = np.maximum(np.arange(len(parts.owner)) - 1, 0)
+    before = np.where(parts.owner[before] == parts.owner, before, np.arange(len(before)))
+    joined = built[before[one], other] | built[one, before[other]]
+    joined |= built[before[one], before[other]]
+    apart = ~built[one, other] & ~(joined & (depths > -_CROWDED))
     return one[apart], other[apart]
 
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty
 
-from ...blender.skin_radii import skin_key, skin_radii
+from ...blender.skin_radii import skin_key, skin_parts, skin_radii
 from ...core.locomotion.arm_frames import ArmFrames, arm_frames
 from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.generator import Arm
@@ -163,16 +163,14 @@ def _read_apart(
         and skeleton.weighted[number]
         and not _hangs(skeleton, name, limbs)
     ]
-    radii = skin_radii(armature, [*(arm.bones for arm in arms), *((name,) for name in parts)])
-    still: list[Capsules] = []
-    for name, own in zip(parts, radii[len(arms) :], strict=True):
-        number = skeleton.index[name]
-        ends = np.stack([skeleton.heads[number], skeleton.tails[number]])
-        still.append(Capsules(name, ends[None], own, ends))
+    radii = skin_radii(armature, [arm.bones for arm in arms])
+    still = [
+        Capsules(name, ends[None], thick, ends) for name, ends, thick in skin_parts(armature, parts)
+    ]
     return Apart(
         arms=tuple(arm_frames(skeleton, arm.bones, body) for arm in arms),
         names=tuple(arm.name for arm in arms),
-        radii=tuple(radii[: len(arms)]),
+        radii=tuple(radii),
         still=tuple(still),
         upward=body.rotation[:, 2],
     )
