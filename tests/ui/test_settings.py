@@ -128,13 +128,14 @@ def test_the_weight_curve_is_made_when_it_is_switched_on_and_kept_when_off() -> 
 
 
 def test_the_weight_curve_moves_the_arms_as_weights_do() -> None:
-    from octo_motion.ui.locomotion.workflow import _gait_settings, read_gait
+    from octo_motion.ui.locomotion.gait_reading import gait_settings
+    from octo_motion.ui.locomotion.properties import read_gait
 
     settings = locomotion_settings(make_octopus())
     settings.weight_root, settings.weight_tip = 0.9, 0.3
-    straight = _gait_settings(settings, read_gait(settings)).weights
+    straight = gait_settings(settings, read_gait(settings)).weights
     settings.use_weight_curve = True
-    drawn = _gait_settings(settings, read_gait(settings)).weights
+    drawn = gait_settings(settings, read_gait(settings)).weights
     assert straight == pytest.approx((0.9, 0.3))
     assert len(drawn) == 33
     assert (drawn[0], drawn[16], drawn[-1]) == pytest.approx((0.9, 0.6, 0.3), abs=1e-4)

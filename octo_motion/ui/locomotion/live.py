@@ -25,9 +25,10 @@ from ...core import remembered
 from ...core.errors import OctoMotionError, RigError
 from ...core.remembered import key_of
 from ..plain import plain
+from .previous import playing_action, previous_action
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from .wishes import gathered
-from .workflow import RESULTS, playing_action, prepare, previous_action
+from .workflow import RESULTS, prepare
 
 _SOON: Final = 0.01
 """Seconds from a change to the new motion at least: what changes together is made together."""

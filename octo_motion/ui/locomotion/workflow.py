@@ -10,45 +10,39 @@ before anything has changed.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final, cast
+from typing import Final
 
 import bpy
 import numpy as np
 
 from ...blender import actions, presets
-from ...blender.armature import armature_data, read_skeleton, world_matrix
-from ...blender.arms import world_directions
+from ...blender.armature import read_skeleton, world_matrix
 from ...blender.contacts import Contact, write_markers
 from ...blender.curves import read_route
 from ...blender.poses import (
     SCALE,
     animated_bones,
     as_posed,
-    displaced_bones,
     rest_bones,
     unscale_bones,
 )
 from ...blender.stretching import stretch_channels
-from ...blender.weight_curve import sample_weight_curve
-from ...core.errors import RigError, RouteError, SettingsError, WriteError
-from ...core.keys import check_bounds
-from ...core.locomotion.arm_frames import ArmFrames, arm_frames
+from ...core.errors import RouteError, WriteError
 from ...core.locomotion.between_frames import Course, raised_between
-from ...core.locomotion.chains import BodyFrame, Side, body_frame, chain_of, is_driven
+from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.changes import between
-from ...core.locomotion.detection import Detection, detect_arms
+from ...core.locomotion.detection import Detection
 from ...core.locomotion.figures import Figure, Measured, Poses, automatic, figures
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
-from ...core.locomotion.generator import Arm, GaitSettings, Generator
+from ...core.locomotion.generator import Arm, Generator
 from ...core.locomotion.ground import Ground
 from ...core.locomotion.grounded import Raise
 from ...core.locomotion.keeping_apart import kept_apart
-from ...core.locomotion.loops import route_in_place, travel_in_place, whole_frames
+from ...core.locomotion.loops import route_in_place
 from ...core.locomotion.mantle import find_mantle, stretched
 from ...core.locomotion.off_ground import off_ground
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
@@ -57,12 +51,9 @@ from ...core.locomotion.steady import Steady
 from ...core.locomotion.travel import (
     Travel,
     TravelSettings,
-    duration,
     plan_travel,
-    strides,
     unhurried,
 )
-from ...core.remembered import Remembered, key_of
 from ...core.rotations import IDENTITY, Floats, from_matrix, rotate
 from ...core.skeleton import Skeleton
 from ..plain import plain
@@ -70,32 +61,42 @@ from .apart import Apart, read_apart
 from .arm_items import bones_of, write_arms, write_body
 from .changing import Changing, Journey, Way, gaits_of, read_changes
 from .changing import plan as plan_changes
+from .gait_reading import (
+    frames_of_arms,
+    gait_settings,
+    generator_of,
+    height_of,
+    timing,
+    tolerances_of,
+    travel_settings,
+)
 from .in_place import breathing_channels
 from .keyed import Rig, as_keyed
 from .pace import pace_of, too_few_frames
+from .previous import previous_action
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
 from .quality_report import write_figures
 from .reach_motion import Carried, Reaching, Travelling, read_reaches, write_carried
 from .reduced import Body, Motion, Tolerances, reduced
+from .rig_reading import (
+    chosen_root_bone,
+    listed_arms,
+    listed_body,
+    posed_carriers,
+    told_of_constraints,
+    told_of_driven,
+    told_of_poses,
+    uniform_scale,
+)
 from .standing import Standing, read_standing, resting
 from .wishes import Place, Wanted, as_wishes, gathered, note_shown, store
-
-MOST_FRAMES: Final = 100_000
-"""A journey of more is a slip of the hand: over an hour at 24 frames a second."""
-
-LAST_FRAME: Final = 1_048_574
-"""The last frame that Blender knows."""
 
 MISS: Final = 1e-3
 """Arm lengths by which a target may be missed without a word."""
 
 RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
 """What is no setting, though it is kept with them."""
-_WEIGHT_SAMPLES: Final = 33
 _ROUTE_SAMPLES: Final = 257
-_UNEQUAL: Final = 1e-3
-_HEADING_STEP: Final = 0.2
-"""Radians: no arm that stands half way between two others is a matter of rounding."""
 _MOVING: Final = 0.4
 """Share of the work that is over when the motion is there, but not yet its few keys."""
 _QUICKLY: Final = 12_000
@@ -418,7 +419,7 @@ class Shot:
             poses = kept_off(poses, loose[chosen])
             return poses, course.joints(poses)
 
-        course = Course(_arm_frames(self.skeleton, self.arms, self.body), ground, self.scale)
+        course = Course(frames_of_arms(self.skeleton, self.arms, self.body), ground, self.scale)
         radii = next(each.walk.radii for each in self._stands())
         # On a journey on which the gait never changes, one number stands for all.
         loose = np.broadcast_to(changing.afloat(travel.distance), posed.late.shape)
@@ -465,7 +466,7 @@ class Shot:
             [np.concatenate(each, axis=2) for each in zip(*of, strict=True)]
             for of in (shapes, evened)
         )
-        frames = _arm_frames(self.skeleton, self.arms, self.body)
+        frames = frames_of_arms(self.skeleton, self.arms, self.body)
         course = Course(frames, standing.ground, self.scale, cyclic=self.in_place)
         together = [np.concatenate(each) for each in zip(*joints, strict=True)]
         whole = Poses(posed.rotations, posed.strains, *going)
@@ -522,7 +523,7 @@ class Shot:
         poses = Poses(posed.rotations, posed.strains, *going)
         self.measured = Measured(
             frames=self.frames,
-            arms=_arm_frames(self.skeleton, self.arms, self.body),
+            arms=frames_of_arms(self.skeleton, self.arms, self.body),
             names=[arm.name for arm in self.arms],
             poses=poses,
             misses=np.maximum(posed.late, posed.misses),
@@ -829,17 +830,17 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     depsgraph = context.evaluated_depsgraph_get()
     skeleton = read_skeleton(armature)
     world = world_matrix(armature)
-    scale = _uniform_scale(armature, world)
-    arms, body, detection = _arms(settings, armature, skeleton)
+    scale = uniform_scale(armature, world)
+    arms, body, detection = listed_arms(settings, armature, skeleton)
     at_rest, rest_body = skeleton, body
-    carriers = _carriers(settings, armature, skeleton, arms)
+    carriers = posed_carriers(settings, armature, skeleton, arms)
     turned = [bone for arm in arms for bone in arm.bones]
     if carriers and (posed := as_posed(armature, skeleton, carriers, turned)) is not None:
         # Arms hang where the bones that carry them are.
         skeleton, carriers = posed, []
-        body = _body(settings, posed, arms, detection)
+        body = listed_body(settings, posed, arms, detection)
     gait = read_gait(settings)
-    generator = _generator(skeleton, arms, body, _gait_settings(settings, gait))
+    generator = generator_of(skeleton, arms, body, gait_settings(settings, gait))
     stride = gait.stride * generator.arm_length * scale
     if settings.route is None or in_place:
         route = route_in_place(stride, settings.cycles)
@@ -851,12 +852,12 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     head = find_mantle(skeleton, listed or [arm.bones for arm in arms], body)
     if gait.manner == "SWIM" and settings.streamline > 0.0:
         mantle = head
-    travel = _travel_settings(settings, gait, stride)
+    travel = travel_settings(settings, gait, stride)
     rest = resting(settings)
     if gait.on_ground and any(rest):
         slow = settings.ground.rest_within * stride
         travel = unhurried(travel, route.length, start=slow * rest[0], end=slow * rest[1])
-    seconds, frames, times = _timing(settings, route, travel, scene.render)
+    seconds, frames, times = timing(settings, route, travel, scene.render)
     breath = breathing_channels(armature, settings, head[-1] if head else "", times * seconds)
     wanted = gathered(settings.ground, armature)
     wishes = as_wishes(wanted, arms)
@@ -867,7 +868,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
 
     def read_way(table: GaitTable, own: Generator, wished: Sequence[Wish]) -> Way:
         """One way of moving along this route."""
-        going = _travel_settings(settings, table, table.stride * own.arm_length * scale)
+        going = travel_settings(settings, table, table.stride * own.arm_length * scale)
         holding = None
         if table.on_ground and settings.ground.use:
             holding = read_standing(
@@ -889,12 +890,12 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
                 alike=in_place,
                 rest=rest,
             )
-        return Way(table, own, going, holding, _height(settings, table, own.clearance * scale))
+        return Way(table, own, going, holding, height_of(settings, table, own.clearance * scale))
 
     def read_gait_of(name: str) -> Way:
         """One of the ways that the gait changes to."""
         table = presets.load_gait(name)
-        own = _generator(skeleton, arms, body, _gait_settings(settings, table))
+        own = generator_of(skeleton, arms, body, gait_settings(settings, table))
         return read_way(table, own, ())
 
     first = read_way(gait, generator, wishes)
@@ -933,14 +934,14 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         scale=scale,
         height=standing.line.clearance
         if standing
-        else _height(settings, gait, generator.clearance * scale),
+        else height_of(settings, gait, generator.clearance * scale),
         frames=frames,
         times=times,
         seconds=seconds,
-        root_bone=_root_bone(settings, armature, detection),
+        root_bone=chosen_root_bone(settings, armature, detection),
         mantle=mantle,
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
-        tolerances=None if live else _tolerances(settings, generator.arm_length),
+        tolerances=None if live else tolerances_of(settings, generator.arm_length),
         # What is reached for is known on frames alone.
         hasty=grounded and pace.hasty and reaching is None and (soon or not live),
         in_place=in_place,
@@ -959,9 +960,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         note=settings_note(settings),
         # Detection has looked for constraints itself.
         warnings=[
-            *(detection.notes if detection else _held(skeleton, arms)),
-            *_warnings(settings, armature, skeleton),
-            *_displaced(settings, armature, arms, carriers),
+            *(detection.notes if detection else told_of_driven(skeleton, arms)),
+            *told_of_constraints(settings, armature, skeleton),
+            *told_of_poses(settings, armature, arms, carriers),
             *(standing.warnings if standing else ()),
             *(too_few_frames(settings, pace, scene.render) if grounded else ()),
         ],
@@ -978,23 +979,6 @@ def _local_object(name: str) -> bpy.types.Object:
         return bpy.data.objects[name, None]  # type: ignore[index]
     except KeyError:
         raise WriteError(f"'{name}' is gone.", "Generate again.") from None
-
-
-def playing_action(armature: bpy.types.Object) -> bpy.types.Action | None:
-    """The action that an armature has."""
-    data = armature.animation_data
-    return data.action if data is not None else None
-
-
-def previous_action(
-    armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion
-) -> bpy.types.Action | None:
-    """The action to make anew: the one that plays if it was generated, else the last result."""
-    spliced = cast("Any", armature).octo_motion.splicing.result
-    playing = playing_action(armature)
-    if playing is not None and playing != spliced and actions.is_generated(playing):
-        return playing
-    return settings.result
 
 
 def _check_route_stays(settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object) -> None:
@@ -1016,315 +1000,3 @@ def _with_halves(values: Floats) -> Floats:
     result = np.empty(2 * len(values) - 1)
     result[::2], result[1::2] = values, 0.5 * (values[:-1] + values[1:])
     return result
-
-
-# --- The rig ---------------------------------------------------------------------------------
-
-
-def _uniform_scale(armature: bpy.types.Object, world: Floats) -> float:
-    axes = world[:3, :3]
-    sizes = np.linalg.norm(axes, axis=0)
-    name = f"'{armature.name}'"
-    if not np.isfinite(world).all() or sizes.min() < 1e-9:
-        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
-    scale = float(sizes.mean())
-    if np.ptp(sizes) > _UNEQUAL * scale:
-        shown = ", ".join(f"{size:.4g}" for size in sizes)
-        raise RigError(
-            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
-        )
-    if np.abs(axes.T @ axes / scale**2 - np.eye(3)).max() > _UNEQUAL:
-        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
-    if np.linalg.det(axes) < 0.0:
-        raise RigError(
-            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
-        )
-    # A world matrix has the scale but for the rounding of its rotation, and rotation is what an
-    # earlier result changes: the same settings must give the same keys.
-    own = np.abs(np.array(armature.scale) * np.array(armature.delta_scale)).mean()
-    return float(own) if np.isclose(own, scale, rtol=1e-5) else float(f"{scale:.6g}")
-
-
-def _arms(
-    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, skeleton: Skeleton
-) -> tuple[tuple[Arm, ...], BodyFrame, Detection | None]:
-    """Arms of the list, or those that are found where it is empty."""
-    if len(settings.arms) == 0:
-        found = detect_arms(skeleton, *world_directions(armature))
-        arms = tuple(Arm(each.name, each.bones, each.side, each.pair) for each in found.arms)
-        return arms, found.body, found
-    arms = tuple(
-        Arm(
-            name=item.name,
-            bones=bones_of(item),
-            side=cast("Side", item.side),
-            pair=item.pair,
-            phase=item.phase,
-            flip=item.flip,
-        )
-        for item in settings.arms
-        if item.enabled
-    )
-    if not arms:
-        raise RigError("All arms are switched off.", "Switch on at least one in the list.")
-    return arms, _body(settings, skeleton, arms, None), None
-
-
-def _body(
-    settings: OCTO_MOTION_PG_locomotion,
-    skeleton: Skeleton,
-    arms: tuple[Arm, ...],
-    detection: Detection | None,
-) -> BodyFrame:
-    if detection is not None:
-        found = [arm.bones for arm in arms]
-        return body_frame(skeleton, found, detection.up, detection.front)
-    # The body stays where it is, whichever arms are switched off.
-    bones = [bones_of(item) for item in settings.arms if item.bones]
-    return body_frame(skeleton, bones, settings.body_up, settings.body_front)
-
-
-def _root_bone(
-    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, detection: Detection | None
-) -> str:
-    if settings.travel_on == "OBJECT":
-        return ""
-    name = settings.root_bone or (detection.root_bone if detection else "")
-    if not name and settings.travel_on == "NONE":
-        return ""
-    if not name:
-        raise RigError(
-            f"'{armature.name}' has no root bone.",
-            "Choose the bone that carries the body, or let the object travel.",
-        )
-    bone = armature_data(armature).bones.get(name)
-    if bone is None:
-        raise RigError(
-            f"'{armature.name}' has no bone '{name}' to travel on.", "Choose another root bone."
-        )
-    if bone.use_connect and bone.parent is not None:
-        raise RigError(
-            f"The root bone '{name}' is connected to its parent and cannot move.",
-            "Disconnect it, or choose the topmost bone.",
-        )
-    if not bone.use_local_location and bone.parent is not None:
-        raise RigError(
-            f"The root bone '{name}' does not move along its own axes.",
-            "Switch on Local Location in its Relations, or choose the topmost bone.",
-        )
-    return name
-
-
-def _held(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
-    bones = [bone for arm in arms for bone in arm.bones if is_driven(skeleton, [bone])]
-    if not bones:
-        return []
-    count = "one bone" if len(bones) == 1 else f"{len(bones)} bones"
-    told = (
-        f"Constraints or drivers move {count} of the arms ('{bones[0]}'{' …' * (len(bones) > 1)}): "
-        "keys there have little or no effect while those are on."
-    )
-    return [told]
-
-
-def _warnings(
-    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, skeleton: Skeleton
-) -> list[str]:
-    told: list[str] = []
-    root = settings.root_bone
-    if settings.travel_on == "BONE" and root in skeleton.index and is_driven(skeleton, [root]):
-        told.append(
-            f"Constraints or drivers move the root bone '{root}': its keys have no "
-            "effect while those are on."
-        )
-    if settings.travel_on == "OBJECT" and any(
-        not each.mute and each.influence > 0.0 for each in armature.constraints
-    ):
-        told.append(f"Constraints move '{armature.name}' away from its route.")
-    return told
-
-
-def _carriers(
-    settings: OCTO_MOTION_PG_locomotion,
-    armature: bpy.types.Object,
-    skeleton: Skeleton,
-    arms: tuple[Arm, ...],
-) -> list[str]:
-    """Bones that carry arms, get no keys and are posed: by an artist, or by an imported file."""
-    for arm in arms:
-        # Complains of bones that are gone.
-        chain_of(skeleton, arm.bones)
-    turned = {bone for arm in arms for bone in arm.bones}
-    carrying: set[int] = set()
-    for bone in turned:
-        parent = skeleton.parents[skeleton.index[bone]]
-        while parent >= 0 and parent not in carrying:
-            carrying.add(parent)
-            parent = skeleton.parents[parent]
-    own = {skeleton.names[number] for number in carrying} - turned
-    if settings.travel_on == "BONE":
-        own.discard(settings.root_bone)
-    if (previous := previous_action(armature, settings)) is not None:
-        # These go back to rest if they are not keyed again.
-        own -= animated_bones(previous)
-    return displaced_bones(armature, (), sorted(own))
-
-
-def _displaced(
-    settings: OCTO_MOTION_PG_locomotion,
-    armature: bpy.types.Object,
-    arms: tuple[Arm, ...],
-    carriers: Sequence[str],
-) -> list[str]:
-    """What there is to say of poses that stay and move the arms.
-
-    Args:
-        settings: of the armature.
-        armature: the armature object.
-        arms: its arms.
-        carriers: bones that move the arms and could not be reckoned with.
-    """
-    turned = [bone for arm in arms for bone in arm.bones]
-    if (previous := previous_action(armature, settings)) is not None:
-        stretched_by_it = animated_bones(previous, SCALE)
-        turned = [bone for bone in turned if bone not in stretched_by_it]
-    found = [*displaced_bones(armature, turned, ()), *carriers]
-    if not found:
-        return []
-    count = "one bone" if len(found) == 1 else f"{len(found)} bones"
-    told = (
-        f"The pose of {count} moves the arms ('{found[0]}'): the body stands off its route by "
-        "that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not."
-    )
-    return [told]
-
-
-# --- Settings to core's --------------------------------------------------------------------------
-
-_generators: Final[Remembered[Generator]] = Remembered(12)
-_frames_known: Final[Remembered[list[ArmFrames]]] = Remembered(4)
-
-
-def _arm_frames(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -> list[ArmFrames]:
-    bones = [arm.bones for arm in arms]
-    return _frames_known.get(
-        key_of(skeleton, bones, body),
-        lambda: [arm_frames(skeleton, each, body) for each in bones],
-    )
-
-
-def _generator(
-    skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame, settings: GaitSettings
-) -> Generator:
-    key = key_of(skeleton, arms, body, settings)
-    return _generators.get(key, lambda: Generator(skeleton, arms, body, settings))
-
-
-def _gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> GaitSettings:
-    if settings.use_weight_curve:
-        drawn = sample_weight_curve(settings.weight_curve, _WEIGHT_SAMPLES)
-        weights = tuple(float(each) for each in np.clip(drawn, 0.01, 1.0))
-    else:
-        weights = (settings.weight_root, settings.weight_tip)
-    return GaitSettings(
-        gait=gait,
-        contraction=settings.contraction,
-        weights=weights,
-        softness=settings.softness,
-        give=settings.give,
-        steady=settings.steady,
-        sway=settings.sway,
-        phase_spread=settings.phase_spread,
-        variation=(settings.variation_min, settings.variation_max),
-        seed=settings.seed,
-        period=settings.cycles if settings.travel_on == "NONE" else 0,
-        turning=settings.turning,
-        heading=_heading(settings),
-        stand=settings.stand,
-    )
-
-
-def _heading(settings: OCTO_MOTION_PG_locomotion) -> float:
-    """Radians from the way that the body goes to its front, in steps in which arms change roles."""
-    if settings.heading != "ALONG":
-        return 0.0
-    return _HEADING_STEP * round(settings.heading_angle / _HEADING_STEP)
-
-
-def _travel_settings(
-    settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, stride: float
-) -> TravelSettings:
-    travel = TravelSettings(
-        manner="WALK" if gait.on_ground else "SWIM",
-        speed=settings.speed_mode,
-        ease_in=settings.ease_in,
-        ease_out=settings.ease_out,
-        stride=stride,
-        heading=settings.heading,
-        heading_angle=settings.heading_angle,
-        burst=settings.burst,
-        stroke_phase=gait.power_phase,
-        look_ahead=settings.look_ahead,
-        bank=settings.bank_in_turns,
-        keep_upright=settings.keep_upright,
-        corner=settings.corner,
-    )
-    return travel_in_place(travel) if settings.travel_on == "NONE" else travel
-
-
-def _tolerances(settings: OCTO_MOTION_PG_locomotion, arm_length: float) -> Tolerances | None:
-    if settings.keys != "REDUCED":
-        return None
-    check_bounds(settings.key_angle, settings.key_distance)
-    return Tolerances(
-        settings.key_angle, settings.key_distance * arm_length, settings.key_columns == "BONE"
-    )
-
-
-def _height(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, clearance: float) -> float:
-    if settings.height_mode == "MANUAL":
-        return settings.height
-    return clearance if gait.on_ground else 0.0
-
-
-def _timing(
-    settings: OCTO_MOTION_PG_locomotion,
-    route: Route,
-    travel: TravelSettings,
-    render: bpy.types.RenderSettings,
-) -> tuple[float, Floats, Floats]:
-    """Seconds that the journey takes, its frames, and the share of its time at each."""
-    rate = render.fps / render.fps_base
-    start = settings.frame_start
-    if settings.timing == "RANGE":
-        length = settings.frame_end - start
-        if length < 1:
-            raise SettingsError(
-                f"The motion ends at frame {settings.frame_end} and starts at {start}.",
-                "Let it end after its start.",
-            )
-        exact = float(length)
-    elif settings.timing == "SPEED":
-        exact = duration(route, travel, settings.speed) * rate
-    else:
-        # At full speed a cycle takes the cycle time; so many cycles make the route.
-        cycles = strides(route, travel)
-        cruising = route.length / (cycles * settings.cycle_time)
-        exact = duration(route, travel, cruising) * rate
-    if settings.travel_on == "NONE":
-        exact = whole_frames(exact)
-    if exact > MOST_FRAMES:
-        raise SettingsError(
-            f"The motion would take {exact:,.0f} frames, more than {MOST_FRAMES:,}.",
-            "Shorten the route, or make the body faster.",
-        )
-    # The motion is the same at any frame rate: it ends when it ends, and the frame after that
-    # holds the end. A length that is whole but for rounding does not need that frame.
-    count = max(math.ceil(exact - 1e-4), 1) + 1
-    if start + count - 1 > LAST_FRAME:
-        raise SettingsError(
-            f"The motion would end at frame {start + count - 1:,}, after Blender's last.",
-            "Let it start earlier.",
-        )
-    steps = np.arange(count, dtype=np.float64)
-    return exact / rate, start + steps, np.minimum(steps / exact, 1.0)
