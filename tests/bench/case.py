@@ -17,17 +17,17 @@ import bpy
 import octo_motion
 from octo_motion.blender import actions
 from octo_motion.core.locomotion import generator
-from octo_motion.ui.locomotion import workflow
+from octo_motion.ui.locomotion import shot, workflow
 from tests.bench import blender_way, scene
 from tests.bench.stopwatch import Place, Stopwatch
 
 PARTS: dict[str, list[Place]] = {
     "read rig, route, settings": [(workflow, "prepare")],
-    "travel along the route": [(workflow, "plan_travel"), (workflow, "object_transforms")],
+    "travel along the route": [(shot, "plan_travel"), (shot, "object_transforms")],
     "gait angles and targets": [(generator.Generator, "pose"), (generator, "pseudo_targets")],
     "solve (CCD)": [(generator, "solve"), (generator, "asked_shape")],
     "joints to bone rotations": [(generator, "bone_rotations")],
-    "values of the channels": [(workflow.Shot, "_channels")],
+    "values of the channels": [(shot.Shot, "_channels")],
     "write keys": [(actions, "_write_curves")],
     "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
 }

@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion.workflow import Shot, prepare
+from octo_motion.ui.locomotion.shot import Shot
+from octo_motion.ui.locomotion.workflow import prepare
 from tests.ui.rig import click
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from octo_motion.blender.curves import read_route
 from octo_motion.core.errors import OctoMotionError
+from octo_motion.ui.locomotion import shot as shot_module
 from octo_motion.ui.locomotion import workflow
 from octo_motion.ui.locomotion.generate import OCTO_MOTION_OT_generate_locomotion
 from octo_motion.ui.modal_job import ModalJob
@@ -323,7 +324,7 @@ def test_work_in_small_steps_gives_the_same_keys(
     octopus: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = {key: values.tobytes() for key, values in keys(generate(octopus)).items()}
-    monkeypatch.setattr(workflow, "_BONES_AT_ONCE", 24 * 7)
+    monkeypatch.setattr(shot_module, "_BONES_AT_ONCE", 24 * 7)
     shot = workflow.prepare(octopus, bpy.context)
     progress = list(shot.compute())
     # Twice as many moments as frames: it is a hurry.
@@ -820,7 +821,7 @@ class Operator:
 def long_job(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     """The operator at work in twenty steps, each of which takes a whole turn."""
     settings_of(octopus).tell_overlaps = False
-    monkeypatch.setattr(workflow, "_BONES_AT_ONCE", 24 * 6)
+    monkeypatch.setattr(shot_module, "_BONES_AT_ONCE", 24 * 6)
     monkeypatch.setattr("octo_motion.ui.locomotion.generate.PATIENCE", 0.0)
     monkeypatch.setattr(ModalJob, "_turn", 0.0)
     operator, window = Operator(), Window()

@@ -10,6 +10,7 @@ import pytest
 from octo_motion.ui.locomotion import apart, live, workflow
 from octo_motion.ui.locomotion.apart import DEEP
 from octo_motion.ui.locomotion.properties import locomotion_settings
+from octo_motion.ui.locomotion.shot import Shot
 from tests.bench.apart import add_bumps
 from tests.ui.rig import keys
 
@@ -30,7 +31,7 @@ def octopus() -> Any:
     return armature
 
 
-def computed(armature: Any, *, keep_apart: bool) -> workflow.Shot:
+def computed(armature: Any, *, keep_apart: bool) -> Shot:
     locomotion_settings(armature).keep_apart = keep_apart
     shot = workflow.prepare(armature, bpy.context)
     for _ in shot.compute():
@@ -38,7 +39,7 @@ def computed(armature: Any, *, keep_apart: bool) -> workflow.Shot:
     return shot
 
 
-def figures(shot: workflow.Shot) -> dict[str, float]:
+def figures(shot: Shot) -> dict[str, float]:
     return {each.kind: each.value for each in shot.figures}
 
 

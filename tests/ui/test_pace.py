@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from octo_motion.ui.locomotion import workflow
-from octo_motion.ui.locomotion.workflow import Shot, prepare
+from octo_motion.ui.locomotion.shot import Shot
+from octo_motion.ui.locomotion.workflow import prepare
 from tests.ui.rig import click, give_route, joints_in_world
 from tests.ui.test_quality_report import WAY, bumpy
 

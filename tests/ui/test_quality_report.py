@@ -14,7 +14,8 @@ from octo_motion.core.locomotion import quality
 from octo_motion.core.locomotion.figures import KINDS, Figure, Measured, Poses
 from octo_motion.core.rotations import rotate
 from octo_motion.ui.locomotion import quality_report
-from octo_motion.ui.locomotion.workflow import Shot, prepare
+from octo_motion.ui.locomotion.shot import Shot
+from octo_motion.ui.locomotion.workflow import prepare
 from tests.blender.test_ground import make_mesh
 from tests.ui.rig import click, generate, give_route, joints_in_world, make_octopus
 

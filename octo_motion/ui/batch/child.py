@@ -16,7 +16,7 @@ from typing import Any, Final
 import bpy
 
 from ...core.errors import OctoMotionError
-from ..locomotion.workflow import Summary
+from ..locomotion.summary import Summary
 from .entry import ShotEntry
 from .limits import LimitError, quality
 from .outputs import remove_staged, write_json

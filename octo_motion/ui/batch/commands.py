@@ -13,7 +13,7 @@ import bpy
 
 from ...core.errors import OctoMotionError, SettingsError, WriteError
 from ...core.locomotion import gait
-from ..locomotion.workflow import Summary
+from ..locomotion.summary import Summary
 from .bake import STOPPED, BakeOptions, bake
 from .child import RUN_SHOT, run_shot
 from .command_line import parse

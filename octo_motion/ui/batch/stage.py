@@ -21,8 +21,9 @@ from ...core.errors import OctoMotionError, RigError, RouteError, SettingsError,
 from ...core.locomotion import gait
 from ...core.locomotion.detection import detect_arms
 from ..locomotion.properties import locomotion_settings, set_gait
+from ..locomotion.summary import Summary
 from ..locomotion.wishes import store
-from ..locomotion.workflow import Summary, generate
+from ..locomotion.workflow import generate
 from . import pose_stage, splice_stage
 from .blender_said import blender_said
 from .entry import NewRoute, ShotEntry, frame_rate

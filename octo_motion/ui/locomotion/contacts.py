@@ -14,9 +14,10 @@ from ...core.errors import SettingsError
 from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .shot import show_contacts
 from .standing import resting
 from .wishes import changed_by_hand, gathered, store
-from .workflow import prepare, show_contacts
+from .workflow import prepare
 
 
 class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):

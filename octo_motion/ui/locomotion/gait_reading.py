@@ -18,11 +18,7 @@ from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, GaitSettings, Generator
 from ...core.locomotion.loops import travel_in_place, whole_frames
 from ...core.locomotion.route import Route
-from ...core.locomotion.travel import (
-    TravelSettings,
-    duration,
-    strides,
-)
+from ...core.locomotion.travel import TravelSettings, duration, strides
 from ...core.remembered import Remembered, key_of
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton

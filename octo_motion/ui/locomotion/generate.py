@@ -12,7 +12,9 @@ from ...core.errors import OctoMotionError
 from ..armature_operator import ArmatureOperator
 from ..modal_job import ModalJob
 from . import live
-from .workflow import Shot, Summary, generate, prepare
+from .shot import Shot
+from .summary import Summary
+from .workflow import generate, prepare
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems

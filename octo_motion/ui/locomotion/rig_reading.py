@@ -11,11 +11,7 @@ import numpy as np
 
 from ...blender.armature import armature_data
 from ...blender.arms import world_directions
-from ...blender.poses import (
-    SCALE,
-    animated_bones,
-    displaced_bones,
-)
+from ...blender.poses import SCALE, animated_bones, displaced_bones
 from ...core.errors import RigError
 from ...core.locomotion.chains import BodyFrame, Side, body_frame, chain_of, is_driven
 from ...core.locomotion.detection import Detection, detect_arms
