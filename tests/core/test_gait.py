@@ -68,6 +68,23 @@ def test_an_offset_given_for_one_arm_replaces_the_spread() -> None:
     assert table.offset("RIGHT", 2, 4) == PRESETS["walk"].offset("RIGHT", 2, 4)
 
 
+@pytest.mark.parametrize("pairs", [1, 2, 3, 4, 5])
+def test_rear_arms_do_what_a_gait_has_for_them_where_there_are_fewer(pairs: int) -> None:
+    table = PRESETS["tiptoe"]
+    own = table.for_pairs(pairs)
+    # Five pairs are more than it knows of: its fourth is the fourth.
+    rear = min(pairs, 4)
+    stepping = [pair for pair in range(1, pairs + 1) if not own.curve(pair).free]
+    assert stepping == [rear]
+    assert own.curve(rear) is table.curve(4)
+
+
+def test_offsets_of_single_arms_move_to_the_rear_with_their_pairs() -> None:
+    table = dataclasses.replace(PRESETS["walk"], offsets={(4, "LEFT"): 1.0, (1, "RIGHT"): 2.0})
+    assert table.for_pairs(3).offsets == {(3, "LEFT"): 1.0}
+    assert table.for_pairs(4) is table
+
+
 def test_a_pair_may_have_a_curve_of_its_own() -> None:
     own = gait.curve_from_degrees([0, 180, 360], head=[[0, 30, 0], [0, 0, 0], [0, 0, 0]])
     table = dataclasses.replace(PRESETS["walk"], curves={**PRESETS["walk"].curves, 4: own})

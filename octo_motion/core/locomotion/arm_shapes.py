@@ -23,6 +23,10 @@ _LONGEST: Final = 4.0
 """Handles of a curve, in its lengths."""
 _HALVINGS: Final = 7
 """Steps in which they are found."""
+_BACKWARDS: Final = 1e-4
+"""Least of one and the cosine of an angle whose half has a tangent."""
+_BENDINGS: Final = 6
+"""Newton's steps in which it is found how much more a curve is bent."""
 _BOLD: Final = 0.6
 """Radians that a segment turns at a step of Newton's at most."""
 _FIRM: Final = 1e-4
@@ -88,6 +92,36 @@ def curve(
     handle = low + (high - low) * above / np.maximum(above + below, _TINY)
     amounts[1:] *= handle
     return unit(np.einsum("xsb,xcb->scb", amounts, ways))
+
+
+def bent(directions: Floats, parts: Floats, chord: Floats, share: Floats) -> Floats:
+    """Directions bent so much more that they lead along a chord no farther than a share of it.
+
+    The tangents of half of the angles to the chord are all scaled by one factor: an arch stays an
+    arch, however little of its length is left between its ends.
+
+    Args:
+        directions: (segments, 3, batch) unit.
+        parts: (segments, batch) how much of each segment counts.
+        chord: (3, batch)
+        share: (batch,) of how far they have led, 0…1.
+    """
+    along = unit(chord)
+    cosines = np.einsum("scb,cb->sb", directions, along)
+    across = directions - cosines[:, None] * along
+    squares = (1.0 - cosines) / np.maximum(1.0 + cosines, _BACKWARDS)
+    wanted = share * np.sum(parts * cosines, axis=0)
+    # The logarithm of the factor's square, for which the way led falls evenly.
+    factor = np.zeros(share.shape)
+    for _ in range(_BENDINGS):
+        bends = np.exp(factor) * squares
+        far = np.sum(parts * (1.0 - bends) / (1.0 + bends), axis=0)
+        slope = np.sum(parts * bends / (1.0 + bends) ** 2, axis=0)
+        factor = factor + np.clip(0.5 * (far - wanted) / np.maximum(slope, _TINY), -1.0, 1.0)
+    bends = np.exp(factor) * squares
+    ahead = (1.0 - bends) / (1.0 + bends)
+    size = np.sqrt(np.maximum(1.0 - ahead * ahead, 0.0))
+    return ahead[:, None] * along + size[:, None] * unit(across)
 
 
 def blended(outward: Floats, start: Floats, end: Floats, share: Floats) -> Floats:

@@ -27,6 +27,10 @@ _ACROSS: Final = np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
 _SHARES: Final = np.array([1.0, 2.0, 2.0, 2.0, 1.0]) / 8.0
 _HEADROOM: Final = 0.55
 """Share of its height over the ground that a body keeps over a bump right under it."""
+_MOST_HEADROOM: Final = 0.9
+"""The same at most, where that is not enough for its skin."""
+_LIFTS: Final = 3
+"""How often what a body lacks of it is added, evened out: that alone takes some of it away."""
 _UNDER: Final = 0.25
 """Reaches before, behind and beside the body's centre that count as right under it."""
 _UP: Final = np.array([0.0, 0.0, 1.0])
@@ -97,6 +101,7 @@ def body_line(
     reach: float,
     lean: float,
     smoothing: float,
+    under: float = 0.0,
 ) -> BodyLine:
     """The line of a body that walks on a ground.
 
@@ -109,6 +114,7 @@ def body_line(
         reach: metres that its arms are long.
         lean: 0 stays upright, 1 leans as the ground does.
         smoothing: reaches over which the ground is evened out along the way (standard deviation).
+        under: metres from the body's centre to its lowest skin.
     """
     spacing = reach / _PER_REACH
     margin = 2.0 * settings.stride + 4.0 * smoothing * reach + reach
@@ -123,8 +129,11 @@ def body_line(
     level = _evened(felt @ _SHARES, kernel)
     near = np.abs(_ACROSS) <= _UNDER
     top = _highest(felt[:, near].max(axis=1), int(np.ceil(_UNDER * _PER_REACH)))
-    short = np.maximum(top + _HEADROOM * clearance - (level + clearance), 0.0)
-    level = level + _evened(short, _bell(0.5 * smoothing * reach / spacing))
+    headroom = max(_HEADROOM * clearance, min(under, _MOST_HEADROOM * clearance))
+    rounded = _bell(0.5 * smoothing * reach / spacing)
+    for _ in range(_LIFTS):
+        short = np.maximum(top + headroom - (level + clearance), 0.0)
+        level = level + _evened(short, rounded)
     ahead = np.gradient(level, spacing)
     # Least squares through the heights across the way.
     sideways = _evened(felt @ _ACROSS / (_ACROSS @ _ACROSS * reach), kernel)

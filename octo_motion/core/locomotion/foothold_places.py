@@ -14,7 +14,7 @@ import numpy as np
 
 from ..rotations import Floats
 from .ground import Ground
-from .limbs import Limbs, StanceSettings
+from .limbs import Limbs, StanceSettings, touching
 
 PEELING: Final = 0.5
 """Share of a hold in which the arm is peeled off towards its tip, as the body pulls."""
@@ -94,6 +94,19 @@ def span(settings: StanceSettings, *, may_stretch: bool) -> tuple[float, float]:
     free = 1.0 - settings.planted
     longer = settings.stretch * may_stretch
     return (_NEAR + _NEARER * longer) * free, (_FAR + _FARTHER * longer) * free
+
+
+def easy_height(reach: Floats, radii: Floats, settings: StanceSettings) -> float:
+    """How far above the ground an arm that gets no longer may begin and still hold on with ease.
+
+    Args:
+        reach: (segments + 1,) along it to each joint.
+        radii: (segments + 1,) from each joint to the skin below it.
+        settings: how it holds on.
+    """
+    joint = touching(reach, settings.planted)
+    level = (_EASY * reach[joint]) ** 2 - (_NEAREST * reach[-1]) ** 2
+    return float(np.sqrt(max(level, 0.0)) + radii[joint])
 
 
 def hold_times(settings: StanceSettings) -> tuple[tuple[float, float, float], ...]:

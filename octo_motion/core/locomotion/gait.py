@@ -110,6 +110,24 @@ class GaitTable:
         """The curve for one pair of arms."""
         return self.curves.get(pair, self.curves[0])
 
+    def for_pairs(self, pairs: int) -> GaitTable:
+        """The table for a body of so many pairs of arms.
+
+        Pairs count from the front, but what a gait has for its last pair, its rear arms are to do
+        also where there are fewer.
+        """
+        known = [*self.curves, *(pair for pair, _ in self.offsets)]
+        beyond = max(known) - pairs
+        if beyond <= 0:
+            return self
+        curves = {pair - beyond: curve for pair, curve in self.curves.items() if pair > beyond}
+        offsets = {
+            (pair - beyond, side): offset
+            for (pair, side), offset in self.offsets.items()
+            if pair > beyond
+        }
+        return replace(self, curves={0: self.curves[0], **curves}, offsets=offsets)
+
     def offset(self, side: str, pair: int, pairs: int) -> float:
         """Radians that an arm is ahead of the body's phase, for a body of so many pairs.
 

@@ -170,7 +170,8 @@ class Generator:
         if not arms:
             raise RigError("The list of arms is empty.", "Detect the arms, or add one.")
         self._arms = tuple(arms)
-        self._settings = settings
+        gait = settings.gait.for_pairs(max(arm.pair for arm in self._arms))
+        self._settings = settings = replace(settings, gait=gait)
         _check_disjoint(self._arms)
         for arm in self._arms:
             chain_of(skeleton, arm.bones)
@@ -191,7 +192,6 @@ class Generator:
         ]
         self._hands = np.array([arm.handedness for arm in self._arms])
         self._pairs = tuple(arm.pair for arm in self._arms)
-        gait = settings.gait
         spread = [gait.offset(arm.side, arm.pair, max(self._pairs)) for arm in self._arms]
         if gait.on_ground and settings.heading != 0.0:
             spread = [spread[other] for other in _instead(azimuths, settings.heading)]

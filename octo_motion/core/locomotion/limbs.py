@@ -72,6 +72,11 @@ class Limbs:
 
     def touching(self, planted: float) -> int:
         """The joint that touches first, so that about a share of the arm lies beyond it."""
-        along = self.reach[:, 0] / self.reach[-1, 0]
-        free = int(np.argmin(np.abs(along - (1.0 - planted))))
-        return int(np.clip(free, min(2, len(self.lengths) - 1), len(self.lengths) - 1))
+        return touching(self.reach[:, 0], planted)
+
+
+def touching(reach: Floats, planted: float) -> int:
+    """The joint of an arm, of all along it (segments + 1,), that touches first."""
+    segments = len(reach) - 1
+    free = int(np.argmin(np.abs(reach / reach[-1] - (1.0 - planted))))
+    return int(np.clip(free, min(2, segments - 1), segments - 1))

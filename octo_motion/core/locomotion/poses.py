@@ -141,8 +141,8 @@ def bone_rotations(
         bank: (bones, frames, arms) radians by which each bone is twisted about its own segment,
             against the bone before.
         facing: which way a side of the arms turns besides. A bone that faces askew by θ is turned
-            by the sine of θ: nothing for one that faces right, and nothing for one that faces
-            quite away, which would have no better side to turn to. So it never flips.
+            by sin θ (1 + cos θ) / 2: nothing for one that faces right, and hardly anything for one
+            that faces nearly away, which would have no better side to turn to. So it never flips.
     """
     bones, _, frames, arms = directions.shape
     batch = frames * arms
@@ -171,6 +171,9 @@ def bone_rotations(
             sine = dot(cross(side, towards), wanted[bone])
             cosine = dot(side, towards) - dot(side, wanted[bone]) * dot(towards, wanted[bone])
             askew = np.sin(banked) * cosine + np.cos(banked) * sine
+            # Where all face away, each would add its own to what those before it turned.
+            right = np.cos(banked) * cosine - np.sin(banked) * sine
+            askew *= 0.5 * (1.0 + right)
             twisted = twisted + 0.5 * facing.hold[bone].reshape(batch) * askew
         if np.any(twisted):
             turn = product(turn, np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segment]))

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .arm_shapes import blended, curve, drawn, evened, gentle, raised, smooth, unit
+from .arm_shapes import bent, blended, curve, drawn, evened, gentle, raised, smooth, unit
 from .columns import dot
 from .foothold_places import PEELING
 from .footholds import UNROLLING, Footholds
@@ -47,6 +47,11 @@ _STRAIGHT: Final = 0.999
 _ARCHED: Final = np.radians(15.0)
 _ARCHING: Final = 0.5
 """How much more where it is slack, and over what share of its length that comes."""
+_BUNCHED: Final = 0.7
+"""Share of its length between body and foothold below which its curve is bent all over: a cubic
+that is as long doubles back on itself at its top, and turns over at once."""
+_BUNCHING: Final = 0.05
+"""Over what share of its length that comes."""
 _CURLED: Final = np.radians(85.0)
 """How far the tip stands up before it is unrolled."""
 _FOLDED: Final = np.radians(110.0)
@@ -474,14 +479,18 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
     size = held.lies_from * (1.0 + strain[0])
     middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
     parts = np.clip(held.lies_from - reach[:-1], 0.0, lengths)
+    tight = ratio / (1.0 + strain[0])
+    over = 0.5 * (tight - _BUNCHED)
+    least = _BUNCHED + over + np.sqrt(over * over + _BUNCHING**2)
     directions = curve(
         leaving=leaving,
         arriving=arriving,
         chord=chord,
-        size=size,
+        size=size * tight / least,
         middles=middles,
         parts=parts,
     )
+    directions = bent(directions, parts, chord, tight / least)
     if np.any(kneed := _kneed(batch, held)):
         directions = np.where(kneed, _knee(batch, held, chord, 1.0 + strain[0]), directions)
     through = np.clip((held.lies_from - reach[first:-1]) / lengths[first:], 0.0, 1.0)[:, None]

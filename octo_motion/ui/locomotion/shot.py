@@ -642,10 +642,13 @@ class Shot:
         assert self.out_of_reach is not None
         if self.out_of_reach.max() > MISS:
             frame, arm = np.unravel_index(self.out_of_reach.argmax(), self.out_of_reach.shape)
+            # Bones that may not get longer do not, whatever Stretch is.
+            longer = any(each.stretching for each in self._stands())
+            remedy = "raise Stretch" if longer else "lower Height"
             told = (
                 f"'{self.arms[arm].name}' slides at frame {self.frames[frame]:.0f}: its contact is "
-                f"{self.out_of_reach[frame, arm]:.2g} arm lengths out of reach. Lower Hold, raise "
-                "Stretch or shorten the stride."
+                f"{self.out_of_reach[frame, arm]:.2g} arm lengths out of reach. Lower Hold, "
+                f"{remedy} or shorten the stride."
             )
             return [told]
         misses = self.misses.max(axis=0)

@@ -18,11 +18,12 @@ from ...core.locomotion.body_line import BodyLine, body_line, leaning
 from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.course import Line
 from ...core.locomotion.crawl import CrawlSettings
-from ...core.locomotion.foothold_places import span
+from ...core.locomotion.foothold_places import easy_height, span
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.generator import Arm, Generator
 from ...core.locomotion.ground import Ground, Plane, along_path, passes_over_itself, sampled
 from ...core.locomotion.grounded import GroundedPoses, GroundedWalk, Raise
+from ...core.locomotion.limbs import StanceSettings
 from ...core.locomotion.rhythm import Even, at_rest, crawling, crawling_in_place
 from ...core.locomotion.route import Route
 from ...core.locomotion.steady import Steady, around
@@ -185,9 +186,14 @@ def read_standing(
             settings, depsgraph, route=route, travel=travel, bearings=bearings, reach=reach
         )
     radii = arm_radii(armature, skin, [arm.bones for arm in arms])
+    stretch = [may_stretch(armature, arm.bones) for arm in arms]
+    under = _under(generator, radii)
     if height is None:
         thickness = float(np.mean([each[len(each) // 2] for each in radii]))
-        height = max(generator.clearance + thickness, _LOWEST * generator.arm_length) * scale
+        height = min(
+            generator.clearance + thickness, _within_reach(generator, radii, stretch, stance)
+        )
+        height = max(height, under, _LOWEST * generator.arm_length) * scale
     line = body_line(
         route,
         travel,
@@ -197,8 +203,8 @@ def read_standing(
         reach=reach,
         lean=stance.lean,
         smoothing=stance.smoothing,
+        under=under * scale,
     )
-    stretch = [may_stretch(armature, arm.bones) for arm in arms]
     rhythm = None
     gait = generator.settings.gait
     if gait.manner == "CRAWL":
@@ -242,6 +248,31 @@ def read_standing(
 
     walk = build(line, wishes)
     return Standing(walk, line, bearings, any(stretch), build, ground, warnings)
+
+
+def _under(generator: Generator, radii: Sequence[Floats]) -> float:
+    """How far a body's skin reaches below its centre where its arms begin, armature units."""
+    skins = [radius[0] - root[2] for radius, root in zip(radii, generator.roots, strict=True)]
+    return float(max(skins))
+
+
+def _within_reach(
+    generator: Generator, radii: Sequence[Floats], stretches: Sequence[bool], stance: StanceSettings
+) -> float:
+    """Greatest height at which arms that get no longer hold the ground with ease, armature units.
+
+    What gaits ask for, arms that stretch can do. It may be more than other arms are long before
+    they come to lie.
+    """
+    gait, heights = generator.settings.gait, [np.inf]
+    for build in generator.builds:
+        along = np.concatenate([[0.0], np.cumsum(build.chain.lengths)])
+        for arm in build.arms:
+            longer = stretches[arm] and stance.stretch > 0.0
+            if not (longer or gait.curve(generator.arms[arm].pair).free):
+                reach = along * generator.lengths[arm]
+                heights.append(easy_height(reach, radii[arm], stance) - generator.roots[arm][2])
+    return min(heights)
 
 
 def _ground(

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms that stand close to what they hold: arches that stay arches, at heights they can bear."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from octo_motion.core.locomotion.arm_shapes import bent, unit
+from octo_motion.core.locomotion.body_line import body_line
+from octo_motion.core.locomotion.foothold_places import easy_height
+from octo_motion.core.locomotion.limbs import StanceSettings
+from octo_motion.core.locomotion.travel import TravelSettings, bearings_of
+from octo_motion.core.rotations import Floats
+from tests.core.grounds import STRAIGHT, bumps, largest_turn, walker
+
+STIFF = StanceSettings(stretch=0.0)
+
+
+def an_arch(steepest: float, count: int = 9) -> Floats:
+    """Directions (segments, 3, 1) that lead along x, up and down again."""
+    angles = np.linspace(steepest, -steepest, count)
+    return np.stack([np.cos(angles), 0.0 * angles, np.sin(angles)], axis=1)[..., None]
+
+
+@given(st.floats(0.3, 1.2), st.floats(0.4, 1.0))
+def test_an_arch_is_bent_until_it_leads_as_far_as_it_should(steepest: float, share: float) -> None:
+    arch, parts = an_arch(steepest), np.full((9, 1), 0.1)
+    chord = np.array([[1.0], [0.0], [0.0]])
+    found = bent(arch, parts, chord, np.array([share]))
+    led = np.einsum("sb,scb->cb", parts, found)[:, 0]
+    before = np.einsum("sb,scb->cb", parts, arch)[:, 0]
+    # Six steps of Newton's leave much less than a thousandth of the arm.
+    assert led[0] == pytest.approx(share * before[0], abs=1e-3)
+    # Still an arch: symmetric, and each bone is bent down from the one before.
+    assert abs(led[2]) < 1e-6
+    climbs = np.arctan2(found[:, 2, 0], found[:, 0, 0])
+    assert np.all(np.diff(climbs) < 0.0)
+    assert np.allclose(np.linalg.norm(found, axis=1), 1.0)
+
+
+def test_what_need_not_be_bent_stays_as_it_is() -> None:
+    random = np.random.default_rng(1)
+    ways = unit(random.normal(size=(9, 3, 4)) + np.array([2.0, 0.0, 0.0])[:, None])
+    parts = random.uniform(0.05, 0.2, (9, 4))
+    chord = np.einsum("sb,scb->cb", parts, ways)
+    assert np.allclose(bent(ways, parts, chord, np.ones(4)), ways, atol=1e-9)
+
+
+def test_stiff_arms_do_not_turn_over_where_they_stand_close_to_their_foothold() -> None:
+    walk = walker(bumps(), joints=10, gait="prowl", radii=(0.16, 0.036))
+    assert np.degrees(largest_turn(walk.pose(walk.times).rotations)) < 45.0
+
+
+@pytest.mark.parametrize("joints", [3, 4, 6, 12])
+def test_from_its_easy_height_an_arm_reaches_the_ground_beside_it(joints: int) -> None:
+    reach, radii = np.linspace(0.0, 1.0, joints + 1), np.full(joints + 1, 0.02)
+    height = easy_height(reach, radii, STIFF)
+    free = reach[np.argmin(np.abs(reach - 0.7))]
+    away = np.hypot(height - 0.02, 0.2)
+    # Bent a little, and with a fifth of its length to the side.
+    assert 0.6 * free < away < 0.9 * free
+
+
+@pytest.mark.parametrize("under", [0.0, 0.12])
+def test_a_low_body_keeps_its_skin_out_of_a_hill_it_passes(under: float) -> None:
+    ground, travel = bumps(), TravelSettings(stride=1.0)
+    line = body_line(
+        STRAIGHT,
+        travel,
+        bearings_of(STRAIGHT, travel),
+        ground,
+        clearance=0.16,
+        reach=1.0,
+        lean=0.7,
+        smoothing=0.35,
+        under=under,
+    )
+    centres, _ = line.at(np.linspace(0.0, STRAIGHT.length, 400))
+    gap = centres[:, 2] - ground.height(centres)
+    # What it lacks is evened out along the way: a fiftieth of an arm may be left.
+    assert gap.min() > max(0.55 * 0.16, under) - 0.02
