@@ -101,10 +101,40 @@ def test_six_unequal_arms_that_hang_at_rest_neither_snap_nor_slide(setup: str) -
 
 
 @pytest.mark.parametrize(
-    ("file", "name"),
-    [("nssm_octopus.blend", "Armature"), ("octopus_cheli_sanjuan.glb", "Object_6")],
+    ("file", "name", "setup"),
+    [
+        ("nssm_octopus.blend", "Armature", "walk"),
+        ("nssm_octopus.blend", "Armature", "tiptoe"),
+        *(("octopus_cheli_sanjuan.glb", "Object_6", setup) for setup in ("walk", "hurry", "crawl")),
+        ("octopus_cheli_sanjuan.glb", "Object_6", "tiptoe"),
+        ("rigify_simple_tentacle_8arm.blend", "RIG-octo_meta", "tiptoe"),
+    ],
 )
-def test_rigs_of_artists_walk_over_bumps(
-    shared_data: Callable[[str], Path], file: str, name: str
+def test_rigs_of_artists_go_over_bumps(
+    shared_data: Callable[[str], Path], file: str, name: str, setup: str
 ) -> None:
-    hold_up(figures_on_bumps(opened(shared_data(f"octo/{file}"), name), "walk"))
+    hold_up(figures_on_bumps(opened(shared_data(f"octo/{file}"), name), setup))
+
+
+def test_on_six_arms_too_the_rear_pair_tiptoes() -> None:
+    armature = rig([(0.1,) * 10] * 6, 0.0)
+    figures_on_bumps(armature, "tiptoe")
+    shot = workflow.prepare(armature, bpy.context)
+    assert shot.standing is not None
+    arms = {shot.arms[each.arm].pair for each in shot.standing.walk.footholds()}
+    assert arms == {3}
+
+
+def test_what_is_told_of_arms_that_cannot_stretch_helps_them() -> None:
+    armature = rig([STIFF] * 8, 0.0)
+    figures_on_bumps(armature, "tiptoe")
+    settings = armature.octo_motion.locomotion
+    settings.height_mode, settings.height = "MANUAL", 0.95
+    summary = workflow.generate(armature, bpy.context)
+    (told,) = [each for each in summary.warnings if "out of reach" in each]
+    assert "lower Height" in told
+    assert "Stretch" not in told
+    settings.height_mode = "AUTO"
+    assert not [
+        each for each in workflow.generate(armature, bpy.context).warnings if "out of reach" in each
+    ]

@@ -26,6 +26,8 @@ _LEFT: Final = 0.4
 """Share of the part that lies down which is not peeled off, but let go with the tip."""
 _EASY: Final = 0.80
 """Distance from root to foothold half way through, as a share of the arm between them."""
+_UPRIGHT: Final = 0.76
+"""The same under a body that is as high as arms can bear: where it is lower, it is more."""
 _TAUT: Final = 0.94
 """The same at its longest."""
 _SLACKEST: Final = 0.55
@@ -96,16 +98,20 @@ def span(settings: StanceSettings, *, may_stretch: bool) -> tuple[float, float]:
     return (_NEAR + _NEARER * longer) * free, (_FAR + _FARTHER * longer) * free
 
 
-def easy_height(reach: Floats, radii: Floats, settings: StanceSettings) -> float:
-    """How far above the ground an arm that gets no longer may begin and still hold on with ease.
+def easy_height(
+    reach: Floats, radii: Floats, settings: StanceSettings, *, may_stretch: bool
+) -> float:
+    """How far above the ground an arm may begin and still hold on with ease.
 
     Args:
         reach: (segments + 1,) along it to each joint.
         radii: (segments + 1,) from each joint to the skin below it.
         settings: how it holds on.
+        may_stretch: whether its bones may get longer.
     """
     joint = touching(reach, settings.planted)
-    level = (_EASY * reach[joint]) ** 2 - (_NEAREST * reach[-1]) ** 2
+    longer = 1.0 + _STRETCHED * settings.stretch * may_stretch
+    level = (_UPRIGHT * longer * reach[joint]) ** 2 - (_NEAREST * reach[-1]) ** 2
     return float(np.sqrt(max(level, 0.0)) + radii[joint])
 
 

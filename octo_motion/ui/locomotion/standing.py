@@ -259,19 +259,18 @@ def _under(generator: Generator, radii: Sequence[Floats]) -> float:
 def _within_reach(
     generator: Generator, radii: Sequence[Floats], stretches: Sequence[bool], stance: StanceSettings
 ) -> float:
-    """Greatest height at which arms that get no longer hold the ground with ease, armature units.
+    """Greatest height at which all arms hold the ground with ease, armature units.
 
-    What gaits ask for, arms that stretch can do. It may be more than other arms are long before
-    they come to lie.
+    What a gait asks for may be more than arms are long before they come to lie.
     """
     gait, heights = generator.settings.gait, [np.inf]
     for build in generator.builds:
         along = np.concatenate([[0.0], np.cumsum(build.chain.lengths)])
         for arm in build.arms:
-            longer = stretches[arm] and stance.stretch > 0.0
-            if not (longer or gait.curve(generator.arms[arm].pair).free):
+            if not gait.curve(generator.arms[arm].pair).free:
                 reach = along * generator.lengths[arm]
-                heights.append(easy_height(reach, radii[arm], stance) - generator.roots[arm][2])
+                easy = easy_height(reach, radii[arm], stance, may_stretch=stretches[arm])
+                heights.append(easy - generator.roots[arm][2])
     return min(heights)
 
 
