@@ -13,7 +13,7 @@ reweighted least-squares design of FIR filters*, 1994: the step 1 / (p − 1)].
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeVar
 
@@ -48,19 +48,19 @@ class Aims:
     """(4, rows) values; components that a track does not have are 0."""
     own: Singles
     """(3, 4, rows) error of each track, per change of its values."""
-    tip: Singles
-    """(3, 4, rows) error of the limb's tip, likewise."""
+    ends: Sequence[Singles]
+    """Each (3, 4, rows) error of an end of the limb's bones, likewise: of its tip, first of all."""
     ridge: Singles
     """(rows,) size of ``own``, which tells how much changes matter that are not seen."""
     tracks: int
 
-    def seen(self, off: Floats | Singles) -> tuple[Singles, Singles]:
-        """Errors of the tracks (3, tracks, frames) and of the limb's tip (3, frames)."""
+    def seen(self, off: Floats | Singles) -> list[Singles]:
+        """Errors of the tracks (3, tracks, frames) and of ends of the limb's bones (3, frames)."""
         off = off.astype(np.float32, copy=False)
-        own, tip = (
-            _applied(each, off).reshape(3, self.tracks, -1) for each in (self.own, self.tip)
+        own, *ends = (
+            _applied(each, off).reshape(3, self.tracks, -1) for each in (self.own, *self.ends)
         )
-        return own, tip.sum(axis=1)
+        return [own, *(each.sum(axis=1) for each in ends)]
 
 
 def _applied(slopes: Singles, off: Singles) -> Singles:
@@ -255,8 +255,7 @@ class Curves:
             steps: of conjugate gradients.
         """
         off = self.values(points) - aims.targets
-        own, tip = aims.seen(off)
-        weights = _weights(own, power), _weights(tip, power)
+        weights = [_weights(each, power) for each in aims.seen(off)]
 
         def pulls(change: Singles) -> Singles:
             return self._projected(self._gathered(self._pull(change, aims, weights)))
@@ -281,13 +280,12 @@ class Curves:
         offsets = self._offsets(points) + total.astype(np.float64) / (1.0 + 2.0 * power)
         return self._absolute(offsets)
 
-    def _pull(self, change: Singles, aims: Aims, weights: tuple[Singles, Singles]) -> Singles:
+    def _pull(self, change: Singles, aims: Aims, weights: Sequence[Singles]) -> Singles:
         """Gradient of the weighted squares at each frame: (4, rows)."""
-        own, tip = aims.seen(change)
-        own *= weights[0]
-        tip *= weights[1]
-        pull = _transposed(aims.own, own.reshape(3, -1))
-        pull += _transposed(aims.tip, np.tile(tip, aims.tracks))
+        own, *ends = aims.seen(change)
+        pull = _transposed(aims.own, (weights[0] * own).reshape(3, -1))
+        for slopes, end, weight in zip(aims.ends, ends, weights[1:], strict=True):
+            pull += _transposed(slopes, np.tile(weight * end, aims.tracks))
         pull += (weights[0].ravel() * (_RIDGE * aims.ridge) ** 2) * change
         return pull
 
@@ -309,11 +307,12 @@ class Curves:
         result[:, self._left + 3] += result[:, self._left + 2]
         return result
 
-    def _eased(self, aims: Aims, weights: tuple[Singles, Singles]) -> Callable[[Singles], Singles]:
+    def _eased(self, aims: Aims, weights: Sequence[Singles]) -> Callable[[Singles], Singles]:
         """What nearly solves the system: key by key, and the two handles of a span together."""
         weight = (aims.own**2).sum(axis=0) + (_RIDGE * aims.ridge) ** 2
         weight *= weights[0].ravel()
-        weight += (aims.tip**2).sum(axis=0) * np.tile(weights[1], aims.tracks)
+        for slopes, each in zip(aims.ends, weights[1:], strict=True):
+            weight += (slopes**2).sum(axis=0) * np.tile(each, aims.tracks)
         q = self._quick
         hung = np.zeros(self.size, dtype=np.float32)
         hung[self._right + 1] = hung[self._left + 2] = 1.0

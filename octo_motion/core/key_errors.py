@@ -64,11 +64,12 @@ class Errors:
             chains = [limb.chain for limb in limbs if limb.chain is not None]
             self._rest = to_matrix(np.stack([each.rest_rotations for each in chains]))
             self._steps = np.stack([each.steps for each in chains])
+            self._room = _room(limbs, frames)
         self._exact = [
             rotations_of(values, kind) if turns(kind) else values
             for values, kind in zip(self._values, self.kinds, strict=True)
         ]
-        self._tips = self._tip_of(self._exact)
+        self._ends = self._ends_of(self._exact)
 
     def measure(self, values: Sequence[Floats]) -> tuple[Floats, Floats]:
         """Errors of other values of these limbs.
@@ -103,18 +104,22 @@ class Errors:
                 away = np.maximum(away, off)
         joint = away + self._lever * 2.0 * np.sin(turned)
         if self._chain is not None:
-            joint = np.maximum(joint, np.linalg.norm(self._tip_of(decoded) - self._tips, axis=2))
+            off = [np.linalg.norm(each, axis=2) for each in self._ends_of(decoded) - self._ends]
+            joint = np.maximum(joint, off[-1])
+            bound = [each / room for each, room in zip(off, self._room, strict=True)]
+            return own, np.maximum(joint / self._distance, np.max(bound, axis=0))
         return own, joint / self._distance
 
-    def slopes(self) -> tuple[Floats, Floats]:
+    def slopes(self) -> tuple[Floats, list[Floats]]:
         """What changes of the values change, to first order about those that are exact.
 
         Returns:
             By limb, track, direction, component and frame: the error of each track by itself, and
-            that of the chain's tip (…, 3, 4, frames).
+            those of the chain's tip and of the first of its ends that has a bound of its own, where
+            any has (…, 3, 4, frames).
         """
         rows, frames = self._distance.shape
-        own, tip = np.zeros((2, rows, len(self.kinds), 3, 4, frames))
+        own = np.zeros((rows, len(self.kinds), 3, 4, frames))
         radians: dict[int, Floats] = {}
         for place, (kind, values) in enumerate(zip(self.kinds, self._values, strict=True)):
             if not turns(kind):
@@ -126,8 +131,28 @@ class Errors:
             reach = np.maximum(1.0 / self._angle, self._lever / self._distance)
             own[:, place] = np.moveaxis(radians[place], 1, -1) * reach[:, None, None]
         if self._chain is None:
-            return own, tip
-        arms, stretched, turn = self._levers()
+            return own, []
+        turn, steps = self._walked(self._exact)
+        bones = np.arange(len(steps))[:, None, None]
+        bounded = np.isfinite(self._room)
+        tips = [self._moved(radians, turn, steps, np.minimum(self._distance, self._room[-1]))]
+        if bounded[:-1].any():
+            # Of the ends that have a bound of their own, the first one moves the others.
+            first = np.where(bounded[:-1].any(axis=0), bounded[:-1].argmax(axis=0), -1)
+            room = np.take_along_axis(self._room, np.maximum(first, 0)[None], axis=0)[0]
+            steps = [
+                step * each[..., None] for step, each in zip(steps, bones <= first, strict=True)
+            ]
+            tips.append(self._moved(radians, turn, steps, room))
+        return own, tips
+
+    def _moved(
+        self, radians: dict[int, Floats], turn: list[Floats], steps: list[Floats], bound: Floats
+    ) -> Floats:
+        """How values move the end of a chain of these steps: (limbs, tracks, 3, 4, frames)."""
+        assert self._chain is not None
+        tip = np.zeros((len(bound), len(self.kinds), 3, 4, bound.shape[1]))
+        arms, stretched = self._levers(steps)
         for bone, track in enumerate(self._chain.turned):
             if track >= 0:
                 world = to_matrix(turn[bone]) @ self._rest[:, None, bone] @ radians[track]
@@ -137,7 +162,7 @@ class Errors:
             if track >= 0:
                 along = self._values[track][..., 1:2]
                 tip[:, track, :, 1] = np.swapaxes(stretched[bone] / along, 1, 2)
-        return own, tip / self._distance[:, None, None, None]
+        return tip / bound[:, None, None, None]
 
     def _radians(self, kind: str, values: Floats) -> Floats:
         """How values turn a bone in its own axes: (limbs, frames, 3, 4)."""
@@ -179,21 +204,25 @@ class Errors:
             steps.append(step)
         return found, steps
 
-    def _tip_of(self, decoded: Sequence[Floats]) -> Floats:
-        """Where the tip is seen from its root: (limbs, frames, 3)."""
+    def _ends_of(self, decoded: Sequence[Floats]) -> Floats:
+        """Where the chain's bones end, seen from its root: (bones, limbs, frames, 3)."""
         if self._chain is None:
-            return np.zeros(3)
-        total: Floats = np.add.reduce(self._walked(decoded)[1])
-        return total
+            return np.zeros((0, 1, 1, 3))
+        return np.cumsum(self._walked(decoded)[1], axis=0)
 
-    def _levers(self) -> tuple[list[Floats], list[Floats], list[Floats]]:
-        """What turns and what stretches with each bone, (limbs, frames, 3), and its turn."""
+    def _levers(self, steps: list[Floats]) -> tuple[list[Floats], list[Floats]]:
+        """What turns and what stretches with each bone, (limbs, frames, 3)."""
         assert self._chain is not None
-        turn, steps = self._walked(self._exact)
         arms, stretched = [steps[-1]], [steps[-1]]
         for bone in range(len(steps) - 2, -1, -1):
             follows = self._chain.follows[bone + 1]
             arms.append(steps[bone] + arms[-1] if follows else steps[bone])
             handed = bool(self._chain.scaled) and self._chain.handed[bone + 1]
             stretched.append(steps[bone] + stretched[-1] if handed else steps[bone])
-        return arms[::-1], stretched[::-1], turn
+        return arms[::-1], stretched[::-1]
+
+
+def _room(limbs: Sequence[Limb], frames: int) -> Floats:
+    """How far ends of bones may be off, infinite where none says: (bones, limbs, frames)."""
+    none = np.full((frames, len(limbs[0].chain.turned if limbs[0].chain else ())), np.inf)
+    return np.stack([none if each.room is None else each.room for each in limbs]).transpose(2, 0, 1)

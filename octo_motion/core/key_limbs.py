@@ -67,6 +67,9 @@ class Limb:
     columns: Sequence[int] | None = None
     """Of each track, which key frames it has: those of all with the same number. Without, all
     tracks have theirs in common."""
+    room: Floats | None = None
+    """(frames, bones) how far the ends of the chain's bones may be off, those of the tip among
+    them; infinite where nothing but the rest says so."""
 
 
 @dataclass(frozen=True, eq=False)

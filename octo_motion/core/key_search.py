@@ -45,7 +45,7 @@ class Search:
         limb: what is keyed.
         keyed: (columns, frames) where there are keys to begin with.
         corners: (tracks, frames) where the motion itself has a corner.
-        every: at every how many frames there may be a key.
+        allowed: (frames,) where there may be a key, the first and the last among them.
         loops: whether the motion goes on from its last frame to its first.
         exact: whether all keys keep the motion's own values, and none is added.
     """
@@ -57,13 +57,18 @@ class Search:
         keyed: Booleans,
         corners: Booleans,
         *,
-        every: int = 1,
+        allowed: Booleans | None = None,
         loops: bool = False,
         exact: bool = False,
     ) -> None:
         self._times, self._keyed = times, keyed.copy()
         self._columns = np.array(columns_of(limb))
-        self._every, self._loops = every, loops
+        self._allowed = np.ones(len(times), dtype=bool) if allowed is None else allowed
+        numbers = np.arange(len(times))
+        self._before = np.maximum.accumulate(np.where(self._allowed, numbers, 0))
+        self._after = np.where(self._allowed, numbers, len(times))[::-1]
+        self._after = np.minimum.accumulate(self._after)[::-1]
+        self._loops = loops
         self._widths = [track.values.shape[1] for track in limb.tracks]
         self._corners, self._smooth = corners, ~corners
         self._pinned = np.zeros(corners.shape, dtype=bool)
@@ -105,18 +110,20 @@ class Search:
     # --- Fitting ------------------------------------------------------------------------------
 
     def _aimed(self, targets: Floats) -> Aims:
-        own, tip = (
+        slopes, ends = self._errors.slopes()
+        own, *rest = (
             np.moveaxis(each[0], 0, 2).astype(np.float32).reshape(3, 4, -1)
-            for each in self._errors.slopes()
+            for each in (slopes, *ends)
         )
         ridge = np.abs(own).max(axis=(0, 1))
-        return Aims(targets.reshape(4, -1), own, tip, ridge, len(self._widths))
+        return Aims(targets.reshape(4, -1), own, rest, ridge, len(self._widths))
 
     def _turns_at_the_seam(self, targets: Floats) -> Booleans:
         """Whether tracks (tracks,) have a corner where the motion goes on from its start."""
-        if targets.shape[2] < 5:
+        (at,) = np.nonzero(self._allowed)
+        if len(at) < 5:
             return np.ones(len(self._widths), dtype=bool)
-        bends = np.diff(targets[..., [-3, -2, 0, 1, 2]], 2, axis=2)
+        bends = np.diff(targets[..., at[[-3, -2, 0, 1, 2]]], 2, axis=2)
         own = self._aims.own.reshape(3, 4, *targets.shape[1:])[..., :1]
         before, at, after = np.linalg.norm((own * bends).sum(axis=1), axis=0).T
         # A tight bend is one on both sides, too.
@@ -147,11 +154,11 @@ class Search:
         while True:
             curves = self._laid()
             points = curves.aligned(self._points)
-            own, tip = (
+            own, *ends = (
                 np.linalg.norm(each, axis=0)
                 for each in self._aims.seen(curves.values(points) - self._aims.targets)
             )
-            worst = np.maximum(own, tip)
+            worst = np.maximum(own, np.max(ends, axis=0, initial=0.0))
             broken = np.maximum.reduceat(worst.ravel(), curves.heads) > _JOINED
             heads, tails = curves.heads[broken], curves.tails[broken]
             # Of the two keys of a span, the one goes first whose handles had to turn more.
@@ -200,7 +207,7 @@ class Search:
         starts, ends = heads % count, tails % count
         margin = np.maximum((ends - starts) // 4, 1)
         at = np.clip(frames, starts + margin, ends - margin)
-        at -= at % self._every
+        at = self._before[at]
         split = ~loosened & (at > starts) & (at < ends)
         columns = self._columns[heads[split] // count]
         self._keyed[columns, at[split]] = True
@@ -215,9 +222,13 @@ class Search:
         count = own.shape[1]
         rows = (np.arange(len(own))[:, None] * count + frames).ravel()
         off = self._curves.values(self._points) - self._aims.targets
-        moved = (self._aims.tip[:, :, rows] * off[:, rows]).sum(axis=1)
-        moved = moved.reshape(3, len(own), len(frames))
-        share = (moved * moved.sum(axis=1, keepdims=True)).sum(axis=0)
+        share = np.zeros((len(own), len(frames)))
+        for slopes in self._aims.ends:
+            moved = (slopes[:, :, rows] * off[:, rows]).sum(axis=1)
+            moved = moved.reshape(3, len(own), len(frames))
+            each = (moved * moved.sum(axis=1, keepdims=True)).sum(axis=0)
+            # Of the end that is off by more.
+            share = np.where(each.sum(axis=0) > share.sum(axis=0), each, share)
         share = np.where((share != 0.0).any(axis=0), share, own[:, frames])
         tracks = np.argsort(-share, axis=0)[:_CULPRITS]
         return (tracks * count + frames).ravel()
@@ -227,8 +238,7 @@ class Search:
         broken = (own > _KEPT) | (joint > _KEPT)
         tracks, frames = np.nonzero(broken)
         before = self._pinned.copy(), self._keyed.copy()
-        early = frames - frames % self._every
-        for at in (early, early + self._every * (early < frames)):
+        for at in (self._before[frames], self._after[frames]):
             self._keyed[self._columns[tracks], at] = True
             self._pinned[tracks, at] = True
             self._smooth[tracks, at] = False

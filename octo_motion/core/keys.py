@@ -22,6 +22,7 @@ import numpy as np
 
 from .errors import SettingsError
 from .key_frames import Choice
+from .key_halves import Fine, with_halves
 from .key_limbs import LOCATION, SCALE, BezierKeys, Booleans, Chain, Limb, Track, chain_to_tip
 from .key_search import Search, columns_of
 from .rotations import Floats
@@ -113,12 +114,18 @@ def reducing(
     result: list[list[BezierKeys]] = []
     done, whole = 0, max(sum(len(limb.tracks) for limb in limbs), 1)
     for plan in plans:
+        if every == 1 and plan.limb.chain is not None:
+            fine = with_halves(times, plan.limb, plan.keyed, plan.corners)
+        else:
+            fine = Fine(
+                times, plan.limb, plan.keyed, plan.corners, np.arange(len(times)) % every == 0
+            )
         search = Search(
-            times,
-            plan.limb,
-            plan.keyed,
-            plan.corners,
-            every=every,
+            fine.times,
+            fine.limb,
+            fine.keyed,
+            fine.corners,
+            allowed=fine.allowed,
             loops=loops,
             exact=all_of_them,
         )

@@ -31,6 +31,8 @@ MOST_FRAMES: Final = 100_000
 LAST_FRAME: Final = 1_048_574
 """The last frame that Blender knows."""
 
+_HELD: Final = 0.003
+"""Arm lengths that few keys may be off where a joint rests on the ground: it would slide."""
 _WEIGHT_SAMPLES: Final = 33
 _HEADING_STEP: Final = 0.2
 """Radians: no arm that stands half way between two others is a matter of rounding."""
@@ -120,7 +122,10 @@ def tolerances_of(settings: OCTO_MOTION_PG_locomotion, arm_length: float) -> Tol
         return None
     check_bounds(settings.key_angle, settings.key_distance)
     return Tolerances(
-        settings.key_angle, settings.key_distance * arm_length, settings.key_columns == "BONE"
+        settings.key_angle,
+        settings.key_distance * arm_length,
+        settings.key_columns == "BONE",
+        _HELD * arm_length,
     )
 
 

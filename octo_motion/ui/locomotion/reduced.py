@@ -45,6 +45,8 @@ class Tolerances:
     """Of each arm's tip, in the armature's units."""
     by_bone: bool = True
     """Whether each bone has key frames of its own, rather than each arm."""
+    held: float = np.inf
+    """Of joints that rest on the ground, in the armature's units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +80,8 @@ class Motion:
     mantle: Sequence[actions.Channel]
     stretch: Sequence[actions.Channel] = ()
     """Scales of the arms' bones that stretch."""
+    lying: Sequence[np.ndarray] = ()
+    """For each arm (moments, joints) which rest on the ground, none where nothing does."""
 
     def all(self) -> list[actions.Channel]:
         """Every channel, as one key per frame."""
@@ -112,27 +116,32 @@ def reduced(
     limbs: list[Limb] = []
     found: list[list[BezierKeys]] = []
     distance: float | Floats = tolerances.distance
+    carried: float | Floats = 0.0
     if motion.travel:
         travel, unit = _travel(body, motion, tolerances)
         found += reduce_keys(frames, [travel], every=every, all_of_them=dense, loops=loops)
         parts.append(motion.travel)
         # What it does not take is left to the arms, frame by frame.
         played = [values_at(keys, frames)[None] for keys in found[0]]
-        distance = distance - Errors([travel]).measure(played)[1][0] * travel.distance / unit
+        carried = Errors([travel]).measure(played)[1][0] * travel.distance / unit
+        distance = distance - carried
     rest = iter(motion.arms)
-    for arm in body.arms:
+    for number, arm in enumerate(body.arms):
         turned = [next(rest) for _ in arm.bones]
         stretched = [each for each in motion.stretch if each.group in arm.bones]
         tracks = _tracks(turned, body.modes(arm.bones))
         tracks += [Track(each.values, SCALE) for each in stretched]
         parts.append([replace(each, group=arm.name) for each in (*turned, *stretched)])
+        chain = _chain(body, arm, [each.group for each in stretched])
+        lying = motion.lying[number] if motion.lying else None
         limbs.append(
             Limb(
                 tracks=tracks,
                 angle=tolerances.angle,
                 distance=distance,
-                chain=_chain(body, arm, [each.group for each in stretched]),
+                chain=chain,
                 columns=range(len(tracks)) if tolerances.by_bone else None,
+                room=None if lying is None else _room(chain, lying, tolerances.held - carried),
             )
         )
     if body.mantle:
@@ -161,6 +170,16 @@ def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> Chain:
     )
 
 
+def _room(chain: Chain, lying: np.ndarray, held: float | Floats) -> Floats:
+    """How far the ends of the bones of an arm may be off (moments, bones), as its joints rest."""
+    (turned,) = np.nonzero(np.array(chain.turned) >= 0)
+    result = np.full((len(lying), len(chain.turned)), np.inf)
+    # What rides along between two bones of the arm belongs to the first of them.
+    ends = [*(turned[1:] - 1), len(chain.turned) - 1]
+    result[:, ends] = np.where(lying[:, 1:], np.reshape(held, (-1, 1)), np.inf)
+    return result
+
+
 def _length(skeleton: Skeleton, arm: Arm) -> float:
     return float(np.linalg.norm(chain_to_tip(skeleton, arm.bones).steps, axis=1).sum())
 
@@ -180,10 +199,11 @@ def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> tuple[Limb, f
         pivot = np.zeros(3)
         # The armature's unit, as the object's location has it.
         unit = body.scale / actions.channel_unit(body.armature)
+    held = tolerances.held if motion.lying else np.inf
     limb = Limb(
         tracks=_tracks(motion.travel, [LOCATION, mode]),
         angle=tolerances.angle,
-        distance=_TRAVEL_SHARE * tolerances.distance * unit,
+        distance=_TRAVEL_SHARE * min(tolerances.distance, held) * unit,
         lever=max(_reach(body.skeleton, arm, pivot) for arm in body.arms) * unit,
     )
     return limb, unit

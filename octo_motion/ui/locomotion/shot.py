@@ -117,6 +117,8 @@ class _Moving:
     """(moments, 4)"""
     swimming: Floats | None
     """(moments,) how far the body swims, 0…1, where the gait changes."""
+    lying: Sequence[np.ndarray]
+    """For each arm (moments, joints) which rest on the ground."""
 
 
 @dataclass(eq=False)
@@ -263,6 +265,7 @@ class Shot:
             locations=self.locations,
             orientations=self.orientations,
             swimming=self.swimming,
+            lying=posed.lying,
         )
         every = self.every
         self.locations, self.orientations = self.locations[::every], self.orientations[::every]
@@ -616,6 +619,7 @@ class Shot:
             arms=actions.rotation_channels(armature, self.generator.bones, moving.rotations),
             mantle=actions.rotation_channels(armature, self.mantle, held),
             stretch=self._stretch(armature, moving.strains),
+            lying=moving.lying if self._ground() is not None else (),
         )
 
     def _in_place(self) -> tuple[Floats, Floats]:
