@@ -102,7 +102,7 @@ def test_the_reported_miss_is_the_one_that_the_bones_show(name: str) -> None:
 
     from octo_motion.core.locomotion.targets import contraction, link_rotations, pseudo_targets
 
-    angles = PRESETS[name].curve(1).evaluate(generator.arm_phases(cycle(48))[:, 0])
+    angles = generator.settings.gait.curve(arm.pair).evaluate(generator.arm_phases(cycle(48))[:, 0])
     angles[..., 1] *= -1.0  # left: towards the front is clockwise
     lengths = skeleton.lengths[[skeleton.index[bone] for bone in arm.bones]]
     groups = np.add.reduceat(lengths, [0, *np.cumsum(generator_sizes(lengths))[:2]])
