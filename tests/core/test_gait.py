@@ -80,9 +80,13 @@ def test_rear_arms_do_what_a_gait_has_for_them_where_there_are_fewer(pairs: int)
 
 
 def test_offsets_of_single_arms_move_to_the_rear_with_their_pairs() -> None:
-    table = dataclasses.replace(PRESETS["walk"], offsets={(4, "LEFT"): 1.0, (1, "RIGHT"): 2.0})
+    table = dataclasses.replace(PRESETS["tiptoe"], offsets={(4, "LEFT"): 1.0, (1, "RIGHT"): 2.0})
     assert table.for_pairs(3).offsets == {(3, "LEFT"): 1.0}
     assert table.for_pairs(4) is table
+
+
+def test_where_all_arms_walk_each_pair_keeps_its_own() -> None:
+    assert PRESETS["hurry"].for_pairs(3) is PRESETS["hurry"]
 
 
 def test_a_pair_may_have_a_curve_of_its_own() -> None:

@@ -113,9 +113,12 @@ class GaitTable:
     def for_pairs(self, pairs: int) -> GaitTable:
         """The table for a body of so many pairs of arms.
 
-        Pairs count from the front, but what a gait has for its last pair, its rear arms are to do
-        also where there are fewer.
+        Pairs count from the front. Where a gait lets some arms hold no ground, those of its last
+        pair are the ones that do, and so are the rear arms of a body that has fewer: else nothing
+        would carry it.
         """
+        if not any(curve.free for curve in self.curves.values()):
+            return self
         known = [*self.curves, *(pair for pair, _ in self.offsets)]
         beyond = max(known) - pairs
         if beyond <= 0:
