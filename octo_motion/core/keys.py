@@ -44,7 +44,9 @@ _SLACK: Final = 1.15
 """Bounds within which key frames are chosen: what fitting makes up for afterwards."""
 _LEVERAGE: Final = 2.5
 """Distances of the tip, as shares of the chain's length, that a bone may be turned away when key
-frames are chosen: what others make up for."""
+frames are chosen: what others make up for …"""
+_HELD_LEVERAGE: Final = 4.2
+"""… and the same of joints that are bounded by themselves."""
 _CHOOSING: Final = 0.2
 """Share of the work that it takes to choose key frames."""
 
@@ -172,7 +174,10 @@ class _Plan:
         if limb.chain is not None:
             # Bones that are further off would move the tip by more than others can make up for.
             length = np.linalg.norm(limb.chain.steps, axis=1).sum()
-            distance = angle = min(angle, _LEVERAGE * float(np.mean(limb.distance)) / length)
+            distance = _LEVERAGE * float(np.mean(limb.distance))
+            if limb.room is not None and np.any(held := np.isfinite(limb.room)):
+                distance = min(distance, _HELD_LEVERAGE * float(np.mean(limb.room[held])))
+            distance = angle = min(angle, distance / length)
         unit = distance / angle
         kept = [limb.tracks[place] for place in tracks]
         kept = [
