@@ -352,14 +352,15 @@ def test_few_keys_are_measured_as_blender_plays_them(travel_on: str, mode: str) 
     )
 
 
-def test_few_keys_slip_by_what_they_leave_out(octopus: Any) -> None:
+def test_few_keys_hold_what_rests_however_far_tips_may_be_off(octopus: Any) -> None:
     exact = {figure.kind: figure.value for figure in computed(octopus).figures}
     octopus.octo_motion.locomotion.keys = "REDUCED"
     octopus.octo_motion.locomotion.key_distance = 0.02
     few = {figure.kind: figure.value for figure in computed(octopus).figures}
-    assert few["SLIP"] > exact["SLIP"]
-    # The tolerance, to either side.
-    assert few["SLIP"] < exact["SLIP"] + 2.5 * 0.02
+    # They are what the keys play, and so not the same ...
+    assert few["SLIP"] != exact["SLIP"]
+    # ... but what rests has a bound of its own, to either side, at and between frames.
+    assert few["SLIP"] < exact["SLIP"] + 2.5 * 0.003
 
 
 def test_a_walk_in_place_is_measured_against_the_ground_that_goes_by(octopus: Any) -> None:
