@@ -548,7 +548,7 @@ class OCTO_MOTION_PG_locomotion(
             (
                 "ARM",
                 "Each Arm",
-                "An arm's pose is one column, easy to retime. Some three quarters more keys",
+                "An arm's pose is one column, easy to retime. Some two thirds more keys",
                 0,
             ),
             (
