@@ -150,7 +150,8 @@ class Search:
     def _join(self) -> None:
         """Bring the handles of keys into line where that keeps to the bounds, more or less."""
         corners = self._smooth
-        self._smooth = np.ones_like(self._smooth)
+        # Written through a flat view, which only rows in order have.
+        self._smooth = np.ones(self._smooth.shape, dtype=bool)
         while True:
             curves = self._laid()
             points = curves.aligned(self._points)
