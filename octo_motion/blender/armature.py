@@ -107,6 +107,15 @@ def selected_bones(armature: bpy.types.Object) -> tuple[str, ...]:
     return tuple(bone.name for bone in armature.pose.bones if versions.is_selected(bone))
 
 
+def deformed_meshes(armature: bpy.types.Object) -> list[bpy.types.Object]:
+    """The mesh objects that an armature deforms, whether or not they are its children."""
+    return [
+        item
+        for item in bpy.data.objects
+        if item.type == "MESH" and item.find_armature() == armature
+    ]
+
+
 def world_matrix(armature: bpy.types.Object) -> Floats:
     """The object's world matrix, (4, 4)."""
     return np.array(armature.matrix_world, dtype=np.float64)
@@ -133,9 +142,4 @@ def _driven_bones(armature: bpy.types.Object) -> set[str]:
 
 def _vertex_group_names(armature: bpy.types.Object) -> set[str]:
     """Names of the vertex groups of all meshes that the armature deforms."""
-    return {
-        group.name
-        for item in bpy.data.objects
-        if item.type == "MESH" and item.find_armature() == armature
-        for group in item.vertex_groups
-    }
+    return {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}

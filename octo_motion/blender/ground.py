@@ -14,6 +14,7 @@ from ..core.locomotion.chains import joint_positions
 from ..core.remembered import Remembered, key_of
 from ..core.rotations import Floats
 from ..core.skeleton import Skeleton
+from .armature import deformed_meshes
 
 _MOST_POINTS: Final = 6000
 """Points of a skin that are looked at; an arm's thickness needs no more."""
@@ -138,10 +139,9 @@ def _skin(armature: bpy.types.Object, size: float) -> Floats:
     """
     inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
     found: list[tuple[np.ndarray, Floats]] = []
-    for item in armature.children_recursive:
+    for item in deformed_meshes(armature):
         mesh = item.data
-        if not isinstance(mesh, bpy.types.Mesh) or item.find_armature() != armature:
-            continue
+        assert isinstance(mesh, bpy.types.Mesh)
         points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
         if len(points):
             _read(mesh, "position", "vector", points.ravel())

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.remembered import key_of
 from ..core.rotations import Floats
+from .armature import deformed_meshes
 
 _MOST_VERTICES: Final = 3_000
 """Of more, only every second, third … is looked at."""
@@ -148,9 +149,7 @@ def _meshes(
 ) -> Iterator[tuple[bpy.types.Object, Floats, int]]:
     """Meshes that the armature deforms, points of theirs, and at every how many these are."""
     inverse = np.array(armature.matrix_world.inverted_safe(), dtype=np.float64)
-    for item in bpy.data.objects:
-        if item.type != "MESH" or item.find_armature() != armature:
-            continue
+    for item in deformed_meshes(armature):
         mesh = item.data
         assert isinstance(mesh, bpy.types.Mesh)
         step = max(1, -(-len(mesh.vertices) // _MOST_VERTICES))
@@ -163,18 +162,20 @@ def _meshes(
 
 
 def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
-    """Of each mesh, the points at rest that follow a bone of that name most."""
+    """Of each mesh, the points at rest that follow a bone most, with the bone's name.
+
+    Groups of other names say nothing of bones: masks, pins of cloth.
+    """
+    assert isinstance(armature.data, bpy.types.Armature)
+    bones = armature.data.bones
     for item, moved, step in _meshes(armature):
         assert isinstance(item.data, bpy.types.Mesh)
+        names = {group.index: group.name for group in item.vertex_groups if group.name in bones}
         owner = np.full(len(moved), -1)
         vertices = item.data.vertices
         for number in range(len(moved)):
-            groups = vertices[number * step].groups
-            if len(groups) > 0:
+            groups = [each for each in vertices[number * step].groups if each.group in names]
+            if groups:
                 owner[number] = max(groups, key=lambda each: each.weight).group
-        order = np.argsort(owner, kind="stable")
-        found, starts = np.unique(owner[order], return_index=True)
-        names = {group.index: group.name for group in item.vertex_groups}
-        for group, chosen in zip(found, np.split(order, starts[1:]), strict=True):
-            if group in names:
-                yield names[group], moved[chosen]
+        for group in np.unique(owner[owner >= 0]).tolist():
+            yield names[group], moved[owner == group]

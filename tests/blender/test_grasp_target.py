@@ -117,6 +117,26 @@ def test_arms_are_as_thick_as_their_skin() -> None:
     assert np.all(np.diff(radii) < 0.0)
 
 
+def test_a_mask_over_the_skin_does_not_make_its_arms_thinner() -> None:
+    bpy.ops.octo_motion.add_octopus()
+    octopus: Any = bpy.context.object
+    chain = [f"arm1.{number:02}.L" for number in range(1, 13)]
+    (before,) = skin_radii(octopus, [chain])
+    (skin,) = octopus.children
+    skin.vertex_groups.new(name="Mask").add(range(len(skin.data.vertices)), 1.0, "REPLACE")
+    (after,) = skin_radii(octopus, [chain])
+    np.testing.assert_array_equal(after, before)
+
+
+def test_a_mesh_without_vertices_tells_nothing() -> None:
+    bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    octopus: Any = bpy.context.object
+    empty: Any = bpy.data.objects.new("Empty", bpy.data.meshes.new("Empty"))
+    empty.modifiers.new("Armature", "ARMATURE").object = octopus
+    (radii,) = skin_radii(octopus, [[f"arm1.{number:02}.L" for number in range(1, 13)]])
+    assert radii[0] == pytest.approx(0.036, rel=0.01)
+
+
 def test_an_arm_without_skin_is_slender() -> None:
     bpy.ops.octo_motion.add_octopus(with_mesh=False)
     octopus: Any = bpy.context.object

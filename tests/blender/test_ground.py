@@ -95,6 +95,19 @@ def test_the_skin_tells_how_thick_arms_are() -> None:
     np.testing.assert_allclose(radii[0][1:], radii[1][1:], rtol=0.25)
 
 
+def test_a_skin_need_be_no_child_of_its_armature() -> None:
+    click("add_octopus", with_mesh=True)
+    armature: Any = bpy.context.object
+    click("detect_arms")
+    as_child = arm_radii(armature, read_skeleton(armature), arms_of(armature))
+    (skin,) = armature.children
+    skin.parent = None
+    bpy.context.view_layer.update()
+    by_modifier = arm_radii(armature, read_skeleton(armature), arms_of(armature))
+    for before, after in zip(as_child, by_modifier, strict=True):
+        np.testing.assert_array_equal(after, before)
+
+
 def test_arms_without_a_skin_are_slender() -> None:
     armature = make_octopus()
     bones = [f"Arm1_{number}.L" for number in range(1, 7)]
