@@ -32,7 +32,7 @@ def require_editable(armature: bpy.types.Object) -> None:
     armature_data(armature)
     if armature.library is not None:
         raise WriteError(
-            f"'{armature.name}' is linked from '{armature.library.name}': its list of arms is "
+            f"'{armature.name}' is linked from '{armature.library.name}': its settings are "
             "read-only here.",
             "Make a library override (Object > Library Override > Make).",
         )

@@ -3,7 +3,8 @@
 
 A marker is an empty, a cone that points the way the arm lies. What it stands for is written on
 it (``Object.octo_motion.contact``); its armature is known by name, so that nothing here outlives
-an undo or a file.
+an undo or a file, and no deleted armature is kept in it. An armature that was renamed since is told
+from a copy of it by what it was once called: of a copy, the other one is still there.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from ..core.rotations import Floats
 
 _SIZE: Final = 0.07
 """Arm lengths."""
+_COLLECTION: Final = " Contacts"
+"""How names of collections of markers end, after that of their armature."""
 _MOVED: Final = 1e-4
 """Marker sizes by which a marker may be off where it was put, and radians."""
 
@@ -43,23 +46,31 @@ class Contact:
     """Frames that a cycle takes there."""
 
 
-def markers(armature: bpy.types.Object) -> list[bpy.types.Object]:
-    """The markers of an armature that are in some scene, by name."""
+def markers(armature: bpy.types.Object, once: str = "") -> list[bpy.types.Object]:
+    """The markers of an armature that are in some scene, by name.
+
+    Args:
+        armature: the armature object.
+        once: what it was called when its markers were put.
+    """
+    names = {armature.name}
+    if once and bpy.data.objects.get((once, None)) is None:
+        names.add(once)
     found = [
         item
         for item in bpy.data.objects
-        if item.type == "EMPTY" and _own(item).armature == armature.name and item.users_scene
+        if item.type == "EMPTY" and _own(item).armature in names and item.users_scene
     ]
     return sorted(found, key=lambda item: item.name)
 
 
-def read_markers(armature: bpy.types.Object) -> dict[tuple[str, int], Contact]:
+def read_markers(armature: bpy.types.Object, once: str = "") -> dict[tuple[str, int], Contact]:
     """What the markers say: one that was moved or turned is locked where it is now.
 
-    Of two copies of a marker, the first by name counts.
+    Of two copies of a marker, the first by name counts. Arguments as of :func:`markers`.
     """
     contacts: dict[tuple[str, int], Contact] = {}
-    for item in markers(armature):
+    for item in markers(armature, once):
         own = _own(item)
         place = np.array(item.matrix_world.translation, dtype=np.float64)
         heading = _heading(item)
@@ -80,7 +91,7 @@ def read_markers(armature: bpy.types.Object) -> dict[tuple[str, int], Contact]:
 
 
 def write_markers(
-    armature: bpy.types.Object, contacts: Sequence[Contact], arm_length: float
+    armature: bpy.types.Object, contacts: Sequence[Contact], arm_length: float, once: str = ""
 ) -> None:
     """Put markers where the contacts are: those that are there are moved, others made or removed.
 
@@ -88,10 +99,11 @@ def write_markers(
         armature: whose they are.
         contacts: all of them.
         arm_length: metres.
+        once: as of :func:`markers`.
     """
     known: dict[tuple[str, int], bpy.types.Object] = {}
     surplus: list[bpy.types.Object] = []
-    for item in markers(armature):
+    for item in markers(armature, once):
         place = _own(item).arm, _own(item).cycle
         (surplus.append(item) if place in known else known.setdefault(place, item))
     collection = None
@@ -108,12 +120,19 @@ def write_markers(
     _remove([*known.values(), *surplus])
 
 
-def remove_markers(armature: bpy.types.Object) -> None:
-    """Take all markers of an armature away, and their collection."""
-    _remove(markers(armature))
-    collection = bpy.data.collections.get(_collection_name(armature))
-    if collection is not None and not collection.all_objects and not collection.children:
-        bpy.data.collections.remove(collection)
+def remove_markers(armature: bpy.types.Object, once: str = "") -> None:
+    """Take all markers of an armature away, and their collection.
+
+    Arguments as of :func:`markers`.
+    """
+    found = markers(armature, once)
+    # An armature may have been renamed since its collection was made.
+    holders = {each.name for item in found for each in item.users_collection}
+    _remove(found)
+    for name in {f"{armature.name}{_COLLECTION}", *holders}:
+        each = bpy.data.collections.get((name, None)) if name.endswith(_COLLECTION) else None
+        if each is not None and not each.all_objects and not each.children:
+            bpy.data.collections.remove(each)
 
 
 def _own(item: bpy.types.Object) -> Any:
@@ -144,13 +163,10 @@ def _remove(items: Iterable[bpy.types.Object]) -> None:
         bpy.data.objects.remove(item)
 
 
-def _collection_name(armature: bpy.types.Object) -> str:
-    return f"{armature.name} Contacts"
-
-
 def _collection(armature: bpy.types.Object) -> bpy.types.Collection:
-    name = _collection_name(armature)
-    collection = bpy.data.collections.get(name) or bpy.data.collections.new(name)
+    name = f"{armature.name}{_COLLECTION}"
+    # A linked file may have one of that name, too.
+    collection = bpy.data.collections.get((name, None)) or bpy.data.collections.new(name)
     scene = bpy.context.scene
     assert scene is not None
     if collection not in scene.collection.children_recursive:

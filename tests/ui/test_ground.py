@@ -263,6 +263,75 @@ def test_a_deleted_marker_is_a_contact_less(octopus: Any) -> None:
     assert len(markers(octopus)) == count - 1
 
 
+def test_a_copy_of_an_octopus_with_markers_walks_as_the_octopus_does(octopus: Any) -> None:
+    octopus.octo_motion.locomotion.frame_end = 40
+    click("contacts_show")
+    marker = middle_marker(octopus)
+    marker.location.x += 0.03
+    bpy.context.view_layer.update()
+    before = keys(generate(octopus))
+    count = len(markers(octopus))
+    copy = octopus.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    after = keys(generate(copy))
+    for key, values in before.items():
+        # Where it stood when it was copied is another place than where it was at first.
+        np.testing.assert_allclose(after[key], values, atol=1e-4)
+    assert not any(item.removed for item in ground_of(copy).contacts)
+    assert len(markers(copy)) == len(markers(octopus)) == count
+
+
+def test_markers_stay_those_of_an_octopus_that_is_renamed(octopus: Any) -> None:
+    octopus.octo_motion.locomotion.frame_end = 40
+    click("contacts_show")
+    count = len(markers(octopus))
+    bpy.data.objects.remove(middle_marker(octopus))
+    before = keys(generate(octopus))
+    octopus.name = "Kraken"
+    after = keys(generate(octopus))
+    assert all(np.array_equal(after[key], values) for key, values in before.items())
+    assert len(ground_of(octopus).contacts) == 1
+    assert len(markers(octopus)) == count - 1
+    octopus.name = "Leviathan"
+    click("contacts_hide")
+    assert not [each for each in bpy.data.objects if each.type == "EMPTY"]
+    assert not bpy.data.collections
+
+
+def test_contacts_are_free_even_where_no_markers_can_be_shown_anew(octopus: Any) -> None:
+    click("contacts_show")
+    bpy.data.objects.remove(middle_marker(octopus))
+    octopus.octo_motion.locomotion.route = None
+    assert click("contacts_clear") == {"FINISHED"}
+    assert len(ground_of(octopus).contacts) == 0
+    assert not ground_of(octopus).shown
+    assert markers(octopus) == []
+
+
+def test_a_linked_collection_of_the_same_name_does_not_get_the_markers(
+    octopus: Any, tmp_path: Path
+) -> None:
+    library = str(tmp_path / "library.blend")
+    linked = bpy.data.collections.new("Octopus Contacts")
+    bpy.data.libraries.write(library, {linked}, fake_user=True)
+    bpy.data.collections.remove(linked)
+    file: Any = bpy.data.libraries.load(library, link=True)  # the stubs know no context manager
+    with file as (_, wanted):
+        wanted.collections = ["Octopus Contacts"]
+    click("contacts_show")
+    (holder,) = markers(octopus)[0].users_collection
+    assert holder.library is None
+
+
+def test_contacts_are_shifted_in_object_mode_alone(octopus: Any) -> None:
+    click("contacts_show")
+    markers(octopus)[0].select_set(state=True)
+    assert bpy.ops.octo_motion.contacts_shift.poll()
+    bpy.context.view_layer.objects.active = octopus
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not bpy.ops.octo_motion.contacts_shift.poll()
+
+
 def test_a_contact_can_be_shifted_by_frames(octopus: Any) -> None:
     click("contacts_show")
     marker = middle_marker(octopus)

@@ -22,7 +22,7 @@ from ...core.locomotion import gait
 from ...core.locomotion.detection import detect_arms
 from ..locomotion.properties import locomotion_settings, set_gait
 from ..locomotion.summary import Summary
-from ..locomotion.wishes import store
+from ..locomotion.wishes import once_called, store
 from ..locomotion.workflow import generate
 from . import pose_stage, splice_stage
 from .blender_said import blender_said
@@ -263,7 +263,7 @@ def _fill_lists(entry: ShotEntry, armature: bpy.types.Object, settings: Any) -> 
                     f"There is no arm '{each['arm']}'.", f"Name one of {', '.join(names)}."
                 )
         # Those that are shown would count too.
-        remove_markers(armature)
+        remove_markers(armature, once_called(settings.ground))
         settings.ground.shown = ""
         items = [{**each, "locked": "position" in each} for each in lists["contacts"]]
         store(settings.ground, {})

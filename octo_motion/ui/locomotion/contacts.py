@@ -9,14 +9,15 @@ import bpy
 from bpy.props import FloatProperty
 
 from ...blender.armature import active_armature
+from ...blender.arms import require_editable
 from ...blender.contacts import remove_markers
-from ...core.errors import SettingsError
+from ...core.errors import OctoMotionError, SettingsError
 from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from .shot import show_contacts
 from .standing import resting
-from .wishes import changed_by_hand, gathered, store
+from .wishes import changed_by_hand, gathered, once_called, store
 from .workflow import prepare
 
 
@@ -49,11 +50,10 @@ class OCTO_MOTION_OT_contacts_hide(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
+        require_editable(armature)
         settings = locomotion_settings(armature).ground
         store(settings, gathered(settings, armature))
-        settings.shown = ""
-        remove_markers(armature)
-        _activate(context, armature)
+        _take_away(context, armature)
 
 
 class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
@@ -67,16 +67,21 @@ class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
+        require_editable(armature)
         settings = locomotion_settings(armature).ground
         shown = bool(settings.shown)
         store(settings, {})
-        settings.shown = ""
-        remove_markers(armature)
-        _activate(context, armature)
-        if shown:
+        _take_away(context, armature)
+        if not shown:
+            return
+        try:
             shot = prepare(armature, context)
-            if shot.standing is not None and not shot.in_place:
-                show_contacts(armature, shot)
+        except OctoMotionError as error:
+            # They are free all the same.
+            self.report({"WARNING"}, f"No markers are shown: {error}")
+            return
+        if shot.standing is not None and not shot.in_place:
+            show_contacts(armature, shot)
 
 
 class OCTO_MOTION_OT_contacts_shift(OctoOperator, bpy.types.Operator):
@@ -98,10 +103,13 @@ class OCTO_MOTION_OT_contacts_shift(OctoOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _selected(context):
-            return True
-        cls.poll_message_set("Select markers of contacts.")
-        return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Go to object mode first")
+            return False
+        if not _selected(context):
+            cls.poll_message_set("Select markers of contacts")
+            return False
+        return True
 
     def run(self, context: bpy.types.Context) -> None:
         for item in _selected(context):
@@ -114,8 +122,11 @@ def _selected(context: bpy.types.Context) -> list[bpy.types.Object]:
     return [item for item in chosen if item.octo_motion.contact.armature]  # type: ignore[attr-defined]
 
 
-def _activate(context: bpy.types.Context, armature: bpy.types.Object) -> None:
-    """Make the armature active if what was active is gone."""
+def _take_away(context: bpy.types.Context, armature: bpy.types.Object) -> None:
+    """Take all markers away; the armature is active if what was active is gone."""
+    settings = locomotion_settings(armature).ground
+    remove_markers(armature, once_called(settings))
+    settings.shown = ""
     layer = context.view_layer
     if layer is not None and layer.objects.active is None and armature in layer.objects.values():
         layer.objects.active = armature

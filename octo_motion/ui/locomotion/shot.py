@@ -45,7 +45,7 @@ from .reach_motion import Carried, Reaching, Travelling, write_carried
 from .reduced import Body, Motion, Tolerances, reduced
 from .standing import Standing
 from .summary import Summary
-from .wishes import Place, Wanted, note_shown, store
+from .wishes import Place, Wanted, note_shown, once_called, store
 
 MISS: Final = 1e-3
 """Arm lengths by which a target may be missed without a word."""
@@ -704,8 +704,9 @@ def show_contacts(armature: bpy.types.Object, shot: Shot) -> int:
                 cycle_frames=float(off - on) / each.lasts,
             )
         )
-    write_markers(armature, contacts, shot.generator.arm_length * shot.scale)
-    note_shown(settings, contacts)
+    length = shot.generator.arm_length * shot.scale
+    write_markers(armature, contacts, length, once_called(settings))
+    note_shown(settings, armature, contacts)
     return len(contacts)
 
 

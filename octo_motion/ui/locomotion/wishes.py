@@ -51,9 +51,12 @@ def gathered(settings: OCTO_MOTION_PG_ground, armature: bpy.types.Object) -> dic
     wanted = {place: each for place, each in wanted.items() if each.matters}
     if not settings.shown:
         return wanted
-    found = read_markers(armature)
-    for arm, cycle in json.loads(settings.shown):
-        place = arm, cycle
+    once, places = _shown(settings)
+    found = read_markers(armature, once)
+    if once != armature.name and not found:
+        # A copy of the armature that has markers: nobody has taken any of its own away.
+        return wanted
+    for place in places:
         if place not in found:
             wanted[place] = replace(wanted.get(place, Wanted()), removed=True)
     for place, contact in found.items():
@@ -109,6 +112,22 @@ def changed_by_hand(settings: OCTO_MOTION_PG_ground) -> int:
     return sum(item.removed or item.shift != 0.0 or item.locked for item in settings.contacts)
 
 
-def note_shown(settings: OCTO_MOTION_PG_ground, contacts: Sequence[Contact]) -> None:
+def note_shown(
+    settings: OCTO_MOTION_PG_ground, armature: bpy.types.Object, contacts: Sequence[Contact]
+) -> None:
     """Remember which markers were put, so that one that is gone is known to be removed."""
-    settings.shown = json.dumps([(each.arm, each.cycle) for each in contacts])
+    places = [(each.arm, each.cycle) for each in contacts]
+    settings.shown = json.dumps({"armature": armature.name, "contacts": places})
+
+
+def once_called(settings: OCTO_MOTION_PG_ground) -> str:
+    """What the armature, or the one that it is a copy of, was called when it got markers."""
+    return _shown(settings)[0]
+
+
+def _shown(settings: OCTO_MOTION_PG_ground) -> tuple[str, list[Place]]:
+    """What :func:`note_shown` has noted: "" and nothing where no markers are shown."""
+    if not settings.shown:
+        return "", []
+    noted = json.loads(settings.shown)
+    return noted["armature"], [(arm, cycle) for arm, cycle in noted["contacts"]]
