@@ -21,8 +21,8 @@ _known: Final[Remembered[Skeleton]] = Remembered(4)
 
 
 def active_armature(context: bpy.types.Context) -> bpy.types.Object:
-    """The armature that the user works on: the active object, the one that deforms it, or the one
-    whose contact the active object marks.
+    """The armature that the user works on: the active object, the one that deforms it, the one
+    whose contact it marks, or the one whose route it is (a selected one first, of several).
 
     Raises:
         RigError: there is no such object.
@@ -32,7 +32,7 @@ def active_armature(context: bpy.types.Context) -> bpy.types.Object:
         raise RigError("No object is active.", "Select an armature.")
     if active.type == "ARMATURE":
         return active
-    armature = active.find_armature() or _marked_armature(active)
+    armature = active.find_armature() or _marked_armature(active) or _on_route(active, context)
     if armature is None:
         raise RigError(f"'{active.name}' is not an armature.", "Select an armature.")
     return armature
@@ -43,6 +43,22 @@ def _marked_armature(active: bpy.types.Object) -> bpy.types.Object | None:
     name = active.octo_motion.contact.armature  # type: ignore[attr-defined]
     found = bpy.data.objects.get(name) if name else None
     return found if found is not None and found.type == "ARMATURE" else None
+
+
+def _on_route(active: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object | None:
+    """The armature that goes along a curve."""
+    layer = context.view_layer
+    if active.type != "CURVE" or layer is None:
+        return None
+    followers = [
+        each
+        for each in layer.objects
+        if each.type == "ARMATURE"
+        # Settings come into being when they are looked at: what has none is left without.
+        and each.is_property_set("octo_motion")
+        and each.octo_motion.locomotion.route == active
+    ]
+    return next((each for each in followers if each.select_get()), next(iter(followers), None))
 
 
 def armature_data(armature: bpy.types.Object) -> bpy.types.Armature:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class ArmatureOperator(OctoOperator):
-    """An operator that needs an active armature, or one that deforms the active object."""
+    """An operator on the armature that the user works on, see ``active_armature``."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -12,7 +12,7 @@ from ..core.errors import RigError
 
 
 def armature_in(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active armature, or the one that deforms the active object; ``None`` without."""
+    """The armature that the user works on, see ``active_armature``; ``None`` without."""
     try:
         return active_armature(context)
     except RigError:

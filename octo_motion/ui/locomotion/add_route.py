@@ -46,7 +46,10 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
         return True
 
     def run(self, context: bpy.types.Context) -> None:
-        armature = armature_in(context)
+        active = context.object
+        # Beside a route that is there, a curve is one more: whoever goes along that one goes on.
+        is_curve = active is not None and active.type == "CURVE"
+        armature = None if is_curve else armature_in(context)
         suggested = suggested_control_points(armature, context)
         for name, point in zip(_POINTS, suggested, strict=True):
             if not self.properties.is_property_set(name):

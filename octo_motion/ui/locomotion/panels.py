@@ -346,6 +346,8 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
         layout.prop(settings, "tell_overlaps")
         row = layout.row(align=True)
         row.scale_y = 1.5
+        # Split, the name of the switch would take half of the button's room.
+        row.use_property_split = False
         row.operator(OCTO_MOTION_OT_generate_locomotion.bl_idname, icon="PLAY", text="Generate")
         row.prop(settings, "live", toggle=True, icon="FILE_REFRESH")
         if settings.live_error:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
 import bpy.utils.previews
-from bl_operators.presets import AddPresetBase
 from bl_ui.utils import PresetPanel
 from bpy.props import StringProperty
 
@@ -22,6 +21,7 @@ from ...blender.armature import active_armature
 from ...blender.presets import load_gait
 from ...core.errors import SettingsError
 from ..armature_operator import ArmatureOperator
+from ..armature_preset import ARMATURE, ArmaturePresetAdd
 from .gait_properties import DEFAULT_GAIT, assign
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait, set_gait
 
@@ -145,7 +145,9 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
             settings.travel_on = "OBJECT"
         reset(settings)
         try:
-            bpy.utils.execfile(str(path))
+            # The file is about the active object, which may as well be a route or a marker.
+            with context.temp_override(object=armature):
+                bpy.utils.execfile(str(path))
             read_gait(settings)
         except Exception as error:
             # Whatever a file of the user's does: what it left half done is made whole.
@@ -168,18 +170,15 @@ class OCTO_MOTION_MT_setups(bpy.types.Menu):
 
 
 class OCTO_MOTION_OT_setup_add(  # pyright: ignore[reportIncompatibleMethodOverride]
-    AddPresetBase, bpy.types.Operator
+    ArmaturePresetAdd, bpy.types.Operator
 ):
     bl_idname = "octo_motion.setup_add"
     bl_label = "Keep as Set-Up"
     bl_description = "Keep how the creature moves, for all armatures and files"
-    # A file stays when something else is undone.
-    bl_options = {"REGISTER"}
     preset_menu = "OCTO_MOTION_MT_setups"
     preset_subdir = FOLDER
     preset_defines = [
-        "active = bpy.context.object",
-        "armature = active if active.type == 'ARMATURE' else active.find_armature()",
+        *ARMATURE,
         "settings = armature.octo_motion.locomotion",
     ]
 
@@ -191,10 +190,6 @@ class OCTO_MOTION_OT_setup_add(  # pyright: ignore[reportIncompatibleMethodOverr
             *("settings.table.as_text", "settings.gait"),
             *(f"settings.{path}" for path in governed()),
         ]
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return OCTO_MOTION_OT_setup_load.poll(context)
 
 
 class OCTO_MOTION_PT_setups(PresetPanel, bpy.types.Panel):

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
-from bl_operators.presets import AddPresetBase
 from bpy.props import BoolProperty, EnumProperty
 
 from ...blender.actions import writable_armature
@@ -21,6 +20,8 @@ from ...core.splicing.bone_names import mirrored
 from ...core.splicing.landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED
 from ...core.splicing.mapping import map_skeleton
 from ..armature_operator import ArmatureOperator
+from ..armature_preset import ARMATURE, ArmaturePresetAdd
+from ..panel_base import armature_in
 from . import landmark_properties
 from .landmark_properties import PROPERTIES, read_landmarks, title, write_landmarks
 from .properties import splicing_settings
@@ -193,34 +194,27 @@ class OCTO_MOTION_MT_landmark_presets(bpy.types.Menu):
 
     def draw(self, context: bpy.types.Context | None) -> None:
         """All presets, as in Blender's own menus."""
-        self.draw_preset(cast("bpy.types.Context", context))
+        context = cast("bpy.types.Context", context)
+        # The files are about the active object, which may as well be the armature's mesh or route.
+        armature = armature_in(context)
+        if armature is not None:
+            cast("Any", self).layout.context_pointer_set("object", armature)
+        self.draw_preset(context)
 
 
 class OCTO_MOTION_OT_landmark_preset_add(  # pyright: ignore[reportIncompatibleMethodOverride]
-    AddPresetBase, bpy.types.Operator
+    ArmaturePresetAdd, bpy.types.Operator
 ):
     bl_idname = "octo_motion.landmark_preset_add"
     bl_label = "Keep Landmarks as Preset"
     bl_description = "Keep the table, for all rigs whose bones are called the same"
-    # A file stays when something else is undone.
-    bl_options = {"REGISTER"}
     preset_menu = "OCTO_MOTION_MT_landmark_presets"
     preset_subdir = "octo_motion/landmarks"
     preset_defines = [
-        "active = bpy.context.object",
-        "armature = active if active.type == 'ARMATURE' else active.find_armature()",
+        *ARMATURE,
         "landmarks = armature.octo_motion.splicing.landmarks",
     ]
     preset_values = [f"landmarks.{name}" for name in PROPERTIES.values()]
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        try:
-            active_armature(context)
-        except RigError as error:
-            cls.poll_message_set(str(error).rstrip("."))
-            return False
-        return True
 
 
 def draw_landmarks(
