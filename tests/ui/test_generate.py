@@ -848,6 +848,15 @@ def test_a_long_job_shows_progress_and_comes_to_its_end(long_job: tuple[Any, Any
     assert operator.reports == ["Walk of 120 frames (5.0 s): 'Octopus Locomotion'."]
 
 
+def test_a_warning_is_what_the_status_bar_goes_on_to_show(long_job: tuple[Any, Any]) -> None:
+    operator, window = long_job
+    operator._shot.warnings.extend(["This first.", "Then this."])
+    while operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}:
+        pass
+    told = "Walk of 120 frames (5.0 s): 'Octopus Locomotion'."
+    assert operator.reports == [told, "Then this.", "This first."]
+
+
 def test_esc_leaves_the_scene_as_it_was(long_job: tuple[Any, Any]) -> None:
     operator, window = long_job
     before = scene_contents()

@@ -354,6 +354,7 @@ def test_a_contact_out_of_reach_is_told_with_its_frame(octopus: Any) -> None:
     name = marker.octo_motion.contact.arm
     (told,) = [each for each in warnings(octopus) if "out of reach" in each]
     assert told.startswith(f"'{name}' slides at frame ")
+    assert "Drag its marker nearer, raise Stretch" in told
 
 
 def test_an_override_keeps_contacts_of_its_own_and_lays_down_those_of_its_linked_file(

@@ -193,7 +193,9 @@ class Drawn:
 
     def __init__(self) -> None:
         self.labels: list[str] = []
+        self.marked: list[str] = []
         self.buttons: list[tuple[str, Any]] = []
+        self.alert = False
 
     def column(self, **_: Any) -> "Drawn":
         return self
@@ -201,8 +203,13 @@ class Drawn:
     def split(self, **_: Any) -> "Drawn":
         return self
 
+    def row(self, **_: Any) -> "Drawn":
+        return self
+
     def label(self, *, text: str) -> None:
         self.labels.append(text)
+        if self.alert:
+            self.marked.append(text)
 
     def operator(self, name: str, *, text: str, icon: str) -> Any:  # noqa: ARG002 - Blender's
         button = SimpleNamespace(kind="")
@@ -371,3 +378,22 @@ def test_a_walk_in_place_is_measured_against_the_ground_that_goes_by(octopus: An
         found = {figure.kind: figure.value for figure in computed(octopus).figures}
         assert found["SLIP"] < 2.0 * OF_ARM
         assert found["DEPTH"] < OF_ARM
+
+
+def test_what_one_would_see_is_marked_in_the_panel(small: Any) -> None:
+    settings = small.octo_motion.locomotion
+    values = {
+        "SLIP": 0.02,
+        "DEPTH": 0.004,
+        "STRAIN": 0.3,
+        "MISS": 0.1,
+        "TURN": 0.3,
+        "OVERLAP": 0.05,
+    }
+    quality_report.write_figures(
+        settings, [Figure(kind, value, 7, "Arm") for kind, value in values.items()]
+    )
+    drawn = Drawn()
+    quality_report.draw_figures(drawn, settings)
+    assert len(drawn.labels) == len(values)
+    assert drawn.marked == ["Slip: 2.0 %, Arm", "Miss: 10.0 %, Arm"]

@@ -28,6 +28,9 @@ are below the ground, by which share a bone is longer or shorter than at rest, a
 arm is from its target or foothold, radians per frame that a bone turns, and radii by which arms
 pass through each other or the body."""
 
+TOLD: Final = {"SLIP": 0.01, "DEPTH": 0.005, "MISS": 1e-3, "OVERLAP": 0.1}
+"""From where on a figure is too bad to pass without a word."""
+
 
 @dataclass(frozen=True)
 class Figure:

@@ -13,6 +13,7 @@ from bpy.props import BoolProperty
 from ...blender.skin_radii import skin_key, skin_parts, skin_radii
 from ...core.locomotion.arm_frames import ArmFrames, arm_frames
 from ...core.locomotion.chains import BodyFrame
+from ...core.locomotion.figures import TOLD
 from ...core.locomotion.generator import Arm
 from ...core.locomotion.keeping_apart import MOST_CAPSULES, Bulk, joints_that_count
 from ...core.locomotion.separation import Capsules, Separation, measure
@@ -21,7 +22,7 @@ from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
 from .gait_properties import OVERRIDE
 
-DEEP: Final = 0.1
+DEEP: Final = TOLD["OVERLAP"]
 """Share of a radius by which arms may overlap without a word: flesh gives."""
 
 _MOST_PARTED: Final = 200_000_000

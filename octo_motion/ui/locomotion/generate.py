@@ -61,6 +61,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         return f"Generating locomotion: {100.0 * progress:.0f} %    Esc: stop"
 
     def _tell(self, summary: Summary) -> None:
-        for warning in summary.warnings:
-            self.report({"WARNING"}, warning)
         self.report({"INFO"}, summary.message)
+        # Blender's status bar keeps the last, which is to be the one that says most.
+        for warning in reversed(summary.warnings):
+            self.report({"WARNING"}, warning)

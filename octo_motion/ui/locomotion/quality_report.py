@@ -20,7 +20,7 @@ from bpy.props import (
 from ...blender.armature import active_armature
 from ...blender.overrides import linked_names
 from ...core.errors import SettingsError
-from ...core.locomotion.figures import Figure
+from ...core.locomotion.figures import TOLD, Figure
 from ..armature_operator import ArmatureOperator
 from .gait_properties import OVERRIDE, OVERRIDE_LIST
 
@@ -124,7 +124,9 @@ def draw_figures(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     column = layout.column(align=True)
     for item in known_figures(settings):
         row = column.split(factor=_WORDS, align=True)
-        row.label(text=_told(item))
+        words = row.row()
+        words.alert = item.value > TOLD.get(item.kind, np.inf)
+        words.label(text=_told(item))
         jump = row.operator(
             OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
         )

@@ -20,7 +20,7 @@ from ...core.locomotion.between_frames import Course, raised_between
 from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.changes import between
 from ...core.locomotion.detection import Detection
-from ...core.locomotion.figures import Figure, Measured, Poses, automatic, figures
+from ...core.locomotion.figures import TOLD, Figure, Measured, Poses, automatic, figures
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Arm, Generator
 from ...core.locomotion.ground import Ground
@@ -47,7 +47,7 @@ from .standing import Standing
 from .summary import Summary
 from .wishes import Place, Wanted, note_shown, once_called, store
 
-MISS: Final = 1e-3
+MISS: Final = TOLD["MISS"]
 """Arm lengths by which a target may be missed without a word."""
 
 _MOVING: Final = 0.4
@@ -649,9 +649,10 @@ class Shot:
             # Bones that may not get longer do not, whatever Stretch is.
             longer = any(each.stretching for each in self._stands())
             remedy = "raise Stretch" if longer else "lower Height"
+            first = "Drag its marker nearer" if self._dragged(int(arm)) else "Lower Hold"
             told = (
                 f"'{self.arms[arm].name}' slides at frame {self.frames[frame]:.0f}: its contact is "
-                f"{self.out_of_reach[frame, arm]:.2g} arm lengths out of reach. Lower Hold, "
+                f"{self.out_of_reach[frame, arm]:.2g} arm lengths out of reach. {first}, "
                 f"{remedy} or shorten the stride."
             )
             return [told]
@@ -665,6 +666,13 @@ class Shot:
             f"'{self.arms[worst].name}' stays {misses[worst]:.2g} arm lengths away."
         )
         return [told]
+
+    def _dragged(self, arm: int) -> bool:
+        """Whether a contact of an arm is where the artist has put it."""
+        name = self.arms[arm].name
+        return any(
+            wish.position is not None for (whose, _), wish in self.wanted.items() if whose == name
+        )
 
     def _extend_range(self) -> tuple[str, ...]:
         scene = bpy.data.scenes.get(self.scene)

@@ -145,16 +145,17 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
             self._session.undo()
 
     def _tell(self, session: ImportSession) -> None:
-        for clip in session.clips:
-            for note in clip.notes:
-                self.report({"WARNING"}, f"'{clip.file}': {note}")
-        for path, error in session.refused:
-            self.report({"WARNING"}, f"'{path.name}' was not imported. {error}")
         count = len(session.clips)
         told = f"{count} {'clip' if count == 1 else 'clips'} imported"
         if session.refused:
             told += f", {len(session.refused)} refused"
         self.report({"INFO"}, f"{told}.")
+        # Blender's status bar keeps the last, which is to be the one that says most.
+        for clip in session.clips:
+            for note in clip.notes:
+                self.report({"WARNING"}, f"'{clip.file}': {note}")
+        for path, error in session.refused:
+            self.report({"WARNING"}, f"'{path.name}' was not imported. {error}")
 
 
 def draw_in_import_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> None:  # noqa: ARG001
