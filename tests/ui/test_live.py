@@ -6,6 +6,7 @@ Blender as a module runs no timers: what a timer would do is called by hand.
 
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -292,6 +293,26 @@ def test_an_action_that_is_edited_while_its_route_is_dragged_is_left_alone(
     assert not settings_of(octopus).live
 
 
+def test_an_action_that_a_script_edits_without_a_word_is_left_alone(
+    octopus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # However soon after a motion was made.
+    monkeypatch.setattr(time, "monotonic", lambda: 0.0)
+
+    def drag_a_little() -> None:
+        settings_of(octopus).route.location.x += 0.1
+        bpy.context.view_layer.update()
+        live.run_pending()
+
+    drag_a_little()
+    curve = next(iter(action_of(octopus).layers[0].strips[0].channelbags[0].fcurves))
+    # Blender tells of changed keys, but not of this.
+    curve.modifiers.new("NOISE")
+    drag_a_little()
+    assert len(curve.modifiers) == 1
+    assert not settings_of(octopus).live
+
+
 def test_an_action_that_was_edited_is_left_alone(octopus: Any) -> None:
     action = action_of(octopus)
     curve = next(iter(action.layers[0].strips[0].channelbags[0].fcurves))
@@ -400,6 +421,88 @@ def test_a_live_octopus_that_is_deleted_is_forgotten(octopus: Any) -> None:
     bpy.data.objects.remove(octopus)
     settle()
     assert not settle()
+
+
+def test_an_octopus_that_is_renamed_is_followed_on(octopus: Any) -> None:
+    octopus.name = "Kraken"
+    assert not settle()
+    before = motion(octopus)
+    settings_of(octopus).route.location.x += 0.3
+    assert settle()
+    assert motion(octopus) != before
+
+
+def test_a_marker_of_an_octopus_that_was_renamed_is_followed(octopus: Any) -> None:
+    click("contacts_show")
+    octopus.name = "Kraken"
+    bpy.context.view_layer.update()
+    before = motion(octopus)
+    markers(octopus, "Octopus")[2].location.x += 0.05
+    bpy.context.view_layer.update()
+    assert live.pending()
+    live.run_pending()
+    assert motion(octopus) != before
+
+
+def test_an_octopus_is_followed_once_the_add_on_is_switched_on_again(octopus: Any) -> None:
+    octo_motion.unregister()
+    octo_motion.register()
+    before = motion(octopus)
+    # Only the route: nothing tells of the octopus itself.
+    settings_of(octopus).route.location.x += 0.3
+    bpy.context.view_layer.update()
+    assert live.pending()
+    live.run_pending()
+    assert motion(octopus) != before
+
+
+def test_another_scene_of_another_frame_rate_does_not_matter(octopus: Any) -> None:
+    other = bpy.data.scenes.new("Other")
+    other.render.fps = 60
+    here, there = (bpy.data.objects.new(name, None) for name in ("Here", "There"))
+    bpy.context.scene.collection.objects.link(here)
+    other.collection.objects.link(there)
+    settle()
+    made = len(MADE)
+    for _ in range(2):
+        there.location.x += 1.0
+        other.view_layers[0].update()
+        here.location.x += 1.0
+        settle()
+    assert len(MADE) == made
+    octopus.users_scene[0].render.fps = 30
+    assert settle()
+
+
+def test_a_skin_that_is_no_child_of_the_octopus_is_followed(octopus: Any) -> None:
+    skin = make_square(0.1)
+    skin.modifiers.new("Armature", "ARMATURE").object = octopus
+    settle()
+    for each in skin.data.vertices:
+        each.co *= 2.0
+    skin.data.update()
+    assert settle()
+
+
+class Unasked:
+    """What Blender tells after an update, which nobody is to ask for."""
+
+    mode = "VIEWPORT"
+
+    @property
+    def updates(self) -> Any:
+        raise AssertionError("thousands of objects may be told of")
+
+
+def test_where_nothing_is_live_nobody_looks_at_what_moves(octopus: Any) -> None:
+    settings_of(octopus).live = False
+    settle()
+    told: Any = Unasked()
+    live._after_frame(bpy.context.scene, told)
+    live._after_update(bpy.context.scene, told)
+    settings_of(octopus).live = True
+    with pytest.raises(AssertionError, match="thousands"):
+        live._after_frame(bpy.context.scene, told)
 
 
 def test_while_a_tool_has_the_screen_the_motion_waits(

@@ -5,12 +5,13 @@ Blender tells after each update what has changed. If that is something that a mo
 a timer makes the motion anew a moment later, in place, outside the update; what changes in the
 meantime waits for the same turn. Only an action that was generated and that nobody has edited is
 touched. What our own writing changes is let through Blender's update before we listen again.
+
+Where nothing is live, Blender is not kept waiting: thousands of objects may move with each frame.
 """
 
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final, cast
@@ -20,22 +21,21 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...blender import actions
-from ...blender.armature import read_skeleton
+from ...blender.armature import deformed_meshes, read_skeleton
 from ...core import remembered
 from ...core.errors import OctoMotionError, RigError
 from ...core.remembered import key_of
 from ..plain import plain
+from . import live_properties
 from .previous import playing_action, previous_action
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from .wishes import gathered
+from .wishes import gathered, once_called
 from .workflow import RESULTS, prepare
 
 _SOON: Final = 0.01
 """Seconds from a change to the new motion at least: what changes together is made together."""
 _LATER: Final = 0.3
 """Seconds until it is tried again, while Blender renders or a tool of ours runs."""
-_TRUSTED: Final = 1.0
-"""Seconds within which an action that Blender has told no change of is not looked at again."""
 _NO_MATTER: Final = RESULTS | {
     *("contacts", "active_arm", "active_reach", "active_curve", "active_change", "shown_angle"),
     *("keys", "key_angle", "key_distance", "key_columns", "tell_overlaps"),
@@ -52,17 +52,17 @@ class _State:
         """What each live armature's motion was made from, by the object's name."""
         self.changed: dict[str, bool] = {}
         """Armatures to look at, and whether it is known already that they changed."""
-        self.looked: dict[str, float] = {}
-        """When all keys of an armature's action were last looked at; no action was changed since
-        but by us."""
-        self.rate = 0.0
-        """Frames per second."""
+        self.rates: dict[str, float] = {}
+        """Frames per second of each scene."""
+        self.complete = False
+        """Whether all live armatures of the file are among those seen."""
         self.busy = False
 
     def clear(self) -> None:
         self.seen.clear()
-        self.looked.clear()
         self.changed.clear()
+        self.rates.clear()
+        self.complete = False
         self.busy = False
 
 
@@ -96,6 +96,7 @@ def _handlers() -> list[tuple[Any, Any]]:
         (known.redo_post, _after_undo),
         (known.load_pre, _before_loading),
         (known.load_post, _after_loading),
+        (known.blend_import_post, _after_import),
     ]
 
 
@@ -133,63 +134,89 @@ def run_pending() -> float | None:
 
 @persistent
 def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if _state.busy or depsgraph.mode != "VIEWPORT":
+    if _state.busy or depsgraph.mode != "VIEWPORT" or not _listens():
         return
     touched = _touched(depsgraph)
     for each in touched:
         if isinstance(each, bpy.types.Object) and each.type == "ARMATURE":
             _look_at(each)
-    if not _state.seen:
-        return
-    if any(isinstance(each, bpy.types.Action) for each in touched):
-        _state.looked.clear()
-    rate = scene.render.fps / scene.render.fps_base
-    another_rate, _state.rate = rate != _state.rate and _state.rate > 0.0, rate
+    rate = _rate(scene)
+    another_rate = rate != _state.rates.get(scene.name, rate)
+    _state.rates[scene.name] = rate
     marked = {_marked(each) for each in touched if isinstance(each, bpy.types.Object)}
+    meshes = {each for each in touched if isinstance(each, bpy.types.Mesh)}
     for name in list(_state.seen):
         armature = _armature(name)
         if armature is None:
             del _state.seen[name]
-        elif another_rate or not touched.isdisjoint(_sources(armature)):
+        elif (
+            (another_rate and name in scene.objects)
+            or not touched.isdisjoint(_sources(armature))
+            or _is_skin(armature, meshes)
+        ):
             _soon(name, certain=True)
-        elif name in marked:
+        elif marked & {name, once_called(locomotion_settings(armature).ground)} - {""}:
             _soon(name, certain=False)
 
 
 @persistent
 def _after_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """A change that comes together with another frame, as while it plays, is told here alone."""
-    if _state.busy or depsgraph.mode != "VIEWPORT":
+    if _state.busy or depsgraph.mode != "VIEWPORT" or not _listens():
         return
-    touched = _touched(depsgraph)
-    for each in touched:
-        if isinstance(each, bpy.types.Object) and each.type == "ARMATURE":
-            if each.name not in _state.seen:
-                _look_at(each)
-            elif not pending():
-                # It moves with every frame: now and then is enough to see whether it is set anew.
-                _soon(each.name, certain=False, wait=_LATER)
-    if any(isinstance(each, bpy.types.Action) for each in touched):
-        _state.looked.clear()
+    followed = [each for name in _state.seen if (each := _armature(name)) is not None]
+    sources = [_sources(each) for each in followed]
+    touched = _touched(depsgraph, set(followed).union(*sources))
     still = {each for each in touched if not _is_animated(each)}
-    for name in list(_state.seen):
-        armature = _armature(name)
-        if armature is not None and not still.isdisjoint(_sources(armature)):
-            _soon(name, certain=True)
+    for armature, its in zip(followed, sources, strict=True):
+        if armature in touched and not pending():
+            # It moves with every frame: now and then is enough to see whether it is set anew.
+            _soon(armature.name, certain=False, wait=_LATER)
+        if not still.isdisjoint(its):
+            _soon(armature.name, certain=True)
 
 
-def _touched(depsgraph: bpy.types.Depsgraph) -> set[bpy.types.ID]:
-    """What has changed so that something may move; a selection, for one, moves nothing."""
-    return {
-        cast("bpy.types.ID", update.id.original)
-        for update in depsgraph.updates
-        if update.id is not None
-        and (
-            not isinstance(update.id, bpy.types.Object)
+def _listens() -> bool:
+    """Whether any armature is live; all that are so are known then."""
+    if not _state.complete or not all(map(_armature, _state.seen)):
+        # The add-on was switched on, a file was appended, an armature was renamed.
+        for each in _live_armatures():
+            if each.name not in _state.seen:
+                _state.seen[each.name] = _made_from(each, locomotion_settings(each))
+        _state.rates = {each.name: _rate(each) for each in bpy.data.scenes}
+        _state.complete = True
+    while live_properties.SWITCHED:
+        armature = _armature(live_properties.SWITCHED.pop())
+        if armature is not None:
+            _look_at(armature)
+    return bool(_state.seen)
+
+
+def _rate(scene: bpy.types.Scene) -> float:
+    return scene.render.fps / scene.render.fps_base
+
+
+def _touched(
+    depsgraph: bpy.types.Depsgraph, among: set[bpy.types.ID] | None = None
+) -> set[bpy.types.ID]:
+    """What has changed so that something may move; a selection, for one, moves nothing.
+
+    Args:
+        depsgraph: what tells it.
+        among: what is asked for, all if none.
+    """
+    found: set[bpy.types.ID] = set()
+    for update in depsgraph.updates:
+        each = cast("bpy.types.ID", update.id.original)  # type: ignore[union-attr]
+        if among is not None and each not in among:
+            continue
+        if (
+            not isinstance(each, bpy.types.Object)
             or update.is_updated_geometry
             or update.is_updated_transform
-        )
-    }
+        ):
+            found.add(each)
+    return found
 
 
 def _is_animated(each: bpy.types.ID) -> bool:
@@ -210,7 +237,7 @@ def _look_at(armature: bpy.types.Object) -> None:
     """Begin or cease to follow an armature, or see whether its settings have changed."""
     name = armature.name
     if not _is_live(armature):
-        for known in (_state.seen, _state.changed, _state.looked):
+        for known in (_state.seen, _state.changed):
             known.pop(name, None)
     elif name in _state.seen:
         _soon(name, certain=False)
@@ -252,8 +279,12 @@ def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
                 found.add(each.data)
             each = each.parent
     # Blender tags the armature's data with every pose: its bones are looked at themselves.
-    parts = [settings.weight_curve, *(child.data for child in armature.children)]
-    return found | {each for each in parts if each is not None}
+    return found | ({settings.weight_curve} - {None})
+
+
+def _is_skin(armature: bpy.types.Object, meshes: set[bpy.types.Mesh]) -> bool:
+    """Whether the armature deforms any of these."""
+    return bool(meshes) and any(each.data in meshes for each in deformed_meshes(armature))
 
 
 @persistent
@@ -268,6 +299,7 @@ def _after_undo(*_: object) -> None:
     for armature in _live_armatures():
         _state.seen[armature.name] = None
         _soon(armature.name, certain=True)
+    _state.complete = True
 
 
 @persistent
@@ -279,8 +311,12 @@ def _before_loading(*_: object) -> None:
 
 @persistent
 def _after_loading(*_: object) -> None:
-    for armature in _live_armatures():
-        _state.seen[armature.name] = _made_from(armature, locomotion_settings(armature))
+    _listens()
+
+
+@persistent
+def _after_import(*_: object) -> None:
+    _state.complete = False
 
 
 def _live_armatures() -> list[bpy.types.Object]:
@@ -345,7 +381,7 @@ def _follow(name: str, *, certain: bool) -> None:
 
 
 def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
-    kept = "" if _is_trusted(armature, settings) else _whose(armature, settings)
+    kept = _whose(armature, settings)
     if kept:
         settings.live = False
         settings.live_error = kept
@@ -357,19 +393,6 @@ def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> No
     shot.write(unedited=True)
     if settings.live_error:
         settings.live_error = ""
-    _state.looked.setdefault(armature.name, time.monotonic())
-
-
-def _is_trusted(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> bool:
-    """Whether an armature's action is ours for certain, without a look at each of its keys.
-
-    While something is dragged nobody edits an action, and Blender would have told.
-    """
-    fresh = time.monotonic() - _state.looked.get(armature.name, -np.inf) < _TRUSTED
-    if fresh and settings.result is not None and settings.result == playing_action(armature):
-        return True
-    _state.looked.pop(armature.name, None)
-    return False
 
 
 def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:

@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from .gait_properties import OVERRIDE
 
+SWITCHED: Final[set[str]] = set()
+"""Names of the armatures whose Live was switched, until somebody has looked."""
+
 
 def _tell(settings: Any, _context: bpy.types.Context) -> None:
     """A change in the panel is told to everyone by Blender, one by a script only like this."""
+    SWITCHED.add(settings.id_data.name)
     settings.id_data.update_tag(refresh={"OBJECT"})
 
 
