@@ -110,6 +110,10 @@ def varied(
     return gait.variation(PRESETS["walk"], columns, (1,) * arms, limits, seed)
 
 
+def test_no_frames_are_no_variation() -> None:
+    assert varied(np.empty(0), 5).shape == (0, 3, 3, 3)
+
+
 def test_no_range_is_no_variation() -> None:
     assert not np.any(varied(np.linspace(0, 40, 100), 5, (0.0, 0.0)))
 
@@ -205,6 +209,12 @@ FLAT = [0.0] * 5
         (damaged(head=[FLAT, FLAT]), "is damaged"),
         (damaged(head=[[0, 1], FLAT, FLAT]), "is damaged"),
         (damaged(head="up"), "is damaged"),
+        (damaged(head=5.0), "is damaged"),
+        (damaged(head=[0.0, 1.0, 2.0]), "is damaged"),
+        (damaged(phase=[[0], [90], [180], [270], [360]]), "is damaged"),
+        (damaged(pairs={"all": {"phase": [[0, 0], [360, 360]]}}), "is damaged"),
+        ("[" * 200_000, "The gait file is not JSON ("),
+        ("1" * 5000, "The gait file is not JSON ("),
     ],
 )
 def test_a_damaged_gait_file_says_what_is_wrong_with_it(text: str, message: str) -> None:

@@ -154,9 +154,10 @@ def test_long_shots_do_not_differ_from_short_ones() -> None:
     assert np.max(angle_between(whole[700:720], part)) <= 1e-9
 
 
-def test_no_frames_are_no_poses() -> None:
+@pytest.mark.parametrize("limits", [(0.0, 0.0), (-0.1, 0.1)])
+def test_no_frames_are_no_poses(limits: tuple[float, float]) -> None:
     skeleton, arms, body = body_with_arms(2, 3)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], variation=limits))
 
     assert generator.pose(np.empty(0), np.empty((0, 2))).rotations.shape == (0, 6, 4)
 

@@ -204,7 +204,7 @@ def variation(
     """
     low, high = limits
     result = np.zeros((*phases.shape, LINKS, len(ANGLES)))
-    if low == 0.0 and high == 0.0:
+    if phases.size == 0 or (low == 0.0 and high == 0.0):
         return result
     cycles = np.floor_divide(phases, CYCLE).astype(np.int64)
     rounds = np.broadcast_to(np.asarray(period, dtype=np.int64), phases.shape[1:])
@@ -262,12 +262,24 @@ def _columns_by_curve(table: GaitTable, pairs: tuple[int, ...]) -> dict[int, np.
 def curve_from_degrees(phases: list[float], **angles: list[list[float]]) -> GaitCurve:
     """A curve from degrees, each angle as one list of knot values for each link.
 
-    Angles that are not given stay at zero.
+    Args:
+        phases: of the knots.
+        angles: by their names; those that are not given stay at zero.
+
+    Raises:
+        ValueError: phases are no row of numbers, or an angle has not one for each link and knot.
     """
-    table = np.zeros((len(phases), LINKS, len(ANGLES)))
+    knots = np.asarray(phases, dtype=np.float64)
+    if knots.ndim != 1:
+        raise ValueError("its phases are no row of numbers")
+    table = np.zeros((len(knots), LINKS, len(ANGLES)))
     for name, links in angles.items():
-        table[:, :, ANGLES.index(name)] = np.asarray(links, dtype=np.float64).T
-    return GaitCurve(np.radians(np.asarray(phases, dtype=np.float64)), np.radians(table))
+        values = np.asarray(links, dtype=np.float64)
+        # One number would do for all links and knots, a row for one of the two: nobody means it.
+        if values.shape != (LINKS, len(knots)):
+            raise ValueError(f"{name} has not one number for each link and phase")
+        table[:, :, ANGLES.index(name)] = values.T
+    return GaitCurve(np.radians(knots), np.radians(table))
 
 
 def check(table: GaitTable) -> GaitTable:
@@ -365,6 +377,9 @@ def from_json(text: str, source: str = "The gait file") -> GaitTable:
         raise GaitError(
             f"{source} is not JSON (line {error.lineno}: {error.msg}).", "Choose a gait file."
         ) from error
+    except (ValueError, RecursionError) as error:
+        # A number of thousands of digits, or brackets in brackets without end.
+        raise GaitError(f"{source} is not JSON ({error}).", "Choose a gait file.") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise GaitError(f"{source} is not a gait of Octo Motion.", "Choose a gait file.")
     if content.get("version") != FORMAT_VERSION:
