@@ -22,7 +22,8 @@ from ...blender.presets import load_gait
 from ...core.errors import SettingsError
 from ..armature_operator import ArmatureOperator
 from ..armature_preset import ARMATURE, ArmaturePresetAdd
-from .gait_properties import DEFAULT_GAIT, assign
+from ..plain import plain
+from .gait_properties import DEFAULT_GAIT, assign, matched
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait, set_gait
 
 if TYPE_CHECKING:
@@ -109,6 +110,16 @@ def reset(settings: Any) -> None:
     set_gait(settings, load_gait(DEFAULT_GAIT))
 
 
+def _put_back(group: Any, before: dict[str, Any]) -> None:
+    """Give a group of properties the values that :func:`plain` has told of it."""
+    for name, value in before.items():
+        if group.bl_rna.properties[name].type == "COLLECTION":
+            for item, own in matched(group, name, value):
+                _put_back(item, own)
+        else:
+            assign(group, name, value)
+
+
 def shown_name(name: str) -> str:
     """How a file's name is shown."""
     return bpy.path.display_name(name)
@@ -139,7 +150,10 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
             raise SettingsError(
                 f"There is no set-up '{self.name}'.", f"Choose one of {', '.join(paths)}."
             )
-        settings = locomotion_settings(armature)
+        settings: Any = locomotion_settings(armature)
+        owned = ("travel_on", "gait", *governed())
+        before = {path: settings.path_resolve(path) for path in owned}
+        table = plain(settings.table, without=frozenset({"as_text"}))
         if settings.travel_on == "NONE" and settings.gait in _ON_THE_SPOT:
             # It stayed because of the set-up before.
             settings.travel_on = "OBJECT"
@@ -150,11 +164,15 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
                 bpy.utils.execfile(str(path))
             read_gait(settings)
         except Exception as error:
-            # Whatever a file of the user's does: what it left half done is made whole.
-            reset(settings)
+            # Whatever a file of the user's does: nothing of it is left.
+            for path, value in before.items():
+                owner, _, name = path.rpartition(".")
+                assign(settings.path_resolve(owner) if owner else settings, name, value)
+            # At last: the name of a gait, when it is set, fills the table.
+            _put_back(settings.table, table)
             raise SettingsError(
-                f"The set-up '{self.name}' is damaged: {error}",
-                "The default is loaded instead; remove the set-up.",
+                f"The set-up '{self.name}' is damaged: {str(error).rstrip('.')}.",
+                "Remove it, or keep it anew.",
             ) from error
 
 
