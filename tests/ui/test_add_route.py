@@ -41,6 +41,10 @@ def test_the_four_control_points_are_the_papers() -> None:
     np.testing.assert_array_equal(read_route(route).controls[0, :, :3], list(POINTS.values()))
 
 
+def test_the_curve_is_seen_where_it_runs_within_the_hills() -> None:
+    assert add_route(**POINTS).show_in_front
+
+
 def test_points_left_alone_suit_the_armature() -> None:
     new_armature(at=(3, 0, 1))
     route = read_route(add_route())

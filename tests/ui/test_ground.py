@@ -13,6 +13,7 @@ from octo_motion.core.errors import GroundError
 from octo_motion.core.locomotion import quality
 from octo_motion.core.locomotion.ground import Plane
 from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.ui.locomotion import ground_properties
 from octo_motion.ui.locomotion.properties import locomotion_settings
 from octo_motion.ui.locomotion.wishes import Wanted, changed_by_hand, gathered, store
 from octo_motion.ui.locomotion.workflow import prepare
@@ -344,6 +345,19 @@ def test_a_contact_can_be_shifted_by_frames(octopus: Any) -> None:
     # A marker is active: the button knows whose it is.
     click("generate_locomotion")
     assert marker.octo_motion.contact.frame_on == pytest.approx(before + 2.0, abs=0.3)
+
+
+def test_meshes_are_offered_as_ground_but_not_the_creatures_own_skin() -> None:
+    click("add_octopus")
+    armature: Any = bpy.context.object
+    skin = next(each for each in armature.children if each.type == "MESH")
+    ground = make_square()
+    offered = [
+        each.name
+        for each in (skin, ground, armature)
+        if ground_properties.may_be_ground(armature.octo_motion.locomotion.ground, each)
+    ]
+    assert offered == ["Ground"]
 
 
 def test_a_contact_out_of_reach_is_told_with_its_frame(octopus: Any) -> None:

@@ -21,8 +21,9 @@ from ...core.locomotion.limbs import StanceSettings
 from .gait_properties import OVERRIDE, OVERRIDE_LIST
 
 
-def _is_mesh(_settings: Any, candidate: bpy.types.Object) -> bool:
-    return candidate.type == "MESH"
+def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
+    """Whether an object is offered as ground: a mesh, but nobody's own skin."""
+    return candidate.type == "MESH" and candidate.find_armature() != settings.id_data
 
 
 class ContactItem(bpy.types.PropertyGroup):
@@ -82,7 +83,7 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         description="Mesh to walk on, as it is seen: with its modifiers, moved and scaled. Without "
         "one, the ground is where the route is",
         type=bpy.types.Object,
-        poll=_is_mesh,
+        poll=may_be_ground,
         override=OVERRIDE,
     )
     duty: FloatProperty(

@@ -214,6 +214,8 @@ class OCTO_MOTION_PT_setups(PresetPanel, bpy.types.Panel):
     bl_label = "Set-Ups"
     bl_space_type = "VIEW_3D"
     bl_region_type = "HEADER"
+    # Wide enough for every name below its picture.
+    bl_ui_units_x = 14
     preset_subdir = FOLDER
     preset_operator = OCTO_MOTION_OT_setup_load.bl_idname
     preset_add_operator = OCTO_MOTION_OT_setup_add.bl_idname
@@ -227,7 +229,7 @@ class OCTO_MOTION_PT_setups(PresetPanel, bpy.types.Panel):
         for name, icon in _icons():
             if icon:
                 box = grid.column(align=True)
-                box.template_icon(icon_value=icon, scale=4.0)
+                box.template_icon(icon_value=icon, scale=5.0)
                 _button(box, name, text=shown_name(name))
             else:
                 own.append(name)
