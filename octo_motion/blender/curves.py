@@ -100,7 +100,7 @@ def add_route_curve(
         point.co, point.handle_left, point.handle_right = place, left, right
     route = bpy.data.objects.new(name, data)
     route.location = world[0]
-    # On hilly ground the walk follows it from above: the curve, within the hills, is still to be seen.
+    # On hilly ground a walk is above or below its route, which is to be seen within the hills, too.
     route.show_in_front = True
     collection.objects.link(route)
     return route
