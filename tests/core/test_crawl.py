@@ -189,6 +189,43 @@ def test_a_body_that_stands_has_all_arms_on_the_ground(length: float) -> None:
         assert (last - holds.start[on[-1]]).min() > 0.05
 
 
+def winding(seed: int) -> Journey:
+    """A way full of corners, at whose ends the body stands."""
+    random = np.random.default_rng(seed)
+    count = int(random.integers(60, 300))
+    corners = np.where(random.random(count) < 0.05, random.normal(size=count), 0.0)
+    heading = np.convolve(np.pad(corners.cumsum(), 5, mode="edge"), np.full(11, 1 / 11), "valid")
+    ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    body = np.cumsum(ahead, axis=0) * 0.02
+    azimuths = EIGHT[: int(random.integers(2, 9))]
+    turned = heading[:, None] + random.uniform(-np.pi, np.pi) + azimuths
+    outward = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+    distance = np.linspace(0.0, 0.02 * (count - 1), count)
+    roots = body[:, None] + 0.12 * outward
+    return Journey(distance, roots, outward, ahead, 1.0, stands=(True, True))
+
+
+@given(st.integers(0, 2**31), st.sampled_from([0.3, 0.6, 0.8]))
+@tried
+def test_coming_to_rest_every_hold_still_ends_after_it_begins(seed: int, planted: float) -> None:
+    way = winding(seed)
+    settings = CrawlSettings(*span(StanceSettings(planted=planted), may_stretch=False), seed=seed)
+    holds = plan_crawl(way, settings)
+    # As the body comes to rest, too, an arm has at least the way that it needs to lie down, but
+    # for those that lie there as it gets going, or are cut down by a corner.
+    assert np.min(holds.end - holds.start) >= 0.05
+    after = holds.arm[1:] == holds.arm[:-1]
+    assert np.all(holds.start[1:][after] > holds.end[:-1][after])
+
+
+@pytest.mark.parametrize(("near", "far"), [(0.47, 0.4701), (0.01, 0.02), (0.4, 0.44)])
+@pytest.mark.parametrize("arms", [1, 2, 8])
+def test_a_crawl_of_short_holds_comes_to_its_end(near: float, far: float, arms: int) -> None:
+    way = replace(journey(azimuths=EIGHT[:arms]), stands=(True, True))
+    holds = plan_crawl(way, CrawlSettings(near, far))
+    assert np.all(holds.end > holds.start)
+
+
 def test_arms_that_may_stretch_take_hold_farther_out_and_hold_on_longer() -> None:
     (near, far), (nearer, less_far) = (
         span(StanceSettings(), may_stretch=each) for each in (True, False)

@@ -260,15 +260,21 @@ class _Crawl:
         there = sum(each.end > at + lasts or each.end + pause < at + lasts for each in others)
         if there + self._arms - 1 - len(others) < settings.least:
             lasts = longest
-        return self._add(arm, at, self._in_time(at, at + lasts, at + longest))
+        return self._add(arm, *self._in_time(at, lasts, longest))
 
-    def _in_time(self, at: float, end: float, latest: float) -> float:
-        """The end of a hold, with time for another one before the body stands, or beyond that."""
-        if end + sum(_LAST) * self._unit <= self._last:
-            return end
-        if latest + _LONGER * self._unit >= self._last:
-            return at + max(self._last - at, 1e-3 * self._unit) / _LYING[1]
-        return min(end, self._last - sum(_LAST) * self._unit)
+    def _in_time(self, at: float, lasts: float, longest: float) -> tuple[float, float]:
+        """Where a hold begins and ends that leaves time for another one before the body stands, or
+        lasts beyond that.
+        """
+        in_time = self._last - sum(_LAST) * self._unit
+        if at + lasts <= in_time:
+            return at, at + lasts
+        if at + longest + _LONGER * self._unit < self._last:
+            if in_time - at >= min(self._settings.shortest * self._unit, longest):
+                return at, in_time
+            # Too late for two holds, and too early for one: it waits.
+            at = self._last - longest
+        return at, at + max(self._last - at, 1e-3 * self._unit) / _LYING[1]
 
     def _add(self, arm: int, start: float, end: float) -> float:
         """Note a hold, at a place that is clear of the other arms' where there is one."""
