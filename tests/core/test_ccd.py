@@ -201,3 +201,14 @@ def test_a_goal_at_the_root_leaves_finite_numbers(count: int) -> None:
 
     assert np.all(np.isfinite(bent))
     assert np.all(np.isfinite(turned))
+
+
+@pytest.mark.parametrize("give", [0.0, 0.1])
+@pytest.mark.parametrize("far", [1e2, 1e5, 1e9])
+def test_a_goal_however_far_away_is_pointed_at(far: float, give: float) -> None:
+    directions, lengths, goal = a_group(3, 4)
+    goal = far * normalized(goal)
+    found = columns(ccd.closed(columns(directions), lengths, columns(goal), give=give))
+    assert normalized(chord(found, lengths)) == pytest.approx(normalized(goal), abs=1e-6)
+    away = np.linalg.norm(goal, axis=-1)
+    assert np.all(ccd.overreach(away, np.full(away.shape, lengths.sum()), give) <= 1e-9)

@@ -20,3 +20,13 @@ def test_several_vectors_are_turned_as_each_by_itself(many: int) -> None:
 
     np.testing.assert_allclose(np.swapaxes(together, 1, 2), expected, atol=1e-14)
     np.testing.assert_allclose(np.stack(alone), together, atol=1e-14)
+
+
+def test_vectors_of_hardly_any_length_turn_nothing_whatever_is_beside_them() -> None:
+    # Opposite, of no length, and so short that squares of it are lost; and one as it should be.
+    start = np.array([[1.0, 0.0, 1e-13, 1.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    goal = np.array([[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 1e-12, 1.0], [0.0, 0.0, 0.0, 0.0]])
+    turns = columns.smallest_arc(start, goal)
+    np.testing.assert_allclose(np.linalg.norm(turns, axis=0), 1.0, atol=1e-12)
+    np.testing.assert_allclose(turns[:, 1:3], [[1.0, 1.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    np.testing.assert_allclose(rotate(turns[:, 3], start[:, 3]), goal[:, 3], atol=1e-12)

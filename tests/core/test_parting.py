@@ -116,6 +116,21 @@ def test_a_chain_turns_towards_where_its_joints_are_to_go(seed: int) -> None:
     np.testing.assert_allclose(np.linalg.norm(result, axis=2), 1.0, atol=1e-12)
 
 
+@given(SEEDS, st.sampled_from([1e-6, 1e-3, 1e6]))
+@settings(max_examples=30)
+def test_chains_turn_alike_whatever_the_unit_of_length(seed: int, size: float) -> None:
+    directions, lengths, free = chains(seed)
+    lengths[:, 5:] = 0.0  # of no length, as where an arm has fewer joints than others
+    random = np.random.default_rng(seed)
+    goals, weights = 0.1 * random.normal(size=(5, 7, 3)), random.uniform(0.0, 1.0, (5, 7))
+
+    def turned(size: float) -> Floats:
+        own, wanted = size * lengths, size * goals
+        return turned_towards(directions, own, free=free, goals=wanted, weights=weights)
+
+    np.testing.assert_allclose(turned(size)[:, :5], turned(1.0)[:, :5], atol=1e-9)
+
+
 @given(SEEDS)
 @settings(max_examples=30)
 def test_segments_that_are_not_free_do_not_turn_at_all(seed: int) -> None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How deep arms pass through each other is measured right, whatever way they lie."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -43,6 +45,24 @@ def test_depth_is_what_is_missing_to_the_sum_of_radii(seed: int) -> None:
     found = measure([capsule("one", a, b, radii[0]), capsule("two", c, d, radii[1], rest=9.0)])
     expected = max((radii.sum() - nearest(a, b, c, d)) / radii.min(), 0.0)
     assert found.depths[0] == pytest.approx(expected, abs=0.02 / radii.min())
+
+
+@given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-3, 1e3]))
+@settings(max_examples=40)
+def test_depth_does_not_hang_on_the_unit_of_length(seed: int, unit: float) -> None:
+    random = np.random.default_rng(seed)
+    ends, radii = random.normal(size=(4, 3)), random.uniform(0.1, 1.0, 2)
+
+    def deep(size: float) -> float:
+        a, b, c, d = size * ends
+        chains = [
+            capsule("one", a, b, size * radii[0]),
+            capsule("two", c, d, size * radii[1], rest=9.0),
+        ]
+        chains = [replace(each, at_rest=size * each.at_rest) for each in chains]
+        return float(measure(chains).depths[0])
+
+    assert deep(unit) == pytest.approx(deep(1.0), abs=1e-9)
 
 
 def test_the_worst_frame_and_the_pair_are_named() -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.arm_shapes import bent, unit
+from octo_motion.core.locomotion.arm_shapes import bent, drawn, unit
 from octo_motion.core.locomotion.body_line import body_line
 from octo_motion.core.locomotion.foothold_places import easy_height
 from octo_motion.core.locomotion.limbs import StanceSettings
@@ -79,3 +79,24 @@ def test_a_low_body_keeps_its_skin_out_of_a_hill_it_passes(under: float) -> None
     gap = centres[:, 2] - ground.height(centres)
     # What it lacks is evened out along the way: a fiftieth of an arm may be left.
     assert gap.min() > max(0.55 * 0.16, under) - 0.02
+
+
+@given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-3, 1e6]))
+def test_an_arm_is_drawn_alike_whatever_the_unit_of_length(seed: int, size: float) -> None:
+    random = np.random.default_rng(seed)
+    ways = unit(random.normal(size=(7, 3, 4)) + np.array([3.0, 0.0, 0.0])[:, None])
+    lengths, free = random.uniform(0.05, 0.2, (7, 4)), random.uniform(0.0, 1.0, (7, 4))
+    goal = 0.8 * np.einsum("sb,scb->cb", lengths, ways)
+
+    def drawn_in(size: float) -> Floats:
+        return drawn(
+            ways,
+            size * lengths,
+            free=free,
+            chosen=np.ones((7, 4)),
+            roots=np.zeros((3, 4)),
+            goal=size * goal,
+            steps=4,
+        )
+
+    assert np.allclose(drawn_in(size), drawn_in(1.0), atol=1e-9)

@@ -331,7 +331,7 @@ def drawn(
     reach = chosen * lengths
     turning = reach * free
     stiffness = turning * lengths
-    base = (1.0 + _FIRM) * (np.sum(stiffness, axis=0) + _TINY)
+    base = (1.0 + _FIRM) * (np.sum(stiffness, axis=0) + _TINY * np.sum(lengths, axis=0) ** 2)
     squared, way = turning * turning, goal - roots
     result = directions.copy()
     weighted = np.empty_like(result)

@@ -248,6 +248,8 @@ def closed(
     if len(lengths) > 1:
         slack = 1.0 - _size(goal) / whole
         slack = 0.5 * (slack + np.sqrt(slack * slack + _ROUNDING**2))
+        # Far out of reach it is nothing at all, and would be divided by nothing.
+        slack = np.maximum(slack, _TINY)
         slack *= slack / (slack + give)
         directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0), steps)
     return aimed(directions, lengths, goal)
@@ -255,7 +257,7 @@ def closed(
 
 def overreach(chords: Floats, whole: Floats, give: float) -> Floats:
     """How far beyond goals so far away groups of these lengths reach (see :func:`closed`)."""
-    slack = np.clip(1.0 - chords / whole, 0.0, 1.0)
+    slack = np.clip(1.0 - chords / whole, _TINY, 1.0)
     return whole * slack * give / (slack + give)
 
 

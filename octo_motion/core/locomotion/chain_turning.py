@@ -45,7 +45,8 @@ def turned_towards(
     beyond = np.cumsum(weights[:, ::-1], axis=1)[:, ::-1]
     later = np.maximum.outer(np.arange(count), np.arange(count))
     matrix = beyond[:, later] * lever[:, :, None] * lever[:, None, :]
-    stiff = lengths**2 + _TINY
+    # Of segments of no length, too, but little of that of the others.
+    stiff = lengths**2 + _TINY * np.max(lengths**2, axis=1, keepdims=True)
     rows = np.arange(count)
     matrix[:, rows, rows] += _DAMPED * stiff
     between = _EVEN * np.sqrt(stiff[:, 1:] * stiff[:, :-1])

@@ -101,13 +101,14 @@ def smallest_arc(start: Floats, goal: Floats) -> Floats:
     turn[0] = size + dot(start, goal)
     turn[1:] = cross(start, goal)
     length = np.sqrt(dot(turn, turn))
-    definite = length > 1e-8 * size
+    there = size > _TINY * _TINY
+    definite = there & (length > 1e-8 * size)
     if not np.all(definite):
-        unclear = ~definite
-        turn[:, unclear] = rotations.shortest_arc(
-            rotations.normalized(np.broadcast_to(start, goal.shape)[:, unclear].T),
-            rotations.normalized(goal[:, unclear].T),
+        opposite = there & ~definite
+        turn[:, opposite] = rotations.shortest_arc(
+            rotations.normalized(np.broadcast_to(start, goal.shape)[:, opposite].T),
+            rotations.normalized(goal[:, opposite].T),
         ).T
-        turn[:, size <= _TINY * _TINY] = np.array([1.0, 0.0, 0.0, 0.0])[:, None]
+        turn[:, ~there] = rotations.IDENTITY[:, None]
         length = np.where(definite, length, 1.0)
     return turn / length

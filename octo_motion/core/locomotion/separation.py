@@ -20,7 +20,10 @@ import numpy as np
 from ..rotations import Floats
 from .columns import dot
 
-_TINY: Final = 1e-12
+_TINY: Final = 1e-30
+"""Squares of lengths that are none, however small a rig's unit makes its bones."""
+_PARALLEL: Final = 1e-10
+"""Square of the sine of the angle between two segments that are as good as parallel."""
 _AT_ONCE: Final = 250_000
 """Distances that are looked at in one go: what the processor keeps at hand."""
 _ROUNDED: Final = 1e-4
@@ -249,7 +252,7 @@ def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats,
     c, f = dot(u, w), dot(v, w)
     room = a * e - b * b
     whole = 1.0 / np.maximum(a, _TINY)
-    s = np.where(room > _TINY, (b * f - c * e) / np.maximum(room, _TINY), 0.0)
+    s = np.where(room > _PARALLEL * a * e, (b * f - c * e) / np.maximum(room, _TINY), 0.0)
     # A capsule that is a ball is nearest to one point of the other.
     s = np.where(e > _TINY, s, -c * whole)
     np.clip(s, 0.0, 1.0, out=s)
