@@ -156,6 +156,15 @@ def _driven_bones(armature: bpy.types.Object) -> set[str]:
     return names
 
 
+def is_driven_object(obj: bpy.types.Object) -> bool:
+    """Whether drivers move or turn an object."""
+    data = obj.animation_data
+    moved = ("location", "rotation_", "delta_location", "delta_rotation_")
+    return data is not None and any(
+        not curve.mute and curve.data_path.startswith(moved) for curve in data.drivers
+    )
+
+
 def _vertex_group_names(armature: bpy.types.Object) -> set[str]:
     """Names of the vertex groups of all meshes that the armature deforms."""
     return {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}

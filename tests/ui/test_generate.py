@@ -720,6 +720,53 @@ def test_constraints_that_hide_the_keys_are_told(octopus: Any) -> None:
     assert any("root bone 'Root'" in told for told in warnings)
 
 
+def test_drivers_and_layers_that_hide_the_motion_are_told(octopus: Any) -> None:
+    generate(octopus)
+    driver = octopus.driver_add("location", 0)
+    assert any("Drivers move" in told for told in workflow.generate(octopus, bpy.context).warnings)
+    driver.mute = True
+    data = octopus.animation_data
+    below = bpy.data.actions.new("Below")
+    track = data.nla_tracks.new()
+    track.strips.new("Below", 1, below)
+
+    def told_of_layers() -> list[str]:
+        told = workflow.generate(octopus, bpy.context).warnings
+        return [each for each in told if "NLA" in each]
+
+    assert told_of_layers() == []
+    data.action_influence = 0.5
+    assert "mixes" in told_of_layers()[0]
+    data.action_influence, data.action_blend_type = 1.0, "ADD"
+    assert "mixes" in told_of_layers()[0]
+    track.mute = True
+    assert told_of_layers() == []
+    track.mute, track.is_solo = False, True
+    assert "hides" in told_of_layers()[0]
+
+
+@pytest.mark.parametrize("travel_on", ["BONE", "NONE"])
+@pytest.mark.parametrize("listed", [True, False])
+def test_a_root_bone_that_is_posed_and_gets_keys_moves_nothing(
+    octopus: Any, travel_on: str, *, listed: bool
+) -> None:
+    settings_of(octopus).travel_on = travel_on
+    settings_of(octopus).root_bone = "Root"
+    generate(octopus)
+    wanted = joints_in_world(octopus, 12.0)
+    octopus.animation_data_clear()
+    settings_of(octopus).result = None
+    if not listed:
+        settings_of(octopus).arms.clear()
+        if travel_on == "BONE":
+            settings_of(octopus).root_bone = ""
+    root = octopus.pose.bones["Root"]
+    root.location, root.rotation_quaternion = (0.3, 0.2, 0.1), (0.9, 0.0, 0.4, 0.1)
+    bpy.context.view_layer.update()
+    generate(octopus)
+    np.testing.assert_allclose(joints_in_world(octopus, 12.0), wanted, atol=1e-5)
+
+
 def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
     settings_of(octopus).tell_overlaps = False
     settings_of(octopus).frame_end = 120

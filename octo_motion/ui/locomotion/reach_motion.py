@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -242,10 +242,20 @@ def read_reaches(
     skeleton: Skeleton,
     arms: tuple[Arm, ...],
     *,
+    keyed_anew: Collection[str],
     body: BodyFrame,
     frames: Floats,
 ) -> Reaching | None:
     """What the list of reaches asks for; none if it is empty or muted.
+
+    Args:
+        armature: the armature object.
+        settings: its settings.
+        skeleton: its bones at rest.
+        arms: its arms.
+        keyed_anew: bones whose present pose does not last.
+        body: where the body lies in it.
+        frames: (frames,) of the motion.
 
     Raises:
         OctoMotionError: an object is missing, has no surface, or moves with the armature; frames
@@ -259,9 +269,7 @@ def read_reaches(
         arms=arms,
         frames=tuple(arm_frames(skeleton, arm.bones, body) for arm in arms),
         radii=tuple(radii),
-        standings=tuple(
-            standing_of(armature, arm.bones[0], left_out={settings.root_bone}) for arm in arms
-        ),
+        standings=tuple(standing_of(armature, arm.bones[0], left_out=keyed_anew) for arm in arms),
         up=body.rotation[:, 2],
         reaches=tuple(_reach(item, armature, frames) for item in items),
     )

@@ -9,7 +9,7 @@ from typing import Final, cast
 import bpy
 import numpy as np
 
-from ...blender.armature import armature_data
+from ...blender.armature import armature_data, is_driven_object
 from ...blender.arms import world_directions
 from ...blender.poses import SCALE, animated_bones, displaced_bones
 from ...core.errors import RigError
@@ -144,21 +144,53 @@ def told_of_driven(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
 
 
 def told_of_constraints(
-    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, skeleton: Skeleton
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    root_bone: str,
 ) -> list[str]:
-    """What there is to say of constraints that move the body."""
+    """What there is to say of constraints and drivers that move the body."""
     told: list[str] = []
-    root = settings.root_bone
-    if settings.travel_on == "BONE" and root in skeleton.index and is_driven(skeleton, [root]):
+    if root_bone and is_driven(skeleton, [root_bone]):
         told.append(
-            f"Constraints or drivers move the root bone '{root}': its keys have no "
+            f"Constraints or drivers move the root bone '{root_bone}': its keys have no "
             "effect while those are on."
         )
     if settings.travel_on == "OBJECT" and any(
         not each.mute and each.influence > 0.0 for each in armature.constraints
     ):
         told.append(f"Constraints move '{armature.name}' away from its route.")
+    if settings.travel_on == "OBJECT" and is_driven_object(armature):
+        told.append(f"Drivers move '{armature.name}' away from its route.")
     return told
+
+
+def told_of_layers(armature: bpy.types.Object) -> list[str]:
+    """What there is to say of NLA tracks that do not let the motion through as it is."""
+    data = armature.animation_data
+    tracks = data.nla_tracks if data is not None and data.use_nla else ()
+    if data is None or not any(len(track.strips) for track in tracks if not track.mute):
+        return []
+    name = f"'{armature.name}'"
+    if any(track.is_solo for track in tracks):
+        return [f"A solo NLA track of {name} hides the motion. Switch its star off."]
+    if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
+        told = (
+            f"The NLA mixes the motion of {name} with its tracks. In the NLA editor's sidebar set "
+            "Blending to Replace and Influence to 1 if it should not."
+        )
+        return [told]
+    return []
+
+
+def keyed_anew(
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, root_bone: str
+) -> set[str]:
+    """Bones that carry the body and whose present pose does not last: the root bone gets keys, and
+    what the motion before has keyed goes back to rest if it is not keyed again.
+    """
+    previous = previous_action(armature, settings)
+    return {root_bone} | (animated_bones(previous) if previous is not None else set())
 
 
 def posed_carriers(
@@ -166,6 +198,7 @@ def posed_carriers(
     armature: bpy.types.Object,
     skeleton: Skeleton,
     arms: tuple[Arm, ...],
+    root_bone: str,
 ) -> list[str]:
     """Bones that carry arms, get no keys and are posed: by an artist, or by an imported file."""
     for arm in arms:
@@ -179,11 +212,7 @@ def posed_carriers(
             carrying.add(parent)
             parent = skeleton.parents[parent]
     own = {skeleton.names[number] for number in carrying} - turned
-    if settings.travel_on == "BONE":
-        own.discard(settings.root_bone)
-    if (previous := previous_action(armature, settings)) is not None:
-        # These go back to rest if they are not keyed again.
-        own -= animated_bones(previous)
+    own -= keyed_anew(settings, armature, root_bone)
     return displaced_bones(armature, (), sorted(own))
 
 

@@ -46,11 +46,13 @@ from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gai
 from .reach_motion import read_reaches
 from .rig_reading import (
     chosen_root_bone,
+    keyed_anew,
     listed_arms,
     listed_body,
     posed_carriers,
     told_of_constraints,
     told_of_driven,
+    told_of_layers,
     told_of_poses,
     uniform_scale,
 )
@@ -110,8 +112,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     world = world_matrix(armature)
     scale = uniform_scale(armature, world)
     arms, body, detection = listed_arms(settings, armature, skeleton)
+    root_bone = chosen_root_bone(settings, armature, detection)
     at_rest, rest_body = skeleton, body
-    carriers = posed_carriers(settings, armature, skeleton, arms)
+    carriers = posed_carriers(settings, armature, skeleton, arms, root_bone)
     turned = [bone for arm in arms for bone in arm.bones]
     if carriers and (posed := as_posed(armature, skeleton, carriers, turned)) is not None:
         # Arms hang where the bones that carry them are.
@@ -194,7 +197,10 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     if settings.keep_apart or tell_overlaps:
         apart = read_apart(armature, skeleton, arms, body, live=live)
     pace = pace_of(route, travel, seconds * scene.render.fps / scene.render.fps_base)
-    reaching = read_reaches(armature, settings, at_rest, arms, body=rest_body, frames=frames)
+    anew = keyed_anew(settings, armature, root_bone)
+    reaching = read_reaches(
+        armature, settings, at_rest, arms, keyed_anew=anew, body=rest_body, frames=frames
+    )
     grounded = standing is not None or changing is not None
     soon = len(frames) * len(generator.bones) <= _QUICKLY
     return Shot(
@@ -216,7 +222,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         frames=frames,
         times=times,
         seconds=seconds,
-        root_bone=chosen_root_bone(settings, armature, detection),
+        root_bone=root_bone,
         mantle=mantle,
         mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
         tolerances=None if live else tolerances_of(settings, generator.arm_length),
@@ -239,7 +245,8 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         # Detection has looked for constraints itself.
         warnings=[
             *(detection.notes if detection else told_of_driven(skeleton, arms)),
-            *told_of_constraints(settings, armature, skeleton),
+            *told_of_constraints(settings, armature, skeleton, root_bone),
+            *told_of_layers(armature),
             *told_of_poses(settings, armature, arms, carriers),
             *(standing.warnings if standing else ()),
             *(too_few_frames(settings, pace, scene.render) if grounded else ()),
