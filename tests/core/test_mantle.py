@@ -85,6 +85,71 @@ def test_a_part_that_lies_across_the_body_is_not_bent_up(lean: float) -> None:
     assert find_mantle(*octopus(lean)) == ()
 
 
+def test_stalks_that_stand_higher_than_a_mantle_that_lies_back_are_not_taken_for_it() -> None:
+    skeleton, arms, body = octopus(70.0)
+    eye = skeleton.index["eye"]
+    matrices = skeleton.rest_matrices.copy()
+    matrices[eye] = bone_matrix(np.array([0.05, 0.0, 0.2]), np.array([0.0, 0.0, 1.0]), 0.0)
+    lengths = skeleton.lengths.copy()
+    lengths[eye] = 0.3
+    stalked = dataclasses.replace(skeleton, rest_matrices=matrices, lengths=lengths)
+    assert stalked.tails[eye, 2] > stalked.tails[stalked.index["mantle"], 2]
+    assert find_mantle(stalked, arms, body) == ("head", "mantle")
+
+
+def test_bones_without_length_that_importers_put_in_between_ride_along() -> None:
+    """Each bone of the mantle hangs on a twin that begins where it does, and points anywhere."""
+    skeleton, arms, body = octopus()
+    names, parents = list(skeleton.names), list(skeleton.parents)
+    matrices, lengths = list(skeleton.rest_matrices), list(skeleton.lengths)
+    for name in ("head", "mantle"):
+        bone = names.index(name)
+        astray = bone_matrix(matrices[bone][:3, 3], np.array([0.0, -1.0, 0.1]), 0.4)
+        names.append(f"{name} twin")
+        parents.append(parents[bone])
+        matrices.append(astray)
+        lengths.append(0.2)
+        parents[bone] = len(names) - 1
+        # Importers do not know where a bone ends.
+        matrices[bone] = astray
+    # Parents come first. Eye and siphon begin where the mantle does, and nobody could tell them.
+    kept = [bone for bone, name in enumerate(names) if name not in {"eye", "siphon"}]
+    order = sorted(kept, key=lambda bone: _depth(parents, bone))
+    place = {bone: number for number, bone in enumerate(order)}
+    imported = skeleton_of(
+        [names[bone] for bone in order],
+        [place.get(parents[bone], -1) for bone in order],
+        [matrices[bone] for bone in order],
+        [lengths[bone] for bone in order],
+    )
+    mantle = find_mantle(imported, arms, body)
+    assert mantle == ("head", "mantle")
+    turns = stretched(imported, mantle, body, 1.0)
+    basis = np.tile(IDENTITY, (len(imported), 1))
+    basis[[imported.index[name] for name in mantle]] = turns
+    _, heads = imported.pose(basis)
+    first, second = (heads[imported.index[name]] for name in mantle)
+    assert np.allclose((second - first) / np.linalg.norm(second - first), [0, 0, 1], atol=1e-9)
+
+
+def _depth(parents: list[int], bone: int) -> int:
+    return 0 if bone < 0 else 1 + _depth(parents, parents[bone])
+
+
+def test_a_mantle_beside_the_bone_that_carries_the_arms_belongs_to_it() -> None:
+    """Two bones without parents that begin at one place: one carries arms, one is the mantle."""
+    skeleton, arms, body = octopus()
+    head = skeleton.index["head"]
+    parents = list(skeleton.parents)
+    parents[head] = -1
+    apart = dataclasses.replace(skeleton, parents=tuple(parents))
+    assert find_mantle(apart, arms, body) == ("head", "mantle")
+    matrices = apart.rest_matrices.copy()
+    for name in ("head", "mantle", "eye", "siphon"):
+        matrices[apart.index[name], :3, 3] += 0.1
+    assert find_mantle(dataclasses.replace(apart, rest_matrices=matrices), arms, body) == ()
+
+
 def test_a_part_that_constraints_move_is_left_to_them() -> None:
     skeleton, arms, body = octopus()
     driven = tuple(name == "mantle" for name in skeleton.names)

@@ -18,13 +18,20 @@ from .chains import BodyFrame, joint_positions
 from .poses import arm_rest, bone_rotations
 
 _FARTHEST_LEAN: Final = np.radians(75.0)
-"""A part that leans further than this is not built to be straightened."""
+"""A part that leans further than this is not built to be straightened: it would swallow the head
+that it lies behind."""
+_SAME_PLACE: Final = 1e-3
+"""Joints that are closer than this share of the body's size are one."""
 
 
 def find_mantle(
     skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFrame
 ) -> tuple[str, ...]:
-    """Bones from what the arms stand on to the body's highest tip; none if there is no such part.
+    """Bones from what the arms stand on to the tip of the largest part that is no arm; none if
+    there is no such part above the arms.
+
+    Bones without length of their own, as importers put between others, are left out: they ride
+    along.
 
     Args:
         skeleton: the rig.
@@ -38,13 +45,18 @@ def find_mantle(
         while bone >= 0:
             carrying.add(bone)
             bone = skeleton.parents[bone]
-    heights = body.to_body(skeleton.tails)[:, 2]
+    same = _SAME_PLACE * float(np.max(np.ptp(skeleton.heads, axis=0), initial=0.0))
     best: tuple[int, ...] = ()
+    largest = 0.0
     for tip in range(len(skeleton)):
-        path = _path(skeleton, tip, carrying)
-        usable = path and limbs.isdisjoint(path) and heights[tip] > 0.0
-        if usable and (not best or heights[tip] > heights[best[-1]]):
-            best = path
+        path = _path(skeleton, tip, carrying, same)
+        if not path or not limbs.isdisjoint(path):
+            continue
+        joints = joint_positions(skeleton, [skeleton.names[bone] for bone in path])
+        size = float(np.linalg.norm(joints[-1] - joints[0]))
+        # Of two that come equally far, the one that hangs on the other.
+        if size > largest - same and body.to_body(joints[-1])[2] > 0.0:
+            best, largest = path, size
     if any(skeleton.constrained[bone] for bone in best):
         return ()
     leaning = np.arccos(np.clip(_directions(skeleton, best) @ body.rotation[:, 2], -1.0, 1.0))
@@ -74,14 +86,23 @@ def stretched(skeleton: Skeleton, mantle: Sequence[str], body: BodyFrame, amount
     return turns[0, 0]
 
 
-def _path(skeleton: Skeleton, tip: int, carrying: set[int]) -> tuple[int, ...]:
-    """Bones from below what carries the arms to a tip; none if it does not hang on that."""
+def _path(skeleton: Skeleton, tip: int, carrying: set[int], same: float) -> tuple[int, ...]:
+    """Bones from below what carries the arms to a tip; none if it does not hang on that.
+
+    A bone without a parent hangs on what carries the arms if it begins where that begins or ends.
+    """
     path: list[int] = []
     bone = tip
     while bone >= 0 and bone not in carrying:
-        path.append(bone)
+        if not path or np.linalg.norm(skeleton.heads[bone] - skeleton.heads[path[-1]]) > same:
+            path.append(bone)
         bone = skeleton.parents[bone]
-    return tuple(reversed(path)) if bone >= 0 else ()
+    if bone < 0 and path:
+        ends = [place[each] for each in carrying for place in (skeleton.heads, skeleton.tails)]
+        start = skeleton.heads[path[-1]]
+        if all(np.linalg.norm(end - start) > same for end in ends):
+            return ()
+    return tuple(reversed(path))
 
 
 def _directions(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
