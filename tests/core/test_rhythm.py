@@ -103,6 +103,20 @@ def test_in_between_arms_that_start_and_end_at_rest_keep_their_rhythm() -> None:
     assert steps.max() < 4.0 * 2.0 * np.pi / 0.8
 
 
+@given(st.floats(0.1, 0.85), st.floats(6.0, 40.0), st.integers(0, 2**31))
+def test_however_short_its_holds_a_walk_from_rest_to_rest_keeps_its_rhythm(
+    duty: float, strides: float, seed: int
+) -> None:
+    even = Even(0.8, np.random.default_rng(seed).uniform(-7.0, 7.0, 8))
+    length = 0.8 * strides
+    own = at_rest(even, length, start=True, end=True, middle=MIDDLE, duty=duty)
+    # An arm is as it would be a cycle and a half from where the body stands, and all the way on.
+    distance = np.linspace(2.5 * 0.8, length - 2.5 * 0.8, 300)
+    np.testing.assert_allclose(own.phases(distance), even.phases(distance), atol=1e-9)
+    back = own.distances(range(8), own.phases(distance).T / (2.0 * np.pi))
+    np.testing.assert_allclose(back, np.tile(distance, (8, 1)), atol=1e-6)
+
+
 def test_each_cycle_of_a_crawl_knows_where_its_hold_is() -> None:
     rhythm, holds = crawl()
     turns, away = rhythm.aims(range(8), np.arange(-1, 40))

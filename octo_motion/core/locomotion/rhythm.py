@@ -157,10 +157,10 @@ def at_rest(
         duty: share of a cycle that a hold takes.
     """
     if isinstance(rhythm, Even):
-        at = np.array([0.0, length])
-        values = (rhythm.phases(at) - middle) / _CYCLE
-        slopes = np.full(2, 1.0 / rhythm.stride)
-        tables: Sequence[Table] = [Table(at, column, slopes) for column in values.T]
+        ends = (rhythm.phases(np.array([0.0, length])) - middle) / _CYCLE
+        tables: Sequence[Table] = [
+            _even_table(first, last, rhythm.stride, duty) for first, last in ends.T.tolist()
+        ]
     else:
         tables = rhythm.tables
     rested = [_rested(table, length, duty, start=start, end=end) for table in tables]
@@ -388,6 +388,23 @@ class Table:
         return np.where(low, before, np.where(high, after, inside))
 
 
+def _even_table(first: float, last: float, stride: float, duty: float) -> Table:
+    """The table of an arm that has the same cycle all the way, its knots where holds begin and end.
+
+    Two knots would do for it. But what is changed next to one of them changes all that lies between
+    the two.
+
+    Args:
+        first: cycles from the middle of hold 0 where the route begins …
+        last: … and where it ends.
+        stride: metres in a cycle.
+        duty: share of a cycle that a hold takes.
+    """
+    holds = np.arange(np.floor(first) - 1.0, np.ceil(last) + 2.0)
+    values = (holds[:, None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
+    return Table(stride * (values - first), values, np.full(len(values), 1.0 / stride))
+
+
 def _table(holds: Holds, arm: int, duty: float) -> Table:
     own: NDArray[np.bool_] = holds.arm == arm
     start, end = holds.start[own], holds.end[own]
@@ -413,7 +430,9 @@ def _rested(table: Table, length: float, duty: float, *, start: bool, end: bool)
     first, low = _going(table, duty) if start else (0.0, -np.inf)
     last, high = _stopping(table, length, duty) if end else (0.0, np.inf)
     if low < high:
-        own = table.at[(table.at > low) & (table.at < high)]
+        # A knot that is there already, but for its last digits, is not to be there twice.
+        same = 1e-9 * (table.at[-1] - table.at[0])
+        own = table.at[(table.at > low + same) & (table.at < high - same)]
         at = np.unique([*[0.0, low] * start, *own, *[high, length] * end])
     else:
         at = np.array([0.0, length])
