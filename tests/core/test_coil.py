@@ -136,12 +136,32 @@ def test_clearance_of_a_box_is_the_distance_across_its_faces(angle: float, heigh
     assert profile.clearance(point) == pytest.approx(exact, rel=2e-3)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e3, 1e9])
+@pytest.mark.parametrize("taper", [0.0, 0.5])
+def test_an_arm_winds_alike_whatever_the_unit_of_length(size: float, taper: float) -> None:
+    vertices, faces = objects.rod()
+    radii = 0.02 * np.linspace(1.0, 1.0 - taper, JOINTS + 1)
+
+    def angle(size: float) -> float:
+        profile = profile_of(size * vertices, faces)
+        start = Start(12, outside(profile, 0.5 * size))
+        return wind(Skins.of(profile, size * radii), size * LENGTHS, start, Winding(3.0, 1)).angle
+
+    # Joints are lifted until they lack nothing: which of them do is a matter of the last digits.
+    assert angle(size) == pytest.approx(angle(1.0), rel=1e-3)
+
+
 def test_what_cannot_be_wound_about_is_told() -> None:
     vertices, faces = objects.rod()
     with pytest.raises(RigError, match="no faces"):
         profile_of(vertices, faces[:0])
     with pytest.raises(RigError, match="no size"):
         profile_of(0.0 * vertices, faces)
+    plate = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    halves = np.array([[0, 1, 2], [0, 2, 3]])
+    with pytest.raises(RigError, match="or choose another axis"):
+        profile_of(plate, halves)
+    assert profile_of(plate, halves, np.array([1.0, 0.0, 0.0])).heights[-1] > 0.9
     profile = profile_of(vertices, faces)
     with pytest.raises(RigError, match="within the object"):
         wound(profile, np.array([0.01, 0.0, 0.5]))

@@ -98,6 +98,18 @@ def test_upright_faces_alone_are_no_ground() -> None:
         sampled(wall, PATH, ALL, **NEED)
 
 
+@pytest.mark.parametrize("nowhere", [np.nan, np.inf])
+@pytest.mark.parametrize("axis", [0, 2])
+def test_a_face_with_a_corner_that_is_nowhere_is_no_ground(nowhere: float, axis: int) -> None:
+    broken = square(-1.0, 1.0)
+    broken[0, 1, axis] = nowhere
+    faces = np.concatenate([square(-9, 9, 0.3), broken])
+    ground = sampled(faces, PATH, ALL, **NEED)
+    # All of the other face counts, and where there is none of it the one below.
+    assert ground.height(np.array([0.5, -0.8])) == pytest.approx(0.3)
+    assert np.all(np.isfinite(ground.heights))
+
+
 def test_a_route_that_leaves_the_ground_is_told_where() -> None:
     with pytest.raises(GroundError, match=r"leaves the ground after 5[0-9] % of its length"):
         sampled(square(-2.1, 2.1), PATH, ALL, **NEED)

@@ -111,7 +111,7 @@ def profile_of(vertices: Floats, triangles: np.ndarray, axis: Floats | None = No
             longest, the one nearest to z.
 
     Raises:
-        RigError: the mesh has no faces, or no size.
+        RigError: the mesh has no faces, or no size along its axis.
     """
     if len(triangles) == 0:
         raise RigError("The object to grasp has no faces.", "Choose an object with a surface.")
@@ -124,8 +124,8 @@ def profile_of(vertices: Floats, triangles: np.ndarray, axis: Floats | None = No
         raise RigError("The object to grasp has no size.", "Give it a scale greater than zero.")
     center = areas @ corners.mean(axis=1) / whole
     along = _main_axis(corners - center, areas / whole) if axis is None else normalized(axis)
-    first = normalized(np.eye(3)[np.argmin(np.abs(along))] - along * np.min(np.abs(along)))
-    first = normalized(first - (first @ along) * along)
+    across = np.eye(3)[np.argmin(np.abs(along))]
+    first = normalized(across - (across @ along) * along)
     axes = np.stack([first, np.cross(along, first), along], axis=1)
     local = (corners - center) @ axes
     low, high = float(local[..., 2].min()), float(local[..., 2].max())
@@ -166,7 +166,11 @@ def _slices(corners: Floats, heights: Floats) -> Floats:
         support[number] = np.max(points @ _CIRCLE, axis=0)
     known = np.isfinite(support[:, 0])
     if not known.any():
-        raise RigError("The object to grasp has no size.", "Give it a scale greater than zero.")
+        # All of it is at one height: it is flat.
+        raise RigError(
+            "The object to grasp has no size.",
+            "Give it some height along the axis that the arm winds about, or choose another axis.",
+        )
     numbers = np.arange(len(heights))
     for direction in range(_DIRECTIONS):
         support[:, direction] = np.interp(numbers, numbers[known], support[known, direction])
@@ -235,7 +239,10 @@ class Skins:
     @staticmethod
     def of(profile: Profile, radii: Floats) -> Skins:
         """Tables for a few thicknesses; between them supports are linear enough."""
-        thickness = np.linspace(float(radii.min()), float(radii.max()) + 1e-9, _THICKNESSES)
+        # No two tables of one thickness, however even the arm.
+        thinnest, thickest = float(radii.min()), float(radii.max())
+        apart = max(thickest - thinnest, 1e-9 * thickest, 1e-30)
+        thickness = np.linspace(thinnest, thinnest + apart, _THICKNESSES)
         tables = np.stack([profile.grown(float(each)) for each in thickness])
         return Skins(profile, radii, thickness, tables)
 

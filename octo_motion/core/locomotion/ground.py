@@ -352,7 +352,10 @@ def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Fl
 
 
 def _over(triangles: Floats, grid: HeightField) -> _Faces:
-    """The faces that may lie over some sample of a grid."""
+    """The faces that may lie over some sample of a grid; none with a corner that is nowhere."""
+    known = np.isfinite(triangles).all(axis=(1, 2))
+    if not known.all():
+        triangles = triangles[known]
     (x0, x1, x2), (y0, y1, y2) = (
         [(triangles[:, corner, axis] - grid.origin[axis]) / grid.spacing for corner in range(3)]
         for axis in range(2)
