@@ -234,6 +234,10 @@ class PoseKeys:
             track.name = f"{action.name} below"
             strip = track.strips.new(action.name, round(action.frame_range[0]), action)
             strip.action_slot = slot
+            # Strips are made on whole frames; this one is to play what was played before.
+            length = strip.frame_end - strip.frame_start
+            strip.frame_start = action.frame_range[0]
+            strip.frame_end = strip.frame_start + length
             before.track = track.name
         if data.action is None or before.track is not None:
             made = bpy.data.actions.new(f"{armature.name} Pose")

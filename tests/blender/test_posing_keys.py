@@ -206,6 +206,27 @@ def test_layer_lies_over_the_action_and_holds_the_new_keys_alone(armature: Any) 
     assert armature.pose.bones[BODY].rotation_quaternion[2] == pytest.approx(0.6, abs=1e-6)
 
 
+def test_what_lies_under_a_layer_plays_on_whatever_its_first_frame(armature: Any) -> None:
+    bone = armature.pose.bones[ARM]
+    bone.rotation_mode = "XYZ"
+    # As imported clips have their keys: between frames.
+    for frame, angle in ((1.5, 0.0), (11.5, 1.0)):
+        bone.rotation_euler.x = angle
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    frames = (2, 5, 9)
+
+    def played() -> list[float]:
+        found = []
+        for frame in frames:
+            bpy.context.scene.frame_set(frame)
+            found.append(bone.rotation_euler.x)
+        return found
+
+    before = played()
+    PoseKeys(armature, "LAYER").insert(armature, [Keyed(BODY)], 5.0)
+    assert played() == pytest.approx(before, abs=1e-6)
+
+
 def test_chosen_action_gets_the_keys(armature: Any) -> None:
     own = animate(armature)
     chosen = bpy.data.actions.new("Chosen")
