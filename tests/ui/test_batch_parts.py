@@ -186,6 +186,15 @@ def test_figures_of_a_report_are_in_the_units_of_limits() -> None:
     )
 
 
+def test_figures_that_are_no_numbers_make_no_report_that_others_cannot_read(tmp_path: Path) -> None:
+    path = tmp_path / "report.json"
+    write_json(path, quality([Figure("DEPTH", math.nan, 3, "A")]))
+    assert "NaN" not in path.read_text(encoding="utf-8")
+    with pytest.raises(ValueError, match="JSON compliant"):
+        write_json(path, math.inf)
+    assert json.loads(path.read_text(encoding="utf-8"))["depth"]["value"] is None
+
+
 def test_limits_of_the_command_line_are_numbers_by_name() -> None:
     assert parse_limits(["slip=1", " turn = 45.5 ", "slip=0.01", "miss=inf"]) == {
         "slip": 0.01,

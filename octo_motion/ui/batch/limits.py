@@ -79,11 +79,11 @@ def quality(figures: Sequence[Figure]) -> dict[str, dict[str, Any]]:
     """Figures for a report: value, frame and arm of the worst of each kind, by name.
 
     Values are in arm lengths (slip, depth, miss), shares (strain), degrees per frame (turn) and
-    radii (overlap).
+    radii (overlap); none for what is no finite number, which JSON does not know.
     """
     return {
         figure.kind.lower(): {
-            "value": _value(figure),
+            "value": _value(figure) if math.isfinite(figure.value) else None,
             "frame": figure.frame,
             "arm": figure.arm,
         }

@@ -72,7 +72,7 @@ def write_json(path: Path, content: Any) -> None:
     """
     with staged([path]) as places:
         try:
-            text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+            text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
             places[path].write_text(text, encoding="utf-8")
         except OSError as error:
             raise _unwritable(path, error) from error
