@@ -35,6 +35,11 @@ def gait_names() -> list[str]:
     return [*gait.presets(), *user_gait_names()]
 
 
+def has_gait(name: str) -> bool:
+    """Whether there is a gait of that name; quick enough to be asked while a panel is drawn."""
+    return name in gait.presets() or (bool(name) and _path_of(name).is_file())
+
+
 def user_gait_names() -> list[str]:
     """Names of the user's own gaits, sorted."""
     built_in = gait.presets()

@@ -36,6 +36,12 @@ def test_gaits_of_the_extension_come_first() -> None:
     assert presets.gait_names() == [*gait.presets(), "a walk"]
 
 
+def test_it_is_known_which_gaits_there_are() -> None:
+    presets.save_gait(my_gait())
+    assert all(map(presets.has_gait, presets.gait_names()))
+    assert not any(map(presets.has_gait, ("", "hop", "my")))
+
+
 @given(name=st.text(min_size=1, max_size=presets.LONGEST_NAME).filter(str.strip))
 def test_any_name_has_a_file_of_its_own(name: str) -> None:
     path = presets._path_of(name)

@@ -230,6 +230,12 @@ def test_a_knot_is_removed_and_neighbours_close_the_gap(settings: Any) -> None:
         click("gait_knot_remove", knot=0)
 
 
+def test_a_row_that_is_not_there_leaves_the_table_as_it_was(settings: Any) -> None:
+    with pytest.raises(RuntimeError, match="no row 99"):
+        click("gait_knot_add", knot=99)
+    assert len(settings.table.curves) == 0
+
+
 def test_there_is_no_knot_within_a_degree_of_another(settings: Any) -> None:
     settings.gait = "swim"
     settings.table.curves[0].knots[1].phase = np.radians(0.5)

@@ -605,6 +605,10 @@ def too_late(armature: Any) -> None:
     settings_of(armature).timing, settings_of(armature).frame_start = "CADENCE", 1_048_570
 
 
+def too_early(armature: Any) -> None:
+    settings_of(armature).timing, settings_of(armature).frame_start = "CADENCE", -1_048_580
+
+
 def eased_too_much(armature: Any) -> None:
     settings_of(armature).ease_in = settings_of(armature).ease_out = 0.8
 
@@ -665,6 +669,7 @@ def tweaked(armature: Any) -> None:
         (backwards, "ends at frame -5 and starts at 1"),
         (too_long, "frames, more than 100,000"),
         (too_late, "after Blender's last"),
+        (too_early, "before Blender's first"),
         (eased_too_much, "do not fit into the time"),
         (unknown_gait, "There is no gait 'hop'. Choose one of"),
         (nothing_chosen, "No gait is chosen"),

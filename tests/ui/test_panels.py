@@ -160,6 +160,17 @@ def test_a_route_is_offered_and_then_its_settings() -> None:
     assert "spline" in Tab()["route"]
 
 
+def test_in_place_the_route_is_greyed_out() -> None:
+    octopus = make_octopus()
+    give_route(octopus)
+    settings = locomotion_settings(octopus)
+    for travel_on, active in (("OBJECT", True), ("NONE", False)):
+        settings.travel_on = travel_on
+        layout: Any = Layout()
+        panels.OCTO_MOTION_PT_route.show(layout, layout, settings)
+        assert layout.active is active
+
+
 @pytest.mark.parametrize("gait", ["walk", "swim"])
 def test_a_gait_shows_what_it_needs(gait: str) -> None:
     settings = locomotion_settings(make_octopus())

@@ -12,6 +12,7 @@ from mathutils import Matrix
 
 from ...blender.octopus import add_octopus
 from ...core.locomotion.octopus_shape import ARMS, JOINTS, OctopusShape
+from ..local_view import show_in_local_view
 from ..operator_base import OctoOperator
 
 _DEFAULT: Final = OctopusShape()
@@ -111,7 +112,7 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
             taper=self.taper,
         )
         armature = add_octopus(context, shape, self._place(context), with_skin=self.with_mesh)
-        _show_in_local_view(context, armature)
+        show_in_local_view(context, armature, *armature.children)
 
     def _place(self, context: bpy.types.Context) -> Matrix:
         """Where Blender puts new objects; without a 3D view there is none to align them to."""
@@ -129,11 +130,3 @@ def draw_in_add_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     layout = self.layout
     assert layout is not None
     layout.operator(OCTO_MOTION_OT_add_octopus.bl_idname, icon="OUTLINER_OB_ARMATURE")
-
-
-def _show_in_local_view(context: bpy.types.Context, armature: bpy.types.Object) -> None:
-    """Where a view shows a few objects alone, what is added there joins them."""
-    space = context.space_data
-    if isinstance(space, bpy.types.SpaceView3D) and space.local_view:
-        for each in (armature, *armature.children):
-            each.local_view_set(space, state=True)

@@ -10,6 +10,7 @@ from bpy.props import FloatVectorProperty
 from ...blender.curves import add_route_curve, suggested_control_points
 from ...core.errors import WriteError
 from ...core.locomotion.route import Route
+from ..local_view import show_in_local_view
 from ..operator_base import OctoOperator
 from ..panel_base import armature_in
 from .properties import locomotion_settings
@@ -58,6 +59,7 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
         # Raises, before anything is made, if they lead nowhere.
         Route.bezier(points[None])
         route = add_route_curve("Octopus Route", points, _collection(context))
+        show_in_local_view(context, route)
         if armature is None:
             _make_active(context, route)
         elif not _assign(armature, route):

@@ -34,7 +34,7 @@ class OCTO_MOTION_UL_changes(ItemRows, bpy.types.UIList):
 
     def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
         row = layout.row(align=True)
-        row.alert = item.gait not in presets.gait_names()
+        row.alert = not presets.has_gait(item.gait)
         row.label(text=item.gait, icon="ANIM")
         row.prop(item, "position", text="", emboss=False)
 

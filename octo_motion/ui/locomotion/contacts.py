@@ -10,9 +10,10 @@ from bpy.props import FloatProperty
 
 from ...blender.armature import active_armature
 from ...blender.arms import require_editable
-from ...blender.contacts import remove_markers
+from ...blender.contacts import markers, remove_markers
 from ...core.errors import OctoMotionError, SettingsError
 from ..armature_operator import ArmatureOperator
+from ..local_view import show_in_local_view
 from ..operator_base import OctoOperator
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from .shot import show_contacts
@@ -39,6 +40,7 @@ class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
                 "Choose a walk along a route, and Hold the Ground.",
             )
         count = show_contacts(armature, shot)
+        show_in_local_view(context, *markers(armature))
         self.report({"INFO"}, f"{count} contacts.")
 
 

@@ -29,7 +29,7 @@ MOST_FRAMES: Final = 100_000
 """A journey of more is a slip of the hand: over an hour at 24 frames a second."""
 
 LAST_FRAME: Final = 1_048_574
-"""The last frame that Blender knows."""
+"""The last frame that Blender knows; the first is as far below zero."""
 
 _HELD: Final = 0.003
 """Arm lengths that few keys may be off where a joint rests on the ground: it would slide."""
@@ -170,6 +170,11 @@ def timing(
     # The motion is the same at any frame rate: it ends when it ends, and the frame after that
     # holds the end. A length that is whole but for rounding does not need that frame.
     count = max(math.ceil(exact - 1e-4), 1) + 1
+    if start < -LAST_FRAME:
+        raise SettingsError(
+            f"The motion would start at frame {start:,}, before Blender's first.",
+            "Let it start later.",
+        )
     if start + count - 1 > LAST_FRAME:
         raise SettingsError(
             f"The motion would end at frame {start + count - 1:,}, after Blender's last.",

@@ -18,7 +18,7 @@ from ...core.errors import GaitError
 from ...core.locomotion import gait
 from ...core.locomotion.gait import CYCLE
 from ..armature_operator import ArmatureOperator
-from .gait_properties import SIDES, fill_curve, fill_offsets, fill_table, read_curve, used
+from .gait_properties import SIDES, fill_curve, fill_offsets, fill_table, used
 from .properties import (
     OCTO_MOTION_PG_locomotion,
     load_gait,
@@ -54,6 +54,23 @@ def _active(collection: Any, index: int, what: str) -> Any:
     if not 0 <= index < len(collection):
         raise GaitError(f"No {what} is chosen.", f"Choose one, or add a {what}.")
     return collection[index]
+
+
+def _chosen_curve(settings: OCTO_MOTION_PG_locomotion) -> tuple[int, gait.GaitCurve]:
+    """The pair that is chosen in the list, 0 for all, and its angles.
+
+    Raises:
+        GaitError: none is chosen.
+    """
+    pair = 0
+    if listed := used(settings.table.curves):
+        pair = _active(listed, settings.table.active_curve, "pair").pair
+    return pair, read_gait(settings).curves[pair]
+
+
+def _curve_of(table: Any, pair: int) -> Any:
+    """The table's item with the angles of a pair."""
+    return next(curve for curve in used(table.curves) if curve.pair == pair)
 
 
 # --- Presets -------------------------------------------------------------------------------------
@@ -272,22 +289,26 @@ class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
     )
 
     def run(self, context: bpy.types.Context) -> None:
-        group = _editable(_settings(context))
-        curve = _active(used(group.curves), group.active_curve, "pair")
-        knots = used(curve.knots)
-        if self.knot >= len(knots):
+        settings = _settings(context)
+        pair, shape = _chosen_curve(settings)
+        # As they are listed, which need not be in order.
+        listed = used(settings.table.curves)
+        phases = shape.phases[:-1].tolist()
+        if listed:
+            phases = [each.phase for each in used(listed[settings.table.active_curve].knots)]
+        if self.knot >= len(phases):
             raise GaitError(f"There is no row {self.knot}.", "Choose a knot of the table.")
-        shape = read_curve(curve)
         if self.knot < 0:
             gap = int(np.argmax(np.diff(shape.phases)))
         else:
-            phase = knots[self.knot].phase % CYCLE
+            phase = phases[self.knot] % CYCLE
             gap = int(np.clip(np.searchsorted(shape.phases, phase + 1e-4) - 1, 0, None))
             gap = min(gap, len(shape.phases) - 2)
         middle = 0.5 * (shape.phases[gap] + shape.phases[gap + 1])
         if shape.phases[gap + 1] - shape.phases[gap] < np.radians(1.0):
             raise GaitError("There is no room for a knot.", "Move the next knot further away.")
         angles = shape.evaluate(np.array([middle]))[0]
+        curve = _curve_of(_editable(settings), pair)
         # Sorted, and with a knot at 0 if there was none: the same motion, in good order.
         fill_curve(
             curve,
@@ -316,11 +337,7 @@ class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         settings = _settings(context)
-        table = read_gait(settings)
-        pair = 0
-        if listed := used(settings.table.curves):
-            pair = _active(listed, settings.table.active_curve, "pair").pair
-        shape = table.curves[pair]
+        pair, shape = _chosen_curve(settings)
         count = len(shape.phases) - 1
         knot = self.knot if self.knot >= 0 else count - 1
         if knot >= count:
@@ -330,8 +347,7 @@ class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
         shape = gait.GaitCurve(
             np.delete(shape.phases, knot), np.delete(shape.angles, knot, axis=0), free=shape.free
         )
-        group = _editable(settings)
-        fill_curve(used(group.curves)[sorted(table.curves).index(pair)], shape)
+        fill_curve(_curve_of(_editable(settings), pair), shape)
 
 
 class OCTO_MOTION_OT_gait_offset_add(ArmatureOperator, bpy.types.Operator):

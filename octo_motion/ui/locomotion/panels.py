@@ -89,6 +89,8 @@ class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
                 OCTO_MOTION_OT_add_route.bl_idname, text="Add Route", icon="CURVE_BEZCURVE"
             )
             return
+        # In place the ground goes by, evenly, and the route is kept for later.
+        layout.active = settings.travel_on != "NONE"
         splines = getattr(settings.route.data, "splines", ())
         if len(splines) > 1 or settings.spline >= 0:
             layout.prop(settings, "spline")

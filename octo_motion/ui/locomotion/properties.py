@@ -22,7 +22,7 @@ from bpy.props import (
 
 from ...blender import presets
 from ...blender.armature import armature_data
-from ...blender.weight_curve import ensure_weight_curve
+from ...blender.weight_curve import curve_node, ensure_weight_curve
 from ...core.errors import GaitError
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import MOST_STEADY, GaitSettings
@@ -57,6 +57,10 @@ AXES: Final = (
 
 def _is_curve(_settings: Any, candidate: bpy.types.Object) -> bool:
     return candidate.type == "CURVE"
+
+
+def _is_weight_curve(_settings: Any, candidate: bpy.types.NodeTree) -> bool:
+    return curve_node(candidate) is not None
 
 
 def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
@@ -443,6 +447,7 @@ class OCTO_MOTION_PG_locomotion(
         name="Weight Curve",
         description="Node group that keeps the curve of joint weights",
         type=bpy.types.NodeTree,
+        poll=_is_weight_curve,
         override=OVERRIDE,
     )
 
