@@ -30,7 +30,7 @@ def turned_towards(
     """Directions (chains, segments, 3) that bring joints nearer to where they are to go.
 
     Args:
-        directions: (chains, segments, 3) unit.
+        directions: (chains, segments, 3) unit, or zero for segments of no length, which stay so.
         lengths: (chains, segments)
         free: (chains, segments) how far each is free to turn, 0…1; at 0 it stays as it is.
         goals: (chains, segments, 3) by how much the joint after each segment is to move.
@@ -61,7 +61,8 @@ def turned_towards(
     most = np.sqrt(np.max(np.sum(turn**2, axis=2), axis=1))[:, None, None]
     result = directions + turn / np.sqrt(1.0 + (most / _BOLD) ** 2)
     size = np.linalg.norm(result, axis=2, keepdims=True)
-    return np.where(free[..., None] > 0.0, result / np.maximum(size, _TINY), directions)
+    turns = (free > 0.0) & (lengths > 0.0)
+    return np.where(turns[..., None], result / np.maximum(size, _TINY), directions)
 
 
 def joints_of(roots: Floats, directions: Floats, lengths: Floats) -> Floats:

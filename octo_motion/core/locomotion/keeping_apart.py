@@ -185,6 +185,9 @@ class _Posed:
         count = len(self.columns)
         start, end = (each[:, self.numbers, : len(which)] for each in (before, after))
         frame, arm = np.nonzero((start != end).reshape(len(start), count, -1).any(axis=2))
+        if not len(frame):
+            # Others have made way.
+            return
         first, second = (normalized(np.diff(each[frame, arm], axis=1)) for each in (start, end))
         turned = np.flatnonzero((first != second).reshape(len(first), -1).any(axis=1))
         frame, arm = frame[turned], arm[turned]
