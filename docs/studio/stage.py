@@ -43,6 +43,10 @@ _SIDE_BY_SIDE = 20
 """Ground tiles across the shorter side of the animation."""
 
 
+_SKIN_POINTS = 1000
+"""Of each mesh, at least so many vertices are looked at, if it has them."""
+
+
 def the_scene() -> bpy.types.Scene:
     """The scene that is shown; there always is one."""
     scene = bpy.context.scene
@@ -104,7 +108,7 @@ def _set_background(scene: bpy.types.Scene, colour: Colour) -> None:
 
 
 def skin_points(armature: bpy.types.Object, frames: Iterable[float]) -> Points:
-    """Points of the skin (frames, points, 3) in world space, about a thousand of them per frame.
+    """Points of the skin (frames, points, 3) in world space, a few thousand at most per frame.
 
     Without a skin: the heads and tails of the bones.
     """
@@ -124,16 +128,18 @@ def go_to(frame: float) -> None:
 def _points_now(armature: bpy.types.Object) -> Points:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     parts: list[Points] = []
-    for child in armature.children:
-        if child.type != "MESH":
+    for child in the_scene().objects:
+        if child.type != "MESH" or armature not in (child.parent, child.find_armature()):
             continue
         evaluated = child.evaluated_get(depsgraph)
         mesh = evaluated.data
         assert isinstance(mesh, bpy.types.Mesh)
         points = np.empty(3 * len(mesh.vertices), dtype=np.float32)
         mesh.vertices.foreach_get("co", points)
-        # Every few vertices are enough: none is far from the next.
-        parts.append(_moved(evaluated.matrix_world, points.reshape(-1, 3)[::29]))
+        # Of a fine skin every few vertices are enough, none is far from the next; of a coarse one
+        # each may be a corner that stands out.
+        step = max(1, len(mesh.vertices) // _SKIN_POINTS)
+        parts.append(_moved(evaluated.matrix_world, points.reshape(-1, 3)[::step]))
     if not parts:
         assert armature.pose is not None
         ends = [end for bone in armature.pose.bones for end in (bone.head, bone.tail)]
