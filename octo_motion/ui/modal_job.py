@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, cast
 
 from ..core.errors import OctoMotionError
+from . import at_work
 from .job import Job
 from .operator_base import OctoOperator
 
@@ -56,14 +57,14 @@ class ModalJob(OctoOperator):
         self._timer = window_manager.event_timer_add(0.01, window=context.window)
         window_manager.progress_begin(0.0, 1.0)
         window_manager.modal_handler_add(cast("bpy.types.Operator", self))
+        at_work.begun(self, self._stop)
         self._show(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
         """One turn of the work. Everything but Esc has to wait."""
         if event.type == "ESC":
-            self.take_back()
-            self._tear_down(context)
+            self._stop(context)
             self.report({"INFO"}, self._stopped)  # type: ignore[attr-defined]
             return {"CANCELLED"}
         if event.type != "TIMER":
@@ -75,11 +76,14 @@ class ModalJob(OctoOperator):
         except OctoMotionError as error:
             return self._fail(context, error)
         except BaseException:
-            self.take_back()
-            self._tear_down(context)
+            self._stop(context)
             raise
         self._show(context)
         return {"RUNNING_MODAL"}
+
+    def _stop(self, context: bpy.types.Context) -> None:
+        self.take_back()
+        self._tear_down(context)
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender's own end of it: another file is opened, or Blender quits."""
@@ -91,8 +95,7 @@ class ModalJob(OctoOperator):
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
-        self.take_back()
-        self._tear_down(context)
+        self._stop(context)
         self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
         return {"CANCELLED"}
 
@@ -107,6 +110,7 @@ class ModalJob(OctoOperator):
     def _tear_down(self, context: bpy.types.Context) -> None:
         """Leave nothing on the screen; safe to call twice."""
         self._job = None
+        at_work.done(self)
         if self._timer is None:
             return
         assert context.window_manager is not None

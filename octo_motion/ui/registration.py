@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from . import settings
+from . import at_work, settings
 from .batch import registration as command_line
 from .locomotion import (
     add_octopus,
@@ -116,6 +116,7 @@ def register() -> None:
 
 def unregister() -> None:
     """Take back what ``register`` did, in reverse order."""
+    at_work.stop_all()
     posing.unregister()
     device_settings.unregister()
     command_line.unregister()

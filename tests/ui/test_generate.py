@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -11,6 +12,7 @@ import pytest
 
 from octo_motion.blender.curves import read_route
 from octo_motion.core.errors import OctoMotionError
+from octo_motion.ui import at_work
 from octo_motion.ui.locomotion import shot as shot_module
 from octo_motion.ui.locomotion import workflow
 from octo_motion.ui.locomotion.generate import OCTO_MOTION_OT_generate_locomotion
@@ -919,6 +921,20 @@ def test_esc_leaves_the_scene_as_it_was(long_job: tuple[Any, Any]) -> None:
     # Blender may call it as well, when it quits.
     operator.cancel(window)
     assert window.calls.count("timer off") == 1
+
+
+def test_nothing_of_it_is_left_when_the_add_on_is_switched_off(long_job: tuple[Any, Any]) -> None:
+    operator, window = long_job
+    window.windows = []
+    before = scene_contents()
+    operator.modal(window, Press("TIMER"))
+    # What Blender hands over when an add-on goes.
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("octo_motion.ui.at_work.bpy", SimpleNamespace(context=window))
+        at_work.stop_all()
+    assert [each for each in window.calls if each.endswith("off")][:3] == CLEAN
+    assert scene_contents() == before
+    at_work.stop_all()
 
 
 def test_a_failure_in_the_middle_cleans_up(

@@ -105,6 +105,10 @@ class Layout:
         assert isinstance(getattr(data, name), bpy.types.ID)
         self.drawn.append("users")
 
+    def context_pointer_set(self, name: str, data: Any) -> None:
+        assert "context_pointer_set" in FUNCTIONS
+        assert isinstance(data, bpy.types.Object), name
+
     def separator(self, **more: Any) -> None:
         check("separator", more)
 

@@ -347,6 +347,8 @@ def _others_at_work() -> bool:
         operator.bl_idname.startswith("OCTO_MOTION_OT_")
         for window in manager.windows
         for operator in window.modal_operators
+        # Of one whose add-on was switched off meanwhile nothing is left.
+        if operator is not None
     )
 
 

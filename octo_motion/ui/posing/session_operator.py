@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
 
 from ...blender.armature import active_armature
 from ...core.errors import OctoMotionError
+from .. import at_work
 from ..armature_operator import ArmatureOperator
 from .controls import Outcome
 from .puppet_session import PuppetSession, active_session
@@ -68,6 +70,7 @@ class SessionOperator(ArmatureOperator):
             self._overlay = self.take_up(context, self._session)
             self._timer = window_manager.event_timer_add(_RATE, window=window)
             window_manager.modal_handler_add(cast("bpy.types.Operator", self))
+            at_work.begun(self, partial(self._end, keep=True))
         except OctoMotionError as error:
             return self._fail(context, error)
         except BaseException:
@@ -78,7 +81,7 @@ class SessionOperator(ArmatureOperator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
         """One event."""
         if self._session is None or self._session.ended:
-            # Another file was opened, or the extension switched off.
+            # Another file was opened.
             self._end(context, keep=True)
             return {"CANCELLED"}
         try:
@@ -107,6 +110,7 @@ class SessionOperator(ArmatureOperator):
 
     def _end(self, context: bpy.types.Context, *, keep: bool) -> None:
         """Leave nothing on screen; safe to call twice."""
+        at_work.done(self)
         session, self._session = self._session, None
         overlay, self._overlay = self._overlay, None
         timer, self._timer = self._timer, None

@@ -11,6 +11,7 @@ from bpy.props import FloatProperty
 from ...blender.actions import writable_armature
 from ...blender.armature import active_armature
 from ...core.errors import ClipError, OctoMotionError
+from .. import at_work
 from .properties import splicing_settings
 from .splice_build import build_retimed
 from .splice_list import SpliceOperator, active_splice
@@ -95,6 +96,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
             return self._fail(context, error)
         self._mouse = event.mouse_x
         window_manager.modal_handler_add(self)
+        at_work.begun(self, self._tear_down)
         self._tell(context)
         return {"RUNNING_MODAL"}
 
@@ -164,6 +166,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
 
     def _tear_down(self, context: bpy.types.Context) -> None:
         """Leave nothing on screen and armature; safe to call twice."""
+        at_work.done(self)
         if self._session is None:
             return
         self._session.tear_down()
