@@ -11,9 +11,10 @@ from octo_motion.core.locomotion import gait
 from octo_motion.core.locomotion.arm_frames import ArmFrames, arm_frames
 from octo_motion.core.locomotion.coil import profile_of
 from octo_motion.core.locomotion.curl import curled
+from octo_motion.core.locomotion.easing import least_jerk
 from octo_motion.core.locomotion.generator import GaitSettings, Generator
 from octo_motion.core.locomotion.grasp import Grasp, Mode, Places, Target, plan_grasp
-from octo_motion.core.locomotion.reach import Timeline, eased, first_place, front_width
+from octo_motion.core.locomotion.reach import Timeline, first_place, front_width
 from octo_motion.core.rotations import (
     IDENTITY,
     Floats,
@@ -298,11 +299,11 @@ def test_a_motion_that_ends_before_the_release_holds_on() -> None:
 
 def test_the_way_of_least_jerk_starts_and_ends_at_rest() -> None:
     t = np.linspace(-0.5, 1.5, 4001)
-    way = eased(t)
+    way = least_jerk(t)
     assert way[0] == 0.0
     assert way[-1] == 1.0
     assert np.max(np.diff(way, 2)) < 2e-6  # no corner
-    np.testing.assert_allclose(way + eased(1.0 - t), 1.0, atol=1e-12)
+    np.testing.assert_allclose(way + least_jerk(1.0 - t), 1.0, atol=1e-12)
 
 
 # --- The curl -------------------------------------------------------------------------------------

@@ -378,15 +378,3 @@ def _solved(matrix: tuple[Floats, ...], right: Floats) -> Floats:
 def unit(vectors: Floats) -> Floats:
     """Vectors (…, 3, batch) at unit length."""
     return vectors * (1.0 / np.maximum(np.sqrt(dot(vectors, vectors)), _TINY))[..., None, :]
-
-
-def smooth(share: Floats) -> Floats:
-    """From 0 to 1 and from 1 on, level at both ends."""
-    inside = np.clip(share, 0.0, 1.0)
-    return inside * inside * (3.0 - 2.0 * inside)
-
-
-def gentle(share: Floats) -> Floats:
-    """The same with no acceleration at its ends either: next to a hold nothing moves at first."""
-    inside = np.clip(share, 0.0, 1.0)
-    return inside * inside * inside * (10.0 + inside * (6.0 * inside - 15.0))

@@ -34,6 +34,7 @@ from ..rotations import (
     rotate,
     shortest_arc,
 )
+from .easing import smooth_step
 from .route import Route
 
 _FEWEST: Final = 1024
@@ -292,8 +293,8 @@ def _held_angle(
 
 
 def _steered(wanted: Floats, level: Floats, steps: Floats, pace: float, start: float) -> Floats:
-    hold = np.clip((np.minimum(level[1:], level[:-1]) - _LOST) / (_HELD - _LOST), 0.0, 1.0)
-    given = (hold * hold * (3.0 - 2.0 * hold) * steps).tolist()
+    hold = smooth_step((np.minimum(level[1:], level[:-1]) - _LOST) / (_HELD - _LOST))
+    given = (hold * steps).tolist()
     pulls = (pace * level[:-1] ** 2).tolist()
     angle, result = start, [start]
     for target, step, pull in zip(wanted[:-1].tolist(), given, pulls, strict=True):

@@ -26,6 +26,7 @@ from ..rotations import (
     multiply,
     to_rotation_vector,
 )
+from .easing import least_jerk
 
 _HELD: Final = 0.3
 """Share of a change, from either end, in which arms may still hold on, or hold on again: in between
@@ -110,18 +111,12 @@ def changes_by_height(
     return tuple(found)
 
 
-def eased(share: Floats) -> Floats:
-    """From 0 to 1 with neither slope nor bend at the ends."""
-    t = np.clip(share, 0.0, 1.0)
-    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
-
-
 def way_weights(changes: Sequence[Change], ways: int, distance: Floats) -> Floats:
     """How far the body goes each way (…, ways) at distances (…,); they sum to 1."""
     weights = np.zeros((*distance.shape, ways))
     weights[..., 0] = 1.0
     for change in changes:
-        over = eased((distance - change.start) / (change.end - change.start))
+        over = least_jerk((distance - change.start) / (change.end - change.start))
         weights *= (1.0 - over)[..., None]
         weights[..., change.way] += over
     return weights

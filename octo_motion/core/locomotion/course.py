@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 
 from ..rotations import Floats
 from .bearings import Bearings
-from .changes import Change, between, eased, sense_of
+from .changes import Change, between, sense_of
+from .easing import least_jerk
 from .route import Route
 from .stroke import stroke_distance
 from .travel import Travel, TravelSettings, travel_at, walked_at
@@ -133,7 +134,7 @@ class Course:
         flat = wanted.reshape(-1)
         positions, rotations = self.lines[0].at(flat)
         for number, change in enumerate(self.changes):
-            over = eased((flat - change.start) / (change.end - change.start))
+            over = least_jerk((flat - change.start) / (change.end - change.start))
             later = over > 0.0
             if not np.any(later):
                 continue

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..rotations import Floats
 from .arm_frames import ArmFrames, blended
-from .reach import Timeline, eased, folded
+from .easing import least_jerk
+from .reach import Timeline, folded
 
 _FREE: Final = 0.3
 """Share of the arm, from its root, that hardly curls."""
@@ -33,9 +34,9 @@ def curled(arm: ArmFrames, timeline: Timeline, times: Floats, otherwise: Floats)
     along = arm.reach[:-1] / arm.length
     up = (times[:, None] - timeline.start) / (timeline.contact - timeline.start)
     down = (times[:, None] - timeline.release) / (timeline.end - timeline.release)
-    up = eased((up - _WAVE * (1.0 - along)) / (1.0 - _WAVE))
-    down = eased((down - _WAVE * along) / (1.0 - _WAVE))
-    share = up * (1.0 - down) * eased(along / _FREE)
+    up = least_jerk((up - _WAVE * (1.0 - along)) / (1.0 - _WAVE))
+    down = least_jerk((down - _WAVE * along) / (1.0 - _WAVE))
+    share = up * (1.0 - down) * least_jerk(along / _FREE)
     usual = arm.shape(arm.from_bones(otherwise))
     # A front before the arm's root: all of it is behind.
     spiral = folded(arm.lengths, np.full(len(times), -arm.length), bend=0.0, curl=_TIGHT)

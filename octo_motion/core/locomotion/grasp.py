@@ -35,7 +35,8 @@ from .arm_frames import (
 )
 from .ccd import closed
 from .coil import Coil, Profile, Skins, Start, Winding, wind
-from .reach import Timeline, eased, first_place, folded, front_width, passed
+from .easing import least_jerk, smooth_step
+from .reach import Timeline, first_place, folded, front_width, passed
 
 Mode = Literal["TOUCH", "COIL"]
 
@@ -173,8 +174,7 @@ class Grasp:
         twist = _twist(frames[:, -1], held)
         twist = self.twist + np.angle(np.exp(1j * (twist - self.twist)))
         share = np.cumsum(lengths) / lengths.sum()
-        ramp = np.clip((share - 1.0 + _TWISTED) / _TWISTED, 0.0, 1.0)
-        angle = twist[:, None] * (ramp * ramp * (3.0 - 2.0 * ramp))
+        angle = twist[:, None] * smooth_step((share - 1.0 + _TWISTED) / _TWISTED)
         return multiply(frames, from_axis_angle(_X, angle))
 
     def _out_of_the_way(self, joints: Floats, places: Places) -> Floats:
@@ -248,7 +248,7 @@ class Grasp:
         fold[:, 0] = holding[:, 0]
         reaching = blended(fold, holding, reached)
         # What holds is out of the way already.
-        loose = 1.0 - eased((front - touches + width) / width)
+        loose = 1.0 - least_jerk((front - touches + width) / width)
         cleared = self._cleared(arm.shaped(reaching), places[moves], loose)
         reaching = arm.shape(cleared)
         usual = arm.shape(arm.from_bones(otherwise[moves]))

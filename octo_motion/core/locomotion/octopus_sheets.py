@@ -19,7 +19,7 @@ from .octopus_body import HEAD_BASE, MANTLE_WIDEST, BodyForm
 from .octopus_layout import ArmLayout
 from .octopus_rig import BODY
 from .octopus_shape import OctopusShape
-from .octopus_skin import Influences, along_arm, along_body, mixed, smooth_step
+from .octopus_skin import Influences, along_arm, along_body, mixed, ramp
 
 HEAD_ROWS: Final = 24
 END_ROWS: Final = 4
@@ -105,7 +105,7 @@ def upper_sheet(layout: ArmLayout, form: BodyForm) -> Sheet:
 
     sector = _arms_and_web(layout, distance, upper=True)
     # The head's even columns gather into arms and web over the crown.
-    gathered = smooth_step(-0.15 * unit, 0.0, distance)[:, None]
+    gathered = ramp(-0.15 * unit, 0.0, distance)[:, None]
     sector = _blend(_even_ring(layout, distance, sector), sector, gathered)
     skirt = _head_skirt(unit, sector.radius) + shape.arm_height
     height = _smooth_maximum(sector.height, skirt, 0.22 * unit)
@@ -115,7 +115,7 @@ def upper_sheet(layout: ArmLayout, form: BodyForm) -> Sheet:
         [form.mantle_end(polar).points(round_head), form.ring(stations).points(round_head), outer]
     )
     row = np.arange(float(len(points))) - (END_ROWS + HEAD_ROWS + _CROWN_ROWS)
-    amount = 0.6 * smooth_step(-11, -5, row) * (1.0 - smooth_step(0, 3, row))
+    amount = 0.6 * ramp(-11, -5, row) * (1.0 - ramp(0, 3, row))
     points = _relaxed(points, amount, rounds=12)
     body_stations = np.concatenate(
         [
@@ -138,7 +138,7 @@ def lower_sheet(layout: ArmLayout, form: BodyForm) -> Sheet:
     mouth = unit * (_MOUTH[:, 0] - 1.0)
     distance = np.concatenate([mouth, layout.stations[: layout.web_row + 1]])
     sector = _arms_and_web(layout, distance, upper=False)
-    gathered = smooth_step(-0.75 * unit, -0.3 * unit, distance)[:, None]
+    gathered = ramp(-0.75 * unit, -0.3 * unit, distance)[:, None]
     disc = shape.arm_height + unit * np.interp(distance / unit + 1.0, *_MOUTH.T)
     ring = _even_ring(layout, distance, sector)
     inside = (distance < 0.0)[:, None]
@@ -146,7 +146,7 @@ def lower_sheet(layout: ArmLayout, form: BodyForm) -> Sheet:
     points = _blend(ring, sector, gathered).round_the_axis(shape)
 
     row = np.arange(float(len(points))) - len(_MOUTH)
-    amount = 0.5 * smooth_step(-6, -4, row) * (1.0 - smooth_step(0, 3, row))
+    amount = 0.5 * ramp(-6, -4, row) * (1.0 - ramp(0, 3, row))
     points = _relaxed(points, amount, rounds=8)
     influences = _influences(layout, points, distance, np.full(len(points), -1.0), columns.ventral)
     return Sheet(points, influences, distance, columns.web + columns.ventral, columns.ventral)
@@ -244,7 +244,7 @@ def _influences(
     column = np.tile(np.arange(sector), shape.arms)
     step = np.where(column < half, -1, np.where(column > half + arm_columns, 1, 0))
     into_web = np.maximum(half - column, column - half - arm_columns) / half
-    share = 0.5 * smooth_step(0.0, 1.0, into_web)
+    share = 0.5 * ramp(0.0, 1.0, into_web)
 
     # The web hangs back: a point of it goes with the bones beside it, not with those of its row.
     radial = np.hypot(points[..., 0], points[..., 1]) - shape.crown_radius

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ..rotations import Floats
+from .easing import smooth_step
 from .octopus_body import HEAD_MIDDLE, MANTLE_EDGE, NECK
 from .octopus_rig import BODY, FIRST_ARM_BONE, HEAD, MANTLE
 from .octopus_shape import OctopusShape
@@ -28,10 +29,9 @@ class Influences(NamedTuple):
     weights: Floats
 
 
-def smooth_step(start: float, stop: float, values: Floats) -> Floats:
-    """0 before ``start``, 1 after ``stop``, and a cubic with level ends in between."""
-    t = np.clip((values - start) / (stop - start), 0.0, 1.0)
-    return t * t * (3.0 - 2.0 * t)
+def ramp(start: float, stop: float, values: Floats) -> Floats:
+    """0 before ``start``, 1 after ``stop``, and a smooth step (…) in between."""
+    return smooth_step((values - start) / (stop - start))
 
 
 def rigid(bone: int, shape: tuple[int, ...]) -> Influences:
@@ -75,8 +75,8 @@ def along_arm(shape: OctopusShape, arm: Indices, distance: Floats) -> Influences
 
 def along_body(station: Floats) -> Influences:
     """Influences (…, 3) of body, head and mantle at stations of the body's axis."""
-    head = smooth_step(-1.0, HEAD_MIDDLE, station)
-    mantle = smooth_step(NECK - 0.7, MANTLE_EDGE + 1.0, station)
+    head = ramp(-1.0, HEAD_MIDDLE, station)
+    mantle = ramp(NECK - 0.7, MANTLE_EDGE + 1.0, station)
     bones = np.broadcast_to(np.array([BODY, HEAD, MANTLE]), (*station.shape, 3))
     return Influences(bones, np.stack([1.0 - head, head * (1.0 - mantle), head * mantle], axis=-1))
 

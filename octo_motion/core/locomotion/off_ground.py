@@ -14,8 +14,9 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats, conjugate, multiply, rotate, shortest_arc
-from .arm_shapes import raised, smooth
+from .arm_shapes import raised
 from .between_frames import Course
+from .easing import smooth_step
 from .figures import Poses
 
 _OVER: Final = 0.03
@@ -42,8 +43,8 @@ def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
     """
     result = np.full(shares[0].shape if shares else (1, 1), float(swims[0]))
     for swum, share in zip(swims[1:], shares, strict=True):
-        leaving = np.maximum(result, smooth(share / _RAMP))
-        coming = smooth((1.0 - share) / _RAMP) if not swum else 1.0
+        leaving = np.maximum(result, smooth_step(share / _RAMP))
+        coming = smooth_step((1.0 - share) / _RAMP) if not swum else 1.0
         result = np.where(share > 0.0, leaving * coming, result)
     return result
 
@@ -69,7 +70,7 @@ def off_ground(course: Course, poses: Poses, radii: Sequence[Floats], loose: Flo
         roots = poses.locations[chosen] + rotate(facing[:, 0], course.scale * arm.root)
         reach = np.concatenate([np.zeros((len(chosen), 1)), np.cumsum(lengths, axis=1)], axis=1)
         needed = radii[number] + _OVER * reach[:, -1:]
-        out = smooth(reach / (_OUT * reach[:, -1:])) * loose[chosen, number, None]
+        out = smooth_step(reach / (_OUT * reach[:, -1:])) * loose[chosen, number, None]
         turned = raised(
             np.ascontiguousarray(np.moveaxis(directions, 0, -1)),
             np.ascontiguousarray(lengths.T),

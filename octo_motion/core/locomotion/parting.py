@@ -18,9 +18,10 @@ from typing import Final, Protocol
 import numpy as np
 
 from ..rotations import Floats
-from .arm_shapes import drawn, smooth
+from .arm_shapes import drawn
 from .chain_turning import joints_of, turned_towards
 from .columns import dot
+from .easing import smooth_step
 from .over_time import blurred, covered, reach, widened
 from .separation import Capsules
 from .touching import Crowd, Touches, Touching, aside
@@ -236,7 +237,7 @@ class _Parting:
         room = np.minimum(self._room[frame, arm, segment], self._room[frame, arm, segment + 1])
         radius = np.maximum(self._crowd.radii[arm, segment], _TINY)
         down = np.maximum(-dot(way, self._crowd.up[frame].T), 0.0)
-        return own * can * (1.0 - down * (1.0 - smooth(room / (2.0 * radius))))
+        return own * can * (1.0 - down * (1.0 - smooth_step(room / (2.0 * radius))))
 
     def _spread(self, wanted: Floats) -> Floats:
         """The same, begun in time and ended late: as far as is asked, and smoothly."""
@@ -253,7 +254,7 @@ class _Parting:
         length = _length(mean)
         # Where it is asked to go now one way and now the other, it stays between them.
         mean_size = blurred(size, self._width, cyclic=self._cyclic)
-        agreed = smooth(2.0 * length / np.maximum(mean_size, _TINY))
+        agreed = smooth_step(2.0 * length / np.maximum(mean_size, _TINY))
         whole = self._covered(size) * agreed
         whole[whole < 1e-5 * self._scale] = 0.0
         whole *= self._loose.reshape(len(wanted), -1)[:, columns]
@@ -330,7 +331,7 @@ class _Parting:
         for which in (0, 1):
             np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
         low, high = _HOPELESS
-        result = smooth((worst[:, :arms] - low) / (high - low))
+        result = smooth_step((worst[:, :arms] - low) / (high - low))
         changed = self._changed()
         most = max(_SWIFT * float(self._turns_before.max(initial=0.0)), _UNSEEN)
         swift = self._turns_before > most
@@ -403,9 +404,9 @@ def _freedom(lying: np.ndarray) -> tuple[Floats, Floats]:
     onward = np.where(lying, numbers, far)[..., ::-1]
     onward = np.minimum.accumulate(onward, axis=2)[..., ::-1] - numbers
     back = numbers - np.maximum.accumulate(np.where(lying, numbers, -far), axis=2)
-    segments = smooth(np.minimum(onward[..., :-1], back[..., 1:]) / _BORDER)
+    segments = smooth_step(np.minimum(onward[..., :-1], back[..., 1:]) / _BORDER)
     # The root is the body's.
-    return segments, smooth(np.minimum(np.minimum(onward, back), numbers) / _BORDER)
+    return segments, smooth_step(np.minimum(np.minimum(onward, back), numbers) / _BORDER)
 
 
 def _differ(one: Floats, other: Floats | float) -> np.ndarray:

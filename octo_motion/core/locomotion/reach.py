@@ -24,6 +24,7 @@ import numpy as np
 from ..errors import SettingsError
 from ..rotations import Floats
 from .arm_frames import bends
+from .easing import least_jerk
 
 FOLD: Final = np.radians(100.0)
 """Angle of the travelling bend."""
@@ -98,28 +99,24 @@ class Timeline:
         whole, back = self.contact - self.start, self.end - self.release
         out = (times[:, None] - self.start) / (_GATHERED * whole)
         gone = (times[:, None] - self.release - _LEAVES * back) / ((1.0 - _LEAVES) * back)
-        out = eased((1.0 + _STAGGER) * out - _STAGGER * (1.0 - along))
-        gone = eased((1.0 + _STAGGER) * gone - _STAGGER * along)
+        out = least_jerk((1.0 + _STAGGER) * out - _STAGGER * (1.0 - along))
+        gone = least_jerk((1.0 + _STAGGER) * gone - _STAGGER * along)
         return out * (1.0 - gone)
 
     def front(self, times: Floats, begins: float, touches: float, ends: float) -> Floats:
         """Where (frames,) the front is along the arm, from its three places."""
         whole, back = self.contact - self.start, self.end - self.release
-        out = eased((times - self.start - _SET_OUT * whole) / ((1.0 - _SET_OUT) * whole))
+        out = least_jerk((times - self.start - _SET_OUT * whole) / ((1.0 - _SET_OUT) * whole))
         if self.closed > self.contact:
-            wound = eased((times - self.contact) / (self.closed - self.contact))
+            wound = least_jerk((times - self.contact) / (self.closed - self.contact))
         else:
             wound = (times >= self.contact).astype(np.float64)
-        unwound = eased((times - self.release) / (_UNWOUND * back))
-        back_again = eased(((times - self.release) / back - _BACK_FROM) / (_BACK_TO - _BACK_FROM))
+        unwound = least_jerk((times - self.release) / (_UNWOUND * back))
+        back_again = least_jerk(
+            ((times - self.release) / back - _BACK_FROM) / (_BACK_TO - _BACK_FROM)
+        )
         place = begins + (touches - begins) * out * (1.0 - back_again)
         return place + (ends - touches) * wound * (1.0 - unwound)
-
-
-def eased(share: Floats) -> Floats:
-    """The way of least jerk from 0 to 1 (Flash and Hogan 1985); held beyond both ends."""
-    t = np.clip(share, 0.0, 1.0)
-    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
 
 
 def front_width(lengths: Floats) -> float:
@@ -138,7 +135,7 @@ def passed(lengths: Floats, front: Floats) -> Floats:
     The first joint aims the arm; it is always passed.
     """
     joints = np.cumsum(lengths) - lengths
-    result = eased((front[..., None] - joints) / front_width(lengths))
+    result = least_jerk((front[..., None] - joints) / front_width(lengths))
     result[..., 0] = 1.0
     return result
 
@@ -153,14 +150,14 @@ def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1
         curl: how much of the spiral.
     """
     whole, width = float(lengths.sum()), front_width(lengths)
-    shy = _SHY + (1.0 - _SHY) * eased(front[..., None] / (_BOLD * whole))
+    shy = _SHY + (1.0 - _SHY) * least_jerk(front[..., None] / (_BOLD * whole))
     shy = np.where(front[..., None] < 0.0, 1.0, shy)
     ends = np.concatenate([[0.0], np.cumsum(lengths)])
     left = whole - ends + _BLUNT * whole
     spiral = curl * _SPIRAL * np.log(left[:-1] / left[1:])
     # The bend lies within the front: its angle up to each place along the arm runs as the front.
     behind = front[..., None] - 0.5 * width
-    so_far = eased((ends - 0.5 * np.append(lengths, lengths[-1]) - behind) / width)
+    so_far = least_jerk((ends - 0.5 * np.append(lengths, lengths[-1]) - behind) / width)
     fold = bend * FOLD * np.diff(so_far, axis=-1)
     angles = np.minimum(shy * (spiral + fold), _MOST_BENT)
     angles[..., 0] = 0.0

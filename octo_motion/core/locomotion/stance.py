@@ -19,8 +19,9 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .arm_shapes import bent, blended, curve, drawn, evened, gentle, raised, smooth, unit
+from .arm_shapes import bent, blended, curve, drawn, evened, raised, unit
 from .columns import dot
+from .easing import least_jerk, smooth_step
 from .foothold_places import PEELING
 from .footholds import UNROLLING, Footholds
 from .ground import Ground
@@ -204,10 +205,10 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
     on, off = footholds.on[at], footholds.off[at]
     touching, whole = batch.reach[footholds.touching], batch.reach[-1]
     earlier = _EARLIER * (on + 0.5)
-    down = smooth((since - on + earlier) / (UNROLLING * (off - on) + earlier))
-    gone = smooth((since - footholds.peeled()[at]) / (PEELING * (off - on)))
-    landing = gentle((since + 0.5) / (on + 0.5))
-    leaving = gentle((0.5 - since) / (0.5 - off))
+    down = smooth_step((since - on + earlier) / (UNROLLING * (off - on) + earlier))
+    gone = smooth_step((since - footholds.peeled()[at]) / (PEELING * (off - on)))
+    landing = least_jerk((since + 0.5) / (on + 0.5))
+    leaving = least_jerk((0.5 - since) / (0.5 - off))
     weight = np.where(since < on, landing, np.where(since > off, leaving, 1.0))
     joints = np.moveaxis(footholds.joints[at], 0, -1)
     # An arm in the air goes along with the body, and does so gently at first.
@@ -215,7 +216,7 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
     moved = np.where(
         since < on, roots - footholds.roots_on[at].T, roots - footholds.roots_off[at].T
     )
-    carried = moved * gentle((before + after) / _GOING)
+    carried = moved * least_jerk((before + after) / _GOING)
     return Hold(
         weight=weight * footholds.present[at],
         lies_from=touching + gone * (footholds.peeled_to[at] - touching),
@@ -273,7 +274,7 @@ def stand(
     if len(swinging):
         part, own = batch.part(swinging), held.part(swinging)
         away = 1.0 - own.weight
-        let_go, at_once = smooth(_LETTING_GO * away), smooth(_AT_ONCE * away)
+        let_go, at_once = smooth_step(_LETTING_GO * away), smooth_step(_AT_ONCE * away)
         free = _freedom(part, own)
         whole = part.reach[-1]
         # What has lain is as high as its skin is thick, and no higher yet.
@@ -365,7 +366,7 @@ def _held(
         )
     # What is beyond the joint that is held can be raised without letting go; where it comes to
     # lie it needs no raising, or it would stay up until the last moment and then drop.
-    beyond = (1.0 - to_goal) * smooth((batch.reach[1:] - held.lies_to) / batch.lengths)
+    beyond = (1.0 - to_goal) * smooth_step((batch.reach[1:] - held.lies_to) / batch.lengths)
     soft = _SOFT * batch.radii + _TINY
     own = raised(
         own,
@@ -420,20 +421,20 @@ def _knee(batch: Batch, held: Hold, chord: Floats, longer: Floats) -> Floats:
 
 def _freedom(batch: Batch, held: Hold) -> Floats:
     """How far each segment (segments, batch) is free to turn: 0 where it lies on the ground."""
-    return smooth((held.lies_from - batch.reach[:-1]) / (_BORDER * batch.lengths))
+    return smooth_step((held.lies_from - batch.reach[:-1]) / (_BORDER * batch.lengths))
 
 
 def _loose(batch: Batch, held: Hold) -> Floats:
     """How far each joint (segments + 1, batch) may be raised: 0 where it lies, and at the root."""
     reach, width = batch.reach, batch.reach[1]
-    before = smooth((held.lies_from - reach) / width)
-    after = smooth((reach - held.lies_to) / width)
+    before = smooth_step((held.lies_from - reach) / width)
+    after = smooth_step((reach - held.lies_to) / width)
     return np.maximum(before, np.where(held.by_tip, 0.0, after)) * _out(reach)
 
 
 def _out(reach: Floats) -> Floats:
     """0 at the root, which the body carries, 1 a little further out."""
-    return smooth(reach / (0.15 * reach[-1]))
+    return smooth_step(reach / (0.15 * reach[-1]))
 
 
 def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, Floats, Floats]:
@@ -471,9 +472,9 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
         strain[0] -= shortest * np.tanh(slack / shortest)
     # A cubic from body to ground that leaves and arrives as the arm does, and is as long. The
     # slacker the arm, the more it rises.
-    rising = _RAISED + _ARCHED * smooth((_EASY - ratio) / _ARCHING)
+    rising = _RAISED + _ARCHED * smooth_step((_EASY - ratio) / _ARCHING)
     # Slack, it comes down rather than back from under the body.
-    falling = _FALLING * smooth((_EASY - ratio) / _ARCHING)
+    falling = _FALLING * smooth_step((_EASY - ratio) / _ARCHING)
     arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
     leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
     size = held.lies_from * (1.0 + strain[0])

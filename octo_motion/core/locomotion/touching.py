@@ -17,8 +17,8 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .arm_shapes import smooth
 from .columns import dot
+from .easing import smooth_step
 from .separation import Capsules, near, nearest, pairs_of, parts_of
 
 GIVEN: Final = 0.05
@@ -232,7 +232,7 @@ def aside(touches: Touches) -> tuple[Floats, Floats]:
     straight = touches.gap / np.maximum(touches.distance, _TINY)
     wrong = np.maximum(-dot(straight, touches.side), 0.0)
     # From too far it is not to be told whether they have passed through each other at all.
-    told = smooth((1.0 + NEAR - apart) / NEAR)
+    told = smooth_step((1.0 + NEAR - apart) / NEAR)
     back = np.maximum(1.0 - apart, 0.0) + wrong * told
     inside = np.minimum(apart, 1.0)
     way = inside * straight + (inside * wrong + back) * touches.side

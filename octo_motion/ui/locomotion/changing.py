@@ -19,12 +19,12 @@ from ...core.locomotion.changes import (
     blended,
     changes_by_height,
     check_changes,
-    eased,
     slowing,
     way_weights,
     windows,
 )
 from ...core.locomotion.course import Course, Line, SwumLine, WalkedLine
+from ...core.locomotion.easing import least_jerk
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Generator
@@ -323,7 +323,7 @@ class Changing:
     def _shares(self, change: int, distance: Floats) -> Floats:
         """How far each arm (frames, arms) has gone over at a change."""
         found = self.windows[change]
-        return eased((distance[:, None] - found.start) / (found.end - found.start))
+        return least_jerk((distance[:, None] - found.start) / (found.end - found.start))
 
     def _travel(self, number: int, distance: Floats) -> Travel:
         """The body at some distances as one of the ways has it."""
