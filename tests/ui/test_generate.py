@@ -752,6 +752,19 @@ def test_drivers_and_layers_that_hide_the_motion_are_told(octopus: Any) -> None:
     assert "hides" in told_of_layers()[0]
 
 
+def test_what_keeps_the_motion_from_being_seen_as_it_is_is_told(octopus: Any) -> None:
+    def told() -> list[str]:
+        warnings = workflow.generate(octopus, bpy.context).warnings
+        return [each for each in warnings if "rest position" in each or "stretches" in each]
+
+    assert told() == []
+    octopus.data.pose_position = "REST"
+    bpy.context.scene.render.frame_map_new = 200
+    resting, stretched = told()
+    assert "its arms do not move" in resting
+    assert "(100 to 200)" in stretched
+
+
 @pytest.mark.parametrize("travel_on", ["BONE", "NONE"])
 @pytest.mark.parametrize("listed", [True, False])
 def test_a_root_bone_that_is_posed_and_gets_keys_moves_nothing(

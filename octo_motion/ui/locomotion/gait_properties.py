@@ -154,6 +154,8 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
         subtype="ANGLE",
         soft_min=-2.0 * np.pi,
         soft_max=2.0 * np.pi,
+        step=500,
+        precision=1,
         override=OVERRIDE,
     )
     unused: _unused()
@@ -162,8 +164,10 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
 class OCTO_MOTION_PG_gait_note(bpy.types.PropertyGroup):
     """A remark that travels with the table."""
 
-    subject: StringProperty(name="Subject", override=OVERRIDE)
-    text: StringProperty(name="Text", override=OVERRIDE)
+    subject: StringProperty(
+        name="Subject", description="What the remark is about", override=OVERRIDE
+    )
+    text: StringProperty(name="Text", description="The remark itself", override=OVERRIDE)
     unused: _unused()
 
 

@@ -164,7 +164,10 @@ class _FileOperator(ArmatureOperator):
     filename_ext: Final = presets.SUFFIX
 
     filepath: StringProperty(
-        name="File", subtype="FILE_PATH", options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"}
+        name="File",
+        description="The gait's file (JSON)",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
     filter_glob: StringProperty(default=f"*{presets.SUFFIX}", options={"HIDDEN"})
 

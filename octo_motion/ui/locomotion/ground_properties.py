@@ -55,7 +55,7 @@ class ContactItem(bpy.types.PropertyGroup):
     position: FloatVectorProperty(
         name="Position",
         description="Where the arm touches the ground, if the contact is locked",
-        subtype="XYZ",
+        subtype="TRANSLATION",
         size=3,
         override=OVERRIDE,
     )

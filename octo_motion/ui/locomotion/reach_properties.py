@@ -48,7 +48,7 @@ class ReachItem(bpy.types.PropertyGroup):
     )
     target: PointerProperty(
         name="Object",
-        description="What is reached for. It may move; nothing of it is changed",
+        description="What is reached for. It may move; only if it is carried is it changed",
         type=bpy.types.Object,
         poll=_has_surface,
         override=OVERRIDE,

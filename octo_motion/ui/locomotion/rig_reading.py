@@ -165,6 +165,23 @@ def told_of_constraints(
     return told
 
 
+def told_of_showing(armature: bpy.types.Object, render: bpy.types.RenderSettings) -> list[str]:
+    """What there is to say of a motion that is there, but is not shown as it is."""
+    told = told_of_layers(armature)
+    if armature_data(armature).pose_position == "REST":
+        told.append(
+            f"'{armature.name}' is shown in its rest position: its arms do not move. Choose Pose "
+            "Position in the properties of the armature."
+        )
+    if render.frame_map_old != render.frame_map_new:
+        told.append(
+            f"The scene stretches time ({render.frame_map_old} to {render.frame_map_new}): the "
+            "motion plays at another speed than it was made for. Set both to the same number in "
+            "the output properties."
+        )
+    return told
+
+
 def told_of_layers(armature: bpy.types.Object) -> list[str]:
     """What there is to say of NLA tracks that do not let the motion through as it is."""
     data = armature.animation_data

@@ -52,8 +52,8 @@ from .rig_reading import (
     posed_carriers,
     told_of_constraints,
     told_of_driven,
-    told_of_layers,
     told_of_poses,
+    told_of_showing,
     uniform_scale,
 )
 from .shot import Shot
@@ -246,7 +246,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         warnings=[
             *(detection.notes if detection else told_of_driven(skeleton, arms)),
             *told_of_constraints(settings, armature, skeleton, root_bone),
-            *told_of_layers(armature),
+            *told_of_showing(armature, scene.render),
             *told_of_poses(settings, armature, arms, carriers),
             *(standing.warnings if standing else ()),
             *(too_few_frames(settings, pace, scene.render) if grounded else ()),
