@@ -18,8 +18,8 @@ from mathutils import Vector
 from shots import Performance
 from stage import Pixels, Points
 
-FRONT: Final = np.array([0.0, -1.0, 0.0])
-"""Where a creature faces that nothing turns."""
+from octo_motion.core.locomotion.chains import AXES
+
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _PHASES: Final = 8
 _COLUMNS: Final = 4
@@ -104,13 +104,20 @@ def _travel(
         right = (after - before) * [1.0, 1.0, 0.0]
         if not np.any(right):
             # In place the ground would go by.
-            right = FRONT
+            right = front(armature)
         right = right / np.linalg.norm(right)
         away = np.cross(_UP, right)
         up = np.cos(view.elevation) * _UP + np.sin(view.elevation) * away
         bodies.append(here)
         axes.append(np.stack([right, up, np.cross(right, up)], axis=1))
     return np.stack(bodies), np.stack(axes)
+
+
+def front(armature: bpy.types.Object) -> Points:
+    """Where a creature faces that nothing turns (3,), level."""
+    axis = Vector(AXES[armature.octo_motion.locomotion.body_front])
+    faced = np.array(armature.matrix_world.to_3x3() @ axis, dtype=np.float64) * [1.0, 1.0, 0.0]
+    return faced / np.linalg.norm(faced)
 
 
 def _place(armature: bpy.types.Object, frame: float) -> Points:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 import time
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO
 
 import bpy
 import contact_sheet
@@ -39,6 +40,11 @@ _OBLIQUE: Final = contact_sheet.View("above the side", np.radians(22.0))
 _CELL: Final = (180, 135)
 _STRIP: Final = 4
 """Pictures of a cycle beside each other."""
+_IMPORTERS: Final = {
+    ".blend": lambda path: bpy.ops.wm.open_mainfile(filepath=path),
+    ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
+    ".fbx": lambda path: bpy.ops.import_scene.fbx(filepath=path),
+}
 _BACKGROUND: Final = (0.06, 0.06, 0.065)
 
 
@@ -59,6 +65,13 @@ def main() -> None:
     arguments = parser.parse_args()
     if unknown := set(arguments.names) - set(names):
         parser.error(f"there is no set-up '{unknown.pop()}'")
+    rig: Path | None = arguments.rig
+    if rig is not None and not rig.is_file():
+        parser.error(f"there is no file '{rig}'")
+    if rig is not None and rig.suffix.lower() not in _IMPORTERS:
+        parser.error(f"'{rig.name}' is no {', '.join(_IMPORTERS)} file")
+    if arguments.armature and rig is None:
+        parser.error("--armature needs --rig: the octopus of the add-on has one armature")
     folder = arguments.folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     # Blender tells of everything that it does; here only the pictures matter.
@@ -68,19 +81,30 @@ def main() -> None:
     try:
         for name in arguments.names or names:
             start = time.perf_counter()
-            performance = perform(name, arguments.rig, arguments.armature)
+            performance = perform(name, rig, arguments.armature)
             if arguments.thumbnails:
                 path = ours.setup_paths()[name].with_suffix(".png")
                 stage.save_pixels(_thumbnail(performance), path)
             else:
                 path = folder / f"{name}.png"
                 stage.save_pixels(_sheet(performance), path)
-                if arguments.film:
-                    film.render_film(path.with_suffix(".mp4"), (640, 360))
-            print(f"{path}  {time.perf_counter() - start:.0f} s", file=told, flush=True)
+            _tell(told, path, start)
+            if arguments.film and not arguments.thumbnails:
+                start = time.perf_counter()
+                path = path.with_suffix(".mp4")
+                film.render_film(path, (640, 360))
+                _tell(told, path, start)
+    except RuntimeError as error:
+        # What operators of Blender and of the add-on report.
+        sys.exit(f"make setups: error: {str(error).removeprefix('Error: ').strip()}")
     finally:
         # Blender 4.5 does not end while an operator is registered.
         octo_motion.unregister()
+
+
+def _tell(told: TextIO, path: Path, start: float) -> None:
+    """Say what was made, and how long it took."""
+    print(f"{path}  {time.perf_counter() - start:.0f} s", file=told, flush=True)
 
 
 def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Performance:
@@ -90,6 +114,9 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
         name: of the set-up.
         rig: a file with another creature, none for the octopus of the add-on.
         armature: its name, if the file has several.
+
+    Raises:
+        RuntimeError: the file has no such creature, or it cannot move so.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if rig is None:
@@ -118,7 +145,7 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
     if swims:
         stage.add_ground(points, float(points[..., 2].min()) - 0.4 * unit)
     if stays:
-        stage.add_ground(points, float(octopus.matrix_world.translation.z))
+        stage.add_ground(points, _floor(octopus, points))
     camera = stage.add_camera("Camera", lens=50.0)
     stage.look(camera, np.array((-0.35, 0.9, -0.45)), np.array([0.0, 0.0, 1.0]))
     stage.set_resolution(640, 360)
@@ -130,14 +157,14 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
 
 def _load(path: Path, name: str) -> bpy.types.Object:
     """Open or import a creature, and make it the active object."""
-    importers = {
-        ".blend": bpy.ops.wm.open_mainfile,
-        ".glb": bpy.ops.import_scene.gltf,
-        ".fbx": bpy.ops.import_scene.fbx,
-    }
-    importers[path.suffix.lower()](filepath=str(path))
-    found = [each for each in bpy.data.objects if each.type == "ARMATURE"]
-    creature = bpy.data.objects[name] if name else found[0]
+    _IMPORTERS[path.suffix.lower()](str(path))
+    found = {each.name: each for each in bpy.data.objects if each.type == "ARMATURE"}
+    if not found:
+        raise RuntimeError(f"'{path.name}' has no armature.")
+    if name and name not in found:
+        known = ", ".join(f"'{each}'" for each in found)
+        raise RuntimeError(f"'{path.name}' has no armature '{name}', but {known}.")
+    creature = found[name] if name else next(iter(found.values()))
     view_layer = bpy.context.view_layer
     assert view_layer is not None
     view_layer.objects.active = creature
@@ -148,6 +175,16 @@ def _load(path: Path, name: str) -> bpy.types.Object:
         own = each == creature or each.find_armature() == creature or each.type == "EMPTY"
         each.hide_render = not own
     return creature
+
+
+def _floor(octopus: bpy.types.Object, points: Points) -> float:
+    """Height of the ground under a creature that stays.
+
+    A root bone lifts it to its height over its origin; without one the ground is where it reaches.
+    """
+    if octopus.octo_motion.locomotion.root_bone:
+        return float(octopus.matrix_world.translation.z)
+    return float(points[..., 2].min())
 
 
 def _arm_length(octopus: bpy.types.Object) -> float:
@@ -186,6 +223,8 @@ def add_bumps(points: Points, unit: float, height: float = BUMPS) -> bpy.types.O
     mesh.polygons.foreach_set("material_index", chosen)
     mesh.shade_smooth()
     ground = bpy.data.objects.new("Bumps", mesh)
+    # Bumps so gentle never shade each other; looking for it would take a quarter of the time.
+    ground.display.show_shadows = False
     stage.the_scene().collection.objects.link(ground)
     return ground
 
@@ -223,7 +262,7 @@ def _thumbnail(performance: shots.Performance) -> Pixels:
     travel = (after - points).mean(axis=0)
     travel[2] = 0.0
     if octopus.octo_motion.locomotion.travel_on == "NONE":
-        travel = contact_sheet.FRONT
+        travel = contact_sheet.front(octopus)
     travel = travel / max(float(np.linalg.norm(travel)), 1e-9)
     side = np.array([-travel[1], travel[0], 0.0])
     forward = 0.85 * side - 0.35 * travel - np.array([0.0, 0.0, 0.4])
