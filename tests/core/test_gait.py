@@ -85,6 +85,20 @@ def test_offsets_of_single_arms_move_to_the_rear_with_their_pairs() -> None:
     assert table.for_pairs(4) is table
 
 
+def test_arms_that_hold_no_ground_sway_and_their_ends_follow_behind() -> None:
+    phases = np.linspace(0.0, gait.CYCLE, 72, endpoint=False)
+    held = [curve for table in PRESETS.values() for curve in table.curves.values() if curve.free]
+    assert held
+    for curve in held:
+        sideways = curve.evaluate(phases)[..., PITCH]
+        # Less than 20° to and fro is not to be seen in an arm that is curled up.
+        assert np.degrees(np.ptp(sideways, axis=0)).min() >= 20.0
+        first = np.angle(np.exp(-1j * phases) @ sideways)
+        behind = np.degrees(np.mod(-np.diff(first), gait.CYCLE))
+        # What hangs further out swings later, by less than a quarter of the cycle each.
+        assert np.all((behind >= 30.0) & (behind <= 90.0))
+
+
 def test_where_all_arms_walk_each_pair_keeps_its_own() -> None:
     assert PRESETS["hurry"].for_pairs(3) is PRESETS["hurry"]
 
