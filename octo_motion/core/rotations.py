@@ -228,9 +228,9 @@ def to_euler(quaternion: ArrayLike, order: str) -> Floats:
     half_difference = np.where(with_difference < _TINY, -half_sum, half_difference)
     half_sum = np.where(with_sum < _TINY, -half_difference, half_sum)
     result = np.empty((*q.shape[:-1], 3))
-    result[..., i] = mirror * _less_whole_turns(half_sum - half_difference)
+    result[..., i] = mirror * less_whole_turns(half_sum - half_difference)
     result[..., j] = mirror * (2.0 * np.arctan2(with_difference, with_sum) - 0.5 * np.pi)
-    result[..., k] = mirror * _less_whole_turns(half_sum + half_difference)
+    result[..., k] = mirror * less_whole_turns(half_sum + half_difference)
     return result
 
 
@@ -245,9 +245,9 @@ def continuous_euler(angles: ArrayLike, order: str) -> Floats:
     # The two families lie 2π apart and more, so within π of the frame before nothing changes: as a
     # rule nowhere, which is quickly seen.
     steps = np.abs(np.diff(given, axis=0)).sum(axis=-1).max(axis=0, initial=0.0)
-    start = np.abs(_less_whole_turns(given[:1])).sum(axis=-1).max(axis=0, initial=0.0)
+    start = np.abs(less_whole_turns(given[:1])).sum(axis=-1).max(axis=0, initial=0.0)
     plain = (steps < np.pi) & (start < np.pi)
-    result = given + (_less_whole_turns(given[:1]) - given[:1])
+    result = given + (less_whole_turns(given[:1]) - given[:1])
     if not plain.all():
         result[:, ~plain] = _continued(given[:, ~plain], order)
     return result
@@ -261,11 +261,11 @@ def _continued(given: Floats, order: str) -> Floats:
     before = np.concatenate([np.zeros_like(given[:1]), given[:-1]])
     # Changing family costs the same from either to the other, and so does staying in either.
     # So whether to change at a frame hangs on its two triples alone, whatever came before.
-    staying = np.abs(_less_whole_turns(given - before)).sum(axis=-1)
-    changing = np.abs(_less_whole_turns(other - before)).sum(axis=-1)
+    staying = np.abs(less_whole_turns(given - before)).sum(axis=-1)
+    changing = np.abs(less_whole_turns(other - before)).sum(axis=-1)
     in_other = np.cumsum(changing < staying, axis=0) % 2 == 1
     chosen = np.where(in_other[..., None], other, given)
-    chosen[:1] = _less_whole_turns(chosen[:1])
+    chosen[:1] = less_whole_turns(chosen[:1])
     return np.unwrap(chosen, axis=0)
 
 
@@ -291,10 +291,17 @@ def continuous_axis_angle(quaternions: ArrayLike) -> Floats:
     axes[1:] *= signs[..., None]
     angle = 2.0 * np.arctan2(np.sum(axes * q[..., 1:], axis=-1), q[..., 0])
     # The first frame within half a turn, all others next to the one before.
-    angle[:1] = _less_whole_turns(angle[:1])
+    angle[:1] = less_whole_turns(angle[:1])
     return np.concatenate([np.unwrap(angle, axis=0)[..., None], axes], axis=-1)
 
 
-def _less_whole_turns(angle: Floats) -> Floats:
-    """The same angle within [−π, π]."""
+def less_whole_turns(angle: Floats) -> Floats:
+    """The same angles (…,) within [−π, π]."""
     return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+
+
+def rotate_in_plane(vectors: Floats, angle: float | Floats) -> Floats:
+    """Plane vectors ``(…, 2)`` turned anticlockwise by angles ``(…,)``."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)

@@ -3,11 +3,12 @@
 
 import numpy as np
 
-from octo_motion.core.locomotion.draping import settled, turned
+from octo_motion.core.locomotion.draping import settled
 from octo_motion.core.locomotion.ground import Ground, HeightField, Plane
+from octo_motion.core.rotations import rotate_in_plane
 
 ROOTS = np.tile(np.array([0.0, 0.0, 0.16]), (8, 5, 1))
-AIMS = np.tile(turned(np.array([1.0, 0.0]), np.linspace(0.0, 6.0, 8))[:, None], (1, 5, 1))
+AIMS = np.tile(rotate_in_plane(np.array([1.0, 0.0]), np.linspace(0.0, 6.0, 8))[:, None], (1, 5, 1))
 AWAY = np.tile(np.linspace(0.4, 0.7, 5), (8, 1))
 SIZES = np.tile([1.0, 0.3], (8, 1))
 
@@ -22,7 +23,7 @@ def ridge(height: float = 0.16, at: float = 0.55) -> HeightField:
 
 def falls(ground: Ground, turns: np.ndarray, farther: np.ndarray) -> np.ndarray:
     """By how much the ground falls away under each arm, radians."""
-    way = turned(AIMS, turns)
+    way = rotate_in_plane(AIMS, turns)
     along = np.linspace(0.0, 0.3, 13)[:, None, None]
     places = ROOTS[..., :2] + (AWAY + farther + along)[..., None] * way
     slopes = np.arctan(np.diff(ground.height(places), axis=0) / (0.3 / 12.0))

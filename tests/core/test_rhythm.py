@@ -5,11 +5,17 @@ import functools
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from octo_motion.core.locomotion.body_line import body_line
 from octo_motion.core.locomotion.crawl import CrawlSettings, Holds, plan_crawl
-from octo_motion.core.locomotion.rhythm import Even, Tabled, at_rest, free
+from octo_motion.core.locomotion.ground import Plane
+from octo_motion.core.locomotion.loops import route_in_place
+from octo_motion.core.locomotion.rhythm import Even, Tabled, at_rest, crawling_in_place, free
+from octo_motion.core.locomotion.travel import TravelSettings, bearings_of
+from octo_motion.core.rotations import from_axis_angle
 from tests.core.test_crawl import journey
 
 MIDDLE, DUTY = np.radians(225.0), 0.55
@@ -142,6 +148,32 @@ def test_a_crawl_that_is_planned_from_rest_to_rest_is_left_as_it_was_planned() -
         # But for how the phase rises through the first and the last hold: no arm is hurried.
         late = np.abs(own.phases(distance) - planned.phases(distance)) / (2.0 * np.pi)
         assert late.max() < 0.03
+
+
+@pytest.mark.parametrize("pause", [(0.2, 0.45), (2.0, 3.0), (4.0, 5.0)])
+@pytest.mark.parametrize("arms", [1, 8])
+def test_a_crawl_in_place_has_its_loop_however_long_its_pauses(
+    arms: int, pause: tuple[float, float]
+) -> None:
+    travel, route = TravelSettings(stride=0.8), route_in_place(0.8, 2)
+    line = body_line(
+        route,
+        travel,
+        bearings_of(route, travel),
+        Plane(0.0),
+        clearance=0.2,
+        reach=1.0,
+        lean=0.0,
+        smoothing=0.3,
+    )
+    outward = from_axis_angle(np.array([0.0, 0.0, 1.0]), 0.5 + 0.7 * np.arange(arms))
+    roots = np.zeros((arms, 3))
+    settings = CrawlSettings(pause=pause)
+    own = crawling_in_place(line, roots, outward, settings, reach=1.0, middle=MIDDLE, duty=DUTY)
+    phases = own.phases(np.array([0.0, route.length]))
+    assert own.rounds is not None
+    np.testing.assert_allclose(np.diff(phases, axis=0)[0], 2.0 * np.pi * np.array(own.rounds))
+    assert min(own.rounds) >= 1
 
 
 def test_an_arm_without_a_hold_has_a_phase_all_the_same() -> None:

@@ -286,3 +286,10 @@ def test_batches_equal_one_by_one(seed: int, shape: tuple[int, ...]) -> None:
         for index in np.ndindex(shape):
             alone = function(*(array[index] for array in arrays))
             np.testing.assert_allclose(together[index], alone, atol=1e-15)
+
+
+@given(components(2), angles)
+def test_plane_vectors_turn_as_they_do_about_the_vertical(vector: Floats, angle: float) -> None:
+    about = rotations.from_axis_angle(np.array([0.0, 0.0, 1.0]), angle)
+    expected = rotations.rotate(about, np.append(vector, 0.0))[:2]
+    np.testing.assert_allclose(rotations.rotate_in_plane(vector, angle), expected, atol=1e-12)

@@ -81,7 +81,6 @@ class ArmFrames:
         orientations = multiply(frames, conjugate(self.own))
         carried = np.broadcast_to(self.rest.carried, orientations.shape).copy()
         follows = np.array(self.rest.follows)
-        follows[0] = False
         before = orientations[..., np.flatnonzero(follows) - 1, :]
         carried[..., follows, :] = multiply(before, self.rest.carried[follows])
         return multiply(conjugate(carried), orientations)

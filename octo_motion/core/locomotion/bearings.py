@@ -29,9 +29,11 @@ from ..rotations import (
     conjugate,
     continuous,
     from_matrix,
+    less_whole_turns,
     multiply,
     normalized,
     rotate,
+    rotate_in_plane,
     shortest_arc,
 )
 from .easing import smooth_step
@@ -92,8 +94,8 @@ class Bearings:
         laps, rest = self._laps(distance)
         value, whole = self._between(self.bend, rest), self.bend[-1]
         # On the next lap the carried frame stands turned by `lap`, so its axes see less of it.
-        after = whole + turned(value, -self.lap)
-        before = turned(value - whole, self.lap)
+        after = whole + rotate_in_plane(value, -self.lap)
+        before = rotate_in_plane(value - whole, self.lap)
         lap = laps[:, None]
         return np.where(lap > 0.0, after, np.where(lap < 0.0, before, value))
 
@@ -118,13 +120,6 @@ class Bearings:
         ends = (2.0 * t - 3.0) * t * t
         cubic = p1 + ends * (p1 - p2)
         return cubic + 0.5 * t * (1.0 - t) * ((1.0 - t) * slope - t * reach)
-
-
-def turned(vectors: Floats, angle: float | Floats) -> Floats:
-    """Plane vectors ``(…, 2)`` turned by angles ``(…,)`` counter-clockwise."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
 def bearings(route: Route, corner: float, settle: float) -> Bearings:
@@ -269,7 +264,7 @@ def _held_angle(
     if np.max(level) < 1e-6:
         # Straight up or down: nothing is wanted.
         return np.linspace(0.0, lap, len(wanted)) if cyclic else np.zeros(len(wanted))
-    steps = _wrap(np.diff(wanted))
+    steps = less_whole_turns(np.diff(wanted))
     anchor = int(np.argmax(level >= min(_HELD, float(np.max(level)))))
     angles = np.empty(len(wanted))
     # What leads to the first good place is steered back from there.
@@ -283,12 +278,12 @@ def _held_angle(
         return angles
     for _ in range(8):
         start = angles[-1] - lap
-        miss = float(_wrap(start - angles[0]))
+        miss = float(less_whole_turns(start - angles[0]))
         if abs(miss) < 1e-10:
             break
         angles = _steered(wanted, level, steps, pace, angles[0] + miss)
     # What going round does not settle is shared out, so that the lap closes.
-    miss = float(_wrap(angles[0] + lap - angles[-1]))
+    miss = float(less_whole_turns(angles[0] + lap - angles[-1]))
     return angles + np.linspace(0.0, miss, len(angles))
 
 
@@ -304,8 +299,3 @@ def _steered(wanted: Floats, level: Floats, steps: Floats, pace: float, start: f
         angle += step + pull * (sin(off) + 0.125 * (1.0 - cos(off)))
         result.append(angle)
     return np.array(result)
-
-
-def _wrap(angle: Floats) -> Floats:
-    """Angles within [−π, π]."""
-    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))

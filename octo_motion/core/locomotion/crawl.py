@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SettingsError
-from ..rotations import Floats, normalized
+from ..rotations import Floats, normalized, rotate_in_plane
 from .elbow_room import Outline, clearance
 
 _BEFORE: Final = 1.5
@@ -333,9 +333,7 @@ class _Crawl:
         """
         settings, unit = self._settings, self._unit
         root, outward = self._at(arm, np.array([middle]))
-        x, y = outward[0]
-        cosine, sine = np.cos(turns), np.sin(turns)
-        way = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+        way = rotate_in_plane(outward[0], turns)
         place = root + 0.5 * (settings.near + settings.far) * unit * way
         return place, place + settings.lies * unit * way
 

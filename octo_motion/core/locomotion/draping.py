@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from ..rotations import Floats
+from ..rotations import Floats, rotate_in_plane
 from .ground import Ground
 
 _TURNS: Final = np.radians([0.0, -6.0, 6.0, -12.0, 12.0, -18.0, 18.0])
@@ -51,11 +51,11 @@ def settled(
         at = arm[chosen], cycle[chosen]
         extra = (slice(None), *[None] * turn.ndim)
         root, length = roots[at][extra], whole[chosen][extra]
-        place = root[..., :2] + (away[at][extra] + step * length)[..., None] * turned(
+        place = root[..., :2] + (away[at][extra] + step * length)[..., None] * rotate_in_plane(
             aims[at][extra], turn
         )
         along = (lying[chosen][extra] * _POINTS.reshape(-1, *[1] * (turn.ndim + 1)))[..., None]
-        height = ground.height(place + along * turned(lies[at][extra], turn))
+        height = ground.height(place + along * rotate_in_plane(lies[at][extra], turn))
         slope = np.arctan(np.diff(height, axis=0) / (lying[chosen][extra] * _POINTS[1]))
         # The arm comes down to its place, and from there on the ground falls away more.
         comes = np.arctan2(height[0] - root[..., 2], away[at][extra] + step * length)
@@ -72,10 +72,3 @@ def settled(
         at = arm[bad], cycle[bad]
         turns[at], farther[at] = turn[best], step[best] * whole[bad]
     return turns, farther
-
-
-def turned(ways: Floats, angles: Floats) -> Floats:
-    """Directions (…, 2) turned anticlockwise by angles (…,)."""
-    cosine, sine = np.cos(angles), np.sin(angles)
-    x, y = ways[..., 0], ways[..., 1]
-    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)

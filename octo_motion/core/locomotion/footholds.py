@@ -15,9 +15,9 @@ from typing import Final
 
 import numpy as np
 
-from ..rotations import Floats, rotate
+from ..rotations import Floats, rotate, rotate_in_plane
 from .course import Line
-from .draping import settled, turned
+from .draping import settled
 from .foothold_places import PEELING, Passing, hold_times, laid, peeled_to, spots
 from .ground import Ground, normals
 from .limbs import Limbs, StanceSettings
@@ -40,7 +40,7 @@ class Wish:
     cycle: int
     removed: bool = False
     shift: float = 0.0
-    """Cycles by which it is later."""
+    """Cycles by which it is later, −0.3…0.3: beyond that a hold would leave its cycle."""
     position: Floats | None = None
     """(3,) where the arm is to touch, world."""
     heading: float | None = None
@@ -139,12 +139,13 @@ def lay(
         return centres + rotate(rotations, limbs.roots[:, None]), rotations
 
     roots, rotations = roots_at(shift)
-    aside, away = rhythm.aims(limbs.arms, numbers)
-    aim, lie = (turned(each, aside) for each in _ahead(limbs, rotations))
+    asked, away = rhythm.aims(limbs.arms, numbers)
+    aim, lie = (rotate_in_plane(each, asked) for each in _ahead(limbs, rotations))
     joint = limbs.touching(settings.planted)
     sizes = np.stack([limbs.reach[-1], limbs.reach[-1] - limbs.reach[joint]], axis=-1)
     aside, farther = settled(ground, roots, aim, lie, away, sizes=sizes)
-    aim, lie, away = turned(aim, aside), turned(lie, aside), away + farther
+    aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
+    away = away + farther
     # One after the other, for the first will do for nearly all.
     passings = (
         Passing(roots, [roots_at(shift + each)[0] for each in times])

@@ -17,7 +17,14 @@ import numpy as np
 
 from ..errors import RigError, SettingsError
 from ..remembered import Remembered, key_of
-from ..rotations import Floats, from_axis_angle, from_matrix, multiply, rotate
+from ..rotations import (
+    Floats,
+    from_axis_angle,
+    from_matrix,
+    less_whole_turns,
+    multiply,
+    rotate,
+)
 from ..skeleton import Skeleton
 from .arm import GROUPS, group_lengths, split_groups
 from .ccd import Chain, asked_shape, overreach, raised, solve
@@ -102,15 +109,8 @@ class GaitSettings:
 
     def __post_init__(self) -> None:
         numbers = (
-            *(
-                self.heading,
-                self.contraction,
-                self.softness,
-                self.give,
-                self.sway,
-                self.phase_spread,
-            ),
-            *(self.turning, self.steady, *self.weights, *self.variation),
+            *(self.contraction, self.softness, self.give, self.sway, self.phase_spread),
+            *(self.turning, self.steady, self.heading, *self.weights, *self.variation),
         )
         if not np.all(np.isfinite(numbers)):
             raise SettingsError("A setting of the gait is not a number.", "Set it anew.")
@@ -272,7 +272,6 @@ class Generator:
 
         In the arms' frames, as the gait alone has them.
         """
-        assert self.clearance is not None
         return np.stack([self._cycle[1][arm] for arm in arms], axis=-1)
 
     def arm_phases(self, phase: Floats) -> Floats:
@@ -517,7 +516,7 @@ def _instead(azimuths: Floats, heading: float) -> list[int]:
         heading: radians from the way to the front, anticlockwise.
     """
     apart = azimuths + heading - azimuths[:, None]
-    nearest = np.abs(np.angle(np.exp(1j * apart)))
+    nearest = np.abs(less_whole_turns(apart))
     # Of two that are as near always the same one, whatever the rounding.
     return np.argmin(np.round(nearest, 3), axis=0).tolist()
 

@@ -22,6 +22,7 @@ from ..rotations import (
     Floats,
     conjugate,
     from_axis_angle,
+    less_whole_turns,
     multiply,
     normalized,
     rotate,
@@ -172,7 +173,7 @@ class Grasp:
         directions = np.moveaxis(shape, -1, 0)
         frames = transported(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
         twist = _twist(frames[:, -1], held)
-        twist = self.twist + np.angle(np.exp(1j * (twist - self.twist)))
+        twist = self.twist + less_whole_turns(twist - self.twist)
         share = np.cumsum(lengths) / lengths.sum()
         angle = twist[:, None] * smooth_step((share - 1.0 + _TWISTED) / _TWISTED)
         return multiply(frames, from_axis_angle(_X, angle))
@@ -419,4 +420,4 @@ def _twist_without(arm: ArmFrames, frames: Floats, first: int) -> Floats:
     """Twist (…) that the free part has to take on, of an arm planned without any."""
     directions = rotate(frames[:first], _X)
     plain = transported(directions, arm.at_rest[0])
-    return np.angle(np.exp(1j * _twist(plain[-1], frames[first])))
+    return less_whole_turns(_twist(plain[-1], frames[first]))

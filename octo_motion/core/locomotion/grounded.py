@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -198,7 +198,7 @@ class GroundedWalk:
         joint = limbs.touching(self._settings.planted)
         near, far = steps[:joint].sum(axis=0), steps[joint:].sum(axis=0)
         aims = np.arctan2([near[1], far[1]], [near[0], far[0]]).T
-        return Limbs(**{**limbs.__dict__, "aims": _ASKEW * np.tanh(aims / _ASKEW)})
+        return replace(limbs, aims=_ASKEW * np.tanh(aims / _ASKEW))
 
     def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""

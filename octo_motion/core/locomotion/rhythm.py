@@ -24,7 +24,7 @@ _CYCLE: Final = 2.0 * np.pi
 _PER_REACH: Final = 32
 """Samples of a journey to the length of an arm."""
 _SPARE: Final = 6.0
-"""Reaches of crawl besides the loop that is cut from it."""
+"""Reaches of crawl besides the loop that is cut from it, at least."""
 _CUTS: Final = 24
 """Places where it might be cut."""
 _LOOPS: Final = 3
@@ -222,7 +222,9 @@ def crawling_in_place(
         duty: share of a cycle that a hold takes in the gait.
     """
     loop = line.route.length
-    whole = loop + _SPARE * reach
+    # As much as four holds and pauses, however long these may be: there is one more to cut at.
+    pause = max(settings.pause[1], settings.search[1]) + settings.far - settings.near
+    whole = loop + max(_SPARE, 4.0 * pause) * reach
     distance = _samples(whole, reach)
     (start, end), (turned, _) = line.at(np.array([0.0, loop]))
     centres = start + distance[:, None] / loop * (end - start)

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 
 from ..errors import SettingsError
 from ..remembered import Remembered, key_of
-from ..rotations import Floats, from_axis_angle, multiply
-from .bearings import Bearings, bearings, turned
+from ..rotations import Floats, from_axis_angle, multiply, rotate_in_plane
+from .bearings import Bearings, bearings
 from .route import Route
 from .stroke import phase_at_distance, stroke_distance
 
@@ -174,7 +174,7 @@ def travel_at(
 def walked_at(
     route: Route, settings: TravelSettings, table: Bearings, distance: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Where a walking, upright body is at distances (…,) along its route, and before and after it.
+    """Where a walking, upright body is at distances (n,) along its route, and before and after it.
 
     Beyond the ends of an open route it goes straight on; a closed one it goes round again.
 
@@ -282,10 +282,10 @@ def _swum(
     if settings.bank:
         half = 0.5 * min(settings.stride, table.length)
         per_stride = table.bend_at(distance + half) - table.bend_at(distance - half)
-        sideways = turned(per_stride, -roll)[:, 0].copy()
+        sideways = rotate_in_plane(per_stride, -roll)[:, 0].copy()
         roll = roll + settings.bank * np.arctan(sideways)
     rotations = multiply(table.carried_at(distance), from_axis_angle(_UP, roll))
-    turn = turned(table.bend_at(ahead) - table.bend_at(distance), -roll)
+    turn = rotate_in_plane(table.bend_at(ahead) - table.bend_at(distance), -roll)
     return rotations, turn
 
 
@@ -305,4 +305,4 @@ def _walked(
         tilted = multiply(multiply(table.carried_at(distance), rolled), _LAID_FORWARD)
         rotations = multiply(tilted, from_axis_angle(_UP, off))
     leftwards = table.compass_at(ahead) - compass
-    return rotations, leftwards[:, None] * turned(_LEFT, -off)
+    return rotations, leftwards[:, None] * rotate_in_plane(_LEFT, -off)
