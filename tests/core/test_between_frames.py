@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.arm_frames import arm_frames
-from octo_motion.core.locomotion.between_frames import Course, raised_between
+from octo_motion.core.locomotion.between_frames import ArmsOverGround, raised_between
 from octo_motion.core.locomotion.figures import Poses
 from octo_motion.core.locomotion.grounded import Raise
 from octo_motion.core.locomotion.placement import object_transforms
@@ -23,7 +23,7 @@ class Shot:
         _, centres, orientations = walk.places(self.times)
         self.going = object_transforms(walk.body, 1.0, centres, orientations)
         arms = [arm_frames(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
-        self.course = Course(arms, walk.ground, 1.0)
+        self.course = ArmsOverGround(arms, walk.ground, 1.0)
         self.asked: list[np.ndarray] = []
         self.shapes: tuple[Floats, ...] = ()
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.arm_frames import arm_frames
-from octo_motion.core.locomotion.between_frames import Course
+from octo_motion.core.locomotion.between_frames import ArmsOverGround
 from octo_motion.core.locomotion.figures import Poses
 from octo_motion.core.locomotion.ground import Plane
 from octo_motion.core.locomotion.off_ground import afloat, off_ground
@@ -13,11 +13,11 @@ from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.grounds import GROUNDS, largest_turn, walker
 
 
-def hanging(frames: int) -> tuple[Course, Poses, list[Floats]]:
+def hanging(frames: int) -> tuple[ArmsOverGround, Poses, list[Floats]]:
     """A body that comes down until half of each arm hangs into the ground, and radii."""
     walk = walker(GROUNDS["plane"])
     arms = [arm_frames(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
-    course = Course(arms, Plane(0.0), 1.0)
+    course = ArmsOverGround(arms, Plane(0.0), 1.0)
     bones = sum(len(arm.bones) for arm in arms)
     rotations = np.zeros((frames, bones, 4))
     rotations[..., 0] = 1.0

@@ -45,7 +45,7 @@ _MOST: Final = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ArmsOverGround:
     """The arms of a body over time, and what they are above of."""
 
     arms: Sequence[ArmFrames]
@@ -141,7 +141,7 @@ def _bends(values: Floats) -> Floats:
 
 
 def raised_between(
-    course: Course,
+    course: ArmsOverGround,
     poses: Poses,
     joints: Sequence[Floats],
     again: Callable[[np.ndarray, Floats], tuple[Poses, Sequence[Floats]]],
@@ -184,7 +184,9 @@ def raised_between(
     return _best(course, tried, lift > 0.0)
 
 
-def _best(course: Course, tried: Sequence[tuple[Poses, Floats]], raised: np.ndarray) -> Poses:
+def _best(
+    course: ArmsOverGround, tried: Sequence[tuple[Poses, Floats]], raised: np.ndarray
+) -> Poses:
     """Of several ways to raise arms, wherever one was raised, the one with the least dip.
 
     A higher arm may dip the more, where it has to come down from there in a frame. And one that
@@ -192,7 +194,7 @@ def _best(course: Course, tried: Sequence[tuple[Poses, Floats]], raised: np.ndar
 
     Args:
         course: the arms.
-        tried: poses, and what :meth:`Course.dips` says of them.
+        tried: poses, and what :meth:`ArmsOverGround.dips` says of them.
         raised: (frames, arms) where these are not the same.
     """
     if len(tried) == 1:

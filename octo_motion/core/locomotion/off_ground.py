@@ -15,7 +15,7 @@ import numpy as np
 
 from ..rotations import Floats, conjugate, multiply, rotate, shortest_arc
 from .arm_shapes import raised
-from .between_frames import Course
+from .between_frames import ArmsOverGround
 from .easing import smooth_step
 from .figures import Poses
 
@@ -49,7 +49,9 @@ def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
     return result
 
 
-def off_ground(course: Course, poses: Poses, radii: Sequence[Floats], loose: Floats) -> Floats:
+def off_ground(
+    course: ArmsOverGround, poses: Poses, radii: Sequence[Floats], loose: Floats
+) -> Floats:
     """Rotations (frames, bones, 4) of the same arms off the ground.
 
     Args:

@@ -16,7 +16,7 @@ from ...blender.contacts import Contact, write_markers
 from ...blender.poses import SCALE, animated_bones, rest_bones, unscale_bones
 from ...blender.stretching import stretch_channels
 from ...core.errors import WriteError
-from ...core.locomotion.between_frames import Course, raised_between
+from ...core.locomotion.between_frames import ArmsOverGround, raised_between
 from ...core.locomotion.chains import BodyFrame
 from ...core.locomotion.changes import between
 from ...core.locomotion.detection import Detection
@@ -336,7 +336,9 @@ class Shot:
             poses = kept_off(poses, loose[chosen])
             return poses, course.joints(poses)
 
-        course = Course(frames_of_arms(self.skeleton, self.arms, self.body), ground, self.scale)
+        course = ArmsOverGround(
+            frames_of_arms(self.skeleton, self.arms, self.body), ground, self.scale
+        )
         radii = next(each.walk.radii for each in self._stands())
         # On a journey on which the gait never changes, one number stands for all.
         loose = np.broadcast_to(changing.afloat(travel.distance), posed.late.shape)
@@ -384,7 +386,7 @@ class Shot:
             for of in (shapes, evened)
         )
         frames = frames_of_arms(self.skeleton, self.arms, self.body)
-        course = Course(frames, standing.ground, self.scale, cyclic=self.in_place)
+        course = ArmsOverGround(frames, standing.ground, self.scale, cyclic=self.in_place)
         together = [np.concatenate(each) for each in zip(*joints, strict=True)]
         whole = Poses(posed.rotations, posed.strains, *going)
         raised = raised_between(course, whole, together, again)
