@@ -16,13 +16,13 @@ from typing import Any, Final
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 from numpy.typing import ArrayLike
 
 from ..core.errors import RouteError
 from ..core.locomotion.route import Route, s_bend
 from ..core.rotations import Floats, normalized
 from .armature import armature_data
+from .world import world_of
 
 LONGEST: Final = -1
 """Index that stands for the longest spline of a curve."""
@@ -60,7 +60,7 @@ def read_route(
     lines = _drawn_lines(evaluated) if _is_bent_after_its_points(evaluated) else None
     if lines is None:
         lines = _splines(evaluated, depsgraph)
-    world = np.array(_world_matrix(evaluated), dtype=np.float64)
+    world = np.array(world_of(curve, depsgraph), dtype=np.float64)
     if spline_index == LONGEST:
         return _longest(lines, world, curve.name)
     if not 0 <= spline_index < len(lines):
@@ -176,22 +176,6 @@ def _longest(lines: Sequence[_Line], world: Floats, name: str) -> Route:
     if best is None:
         raise reason
     return best
-
-
-def _world_matrix(evaluated: bpy.types.Object) -> Matrix:
-    """Of an object that Blender may not evaluate because it is disabled or excluded.
-
-    Blender leaves such an object's own world matrix as it was long ago, so its transform and its
-    parents' are put together here; its constraints do not count.
-    """
-    if evaluated.is_evaluated:
-        return evaluated.matrix_world
-    if evaluated.parent is None:
-        return evaluated.matrix_basis
-    if evaluated.parent_type == "OBJECT":
-        parent = _world_matrix(evaluated.parent)
-        return parent @ evaluated.matrix_parent_inverse @ evaluated.matrix_basis
-    return evaluated.matrix_world
 
 
 # --- splines -------------------------------------------------------------------------------------

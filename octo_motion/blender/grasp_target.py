@@ -14,6 +14,7 @@ import numpy as np
 from ..core.errors import RigError
 from ..core.rotations import Floats, continuous, from_matrix
 from .actions import is_generated
+from .world import world_of
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that can have faces."""
@@ -28,7 +29,8 @@ def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
     Raises:
         RigError: it has no surface.
     """
-    evaluated = target.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = target.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh() if target.type in WITH_SURFACE else None
     if mesh is None or len(mesh.polygons) == 0:
         if mesh is not None:
@@ -44,7 +46,7 @@ def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
         mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
     finally:
         evaluated.to_mesh_clear()
-    matrix = np.array(evaluated.matrix_world, dtype=np.float64)[:3, :3]
+    matrix = np.array(world_of(target, depsgraph), dtype=np.float64)[:3, :3]
     own = matrix_rotation(matrix)
     return vertices @ (own.T @ matrix).T, triangles
 
@@ -58,15 +60,14 @@ def read_places(target: bpy.types.Object, frames: Floats) -> tuple[Floats, Float
     assert scene is not None
     matrices = np.empty((len(frames), 4, 4))
     if not may_move(target):
-        shown = target.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        matrices[:] = np.array(shown.matrix_world, dtype=np.float64)
+        still = world_of(target, bpy.context.evaluated_depsgraph_get())
+        matrices[:] = np.array(still, dtype=np.float64)
     else:
         with _frame_kept(scene):
             for number, frame in enumerate(frames):
                 whole = math.floor(frame)
                 scene.frame_set(whole, subframe=float(frame - whole))
-                shown = target.evaluated_get(bpy.context.evaluated_depsgraph_get())
-                matrices[number] = shown.matrix_world
+                matrices[number] = world_of(target, bpy.context.evaluated_depsgraph_get())
     rotations = from_matrix(np.stack([matrix_rotation(each) for each in matrices[:, :3, :3]]))
     return matrices[:, :3, 3], continuous(rotations)
 

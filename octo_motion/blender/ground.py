@@ -15,6 +15,7 @@ from ..core.remembered import Remembered, key_of
 from ..core.rotations import Floats
 from ..core.skeleton import Skeleton
 from .armature import deformed_meshes
+from .world import world_of
 
 _MOST_POINTS: Final = 6000
 """Points of a skin that are looked at; an arm's thickness needs no more."""
@@ -62,7 +63,7 @@ def read_triangles(
         corners, content = _corners(mesh, points)
     finally:
         evaluated.to_mesh_clear()
-    world = np.array(evaluated.matrix_world, dtype=np.float64)
+    world = np.array(world_of(ground, depsgraph), dtype=np.float64)
     key = key_of(content, world)
 
     def placed() -> Floats:

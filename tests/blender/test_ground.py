@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mesh objects as grounds, skins as thickness, bones that stretch, markers of contacts."""
 
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -58,6 +59,34 @@ def test_modifiers_of_a_ground_count() -> None:
     found = triangles(ground)
     assert len(found) == 2 * 64
     np.testing.assert_allclose(found[..., 2], 0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize("disabled", [True, False])
+def test_a_ground_that_blender_does_not_evaluate_is_read_where_it_stands(
+    tmp_path: Path, *, disabled: bool
+) -> None:
+    ground = make_square()
+    # What a setting points at counts as evaluated, and is not.
+    make_octopus().octo_motion.locomotion.ground.object = ground
+    holder = bpy.data.objects.new("Holder", None)
+    bpy.context.scene.collection.objects.link(holder)
+    ground.parent = holder
+    if disabled:
+        ground.hide_viewport = True
+    else:
+        hidden = bpy.data.collections.new("Hidden")
+        bpy.context.scene.collection.children.link(hidden)
+        bpy.context.scene.collection.objects.unlink(ground)
+        hidden.objects.link(ground)
+        bpy.context.view_layer.layer_collection.children["Hidden"].exclude = True
+    bpy.context.view_layer.update()
+    holder.location.z, ground.scale = 3.0, (2.0, 2.0, 2.0)
+    for _ in range(2):
+        found = triangles(bpy.data.objects["Ground"])
+        np.testing.assert_allclose(found[..., 2], 3.0)
+        assert np.ptp(found[..., 0]) == pytest.approx(8.0)
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "ground.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "ground.blend"))
 
 
 def test_a_ground_in_edit_mode_is_read_as_it_is_edited() -> None:

@@ -193,6 +193,15 @@ def test_a_ground_that_cannot_be_walked_on_is_told(octopus: Any, make: Any, told
     assert octopus.animation_data is None or octopus.animation_data.action is None
 
 
+def test_a_ground_whose_modifiers_do_not_count_is_told(octopus: Any) -> None:
+    ground = make_square(20.0)
+    ground_of(octopus).object = ground
+    ground.hide_viewport = True
+    assert not any("modifiers" in told for told in warnings(octopus))
+    ground.modifiers.new("Bumps", "DISPLACE")
+    assert any("its modifiers do not count" in told for told in warnings(octopus))
+
+
 def test_a_route_over_itself_is_warned_of(octopus: Any) -> None:
     stairs = ((0.0, 0.0, 0.0), (9.0, -2.0, 0.2), (-9.0, -2.0, 1.2), (0.2, 0.0, 1.4))
     give_route(octopus, stairs)

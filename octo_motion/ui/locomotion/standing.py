@@ -13,6 +13,7 @@ import numpy as np
 
 from ...blender.ground import arm_radii, read_triangles
 from ...blender.stretching import may_stretch
+from ...blender.world import is_enabled
 from ...core.locomotion.bearings import Bearings
 from ...core.locomotion.body_line import BodyLine, body_line, leaning
 from ...core.locomotion.chains import BodyFrame
@@ -52,6 +53,11 @@ _OVER_ITSELF: Final = (
     "the ground, or switch Hold the Ground off."
 )
 
+
+_BARE: Final = (
+    "The ground '{name}' is disabled in viewports or excluded: its modifiers do not count. Hide it "
+    "with its eye in the outliner instead."
+)
 
 _grounds: Final[Remembered[Ground]] = Remembered(2)
 
@@ -303,4 +309,6 @@ def _ground(
         key_of(content, path, inside, sizes),
         lambda: sampled(triangles, path, inside, **sizes, content=content),
     )
+    if len(settings.object.modifiers) > 0 and not is_enabled(settings.object, depsgraph):
+        return ground, (_BARE.format(name=settings.object.name),)
     return ground, ()
