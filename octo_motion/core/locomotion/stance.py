@@ -442,45 +442,89 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
 
     And the way (3, batch) from each one's root to where it meets the ground.
     """
-    lengths, reach = batch.lengths, batch.reach
-    count, first = len(lengths), held.touching
+    first = held.touching
     lying = np.diff(held.joints, axis=0)
-    lying /= lengths[first:, None]
-    # Directions at the joints that lie, and what the arm runs into where it meets the ground.
-    at_joints = np.concatenate([lying[:1], 0.5 * (lying[1:] + lying[:-1]), lying[-1:]])
-    place = held.carried.copy()
-    arriving = np.zeros_like(batch.roots)
-    for number in range(count - first):
-        low, high = reach[first + number], reach[first + number + 1]
-        share = np.clip((held.lies_from - low) / (high - low), 0.0, 1.0)
-        inside = (held.lies_from >= low) & ((held.lies_from < high) | (number == count - first - 1))
-        place += inside * (held.joints[number] + share * lying[number] * lengths[first + number])
-        arriving += inside * (
-            at_joints[number] + share * (at_joints[number + 1] - at_joints[number])
-        )
-    arriving = unit(arriving)
+    lying /= batch.lengths[first:, None]
+    place, arriving = _met(batch, held, lying)
     chord = place - batch.roots
     ratio = np.sqrt(dot(chord, chord)) / held.lies_from
     strain = np.zeros((1, ratio.shape[-1]))
     if batch.limbs.may_stretch and settings.stretch > 0.0:
-        taut = np.maximum(ratio / _EASY - 1.0, 0.0)
-        taut = taut * taut / (taut + _GENTLE)
-        slack = np.maximum(1.0 - ratio / _CROWDED, 0.0)
-        slack = slack * slack / (slack + _GENTLE)
-        shortest = _SHORTER * settings.stretch
-        strain[0] = settings.stretch * np.tanh(taut / settings.stretch)
-        strain[0] -= shortest * np.tanh(slack / shortest)
-    # A cubic from body to ground that leaves and arrives as the arm does, and is as long. The
-    # slacker the arm, the more it rises.
-    rising = _RAISED + _ARCHED * smooth_step((_EASY - ratio) / _ARCHING)
+        strain[0] = _strained(ratio, settings.stretch)
+    directions = _arch(batch, held, chord, arriving, strain[0])
+    if np.any(kneed := _kneed(batch, held)):
+        directions = np.where(kneed, _knee(batch, held, chord, 1.0 + strain[0]), directions)
+    through = np.clip((held.lies_from - batch.reach[first:-1]) / batch.lengths[first:], 0.0, 1.0)
+    directions[first:] = through[:, None] * directions[first:] + (1.0 - through[:, None]) * lying
+    rolled = _rolled(batch, held, lying, directions[first - 1])
+    directions[first:] = np.where(held.by_tip, directions[first:], rolled)
+    return strain, unit(directions), chord
+
+
+def _met(batch: Batch, held: Hold, lying: Floats) -> tuple[Floats, Floats]:
+    """Where arms meet the ground, and which way they run into it, (3, batch) both.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        lying: (segments − c, 3, batch) unit vectors along the segments that lie.
+    """
+    lengths, reach, first, last = batch.lengths, batch.reach, held.touching, len(lying) - 1
+    # Directions at the joints that lie.
+    at_joints = np.concatenate([lying[:1], 0.5 * (lying[1:] + lying[:-1]), lying[-1:]])
+    place = held.carried.copy()
+    arriving = np.zeros_like(batch.roots)
+    for number in range(len(lying)):
+        low, high = reach[first + number], reach[first + number + 1]
+        share = np.clip((held.lies_from - low) / (high - low), 0.0, 1.0)
+        inside = (held.lies_from >= low) & ((held.lies_from < high) | (number == last))
+        place += inside * (held.joints[number] + share * lying[number] * lengths[first + number])
+        arriving += inside * (
+            at_joints[number] + share * (at_joints[number + 1] - at_joints[number])
+        )
+    return place, unit(arriving)
+
+
+def _strained(ratio: Floats, stretch: float) -> Floats:
+    """Strains (batch,) of arms that may stretch, and shorten where they are crowded.
+
+    Args:
+        ratio: (batch,) of the way from body to ground to the length of arm between the two.
+        stretch: the most that bones get longer by, as a share.
+    """
+    taut = np.maximum(ratio / _EASY - 1.0, 0.0)
+    taut = taut * taut / (taut + _GENTLE)
+    slack = np.maximum(1.0 - ratio / _CROWDED, 0.0)
+    slack = slack * slack / (slack + _GENTLE)
+    shortest = _SHORTER * stretch
+    return stretch * np.tanh(taut / stretch) - shortest * np.tanh(slack / shortest)
+
+
+def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Floats) -> Floats:
+    """Directions (segments, 3, batch) of arms that are one curve from the body to the ground.
+
+    A cubic that leaves and arrives as the arm does, and is as long. The slacker the arm, the more
+    it rises.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        chord: (3, batch) from each one's root to where it meets the ground.
+        arriving: (3, batch) unit: which way it runs into it there.
+        strain: (batch,) by how much it is longer than at rest, as a share.
+    """
+    lengths, reach = batch.lengths, batch.reach
+    ratio = np.sqrt(dot(chord, chord)) / held.lies_from
+    slack = smooth_step((_EASY - ratio) / _ARCHING)
+    rising = _RAISED + _ARCHED * slack
     # Slack, it comes down rather than back from under the body.
-    falling = _FALLING * smooth_step((_EASY - ratio) / _ARCHING)
+    falling = _FALLING * slack
     arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
     leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
-    size = held.lies_from * (1.0 + strain[0])
+    size = held.lies_from * (1.0 + strain)
     middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
     parts = np.clip(held.lies_from - reach[:-1], 0.0, lengths)
-    tight = ratio / (1.0 + strain[0])
+    tight = ratio / (1.0 + strain)
     over = 0.5 * (tight - _BUNCHED)
     least = _BUNCHED + over + np.sqrt(over * over + _BUNCHING**2)
     directions = curve(
@@ -491,22 +535,28 @@ def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, 
         middles=middles,
         parts=parts,
     )
-    directions = bent(directions, parts, chord, tight / least)
-    if np.any(kneed := _kneed(batch, held)):
-        directions = np.where(kneed, _knee(batch, held, chord, 1.0 + strain[0]), directions)
-    through = np.clip((held.lies_from - reach[first:-1]) / lengths[first:], 0.0, 1.0)[:, None]
-    directions[first:] = through * directions[first:] + (1.0 - through) * lying
-    # Not unrolled yet: the part beyond stands up, the more, the further out.
+    return bent(directions, parts, chord, tight / least)
+
+
+def _rolled(batch: Batch, held: Hold, lying: Floats, before: Floats) -> Floats:
+    """Directions (segments − c, 3, batch) of what is not unrolled yet: it stands up.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        lying: (segments − c, 3, batch) unit: how it will lie.
+        before: (3, batch) unit: the direction of the segment before.
+    """
+    first, reach = held.touching, batch.reach
     span = reach[-1] - reach[first]
+    # The more, the further out.
     beyond = np.maximum(reach[first + 1 :] - held.lies_to, 0.0) / span
     angle = _CURLED * beyond * np.sqrt(beyond)
     # It folds back no further than what comes before it leaves room for.
-    bend = np.arccos(np.clip(dot(directions[first - 1], lying[0]), -1.0, 1.0))
+    bend = np.arccos(np.clip(dot(before, lying[0]), -1.0, 1.0))
     room = np.maximum(_FOLDED - bend, _TINY) / np.maximum(angle[0], _TINY)
     angle = (angle * room * np.tanh(1.0 / room))[:, None]
     up = np.zeros_like(lying)
     up[:, 2] = 1.0
     up = unit(up - dot(up, lying)[:, None] * lying)
-    rolled = np.cos(angle) * lying + np.sin(angle) * up
-    directions[first:] = np.where(held.by_tip, directions[first:], rolled)
-    return strain, unit(directions), chord
+    return np.cos(angle) * lying + np.sin(angle) * up
