@@ -20,13 +20,17 @@ def diameters(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
     Args:
         joints: number of segments n.
         first: diameter w₀ at the root, in metres.
-        taper: τ, the share of w₀ that each joint loses; 1/n makes a cone.
+        taper: τ, the share of w₀ that each joint loses; 1/n makes a cone, and more would leave
+            joints that are thinner than nothing.
+
+    Returns:
+        (joints,) in metres.
     """
     return first * (1.0 - taper * np.arange(joints, dtype=np.float64))
 
 
 def segment_lengths(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
-    """Lengths ``l_i = w_i / 2`` of the segments, root to tip [Octopus, eq. 3.2]."""
+    """Lengths ``l_i = w_i / 2`` (joints,) of the segments, root to tip [Octopus, eq. 3.2]."""
     return 0.5 * diameters(joints, first, taper)
 
 
@@ -38,7 +42,7 @@ def split_groups(lengths: Floats) -> tuple[int, int, int]:
     their squares is smallest); of equal cuts the one nearest to equal counts wins.
 
     Args:
-        lengths: (segments,), at least three of them.
+        lengths: (segments,), at least three of them, not all zero.
     """
     count = len(lengths)
     reach = np.concatenate([[0.0], np.cumsum(lengths)])

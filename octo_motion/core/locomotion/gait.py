@@ -216,10 +216,10 @@ def variation(
     for pair, columns in _columns_by_curve(table, pairs).items():
         curve, own = table.curve(pair), phases[:, columns]
         knots = len(curve.phases) - 1
-        draws = {each: _draw_cycle(seed, each, len(pairs), knots) for each in kept}
+        draws = {each: _draw_cycle(seed, each, columns, knots) for each in kept}
         values = np.array(
             [
-                [draws[number][arm] for arm, number in zip(columns, numbers, strict=True)]
+                [draws[number][place] for place, number in enumerate(numbers)]
                 for numbers in drawn[:, columns].tolist()
             ]
         )
@@ -244,13 +244,12 @@ def variation(
     return result
 
 
-def _draw_cycle(seed: int, cycle: int, arms: int, knots: int) -> Floats:
+def _draw_cycle(seed: int, cycle: int, arms: np.ndarray, knots: int) -> Floats:
     """(arms, knots, links, 2) uniform in [0, 1). Each arm has a stream of its own."""
     # SeedSequence takes no negative numbers; a phase offset can reach back before cycle 0.
     words = [seed, abs(cycle), int(cycle < 0)]
-    return np.stack(
-        [np.random.default_rng([*words, arm]).random((knots, LINKS, 2)) for arm in range(arms)]
-    )
+    streams = [np.random.default_rng([*words, arm]) for arm in arms.tolist()]
+    return np.stack([stream.random((knots, LINKS, 2)) for stream in streams])
 
 
 def _columns_by_curve(table: GaitTable, pairs: tuple[int, ...]) -> dict[int, np.ndarray]:
