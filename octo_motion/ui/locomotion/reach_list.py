@@ -11,9 +11,9 @@ from bpy.props import EnumProperty, StringProperty
 from ...blender.armature import active_armature
 from ...blender.arms import require_editable
 from ...blender.grasp_target import WITH_SURFACE
-from ...blender.overrides import linked_names
 from ...core.errors import RigError, SettingsError
 from ..armature_operator import ArmatureOperator
+from ..list_operators import ListKind, RemoveOperator
 from ..panel_base import ItemRows
 from .arm_items import bones_of
 from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
@@ -23,10 +23,14 @@ _SECONDS_TO_REACH: Final = 1.25
 _SECONDS_TO_HOLD: Final = 2.0
 
 
-def active_reach(settings: Any) -> Any:
-    """The list's active reach, ``None`` in an empty list."""
-    number = settings.active_reach
-    return settings.reaches[number] if 0 <= number < len(settings.reaches) else None
+_REACHES: Final = ListKind(
+    settings=locomotion_settings,
+    check=require_editable,
+    items="reaches",
+    active="active_reach",
+    one="a reach",
+    instead="Mute it instead.",
+)
 
 
 class OCTO_MOTION_UL_reaches(ItemRows, bpy.types.UIList):
@@ -140,33 +144,11 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
         return ""
 
 
-class OCTO_MOTION_OT_reach_remove(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_reach_remove(RemoveOperator, bpy.types.Operator):
     bl_idname = "octo_motion.reach_remove"
     bl_label = "Remove Reach"
     bl_description = "Take the active reach off the list. Generate to see the motion without it"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if active_reach(locomotion_settings(active_armature(context))) is None:
-            cls.poll_message_set("Choose a reach in the list first")
-            return False
-        return True
-
-    def run(self, context: bpy.types.Context) -> None:
-        armature = active_armature(context)
-        require_editable(armature)
-        settings: Any = locomotion_settings(armature)
-        name = settings.reaches[settings.active_reach].name
-        if name in linked_names(settings, "reaches"):
-            raise RigError(
-                f"The reach '{name}' is in the linked file and cannot be removed here.",
-                "Mute it instead.",
-            )
-        settings.reaches.remove(settings.active_reach)
-        settings.active_reach = max(0, min(settings.active_reach, len(settings.reaches) - 1))
+    KIND = _REACHES
 
 
 def draw_reaches(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
@@ -178,7 +160,7 @@ def draw_reaches(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     column = row.column(align=True)
     column.operator(OCTO_MOTION_OT_reach_add.bl_idname, text="", icon="ADD")
     column.operator(OCTO_MOTION_OT_reach_remove.bl_idname, text="", icon="REMOVE")
-    item = active_reach(settings)
+    item = _REACHES.active_item(settings)
     if item is None:
         return
     layout = layout.column()
