@@ -338,18 +338,18 @@ def _used_elsewhere(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
             if user != obj and action in (data.action, data.action_tweak_storage):
                 return True
             strips = (strip for track in data.nla_tracks for strip in track.strips)
-            if any(strip.action == action for strip in _flattened(strips)):
+            if any(strip.action == action for strip in flattened(strips)):
                 return True
         if isinstance(user, bpy.types.Object) and action in _constraint_actions(user):
             return True
     return False
 
 
-def _flattened(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
+def flattened(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
     """The strips, and those inside meta strips."""
     for strip in strips:
         yield strip
-        yield from _flattened(strip.strips)
+        yield from flattened(strip.strips)
 
 
 def _constraint_actions(obj: bpy.types.Object) -> list[bpy.types.Action | None]:

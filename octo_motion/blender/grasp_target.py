@@ -3,9 +3,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final
 
 import bpy
@@ -14,6 +11,7 @@ import numpy as np
 from ..core.errors import RigError
 from ..core.rotations import Floats, continuous, from_matrix
 from .actions import is_generated
+from .playing import time_kept
 from .world import world_of
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
@@ -54,7 +52,8 @@ def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
 def read_places(target: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats]:
     """World positions (frames, 3) and rotations (frames, 4) of an object.
 
-    A still object is read once; otherwise the scene is played through and put back to its frame.
+    A still object is read once; otherwise the scene is played through and put back to its frame,
+    and what has no keys yet survives.
     """
     scene = bpy.context.scene
     assert scene is not None
@@ -63,10 +62,9 @@ def read_places(target: bpy.types.Object, frames: Floats) -> tuple[Floats, Float
         still = world_of(target, bpy.context.evaluated_depsgraph_get())
         matrices[:] = np.array(still, dtype=np.float64)
     else:
-        with _frame_kept(scene):
+        with time_kept(scene) as go_to:
             for number, frame in enumerate(frames):
-                whole = math.floor(frame)
-                scene.frame_set(whole, subframe=float(frame - whole))
+                go_to(float(frame))
                 matrices[number] = world_of(target, bpy.context.evaluated_depsgraph_get())
     rotations = from_matrix(np.stack([matrix_rotation(each) for each in matrices[:, :3, :3]]))
     return matrices[:, :3, 3], continuous(rotations)
@@ -117,12 +115,3 @@ def matrix_rotation(matrix: Floats) -> Floats:
     left, _, right = np.linalg.svd(matrix)
     turn = left @ right
     return turn if np.linalg.det(turn) > 0.0 else -turn
-
-
-@contextmanager
-def _frame_kept(scene: bpy.types.Scene) -> Iterator[None]:
-    frame, subframe = scene.frame_current, scene.frame_subframe
-    try:
-        yield
-    finally:
-        scene.frame_set(frame, subframe=subframe)

@@ -25,6 +25,7 @@ from ..core.splicing.mapping import map_skeleton
 from .actions import channelbags_of
 from .armature import read_skeleton
 from .clips import read_clip
+from .playing import time_kept
 
 SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
 
@@ -284,14 +285,15 @@ def _made_since(before: set[int]) -> list[bpy.types.ID]:
 def _unchanged(context: bpy.types.Context, scene: bpy.types.Scene) -> Iterator[None]:
     """Give the scene back its time, and the view layer what was selected if the import fails."""
     render = scene.render
-    time = (scene.frame_start, scene.frame_end, scene.frame_current, scene.frame_subframe)
+    ends = scene.frame_start, scene.frame_end
     rate = (render.fps, render.fps_base)
     layer = context.view_layer
     assert layer is not None
     active = layer.objects.active
     selected = [each for each in layer.objects if each.select_get(view_layer=layer)]
     try:
-        yield
+        with time_kept(scene):
+            yield
     except BaseException:
         for each in layer.objects:
             each.select_set(each in selected, view_layer=layer)
@@ -299,9 +301,7 @@ def _unchanged(context: bpy.types.Context, scene: bpy.types.Scene) -> Iterator[N
         raise
     finally:
         render.fps, render.fps_base = rate
-        scene.frame_start, scene.frame_end = time[:2]
-        if (scene.frame_current, scene.frame_subframe) != time[2:]:
-            scene.frame_set(time[2], subframe=time[3])
+        scene.frame_start, scene.frame_end = ends
 
 
 def _remove_strays(made: list[bpy.types.ID]) -> None:

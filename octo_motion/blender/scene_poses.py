@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -12,6 +11,7 @@ import bpy
 import numpy as np
 
 from ..core.rotations import Floats
+from .playing import time_kept
 
 _CHANNELS: Final = (
     *("location", "scale"),
@@ -22,7 +22,7 @@ _CHANNELS: Final = (
 def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats]:
     """What an armature looks like at these frames of the current scene.
 
-    The scene is played through and put back to its frame; a pose that has no keys yet survives.
+    The scene is played through and put back to its frame; what has no keys yet survives.
 
     Returns:
         Bone matrices (frames, bones, 4, 4) in armature space, in the order of the armature's
@@ -35,10 +35,9 @@ def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Flo
     bones = np.empty((len(frames), count, 4, 4))
     world = np.empty((len(frames), 4, 4))
     buffer = np.empty(16 * count, dtype=np.float32)
-    with _kept(scene, armature):
+    with _pose_kept(armature), time_kept(scene) as go_to:
         for number, frame in enumerate(frames):
-            whole = math.floor(frame)
-            scene.frame_set(whole, subframe=float(frame - whole))
+            go_to(float(frame))
             shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
             assert shown.pose is not None
             shown.pose.bones.foreach_get("matrix", buffer)
@@ -74,15 +73,14 @@ def assigned(
 
 
 @contextmanager
-def _kept(scene: bpy.types.Scene, armature: bpy.types.Object) -> Iterator[None]:
-    frame, subframe = scene.frame_current, scene.frame_subframe
+def _pose_kept(armature: bpy.types.Object) -> Iterator[None]:
+    """The pose as it was: what an action that is assigned for a while moves is no one else's."""
     assert armature.pose is not None
     owners = (armature, *armature.pose.bones)
     values = [[tuple(getattr(owner, name)) for name in _CHANNELS] for owner in owners]
     try:
         yield
     finally:
-        scene.frame_set(frame, subframe=subframe)
         for owner, mine in zip(owners, values, strict=True):
             for name, value in zip(_CHANNELS, mine, strict=True):
                 if tuple(getattr(owner, name)) != value:
