@@ -91,10 +91,6 @@ class Choice:
         """Where the motion itself has a corner: (limbs, frames, tracks)."""
         return self._loose
 
-    def all_of_them(self) -> None:
-        """Mark all frames that may have a key."""
-        self.keyed[:, :: self._every] = True
-
     def fewest(self) -> Iterator[float]:
         """Mark as few frames as will do; the share that is done."""
         limbs, starts, ends = self._stretches()

@@ -1,85 +1,88 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Moments between frames, where keys stand so close that frames alone do not say how to go.
+"""Moments between frames, as frames alone do not say how curves have to go.
 
-A curve from one key to another a frame or two later has handles that no frame has much to say
-about: it may be right at every frame and swing out in between. So the motion is looked at half way
-between such frames, too: as it would go with a key on each of them and automatic handles.
+A curve from one key to another a few frames later has handles that no frame has much to say about:
+it may be right at every frame and swing out in between, where a foot would slide. So the motion is
+looked at half way between frames, too: as it would go with a key on each of them and automatic
+handles.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .key_limbs import Booleans, Limb, Track
 from .rotations import Floats
 
-_CLOSE: Final = 7
-"""Frames from one key to the next up to which moments in between are looked at."""
 _HANDLE: Final = 1.0 / 2.5614
 """Length of an automatic handle, as a share of the time between two keys."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fine:
-    """A limb at frames and at some moments in between."""
+    """A limb at all moments at which it is looked at."""
 
     times: Floats
     """(moments,)"""
     limb: Limb
-    keyed: Booleans
-    """(columns, moments)"""
-    corners: Booleans
-    """(tracks, moments)"""
     allowed: Booleans
-    """(moments,) which are frames."""
+    """(moments,) where there may be a key."""
+
+    def marked(self, marks: Booleans) -> Booleans:
+        """Marks (rows, moments) that are given at frames (rows, frames), or at all moments."""
+        if marks.shape[1] == len(self.times):
+            return marks
+        result = np.zeros((len(marks), len(self.times)), dtype=bool)
+        result[:, self.allowed] = marks
+        return result
 
 
-def with_halves(times: Floats, limb: Limb, keyed: Booleans, corners: Booleans) -> Fine:
-    """A limb, and half way between two frames where keys stand close.
+def with_halves(times: Floats, limb: Limb) -> Fine:
+    """A limb on frames and half way between them.
 
     Args:
         times: (frames,) at least two.
         limb: at the frames.
-        keyed: (columns, frames) where there are keys, the first and the last frame among them.
-        corners: (tracks, frames) where the motion has corners.
     """
-    close = np.zeros(len(times) - 1, dtype=bool)
-    for column in keyed:
-        lengths = np.diff(np.flatnonzero(column))
-        close |= np.repeat(lengths <= _CLOSE, lengths)
-    (before,) = np.nonzero(close)
-    at = np.arange(len(times)) + np.concatenate([[0], np.cumsum(close)])
-    between = at[before] + 1
-    allowed = np.zeros(len(times) + len(before), dtype=bool)
-    allowed[at] = True
 
-    def joined(frames: np.ndarray, halves: np.ndarray) -> np.ndarray:
-        result = np.empty((len(allowed), *frames.shape[1:]), dtype=frames.dtype)
-        result[at], result[between] = frames, halves
-        return result
+    def closer(bound: Floats) -> Floats:
+        """Bounds half way, which are those of both frames."""
+        looser = np.isinf(bound[:-1]) | np.isinf(bound[1:])
+        return joined(bound, np.where(looser, np.inf, np.minimum(bound[:-1], bound[1:])))
 
-    def wider(bound: Floats) -> Floats:
-        """What bounds a joint on both frames bounds it in between."""
-        return joined(bound, np.maximum(bound[before], bound[before + 1]))
-
-    def spread(marks: Booleans) -> Booleans:
-        halves = np.zeros((len(before), len(marks)), dtype=bool)
-        return np.ascontiguousarray(joined(marks.T, halves).T)
-
-    tracks = [
-        Track(joined(each.values, _halves(each.values)[before]), each.kind) for each in limb.tracks
-    ]
+    tracks = [Track(joined(each.values, _halves(each.values)), each.kind) for each in limb.tracks]
     finer = replace(
         limb,
         tracks=tracks,
-        distance=wider(np.broadcast_to(limb.distance, len(times))),
-        room=None if limb.room is None else wider(limb.room),
+        distance=closer(np.broadcast_to(limb.distance, len(times))),
+        room=None if limb.room is None else closer(limb.room),
     )
-    moments = joined(times, 0.5 * (times[before] + times[before + 1]))
-    return Fine(moments, finer, spread(keyed), spread(corners), allowed)
+    moments = joined(times, 0.5 * (times[:-1] + times[1:]))
+    return Fine(moments, finer, np.arange(len(moments)) % 2 == 0)
+
+
+def looked_at(times: Floats, limb: Limb, every: int) -> Fine:
+    """A limb at all moments that matter: between frames, too, where something hangs on it.
+
+    Args:
+        times: (moments,) at least two.
+        limb: at those moments.
+        every: at every how many of them there is a frame, from the first to the last.
+    """
+    if every == 1 and (limb.chain is not None or limb.lever > 0.0):
+        return with_halves(times, limb)
+    return Fine(times, limb, np.arange(len(times)) % every == 0)
+
+
+def joined(frames: NDArray[Any], halves: NDArray[Any]) -> NDArray[Any]:
+    """What is on frames (frames, …) and half way between them (frames − 1, …), in turn."""
+    result = np.empty((len(frames) + len(halves), *frames.shape[1:]), dtype=frames.dtype)
+    result[::2], result[1::2] = frames, halves
+    return result
 
 
 def _halves(values: Floats) -> Floats:

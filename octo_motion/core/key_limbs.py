@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -66,10 +66,25 @@ class Limb:
     chain: Chain | None = None
     columns: Sequence[int] | None = None
     """Of each track, which key frames it has: those of all with the same number. Without, all
-    tracks have theirs in common."""
+    tracks have theirs in common. See :meth:`column_numbers`."""
     room: Floats | None = None
     """(frames, bones) how far the ends of the chain's bones may be off, those of the tip among
     them; infinite where nothing but the rest says so."""
+
+    def column_numbers(self) -> list[int]:
+        """Of each track its column of key frames, numbered from 0."""
+        given = self.columns if self.columns is not None else [0] * len(self.tracks)
+        numbers = {column: number for number, column in enumerate(dict.fromkeys(given))}
+        return [numbers[column] for column in given]
+
+    def at(self, moments: Booleans) -> Limb:
+        """The same at some of its frames (frames,)."""
+        return replace(
+            self,
+            tracks=[Track(each.values[moments], each.kind) for each in self.tracks],
+            distance=np.broadcast_to(self.distance, len(moments))[moments],
+            room=None if self.room is None else self.room[moments],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +105,38 @@ class BezierKeys:
     def __len__(self) -> int:
         """Number of keys of each component."""
         return len(self.frames)
+
+
+def bezier_keys(
+    frames: Floats, values: Floats, out: Floats, into: Floats, smooth: Booleans
+) -> BezierKeys:
+    """Keys with handles at thirds of the time between two of them.
+
+    Args:
+        frames: (keys,) at least two.
+        values: (keys, components)
+        out: (keys − 1, components) values of the handles after all keys but the last one.
+        into: (keys − 1, components) values of the handles before all but the first one.
+        smooth: (keys,) whether both handles lie on one line.
+    """
+    third = np.diff(frames)[:, None] / 3.0
+    own = np.stack(np.broadcast_arrays(frames[:, None], values), axis=-1)
+    left, right = own.copy(), own.copy()
+    left[1:, :, 0] -= third
+    left[1:, :, 1] = into
+    right[:-1, :, 0] += third
+    right[:-1, :, 1] = out
+    # Nothing lies before the first key and after the last: their handles go straight on.
+    left[0], right[-1] = 2.0 * own[0] - right[0], 2.0 * own[-1] - left[-1]
+    inner = smooth.copy()
+    inner[[0, -1]] = False
+    return BezierKeys(
+        frames=frames.astype(np.float32),
+        values=values.astype(np.float32),
+        left=left.astype(np.float32),
+        right=right.astype(np.float32),
+        smooth=inner,
+    )
 
 
 def chain_to_tip(skeleton: Skeleton, bones: Sequence[str]) -> Chain:

@@ -21,10 +21,11 @@ from typing import Final
 import numpy as np
 
 from .errors import SettingsError
+from .key_dense import dense_keys
 from .key_frames import Choice
-from .key_halves import Fine, with_halves
+from .key_halves import looked_at
 from .key_limbs import LOCATION, SCALE, BezierKeys, Booleans, Chain, Limb, Track, chain_to_tip
-from .key_search import Search, columns_of
+from .key_search import Search
 from .rotations import Floats
 
 __all__ = [
@@ -46,7 +47,7 @@ _LEVERAGE: Final = 2.5
 """Distances of the tip, as shares of the chain's length, that a bone may be turned away when key
 frames are chosen: what others make up for …"""
 _HELD_LEVERAGE: Final = 4.2
-"""… and the same of joints that are bounded by themselves."""
+"""… and the same of joints that rest."""
 _CHOOSING: Final = 0.2
 """Share of the work that it takes to choose key frames."""
 
@@ -110,27 +111,16 @@ def reducing(
     times = np.asarray(frames, dtype=np.float32).astype(np.float64)
     if len(times) == 1:
         return [[_alone(times, track) for track in limb.tracks] for limb in limbs]
+    if all_of_them:
+        return (yield from _dense(times, limbs, every, loops=loops))
     plans = [_Plan.of(limb, len(times)) for limb in limbs]
-    for share in _choose(times, plans, every, all_of_them=all_of_them):
+    for share in _choose(times, plans, every):
         yield _CHOOSING * share
     result: list[list[BezierKeys]] = []
     done, whole = 0, max(sum(len(limb.tracks) for limb in limbs), 1)
     for plan in plans:
-        if every == 1 and plan.limb.chain is not None:
-            fine = with_halves(times, plan.limb, plan.keyed, plan.corners)
-        else:
-            fine = Fine(
-                times, plan.limb, plan.keyed, plan.corners, np.arange(len(times)) % every == 0
-            )
-        search = Search(
-            fine.times,
-            fine.limb,
-            fine.keyed,
-            fine.corners,
-            allowed=fine.allowed,
-            loops=loops,
-            exact=all_of_them,
-        )
+        fine = looked_at(times, plan.limb, every)
+        search = Search(fine, fine.marked(plan.keyed), fine.marked(plan.corners), loops=loops)
         own, steps = len(plan.limb.tracks), search.found()
         while True:
             try:
@@ -140,6 +130,17 @@ def reducing(
                 break
             yield _CHOOSING + (1.0 - _CHOOSING) * (done + own * share) / whole
         done += own
+    return result
+
+
+def _dense(
+    times: Floats, limbs: Sequence[Limb], every: int, *, loops: bool
+) -> Generator[float, None, list[list[BezierKeys]]]:
+    """A key wherever there may be one, of the motion's own values."""
+    result: list[list[BezierKeys]] = []
+    for limb in limbs:
+        yield len(result) / len(limbs)
+        result.append(dense_keys(times, limb, every, loops=loops))
     return result
 
 
@@ -155,7 +156,7 @@ class _Plan:
 
     @classmethod
     def of(cls, limb: Limb, frames: int) -> _Plan:
-        columns = columns_of(limb)
+        columns = limb.column_numbers()
         return cls(
             limb,
             np.zeros((max(columns, default=-1) + 1, frames), dtype=bool),
@@ -169,7 +170,7 @@ class _Plan:
         together. Scales are bounded like locations, by a share of what they are of.
         """
         limb, angle = self.limb, self.limb.angle
-        tracks = [place for place, each in enumerate(columns_of(limb)) if each == number]
+        tracks = [place for place, each in enumerate(limb.column_numbers()) if each == number]
         distance = float(np.min(limb.distance))
         if limb.chain is not None:
             # Bones that are further off would move the tip by more than others can make up for.
@@ -186,9 +187,7 @@ class _Plan:
         return tracks, Limb(kept, _SLACK * angle, _SLACK * distance, limb.lever)
 
 
-def _choose(
-    times: Floats, plans: Sequence[_Plan], every: int, *, all_of_them: bool
-) -> Generator[float, None, None]:
+def _choose(times: Floats, plans: Sequence[_Plan], every: int) -> Generator[float, None, None]:
     """Fill in the key frames of all plans; columns that are alike are worked on together."""
     alike: dict[object, list[tuple[int, int]]] = {}
     for place, plan in enumerate(plans):
@@ -200,11 +199,8 @@ def _choose(
     for columns in alike.values():
         found = [plans[place].column(number) for place, number in columns]
         choice = Choice(times, [limb for _, limb in found], every)
-        if all_of_them:
-            choice.all_of_them()
-        else:
-            for share in choice.fewest():
-                yield (done + len(columns) * share) / whole
+        for share in choice.fewest():
+            yield (done + len(columns) * share) / whole
         done += len(columns)
         for row, ((place, number), (tracks, _)) in enumerate(zip(columns, found, strict=True)):
             plans[place].keyed[number] = choice.keyed[row]

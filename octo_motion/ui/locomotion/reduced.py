@@ -122,8 +122,8 @@ def reduced(
         found += reduce_keys(frames, [travel], every=every, all_of_them=dense, loops=loops)
         parts.append(motion.travel)
         # What it does not take is left to the arms, frame by frame.
-        played = [values_at(keys, frames)[None] for keys in found[0]]
-        carried = Errors([travel]).measure(played)[1][0] * travel.distance / unit
+        played = [values_at(keys, frames) for keys in found[0]]
+        carried = Errors(travel).measure(played)[1] * travel.distance / unit
         distance = distance - carried
     rest = iter(motion.arms)
     for number, arm in enumerate(body.arms):
