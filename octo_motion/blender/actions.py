@@ -287,6 +287,12 @@ def is_edited(action: bpy.types.Action) -> bool:
     return mark.get("fingerprint") != _fingerprint(action) or _handles_moved(action)
 
 
+def note_of(action: bpy.types.Action) -> str:
+    """How an action was made, as whoever wrote it has noted it; "" for any other."""
+    mark = action.get(MARK)
+    return str(mark.get("note", "")) if mark is not None else ""
+
+
 def key_counts(action: bpy.types.Action) -> tuple[int, int]:
     """How many keys an action had when it was generated, and how many one per frame would be.
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from typing import Final
 
 import bpy
@@ -10,12 +11,14 @@ import numpy as np
 
 from ..core.errors import RigError
 from ..core.rotations import Floats, continuous, from_matrix
-from .actions import is_generated
+from .actions import is_generated, may_replace, note_of
 from .playing import time_kept
 from .world import world_of
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that can have faces."""
+_SAME: Final = 1e-4
+"""Metres or radians by which an object may be off its keys, and not have been moved."""
 
 
 def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
@@ -95,6 +98,90 @@ def can_be_carried(target: bpy.types.Object) -> bool:
     if len(target.constraints) > 0 or target.rigid_body is not None:
         return False
     return target.parent is None or (target.parent_type == "OBJECT" and not may_move(target.parent))
+
+
+def home_of(target: bpy.types.Object) -> tuple[Floats, Floats]:
+    """World position (3,) and rotation (4,) where an object stands until it is carried.
+
+    That is where it is, if an artist has put it there since, else where its keys begin.
+    """
+    action = _generated(target)
+    if action is None or _moved_by_hand(target, action):
+        matrix = np.array(world_of(target, bpy.context.evaluated_depsgraph_get()))
+        return matrix[:3, 3], from_matrix(matrix_rotation(matrix[:3, :3])[None])[0]
+    positions, rotations = read_places(target, np.array([action.frame_start]))
+    return positions[0], rotations[0]
+
+
+def left_behind(carrier: str, carried: Collection[str]) -> list[bpy.types.Object]:
+    """Objects that an armature has carried, which are not among those that it carries now.
+
+    What an artist has edited since is not among them: it is theirs.
+    """
+    found: list[bpy.types.Object] = []
+    for action in bpy.data.actions:
+        if note_of(action) != carrying_note(carrier):
+            continue
+        users = (each for each in bpy.data.user_map(subset=[action])[action])
+        found += [
+            each
+            for each in users
+            if isinstance(each, bpy.types.Object)
+            and each.name not in carried
+            and each.is_editable
+            and _generated(each) == action
+            and may_replace(action, each)
+        ]
+    return found
+
+
+def put_back(target: bpy.types.Object) -> None:
+    """Take an object's keys away that carried it, and let it stand where it stood before."""
+    action, data = _generated(target), target.animation_data
+    if action is None or data is None:
+        return
+    if not _moved_by_hand(target, action):
+        for curve in _curves(action):
+            values = getattr(target, curve.data_path)
+            values[curve.array_index] = curve.evaluate(action.frame_start)
+    data.action = None
+    bpy.data.actions.remove(action)
+
+
+def carrying_note(carrier: str) -> str:
+    """What is noted with the keys of an object that an armature carries."""
+    return f"carried by {carrier}"
+
+
+def is_carried(target: bpy.types.Object, carrier: str) -> bool:
+    """Whether keys that an armature's motion gave an object carry it."""
+    action = _generated(target)
+    return action is not None and note_of(action) == carrying_note(carrier)
+
+
+def _generated(target: bpy.types.Object) -> bpy.types.Action | None:
+    data = target.animation_data
+    action = data.action if data is not None else None
+    return action if action is not None and is_generated(action) else None
+
+
+def _moved_by_hand(target: bpy.types.Object, action: bpy.types.Action) -> bool:
+    """Whether an object is not where its keys have it: artists put it elsewhere, without a key."""
+    scene = bpy.context.scene
+    assert scene is not None
+    frame = scene.frame_current_final
+    return any(
+        abs(getattr(target, curve.data_path)[curve.array_index] - curve.evaluate(frame)) > _SAME
+        for curve in _curves(action)
+    )
+
+
+def _curves(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
+    for layer in action.layers:
+        for strip in layer.strips:
+            if isinstance(strip, bpy.types.ActionKeyframeStrip):
+                for channelbag in strip.channelbags:
+                    yield from channelbag.fcurves
 
 
 def hangs_on(target: bpy.types.Object, owner: bpy.types.Object) -> bool:

@@ -204,6 +204,77 @@ def test_an_object_is_carried_and_left(octopus: Any) -> None:
     assert all(np.allclose(again[path], values, atol=1e-5) for path, values in first.items())
 
 
+@pytest.fixture
+def carried(octopus: Any) -> tuple[Any, Any]:
+    """A rod that is carried away, and its reach."""
+    give_route(octopus, [(0, 0, 0), (0, -0.7, 0), (0, -1.4, 0), (0, -2.0, 0)])
+    rod = thing(objects.rod(0.04, 0.6), HOME)
+    item = reach(octopus, rod, carry=True, frame_contact=34, frame_release=75)
+    generate(octopus)
+    bpy.context.scene.frame_set(90)
+    assert (rod.matrix_world.translation - Vector(HOME)).length > 0.2
+    return rod, item
+
+
+HOME = (0.5, -0.85, 0.0)
+
+
+@pytest.mark.parametrize("how", ["muted", "removed", "left where it is"])
+def test_what_is_no_longer_carried_stands_where_it_stood(
+    how: str, octopus: Any, carried: tuple[Any, Any]
+) -> None:
+    rod, item = carried
+    if how == "muted":
+        item.mute = True
+    elif how == "removed":
+        settings_of(octopus).reaches.clear()
+    else:
+        # While the body is near.
+        item.carry, item.frame_release = False, 50
+    count = len(bpy.data.actions)
+    generate(octopus)
+    assert rod.animation_data.action is None
+    assert len(bpy.data.actions) == count - 1
+    bpy.context.scene.frame_set(50)
+    np.testing.assert_allclose(rod.matrix_world.translation, HOME, atol=1e-5)
+    if how == "left where it is":
+        # The arm winds about it there, not where it was on its way.
+        assert 0.04 < away(arm_joints(octopus, 50), rod).min() < 0.16
+
+
+def test_keys_of_a_carried_object_that_were_edited_are_the_artists(
+    octopus: Any, carried: tuple[Any, Any]
+) -> None:
+    rod, item = carried
+    rod.keyframe_insert("location", frame=95)
+    own = rod.animation_data.action
+    item.mute = True
+    generate(octopus)
+    assert rod.animation_data.action == own
+
+
+def test_another_timing_takes_the_object_from_where_it_stood(
+    octopus: Any, carried: tuple[Any, Any]
+) -> None:
+    rod, item = carried
+    item.frame_contact, item.frame_release = 40, 70
+    generate(octopus)
+    bpy.context.scene.frame_set(20)
+    np.testing.assert_allclose(rod.matrix_world.translation, HOME, atol=1e-5)
+
+
+def test_an_object_that_is_put_elsewhere_is_carried_from_there(
+    octopus: Any, carried: tuple[Any, Any]
+) -> None:
+    rod, _ = carried
+    place = (0.45, -0.9, 0.05)
+    rod.location = place
+    bpy.context.view_layer.update()
+    generate(octopus)
+    bpy.context.scene.frame_set(20)
+    np.testing.assert_allclose(rod.matrix_world.translation, place, atol=1e-5)
+
+
 def test_what_cannot_be_carried_is_told(octopus: Any) -> None:
     rod = thing()
     item = reach(octopus, rod, carry=True)

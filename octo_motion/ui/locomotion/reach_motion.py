@@ -11,7 +11,17 @@ import bpy
 import numpy as np
 
 from ...blender import actions
-from ...blender.grasp_target import can_be_carried, hangs_on, read_form, read_places
+from ...blender.grasp_target import (
+    can_be_carried,
+    carrying_note,
+    hangs_on,
+    home_of,
+    is_carried,
+    left_behind,
+    put_back,
+    read_form,
+    read_places,
+)
 from ...blender.poses import standing_of
 from ...blender.skin_radii import skin_radii
 from ...core.errors import RigError, SettingsError
@@ -207,23 +217,29 @@ def _ways(reaches: Sequence[Reach], times: Floats, travelling: Travelling) -> di
     return ways
 
 
-def write_carried(carried: Carried) -> None:
-    """Give an object the keys of its way; those that it got before are made anew.
+def write_carried(armature: bpy.types.Object, carried: Sequence[Carried]) -> None:
+    """Give objects the keys of their ways; those that they got before are made anew.
+
+    What is no longer carried loses them, and stands where it stood before.
 
     Raises:
-        WriteError: it has become read-only.
+        WriteError: an object has become read-only.
     """
-    target = bpy.data.objects.get(carried.target)
-    if target is None:
-        return
-    data = target.animation_data
-    actions.write_action(
-        target,
-        f"{target.name} Carried",
-        carried.frames,
-        actions.object_channels(target, carried.positions, carried.rotations),
-        previous=data.action if data is not None else None,
-    )
+    for target in left_behind(armature.name, {each.target for each in carried}):
+        put_back(target)
+    for each in carried:
+        target = bpy.data.objects.get(each.target)
+        if target is None:
+            continue
+        data = target.animation_data
+        actions.write_action(
+            target,
+            f"{target.name} Carried",
+            each.frames,
+            actions.object_channels(target, each.positions, each.rotations),
+            previous=data.action if data is not None else None,
+            settings_note=carrying_note(armature.name),
+        )
 
 
 def _check_free(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach, arm: str) -> None:
@@ -305,9 +321,9 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
     profile = profile_of(*read_form(item.target), axis)
     asked = (frames >= timeline.start) & (frames <= timeline.end)
     positions, rotations = still
-    if carry:
-        # Keys that it got before say where it went: it starts from where it is touched.
-        position, rotation = read_places(item.target, np.array([timeline.contact]))
+    if carry or is_carried(item.target, armature.name):
+        # Keys that it got before are made anew, or taken away.
+        position, rotation = home_of(item.target)
         positions, rotations = (
             np.tile(position, (len(frames), 1)),
             np.tile(rotation, (len(frames), 1)),

@@ -570,8 +570,7 @@ class Shot:
             store(settings.ground, self.wanted)
             if settings.ground.shown:
                 show_contacts(armature, self)
-        for each in self.carried:
-            write_carried(each)
+        write_carried(armature, self.carried)
         write_figures(settings, self.figures)
         notes = self._extend_range()
         keys, dense_keys = actions.key_counts(action)
