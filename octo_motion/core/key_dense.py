@@ -18,8 +18,9 @@ from .key_limbs import BezierKeys, Integers, Limb, bezier_keys
 from .key_model import Model
 from .rotations import Floats
 
-_PULL: Final = 1e-3
-"""Weight, against that of a moment, of the wish that slopes are those of the motion."""
+_PULL: Final = 0.03
+"""Weight, against that of a moment, of the wish that slopes are those of the motion: with less, a
+moment that stands out bends curves many keys away from it."""
 _STEPS: Final = 40
 """Of conjugate gradients: what is coupled is so over a few keys only."""
 _ENOUGH: Final = 1e-8
