@@ -6,7 +6,10 @@
 WITH_BPY = python=$$(.ci/venv bpy-5.2 bpy-4.5) && export PYTHONPATH=. &&
 WITH_LINT = python=$$(.ci/venv lint) && bin=$${python%/*} &&
 
-.PHONY: help test lint demo bench build pictures experiment setups clean
+# The Blender with a window that takes pictures of itself; options may follow it.
+BLENDER ?= blender
+
+.PHONY: help test lint demo bench build pictures window experiment setups clean
 
 help: ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
@@ -31,6 +34,9 @@ build: ## make the extension's zip in dist with Blender's own packer, and valida
 
 pictures: ## render the pictures of the documentation anew
 	@$(WITH_BPY) $$python .ci/check_rendering.py && $$python docs/studio/pictures.py $(ARGS)
+
+window: ## take the documentation's pictures of Blender's own window; needs a Blender with a window
+	@BLENDER="$(BLENDER)" .ci/window $(ARGS)
 
 experiment: ## splice a throw and a punch onto a walk at two timings and draw it; ARGS=FOLDER for clips of your own
 	@$(WITH_BPY) $$python .ci/check_rendering.py && $$python docs/studio/experiment.py $(ARGS)

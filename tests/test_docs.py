@@ -550,3 +550,18 @@ def test_every_make_target_that_is_named_exists(page: Path) -> None:
     targets = {line.split()[1] for line in listed.stdout.splitlines()}
     code = re.findall(r"^```.*?^```$|`[^`\n]+`", text_of(page), re.MULTILINE | re.DOTALL)
     assert set(re.findall(r"\bmake ([a-z]+)", "\n".join(code))) <= targets
+
+
+def test_every_picture_is_made_by_a_target_or_said_to_be_made_by_hand() -> None:
+    studio = REPOSITORY / "docs" / "studio"
+    made = {
+        key.value
+        for script in ("pictures.py", "window.py")
+        for table in ast.walk(ast.parse(text_of(studio / script)))
+        if isinstance(table, ast.AnnAssign) and getattr(table.target, "id", "") == "PICTURES"
+        for key in getattr(table.value, "keys", ())
+    }
+    by_hand = set(re.findall(r"`(\w+)\.png`", text_of(REPOSITORY / "docs" / "README.md")))
+    there = {path.stem for path in (REPOSITORY / "docs" / "images").glob("*.png")}
+    assert there == made | by_hand
+    assert not made & by_hand

@@ -117,6 +117,37 @@ def add_script(path: Path, text: str) -> None:
     path.chmod(0o755)
 
 
+@needs_posix_shell
+def test_pictures_of_the_window_say_that_there_is_no_blender(machine: Path) -> None:
+    run = run_on(machine, ".ci/window")
+    assert run.returncode == 1
+    assert run.stderr == (
+        "There is no 'blender': name a Blender, as in make window BLENDER=/path/to/blender.\n"
+    )
+
+
+@needs_posix_shell
+def test_pictures_of_the_window_say_that_there_is_no_display(machine: Path) -> None:
+    add_script(machine / "tools" / "uname", "echo Linux")
+    add_script(machine / "tools" / "blender", "echo Blender was started")
+
+    run = run_on(machine, ".ci/window")
+
+    assert (run.returncode, run.stdout) == (1, "")
+    assert "there is no display" in run.stderr
+
+
+@needs_posix_shell
+def test_pictures_of_the_window_hand_on_what_is_asked_for(machine: Path) -> None:
+    add_script(machine / "tools" / "uname", "echo Darwin")
+    add_script(machine / "tools" / "blender", 'echo "$@"')
+
+    run = run_on(machine, ".ci/window", "panel", "--folder", "a b")
+
+    assert run.returncode == 0
+    assert run.stdout.endswith("--python docs/studio/window.py -- panel --folder a b\n")
+
+
 VERSION = f"{sys.version_info.major}.{sys.version_info.minor}"
 THIS_PYTHON = f'exec "{sys.executable}" "$@"'
 

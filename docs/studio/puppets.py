@@ -70,7 +70,7 @@ def octopus() -> Pixels:
 def doll() -> Pixels:
     """A wooden doll waves, takes a step and looks aside."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    figure = _make_doll()
+    figure = make_doll()
     figure.octo_motion.posing.material = "DOLL"
     pulls = (
         Pull("hand.L", (0.05, -0.15, 0.85), seconds=1.2),
@@ -175,7 +175,7 @@ def _arrow(start: Points, end: Points) -> None:
     )
 
 
-def _make_doll() -> bpy.types.Object:
+def make_doll() -> bpy.types.Object:
     """An armature whose bones carry stiff parts of wood."""
     figure = bpy.data.objects.new("Doll", bpy.data.armatures.new("Doll"))
     stage.the_scene().collection.objects.link(figure)
