@@ -31,8 +31,8 @@ _LEFT: Final = 200
 """Pixels at the left of the picture: the hand moves about the middle of the viewport."""
 _NEAR: Final = 0.06
 """m"""
-_OUTSIDE: Final = -0.2
-"""m across the doll, which stands at 0"""
+_FAR: Final = 0.22
+"""m"""
 _TRIALS: Final = 20
 _PACE: Final = 0.95
 """Simulated against real time: with less the panel warns."""
@@ -48,8 +48,10 @@ def four_moments() -> Taking:
     pictures = [screen.take_moment()]
     yield from _grab(screen, "thigh.R")
     pictures.append(screen.take_moment())
-    # To the doll's right, so that the leg goes outwards.
-    yield from screen.until(lambda: bool(_hand()[0] < _OUTSIDE), "The simulated hand at the side")
+    start = _hand()
+    yield from screen.until(
+        lambda: bool(np.linalg.norm(_hand() - start) > _FAR), "A pull of the simulated hand"
+    )
     pictures.append(screen.take_moment())
     yield from screen.press("K")
     yield from screen.until(lambda: _hands().said.startswith("Keyed"), "A key")
@@ -109,6 +111,8 @@ def _grab(screen: Screen, bone: str) -> Steps:
         yield from screen.press("G")
         yield from screen.until(lambda: _hands().holding, "What the simulated hand holds")
         if _held() == bone:
+            # Nothing of trials that failed is to be read.
+            _hands().said = ""
             return
         # Blender was slow, and the hand has gone by.
         for key in ("G", "R"):
