@@ -3,12 +3,21 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from textwrap import wrap
+from typing import Any, Final, cast
 
 import bpy
 
 from ..blender.armature import active_armature
 from ..core.errors import RigError
+
+_CHARACTER: Final = 6.5
+"""Pixels that a letter of Blender's own font takes on the average, …"""
+_MARGIN: Final = 80.0
+"""… and that margins, tabs and the icon take from a sidebar's width."""
+_USUAL_WIDTH: Final = 280.0
+_FEWEST: Final = 16
+"""Letters in a line, however narrow the sidebar."""
 
 
 def armature_in(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -17,6 +26,17 @@ def armature_in(context: bpy.types.Context) -> bpy.types.Object | None:
         return active_armature(context)
     except RigError:
         return None
+
+
+def draw_sentence(layout: Any, context: bpy.types.Context, text: str, icon: str) -> None:
+    """A sentence in as many lines as the sidebar needs for it: Blender would cut it off."""
+    region, preferences = context.region, context.preferences
+    scale = preferences.system.ui_scale if preferences is not None else 1.0
+    width = region.width / scale if region is not None else _USUAL_WIDTH
+    characters = max(int((width - _MARGIN) / _CHARACTER), _FEWEST)
+    column = layout.column(align=True)
+    for number, line in enumerate(wrap(text, characters)):
+        column.label(text=line, icon="BLANK1" if number else icon)
 
 
 class TabPanel:

@@ -369,6 +369,27 @@ def test_meshes_are_offered_as_ground_but_not_the_creatures_own_skin() -> None:
     assert offered == ["Ground"]
 
 
+def test_contacts_and_reaches_follow_an_arm_that_is_called_otherwise(octopus: Any) -> None:
+    settings = locomotion_settings(octopus)
+    click("contacts_show")
+    marker = middle_marker(octopus)
+    name, cycle = marker.octo_motion.contact.arm, marker.octo_motion.contact.cycle
+    marker.location.x += 0.05
+    bpy.context.view_layer.update()
+    reach = settings.reaches.add()
+    reach.arm, reach.mute = name, True
+    settings.arms[name].name = "Grabber"
+    assert reach.arm == "Grabber"
+    wanted = gathered(settings.ground, octopus)
+    assert set(wanted) == {("Grabber", cycle)}
+    assert wanted["Grabber", cycle].position is not None
+    # Hidden or shown, the contact stays where it was put.
+    click("contacts_hide")
+    settings.arms["Grabber"].name = "Other"
+    assert set(gathered(settings.ground, octopus)) == {("Other", cycle)}
+    assert {each.arm for each in settings.ground.contacts} == {"Other"}
+
+
 def test_a_contact_out_of_reach_is_told_with_its_frame(octopus: Any) -> None:
     click("contacts_show")
     marker = middle_marker(octopus)

@@ -15,6 +15,7 @@ import pytest
 
 from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.properties import locomotion_settings
+from octo_motion.ui.panel_base import draw_sentence
 from tests.ui.rig import give_route, make_octopus
 
 PANELS = [each for each in panels.CLASSES if issubclass(each, bpy.types.Panel)]
@@ -227,3 +228,18 @@ def test_of_a_linked_armature_the_tab_says_that_it_is_read_only(tmp_path: Path) 
     bpy.context.scene.collection.objects.link(linked)
     bpy.context.view_layer.objects.active = linked
     assert "Linked and read-only." in Tab()["rig"]
+
+
+@pytest.mark.parametrize(("width", "lines"), [(700, 1), (280, 3), (40, 6)])
+def test_a_long_sentence_is_told_in_lines_as_wide_as_the_sidebar(width: int, lines: int) -> None:
+    sentence = (
+        "'Octopus Locomotion' was edited: Live is off and leaves it as it is, all of its keys."
+    )
+    context: Any = SimpleNamespace(
+        region=SimpleNamespace(width=width),
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )
+    layout = Layout()
+    draw_sentence(layout, context, sentence, "ERROR")
+    assert " ".join(layout.drawn) == sentence
+    assert len(layout.drawn) == lines

@@ -66,7 +66,7 @@ def test_every_setting_can_be_overridden_except_names_of_list_items() -> None:
             continue
         for definition in properties(group):
             items = {"ArmItem", "ArmBoneItem", "SpliceItem", "ReachItem", "ChangeItem"}
-            if group.__name__ in items and definition.identifier == "name":
+            if group.__name__ in items and definition.identifier in {"name", "known_as"}:
                 continue
             if definition.identifier == "as_text":
                 # What it says is kept in the table's other properties, which can be.

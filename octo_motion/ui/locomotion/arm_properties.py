@@ -22,6 +22,14 @@ from bpy.props import (
 )
 
 from .gait_properties import OVERRIDE, OVERRIDE_LIST, SIDES
+from .wishes import rename_arm
+
+
+def _renamed(arm: ArmItem, _context: bpy.types.Context) -> None:
+    """Let what speaks of an arm by its name follow: reaches, and contacts that were changed."""
+    before, arm.known_as = arm.known_as, arm.name
+    if before not in ("", arm.name):
+        rename_arm(arm.id_data, before, arm.name)
 
 
 class ArmBoneItem(bpy.types.PropertyGroup):
@@ -33,7 +41,14 @@ class ArmBoneItem(bpy.types.PropertyGroup):
 class ArmItem(bpy.types.PropertyGroup):
     """An arm: its bones from root to tip, and its place in the gait."""
 
-    name: StringProperty(name="Name", description="What this arm is called in the list")
+    name: StringProperty(
+        name="Name", description="What this arm is called in the list", update=_renamed
+    )
+    known_as: StringProperty(
+        name="Known As",
+        description="What it was called until its name was changed",
+        options={"HIDDEN"},
+    )
     bones: CollectionProperty(
         name="Bones",
         description="The arm's bones, from its root to its tip",

@@ -9,7 +9,7 @@ import bpy
 
 from ...blender.actions import key_counts
 from ...blender.weight_curve import NODE, curve_node
-from ..panel_base import ArmaturePanel, ItemRows, TabPanel, armature_in
+from ..panel_base import ArmaturePanel, ItemRows, TabPanel, armature_in, draw_sentence
 from .add_octopus import OCTO_MOTION_OT_add_octopus
 from .add_route import OCTO_MOTION_OT_add_route
 from .arm_list import draw_arms
@@ -355,7 +355,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
         if settings.live_error:
             row = layout.row()
             row.alert = True
-            row.label(text=settings.live_error, icon="ERROR")
+            draw_sentence(row, bpy.context, settings.live_error, "ERROR")
         _draw_result(layout, bpy.context, settings)
 
 

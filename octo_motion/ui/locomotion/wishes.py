@@ -6,11 +6,12 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import bpy
 import numpy as np
 
-from ...blender.contacts import Contact, read_markers
+from ...blender.contacts import Contact, markers, read_markers
 from ...blender.overrides import linked_names
 from ...core.locomotion.footholds import Wish
 from ...core.locomotion.generator import Arm
@@ -96,7 +97,7 @@ def store(settings: OCTO_MOTION_PG_ground, wanted: dict[Place, Wanted]) -> None:
         elif (item.arm, item.cycle) not in wanted:
             item.removed, item.shift, item.locked = False, 0.0, False
     for (arm, cycle), each in sorted(wanted.items()):
-        name = f"{arm} {cycle}"
+        name = _name(arm, cycle)
         item = settings.contacts.get(name)
         if item is None:
             item = settings.contacts.add()
@@ -105,6 +106,26 @@ def store(settings: OCTO_MOTION_PG_ground, wanted: dict[Place, Wanted]) -> None:
         item.shift, item.locked = each.shift, each.position is not None
         if each.position is not None:
             item.position, item.heading = each.position, each.heading
+
+
+def rename_arm(armature: Any, before: str, now: str) -> None:
+    """Let reaches, contacts and their markers speak of an arm by its new name."""
+    settings = armature.octo_motion.locomotion
+    for reach in settings.reaches:
+        if reach.arm == before:
+            reach.arm = now
+    ground = settings.ground
+    for item in ground.contacts:
+        if item.arm == before:
+            item.arm, item.name = now, _name(now, item.cycle)
+    once, places = _shown(ground)
+    if places:
+        renamed = [(now if arm == before else arm, cycle) for arm, cycle in places]
+        ground.shown = json.dumps({"armature": once, "contacts": renamed})
+    for marker in markers(armature, once):
+        own: Any = marker.octo_motion.contact  # type: ignore[attr-defined]
+        if own.arm == before:
+            own.arm = now
 
 
 def changed_by_hand(settings: OCTO_MOTION_PG_ground) -> int:
@@ -123,6 +144,11 @@ def note_shown(
 def once_called(settings: OCTO_MOTION_PG_ground) -> str:
     """What the armature, or the one that it is a copy of, was called when it got markers."""
     return _shown(settings)[0]
+
+
+def _name(arm: str, cycle: int) -> str:
+    """What a contact is called in the settings."""
+    return f"{arm} {cycle}"
 
 
 def _shown(settings: OCTO_MOTION_PG_ground) -> tuple[str, list[Place]]:
