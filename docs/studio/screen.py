@@ -311,7 +311,9 @@ class Screen:
         yield from self.drawn()
         # Where panels have a margin at their right, so that nothing else shows there.
         column = sidebar[:, -_TABS - 8 : -_TABS - 4]
-        other = np.flatnonzero(np.any(np.abs(column - column[-1:]) > 0.01, axis=(1, 2)))
+        # Panels that reach further down than the window leave nothing of the view below them.
+        background = sidebar[-1, _BEFORE // 2]
+        other = np.flatnonzero(np.any(np.abs(column - background) > 0.01, axis=(1, 2)))
         bottom = int(other[-1]) + _BORDER
         self._check_height(bottom)
         return bottom
