@@ -7,9 +7,10 @@ Blender's curve is then a cubic in time itself, and its values depend on those o
 linearly.
 
 First the frames are chosen (:mod:`.key_frames`), for bounds somewhat wider than those that are
-asked for. Then values and handles of all keys of a limb are fitted together (:mod:`.key_curves`),
-handles are brought into line, and keys are added where a bound is still broken
-(:mod:`.key_search`).
+asked for. Then all keys of a limb are fitted together (:mod:`.key_fit`: :mod:`.key_curves` against
+:mod:`.key_model`), handles are brought into line, and keys are added where bounds are still broken
+(:mod:`.key_search`), between frames, too (:mod:`.key_halves`). Keys on every frame have handles of
+their own (:mod:`.key_dense`).
 """
 
 from __future__ import annotations
