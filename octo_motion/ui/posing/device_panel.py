@@ -84,8 +84,9 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
             row.alert = times.late[1] > _LATE
             row.label(text=f"{times.rate:.0f} Hz, {1e3 * times.late[1]:.2f} ms off at most")
             row = column.row()
-            row.alert = times.pace < _SLOW
-            slow = f", {100.0 * times.pace:.0f} % of real time" if times.pace < _SLOW else ""
+            # Before its first step the simulation has no pace.
+            row.alert = 0.0 < times.pace < _SLOW
+            slow = f", {100.0 * times.pace:.0f} % of real time" if row.alert else ""
             row.label(text=f"A step takes {1e3 * times.step:.1f} ms{slow}")
             if times.lag > 0.0:
                 row = column.row()
