@@ -18,7 +18,7 @@ from .key_limbs import BezierKeys, Integers, Limb, bezier_keys
 from .key_model import Model
 from .rotations import Floats
 
-_PULL: Final = 0.03
+_PULL: Final = 0.01
 """Weight, against that of a moment, of the wish that slopes are those of the motion: with less, a
 moment that stands out bends curves many keys away from it."""
 _STEPS: Final = 40
