@@ -672,10 +672,15 @@ def _keys_digest(points: np.ndarray, kinds: np.ndarray) -> bytes:
     return digest.digest()
 
 
+def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
+    """All F-curves of an action, whatever they move."""
+    for channelbag in _channelbags(action):
+        yield from channelbag.fcurves
+
+
 def _sorted_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
     """All curves by path and component: an artist may move channels up and down in the list."""
-    curves = [curve for channelbag in _channelbags(action) for curve in channelbag.fcurves]
-    return sorted(curves, key=lambda each: (each.data_path, each.array_index))
+    return sorted(curves_of(action), key=lambda each: (each.data_path, each.array_index))
 
 
 def _channelbags(action: bpy.types.Action) -> Iterator[bpy.types.ActionChannelbag]:

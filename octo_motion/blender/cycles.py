@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import bpy
 
 from ..core.errors import ClipError
+from .actions import curves_of
 
 
 def lasting(action: bpy.types.Action, frames: int) -> bpy.types.Action:
@@ -29,7 +28,7 @@ def lasting(action: bpy.types.Action, frames: int) -> bpy.types.Action:
     assert copy is not None
     copy.name = f"{action.name} {frames}"
     if start + frames - 1 > end:
-        for curve in _curves(copy):
+        for curve in curves_of(copy):
             _repeat(curve)
     copy.use_frame_range = True
     copy.frame_start, copy.frame_end = start, start + frames - 1
@@ -46,11 +45,3 @@ def _repeat(curve: bpy.types.FCurve) -> None:
     travels = curve.data_path.endswith("location")
     cycles.mode_before = "NONE"
     cycles.mode_after = "REPEAT_OFFSET" if travels else "REPEAT"
-
-
-def _curves(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
-    for layer in action.layers:
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                for channelbag in strip.channelbags:
-                    yield from channelbag.fcurves

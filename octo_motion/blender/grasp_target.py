@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from typing import Final
 
 import bpy
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.errors import RigError
 from ..core.rotations import Floats, continuous, from_matrix
-from .actions import is_generated, may_replace, note_of
+from .actions import curves_of, is_generated, may_replace, note_of
 from .playing import time_kept
 from .world import world_of
 
@@ -141,7 +141,7 @@ def put_back(target: bpy.types.Object) -> None:
     if action is None or data is None:
         return
     if not _moved_by_hand(target, action):
-        for curve in _curves(action):
+        for curve in curves_of(action):
             values = getattr(target, curve.data_path)
             values[curve.array_index] = curve.evaluate(action.frame_start)
     data.action = None
@@ -172,16 +172,8 @@ def _moved_by_hand(target: bpy.types.Object, action: bpy.types.Action) -> bool:
     frame = scene.frame_current_final
     return any(
         abs(getattr(target, curve.data_path)[curve.array_index] - curve.evaluate(frame)) > _SAME
-        for curve in _curves(action)
+        for curve in curves_of(action)
     )
-
-
-def _curves(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
-    for layer in action.layers:
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                for channelbag in strip.channelbags:
-                    yield from channelbag.fcurves
 
 
 def hangs_on(target: bpy.types.Object, owner: bpy.types.Object) -> bool:

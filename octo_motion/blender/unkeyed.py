@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from .actions import is_generated
+from .actions import curves_of, is_generated
 from .fcurves import is_shown
 
 AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
@@ -141,7 +141,7 @@ class _Generated:
             if not is_generated(action):
                 continue
             own: dict[str, dict[int, bpy.types.FCurve]] = {}
-            for curve in _all_curves(action):
+            for curve in curves_of(action):
                 own.setdefault(curve.data_path, {})[curve.array_index] = curve
             for path, components in own.items():
                 found.setdefault(path, []).append(components)
@@ -197,11 +197,3 @@ def _paths(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> Iterable[str
                 channelbag = strip.channelbag(slot)
                 if channelbag is not None:
                     yield from (curve.data_path for curve in channelbag.fcurves if is_shown(curve))
-
-
-def _all_curves(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
-    for layer in action.layers:
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                for channelbag in strip.channelbags:
-                    yield from channelbag.fcurves
