@@ -2,14 +2,16 @@
 """Keys that a session of posing makes, by the rules of Blender's own keying, and can take back.
 
 As long as the session lasts, everything that it changes in an action is noted: each curve as it
-was before its first key, the action and the NLA tracks. ``take_back`` restores all of it.
+was before its first key, the action and the NLA tracks. ``take_back`` restores all of it. Actions
+are known by their session's number: meanwhile they may be renamed, and a linked one may be called
+like one of this file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final, Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal
 
 import bpy
 import numpy as np
@@ -39,18 +41,28 @@ class Keyed:
     placed: bool = False
 
 
+_BLENDING: Final = ("action_blend_type", "action_influence", "action_extrapolation")
+"""How an armature's action lies over its NLA tracks."""
+
+
 @dataclass(eq=False)
 class _Before:
-    """An action as it was before the session's first key."""
+    """An action as it was before the session's first key in it."""
 
     had_data: bool
-    action: str | None
+    action: int
+    """The action that the armature had, 0 for none."""
     slot: int
-    blend: str = "REPLACE"
-    curves: dict[tuple[str, int], KeyArrays | None] = field(default_factory=dict)
+    blending: tuple[Any, ...]
+    keyed: int = 0
+    """The action that keys go to, …"""
+    keyed_slot: int = 0
+    """… and the handle of its slot."""
+    curves: dict[str, dict[int, KeyArrays]] = field(default_factory=dict)
+    """By property, of those that got keys, and by component."""
     groups: set[str] = field(default_factory=set)
-    made: str | None = None
-    """The action that was made, if one was."""
+    made: bool = False
+    """Whether that action was made for the keys."""
     track: str | None = None
     """The NLA track that was made, if one was."""
     fake_user: bool = False
@@ -65,23 +77,27 @@ class PoseKeys:
         armature: the armature object.
         target: where keys go: the action that the armature has (a new one if it has none), a copy
             of it, a new action over it in the NLA, or a chosen one.
-        chosen: name of the chosen action.
+        chosen: the chosen action.
 
     Raises:
         WriteError: it cannot be animated here, or the chosen action is gone or read-only.
     """
 
     def __init__(
-        self, armature: bpy.types.Object, target: Target = "CURRENT", chosen: str = ""
+        self,
+        armature: bpy.types.Object,
+        target: Target = "CURRENT",
+        chosen: bpy.types.Action | None = None,
     ) -> None:
         writable_armature(armature)
         self._target: Target = target
-        self._chosen = chosen
-        self._before: _Before | None = None
+        self._chosen = _number(chosen)
+        self._noted: list[_Before] = []
+        """One for each action that got keys: artists may give the armature another meanwhile."""
         self.count = 0
         """How many times keys were made."""
         if target == "CHOSEN":
-            _chosen_action(chosen)
+            _chosen_action(self._chosen)
         data = armature.animation_data
         if target == "CURRENT" and data is not None and data.action is not None:
             _writable_action(data.action)
@@ -105,14 +121,15 @@ class PoseKeys:
         options, kind = _options(scene), _key_type(scene)
         active = scene.keying_sets_all.active
         if active is not None and active.is_path_absolute:
-            done = self._insert_paths(armature, active, frame, (options, kind))
+            how = _with_set(options, active), kind
+            done = self._insert_paths(armature, active, frame, how)
         else:
             done = []
             for each in bones:
                 bone = armature.pose.bones[each.bone] if armature.pose is not None else None
                 if bone is None:
                     continue
-                how = options | _set_options(active), kind
+                how = _with_set(options, active), kind
                 results = [
                     self._insert(armature, bone.path_from_id(channel), frame, each.bone, how)
                     for channel in _channels(bone, active, placed=each.placed)
@@ -149,12 +166,19 @@ class PoseKeys:
             return 0
         self._prepare(armature)
         names = list(rotations)
-        turned = rotation_channels(
-            armature, names, np.stack([rotations[name] for name in names], axis=1)
-        )
-        placed = [location_channel(armature, name, each) for name, each in locations.items()]
         assert armature.pose is not None
         modes = [armature.pose.bones[name].rotation_mode for name in names]
+        turned = [
+            self._going_on(armature, channel, mode, float(frames[0]))
+            for channel, mode in zip(
+                rotation_channels(
+                    armature, names, np.stack([rotations[name] for name in names], axis=1)
+                ),
+                modes,
+                strict=True,
+            )
+        ]
+        placed = [location_channel(armature, name, each) for name, each in locations.items()]
         tracks = [Track(each.values, mode) for each, mode in zip(turned, modes, strict=True)]
         tracks += [Track(each.values, LOCATION) for each in placed]
         (found,) = reduce_keys(frames, [Limb(tracks, angle, distance)])
@@ -166,55 +190,49 @@ class PoseKeys:
         return len(found[0])
 
     def take_back(self, armature: bpy.types.Object) -> None:
-        """Undo all keys, actions and tracks of this session; safe to call twice."""
-        before, self._before = self._before, None
-        if before is None:
-            return
-        data = armature.animation_data
-        if data is None:
-            return
-        if before.made is None:
-            self._restore_curves(armature, before)
-            if data.action is not None and before.new_slot is not None:
-                for slot in data.action.slots:
-                    if slot.handle == before.new_slot:
-                        data.action.slots.remove(slot)
-                        break
-        action = _local_action(before.action)
-        data.action = action
-        if action is not None:
-            data.action_slot = next(
-                (slot for slot in action.slots if slot.handle == before.slot), None
-            )
-            action.use_fake_user = before.fake_user
-        data.action_blend_type = before.blend  # type: ignore[assignment]
-        if before.track is not None and before.track in data.nla_tracks:
-            data.nla_tracks.remove(data.nla_tracks[before.track])
-        made = _local_action(before.made)
-        if made is not None:
-            bpy.data.actions.remove(made)
-        if not before.had_data:
-            armature.animation_data_clear()
+        """Undo all keys, actions and tracks of this session; safe to call twice.
+
+        An action that the artist has given the armature since is left to it.
+        """
+        while self._noted:
+            self._take_back(armature, self._noted.pop())
 
     # --- Where keys go ----------------------------------------------------------------------
 
     def _prepare(self, armature: bpy.types.Object) -> None:
-        """Note how things are, and give the armature the action that keys go to."""
-        if self._before is not None:
+        """Note how things are, and give the armature the action that keys go to.
+
+        Raises:
+            WriteError: there is none that could be written; nothing has changed then.
+        """
+        data = armature.animation_data
+        if self._noted and data is not None and _has(data, self._noted[-1]):
             return
         writable_armature(armature)
-        had_data = armature.animation_data is not None
-        data = armature.animation_data or armature.animation_data_create()
+        had_data = data is not None
+        data = data or armature.animation_data_create()
         assert data is not None
-        action = data.action
         before = _Before(
             had_data=had_data,
-            action=action.name if action else None,
+            action=_number(data.action),
             slot=data.action_slot_handle,
-            blend=data.action_blend_type,
-            fake_user=action.use_fake_user if action else False,
+            blending=tuple(getattr(data, each) for each in _BLENDING),
+            fake_user=data.action.use_fake_user if data.action else False,
         )
-        slot = data.action_slot
+        try:
+            self._give_action(armature, data, before)
+            assert data.action is not None
+            _writable_action(data.action)
+        except BaseException:
+            before.keyed = _number(data.action)
+            self._take_back(armature, before)
+            raise
+        self._noted.append(before)
+
+    def _give_action(
+        self, armature: bpy.types.Object, data: bpy.types.AnimData, before: _Before
+    ) -> None:
+        action, slot = data.action, data.action_slot
         if self._target == "CHOSEN":
             chosen = _chosen_action(self._chosen)
             if chosen != action:
@@ -223,82 +241,85 @@ class PoseKeys:
                 before.new_slot = _use_slot(data, armature)
         elif self._target == "COPY" and action is not None:
             copy = _copy(action)
+            before.made = True
             _keep(action)
             data.action = copy
             data.action_slot = next(
                 (each for each in copy.slots if slot and each.identifier == slot.identifier), None
             )
-            before.made = copy.name
         elif self._target == "LAYER" and action is not None and slot is not None:
             track = data.nla_tracks.new()
             track.name = f"{action.name} below"
+            before.track = track.name
             strip = track.strips.new(action.name, round(action.frame_range[0]), action)
             strip.action_slot = slot
+            _blend_alike(strip, data)
             # Strips are made on whole frames; this one is to play what was played before.
             length = strip.frame_end - strip.frame_start
             strip.frame_start = action.frame_range[0]
             strip.frame_end = strip.frame_start + length
-            before.track = track.name
         if data.action is None or before.track is not None:
             made = bpy.data.actions.new(f"{armature.name} Pose")
             made.slots.new("OBJECT", armature.name)
             made.layers.new("Layer").strips.new(type="KEYFRAME")
             data.action = made
+            before.made = True
             data.action_slot = made.slots[made.slots[0].identifier]
-            data.action_blend_type = "REPLACE"
-            before.made = made.name
+            data.action_blend_type, data.action_influence = "REPLACE", 1.0
         assert data.action is not None
         _writable_action(data.action)
         if data.action_slot is None:
             before.new_slot = _use_slot(data, armature)
+        before.keyed, before.keyed_slot = _number(data.action), data.action_slot_handle
         slot = data.action_slot
         channelbag = None if slot is None else _channelbag(data.action, slot)
         if channelbag is not None:
             before.groups = {group.name for group in channelbag.groups}
-        self._before = before
 
-    def _restore_curves(self, armature: bpy.types.Object, before: _Before) -> None:
+    @staticmethod
+    def _take_back(armature: bpy.types.Object, before: _Before) -> None:
+        keyed = _action_of(before.keyed)
+        if keyed is not None and not before.made:
+            _restore_curves(keyed, before)
         data = armature.animation_data
-        assert data is not None
-        if data.action is None or data.action_slot is None:
-            return
-        channelbag = _channelbag(data.action, data.action_slot)
-        if channelbag is None:
-            return
-        for curve in list(channelbag.fcurves):
-            place = curve.data_path, curve.array_index
-            if place not in before.curves:
-                continue
-            keys = before.curves[place]
-            if keys is None:
-                channelbag.fcurves.remove(curve)
-            else:
-                write_keys(curve, keys)
-        for group in list(channelbag.groups):
-            if group.name not in before.groups and not len(group.channels):
-                channelbag.groups.remove(group)
+        if data is not None and _number(data.action) == before.keyed:
+            action = _action_of(before.action)
+            data.action = action
+            if action is not None:
+                data.action_slot = next(
+                    (slot for slot in action.slots if slot.handle == before.slot), None
+                )
+                if action.library is None:
+                    action.use_fake_user = before.fake_user
+            for name, value in zip(_BLENDING, before.blending, strict=True):
+                setattr(data, name, value)
+            if before.track is not None and before.track in data.nla_tracks:
+                data.nla_tracks.remove(data.nla_tracks[before.track])
+        if keyed is not None and before.new_slot is not None and not before.made:
+            for slot in keyed.slots:
+                if slot.handle == before.new_slot:
+                    keyed.slots.remove(slot)
+                    break
+        if keyed is not None and before.made and keyed.users <= keyed.use_fake_user:
+            bpy.data.actions.remove(keyed)
+        if not before.had_data and data is not None and data.action is None:
+            armature.animation_data_clear()
 
     # --- Single keys ------------------------------------------------------------------------
 
     def _note(self, armature: bpy.types.Object, path: str) -> None:
         """Keep the curves of a property as they were before their first key."""
-        before, data = self._before, armature.animation_data
-        assert before is not None
+        before, data = self._noted[-1], armature.animation_data
         assert data is not None
         assert data.action is not None
-        if data.action_slot is None or (path, 0) in before.curves:
+        if data.action_slot is None or path in before.curves:
             return
         channelbag = _channelbag(data.action, data.action_slot)
-        curves = (
-            {}
-            if channelbag is None
-            else {
-                curve.array_index: curve for curve in channelbag.fcurves if curve.data_path == path
-            }
-        )
-        for component in range(4):
-            curve = curves.get(component)
-            before.curves[path, component] = None if curve is None else read_keys(curve)
+        before.curves[path] = {
+            curve.array_index: read_keys(curve)
+            for curve in (channelbag.fcurves if channelbag is not None else ())
+            if curve.data_path == path
+        }
 
     def _insert(
         self,
@@ -307,12 +328,15 @@ class PoseKeys:
         frame: float,
         group: str,
         how: tuple[set[str], str],
+        *,
+        component: int = -1,
     ) -> bool:
         self._note(armature, path)
         options, kind = how
         try:
             return armature.keyframe_insert(
                 path,
+                index=component,
                 frame=frame,
                 group=group,
                 options=options,  # type: ignore[arg-type]
@@ -334,9 +358,49 @@ class PoseKeys:
             if path.id != armature:
                 continue
             name = path.data_path.partition('pose.bones["')[2].partition('"]')[0]
-            if self._insert(armature, path.data_path, frame, name, how) and name:
+            try:
+                value = armature.path_resolve(path.data_path)
+            except ValueError:
+                # A bone or a property that is no longer there.
+                continue
+            single = not path.use_entire_array and hasattr(value, "__len__")
+            component = path.array_index if single else -1
+            if (
+                self._insert(armature, path.data_path, frame, name, how, component=component)
+                and name
+            ):
                 done.append(bpy.utils.unescape_identifier(name))
         return list(dict.fromkeys(done))
+
+    @staticmethod
+    def _going_on(armature: bpy.types.Object, channel: Channel, mode: str, start: float) -> Channel:
+        """The same turns in the sign or the round that the curves have where they begin.
+
+        Else the way there from the key before would lead through a whole turn.
+        """
+        data = armature.animation_data
+        assert data is not None
+        assert data.action is not None
+        channelbag = _channelbag(data.action, data.action_slot) if data.action_slot else None
+        if channelbag is None:
+            return channel
+        values = channel.values
+        curves = [
+            channelbag.fcurves.find(channel.data_path, index=component)
+            for component in range(values.shape[1])
+        ]
+        if not all(curve is not None and len(curve.keyframe_points) for curve in curves):
+            return channel
+        before = np.array([curve.evaluate(start) for curve in curves if curve is not None])
+        if mode == "QUATERNION":
+            same = values if before @ values[0] >= 0.0 else -values
+        elif mode == "AXIS_ANGLE":
+            same = values if before[1:] @ values[0, 1:] >= 0.0 else -values
+            rounds = np.round((before[0] - same[0, 0]) / (2.0 * np.pi))
+            same = same + np.array([2.0 * np.pi * rounds, 0.0, 0.0, 0.0])
+        else:
+            same = values + 2.0 * np.pi * np.round((before - values[0]) / (2.0 * np.pi))
+        return replace(channel, values=same)
 
     def _replace(
         self, armature: bpy.types.Object, channel: Channel, keys: Sequence[KeyArrays]
@@ -350,6 +414,8 @@ class PoseKeys:
         assert channelbag is not None
         for component, each in enumerate(keys):
             curve = channelbag.fcurves.find(channel.data_path, index=component)
+            if curve is not None and (curve.lock or (curve.group and curve.group.lock)):
+                continue
             if curve is None:
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
                 group = channelbag.groups.get(channel.group)
@@ -377,12 +443,20 @@ def _key_type(scene: bpy.types.Scene) -> str:
     return scene.tool_settings.keyframe_type
 
 
-def _set_options(active: bpy.types.KeyingSet | None) -> set[str]:
+def _with_set(options: set[str], active: bpy.types.KeyingSet | None) -> set[str]:
+    """The options, with what a keying set says of them."""
     if active is None:
-        return set()
+        return options
+    result = set(options)
+    for own, option in (("needed", "INSERTKEY_NEEDED"), ("visual", "INSERTKEY_VISUAL")):
+        if getattr(active, f"use_insertkey_override_{own}"):
+            result.discard(option)
+            result |= {option} if getattr(active, f"use_insertkey_{own}") else set()
     if active.bl_idname == "Available":
-        return {"INSERTKEY_AVAILABLE"}
-    return {"INSERTKEY_VISUAL"} if "Visual" in active.bl_idname else set()
+        result.add("INSERTKEY_AVAILABLE")
+    elif active.type_info is not None and "Visual" in active.bl_idname:
+        result.add("INSERTKEY_VISUAL")
+    return result
 
 
 def _channels(
@@ -400,16 +474,25 @@ def _channels(
     return ["location", rotation] if placed else [rotation]
 
 
-def _local_action(name: str | None) -> bpy.types.Action | None:
-    """An action of this file by name."""
-    local = (each for each in bpy.data.actions if each.library is None)
-    return next((each for each in local if each.name == name), None)
+def _number(action: bpy.types.Action | None) -> int:
+    """By which an action is known as long as its file is open, 0 for none."""
+    return 0 if action is None else action.session_uid
 
 
-def _chosen_action(name: str) -> bpy.types.Action:
-    action = _local_action(name)
+def _action_of(number: int) -> bpy.types.Action | None:
+    return next((each for each in bpy.data.actions if each.session_uid == number), None)
+
+
+def _has(data: bpy.types.AnimData, before: _Before) -> bool:
+    """Whether the armature still has the action and the slot that keys went to."""
+    return (_number(data.action), data.action_slot_handle) == (before.keyed, before.keyed_slot)
+
+
+def _chosen_action(number: int) -> bpy.types.Action:
+    action = _action_of(number)
     if action is None:
         raise WriteError("The action for the keys is gone.", "Choose another one.")
+    _writable_action(action)
     return action
 
 
@@ -431,6 +514,35 @@ def _keep(action: bpy.types.Action | None) -> None:
     """Save an action that is taken off from being purged."""
     if action is not None and action.library is None:
         action.use_fake_user = True
+
+
+def _blend_alike(strip: bpy.types.NlaStrip, data: bpy.types.AnimData) -> None:
+    """Let a strip lie over what is below it as the action did."""
+    strip.blend_type = data.action_blend_type
+    strip.extrapolation = data.action_extrapolation
+    if data.action_influence < 1.0:
+        strip.use_animated_influence = True
+        curve = strip.fcurves.find("influence")
+        assert curve is not None
+        curve.keyframe_points.insert(strip.frame_start, data.action_influence, options={"REPLACE"})
+
+
+def _restore_curves(action: bpy.types.Action, before: _Before) -> None:
+    slot = next((each for each in action.slots if each.handle == before.keyed_slot), None)
+    channelbag = None if slot is None else _channelbag(action, slot)
+    if channelbag is None:
+        return
+    for curve in list(channelbag.fcurves):
+        if curve.data_path not in before.curves:
+            continue
+        keys = before.curves[curve.data_path].get(curve.array_index)
+        if keys is None:
+            channelbag.fcurves.remove(curve)
+        else:
+            write_keys(curve, keys)
+    for group in list(channelbag.groups):
+        if group.name not in before.groups and not len(group.channels):
+            channelbag.groups.remove(group)
 
 
 def _use_slot(data: bpy.types.AnimData, armature: bpy.types.Object) -> int | None:

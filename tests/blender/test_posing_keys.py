@@ -165,7 +165,7 @@ def test_taking_back_leaves_no_trace(armature: Any, target: Any, animated: bool)
         animate(armature)
     bpy.data.actions.new("Chosen").use_fake_user = True
     before = everything(armature)
-    keys = PoseKeys(armature, target, "Chosen")
+    keys = PoseKeys(armature, target, bpy.data.actions["Chosen"])
     keys.insert(armature, [Keyed(ARM), Keyed(BODY, placed=True)], 5.0)
     turns = from_axis_angle([1.0, 0.0, 0.0], np.linspace(0.0, 1.0, 20))
     keys.insert_motion(
@@ -230,7 +230,7 @@ def test_what_lies_under_a_layer_plays_on_whatever_its_first_frame(armature: Any
 def test_chosen_action_gets_the_keys(armature: Any) -> None:
     own = animate(armature)
     chosen = bpy.data.actions.new("Chosen")
-    PoseKeys(armature, "CHOSEN", "Chosen").insert(armature, [Keyed(BODY)], 5.0)
+    PoseKeys(armature, "CHOSEN", chosen).insert(armature, [Keyed(BODY)], 5.0)
     assert armature.animation_data.action == chosen
     assert keyed(armature) == {f"{BODY} rotation_quaternion": {5.0}}
     assert own.use_fake_user
@@ -238,7 +238,7 @@ def test_chosen_action_gets_the_keys(armature: Any) -> None:
 
 def test_chosen_action_that_is_gone_is_refused(armature: Any) -> None:
     with pytest.raises(WriteError, match="The action for the keys is gone"):
-        PoseKeys(armature, "CHOSEN", "Nowhere")
+        PoseKeys(armature, "CHOSEN")
 
 
 def test_recorded_motion_is_a_few_keys_within_its_bound_and_replaces_what_was_there(

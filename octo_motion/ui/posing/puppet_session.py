@@ -128,8 +128,7 @@ class PuppetSession:
         writable_armature(armature)
         settings: Any = posing_settings(armature)
         self.puppet = Puppet(armature, read_rig(armature, smallest=settings.smallest))
-        chosen = settings.action.name if settings.action else ""
-        self.keys = PoseKeys(armature, settings.keys_to, chosen)
+        self.keys = PoseKeys(armature, settings.keys_to, settings.action)
         self._scene = scene.name
         self._shown = _Shown.of(settings)
         self._materials = self._bone_materials(armature)
