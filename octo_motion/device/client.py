@@ -15,6 +15,7 @@ from enum import Enum
 from pathlib import Path
 from typing import IO
 
+from ..core.errors import DeviceError
 from ..core.posing.figure import Figure, Pose
 from ..core.posing.obstacles import Obstacle
 from .calibration import Phase
@@ -112,9 +113,13 @@ class Client:
         """Start a lost bridge again, with the figure it had, in its last pose.
 
         Raises:
-            DeviceError: it cannot be started.
+            DeviceError: it cannot be started, and stays lost.
         """
-        self.start(self._arguments, self._python)
+        try:
+            self.start(self._arguments, self._python)
+        except DeviceError:
+            self.state = State.LOST
+            raise
         if self._figure is not None:
             figure, pose = self._figure
             self.send_figure(figure, self.pose or pose)

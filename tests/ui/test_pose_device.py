@@ -240,6 +240,101 @@ def test_killed_bridge_leaves_pose_and_keys_and_can_be_started_again(hands: Devi
     assert hands.client.state is State.RUNNING
 
 
+def test_bridge_that_is_started_again_knows_force_floor_and_calibration(
+    hands: DeviceHands,
+) -> None:
+    """The hand must not feel more than was set, and the puppet not fall through its floor."""
+    gentle = dataclasses.replace(TOLD, force=0.1)
+    settings: Any = the_arm().octo_motion.posing
+    settings.floor = True
+    settings.gravity = True
+    kept = Calibration(least=(-0.1,) * 6, most=(0.1,) * 6)  # pyright: ignore[reportArgumentType]
+
+    def wait_gently(what: Callable[[], object], why: str) -> None:
+        end = time.monotonic() + PATIENCE
+        while not what():
+            hands.tick(gentle, room())
+            assert time.monotonic() < end, f"waited in vain: {why}; {hands.notices()}"
+            time.sleep(0.002)
+
+    wait_gently(hands.shown, "the hand is there")
+    hands.calibrations = {"simulated": kept}
+    assert hands.client._child
+    hands.client._child._process.kill()
+    wait_gently(lambda: hands.lost, "it is noticed")
+    sent: list[say.Message] = []
+    start, send = hands.client.start, hands.client.send
+    hands.client.start = lambda *given: (start(*given), sent.clear())
+    hands.client.send = lambda each: (sent.append(each), send(each))
+    press(hands, Key("B"))
+    wait_gently(lambda: 0 in hands._spaces and hands.shown(), "the hand is back")
+    hands.test(0)
+    forces: list[float] = []
+
+    def pushes() -> bool:
+        told = hands.client.pointers.get(0)
+        forces.append(float(np.linalg.norm(told.force)) if told else 0.0)
+        return max(forces) > 0.0 and forces[-1] == 0.0
+
+    wait_gently(pushes, "it is tested")
+    assert max(forces) < 0.15 * 8.0 * 0.1 + 1e-6
+    assert any(isinstance(each, say.ObstacleMessage) and each.shape == 1 for each in sent)
+    assert any(isinstance(each, say.WorldMessage) and each.gravity[2] < -9.0 for each in sent)
+    told = [each for each in sent if isinstance(each, say.CalibrationMessage)]
+    assert [each.calibration() for each in told] == [kept]
+
+
+def test_bridge_that_cannot_be_started_again_leaves_the_session(
+    hands: DeviceHands, tmp_path: Path
+) -> None:
+    """A virus scanner that stops the program must not cost the artist poses and keys."""
+    wait(hands, hands.shown, "the hand is there")
+    hands.session.key(all_bones=True)
+    assert hands.client._child
+    hands.client._child._process.kill()
+    wait(hands, lambda: hands.lost, "it is noticed")
+    hands.notices()
+    python, hands.client._python = hands.client._python, tmp_path / "none"
+    assert press(hands, Key("B")) is Outcome.TAKEN
+    assert "does not start" in hands.notices()[0].problem
+    assert "B starts it again" in device_pose.line(hands)
+    assert the_arm().animation_data.action
+    hands.tick(TOLD, room())
+    hands.client._python = python
+    press(hands, Key("B"))
+    wait(hands, hands.shown, "the hand is back")
+
+
+def test_obstacle_that_stays_where_it_is_is_told_once(
+    hands: DeviceHands, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mesh is large: telling it at each frame would keep the bridge from its hands."""
+    bpy.ops.mesh.primitive_cube_add(location=(0.0, 0.0, -3.0))
+    cube = bpy.context.object
+    assert cube
+    cube.octo_motion.posing.obstacle = "MESH"
+    bpy.ops.mesh.primitive_cube_add(location=(3.0, 0.0, -3.0))
+    other = bpy.context.object
+    assert other
+    other.octo_motion.posing.obstacle = "MESH"
+    bpy.context.view_layer.objects.active = the_arm()
+    sent: list[int] = []
+    send = hands.client.send_obstacle
+    monkeypatch.setattr(
+        hands.client, "send_obstacle", lambda *each: (sent.append(each[0]), send(*each))
+    )
+    bpy.context.scene.frame_set(2)
+    hands.tick(TOLD, room())
+    assert sent == [0, 1]
+    bpy.context.scene.frame_set(3)
+    hands.tick(TOLD, room())
+    assert sent == [0, 1]
+    other.location.x = 4.0
+    bpy.context.scene.frame_set(4)
+    hands.tick(TOLD, room())
+    assert sent == [0, 1, 1]
+
+
 def test_space_mouse_that_blender_has_poses_without_a_bridge() -> None:
     session = PuppetSession(arm(), bpy.context.scene, clock=None)
     now = 0.0
@@ -425,6 +520,17 @@ def test_calibration_that_was_kept_is_told_to_a_device_that_comes_again(
     hands.tick(TOLD, room())
     told = [each for each in sent if isinstance(each, say.CalibrationMessage)]
     assert [each.calibration() for each in told] == [kept]
+
+
+def test_two_blenders_keep_what_each_has_learned(on_stage: DeviceHands) -> None:
+    hands = on_stage
+    wait(hands, hands.shown, "the hand is there")
+    other = Calibration(least=(-0.1,) * 6, most=(0.1,) * 6)  # pyright: ignore[reportArgumentType]
+    device_store.save_calibrations({"another": other})  # as another Blender does meanwhile
+    hands._keep(hands.client.devices[0], Calibration())
+    assert load_calibrations() == {"another": other, "simulated": Calibration()}
+    calibrate("RESET")
+    assert load_calibrations() == {"another": other}
 
 
 def test_calibration_that_is_given_up_or_learned_nothing_changes_nothing(

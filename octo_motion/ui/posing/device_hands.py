@@ -7,7 +7,7 @@ Everything that the bridge hears is in the puppet's metres; whatever is shown is
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from ...blender.device_store import load_calibrations, save_calibrations
 from ...core.errors import SettingsError, WriteError
 from ...core.posing.figure import Pose
+from ...core.posing.obstacles import Obstacle
 from ...core.posing.picking import Hit
 from ...core.posing.session import MOST_STEPS_BACK
 from ...core.rotations import Floats, from_matrix
@@ -94,7 +95,7 @@ class DeviceHands:
         self._start = session.core.pose
         self._figure: Any = None
         self._world: Any = None
-        self._obstacles: tuple[Any, ...] = ()
+        self._obstacles: tuple[Obstacle, ...] = ()
         self._pins: dict[int, bool] = {}
         self._settings: DeviceSettings | None = None
         self._spaces: dict[int, Workspace] = {}
@@ -105,6 +106,21 @@ class DeviceHands:
         """By a device's identity: what was learned of it, on this computer."""
         self._corrected: dict[int, str] = {}
         self._tell(settings)
+
+    def restart(self) -> None:
+        """Start the bridge again, and tell it all that the one before it knew.
+
+        Raises:
+            DeviceError: it cannot be started; pose and keys are as they were.
+        """
+        self.client.restart()
+        told, self._settings = self._settings, None
+        self._world, self._obstacles, self._corrected = None, (), {}
+        self._held.clear()
+        self._asked = None
+        self.recentre()
+        if told is not None:
+            self._tell(told)
 
     # --- What is there --------------------------------------------------------------------------
 
@@ -207,7 +223,8 @@ class DeviceHands:
         identity = self.client.devices[number].identity
         if identity not in self.calibrations:
             raise SettingsError("This device was not calibrated.", "It is as its maker says.")
-        left = {name: each for name, each in self.calibrations.items() if name != identity}
+        kept = self._all_calibrations()
+        left = {name: each for name, each in kept.items() if name != identity}
         save_calibrations(left)
         self.calibrations = left
         self.client.send(CalibrationMessage.of(number, NONE))
@@ -290,13 +307,17 @@ class DeviceHands:
             self._spaces.pop(number, None)
 
     def _keep(self, device: DeviceMessage, calibration: Calibration) -> None:
-        self.calibrations = {**self.calibrations, device.identity: calibration}
+        self.calibrations = {**self._all_calibrations(), device.identity: calibration}
         self.said = f"Calibrated: {device.name}"
         try:
             save_calibrations(self.calibrations)
         except WriteError as error:
             # It holds for now all the same.
             self.client.notices.append(Notice(error.problem, error.remedy))
+
+    def _all_calibrations(self) -> dict[str, Calibration]:
+        """Those known here, and what another Blender may have learned since they were read."""
+        return {**self.calibrations, **load_calibrations()}
 
     def _look_at_held(self) -> None:
         held = [each.body for each in self.client.pointers.values() if each.body >= 0]
@@ -334,9 +355,11 @@ class DeviceHands:
             self._settings = settings
             self.client.send(settings)
 
-    def _tell_obstacles(self, obstacles: tuple[Any, ...]) -> None:
+    def _tell_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
         for number, obstacle in enumerate(obstacles):
-            self.client.send_obstacle(number, obstacle)
+            # All of them are read anew at each frame; what has not moved need not be told again.
+            if number >= len(self._obstacles) or not _alike(obstacle, self._obstacles[number]):
+                self.client.send_obstacle(number, obstacle)
         for number in range(len(obstacles), len(self._obstacles)):
             self.client.send_obstacle(number, None)
         self._obstacles = obstacles
@@ -382,6 +405,14 @@ def _same(first: Pose, second: Pose) -> bool:
     return bool(
         np.array_equal(first.orientations, second.orientations)
         and np.array_equal(first.positions, second.positions)
+    )
+
+
+def _alike(first: Obstacle, second: Obstacle) -> bool:
+    return type(first) is type(second) and all(
+        np.array_equal(getattr(first, each.name), getattr(second, each.name))
+        for each in fields(first)
+        if each.init
     )
 
 

@@ -9,8 +9,9 @@ import bpy
 import numpy as np
 from bpy.props import IntProperty
 
-from ...core.errors import SettingsError
+from ...core.errors import DeviceError, SettingsError
 from ...device.client import Client, State
+from ...device.messages import Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room
@@ -208,12 +209,20 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             case "HOME":
                 hands.recentre()
             case _ if isinstance(hands, DeviceHands):
-                hands.client.restart()
-                hands.recentre()
-                hands.said = "Started again"
+                self._start_again(hands)
             case _:
                 return Outcome.PASSED
         return Outcome.TAKEN
+
+    @staticmethod
+    def _start_again(hands: DeviceHands) -> None:
+        try:
+            hands.restart()
+        except DeviceError as error:
+            # The session goes on without: what was posed and keyed must not be lost for that.
+            hands.client.notices.append(Notice(error.problem, error.remedy))
+            return
+        hands.said = "Started again"
 
     @staticmethod
     def _record(hands: Hands) -> None:
