@@ -73,8 +73,8 @@ def read_clip(
     what another action on the armature has left there is no part of this clip: such a bone is
     at rest. Parents of the object are taken as they stand at the current frame. Scaled bones
     move and turn those they carry; the clip keeps where they are, not how large. But bones that
-    stretch, and whose children do not inherit their scale in full, keep it, and their children are
-    where they are without it.
+    carry no other, or stretch and have children that do not inherit their scale in full, keep it,
+    and their children are where they are without it.
 
     Args:
         armature: the armature object.
@@ -90,7 +90,8 @@ def read_clip(
     Raises:
         RigError: the object is no armature, or has no bones.
         ClipError: there is no action, no slot for the armature, no curve for it, only one frame,
-            or the armature is scaled unequally.
+            a key that is no number, or the armature is scaled unequally; with ``visual``, the
+            scene does not show it.
     """
     armature_data(armature)
     skeleton = read_skeleton(armature)
@@ -121,6 +122,11 @@ def read_clip(
     unkeyed = unkeyed_pose(armature)
     rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
     world = _object_motion(armature, curves, times)
+    if not all(np.isfinite(each).all() for each in (rotations, locations, world)):
+        raise ClipError(
+            f"Action '{action.name}' has keys that are no finite numbers.",
+            "Repair or delete them, or choose another action.",
+        )
     _check_scale(armature, world)
     return Clip(action.name, skeleton, times, per_second, rotations, locations, world, scales)
 
@@ -202,11 +208,38 @@ def _location_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
 def _shown_clip(
     armature: bpy.types.Object, skeleton: Skeleton, name: str, times: Floats, rate: float
 ) -> Clip:
+    _check_shown(armature)
     matrices, world = shown_poses(armature, times)
     _check_scale(armature, world)
     orientations = from_matrix(orientations_of(matrices[..., :3, :3]))
     rotations, locations = unposed(skeleton, orientations, matrices[..., :3, 3])
     return Clip(name, skeleton, times, rate, rotations, locations, world)
+
+
+def _check_shown(armature: bpy.types.Object) -> None:
+    """Blender would hand out the one pose that it has worked out last, at every frame."""
+    layer = bpy.context.view_layer
+    assert layer is not None
+    if armature.hide_viewport or not _is_within(armature, layer.layer_collection):
+        raise ClipError(
+            f"'{armature.name}' is not in the scene, or disabled in viewports: it cannot be read "
+            "as shown.",
+            "Enable it and its collection in the Outliner, or turn off As Shown.",
+        )
+    if armature_data(armature).pose_position == "REST":
+        raise ClipError(
+            f"'{armature.name}' is in its rest position: it cannot be read as shown.",
+            "Choose Pose Position in its armature properties, or turn off As Shown.",
+        )
+
+
+def _is_within(obj: bpy.types.Object, layer: bpy.types.LayerCollection) -> bool:
+    """Whether Blender works the object out because of this collection or one beneath it."""
+    collection = layer.collection
+    if collection.hide_viewport:
+        return False
+    own = not layer.exclude and obj in collection.objects.values()
+    return own or any(_is_within(obj, each) for each in layer.children)
 
 
 def _slot_for(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types.ActionSlot:
@@ -375,7 +408,7 @@ def _bone_motion(
             turned = np.stack([values(name, channel) for name in chosen], axis=1)
             rotations[:, numbers] = _as_quaternions(turned, mode)
     off = np.abs(scales - 1.0).max(axis=(0, 2))
-    stretching = (off > _ROUNDING) & _stretches_apart(armature, skeleton)
+    stretching = (off > _ROUNDING) & _stretches_apart(armature, skeleton, off > _ROUNDING)
     kept = None
     if stretching.any():
         kept = np.where(stretching[:, None], scales, 1.0)
@@ -387,12 +420,20 @@ def _bone_motion(
     return rotations, locations, kept
 
 
-def _stretches_apart(armature: bpy.types.Object, skeleton: Skeleton) -> np.ndarray:
+def _stretches_apart(
+    armature: bpy.types.Object, skeleton: Skeleton, scaled: np.ndarray
+) -> np.ndarray:
     """Whether each bone's children all keep their own axes when it is scaled; at the end of a
-    chain, whether the bone itself does.
+    chain, whether the bone itself does, or has nothing scaled above it.
     """
     bones = armature_data(armature).bones
-    apart = [bones[name].inherit_scale in _APART for name in skeleton.names]
+    beneath = np.zeros(len(skeleton), dtype=bool)
+    for number, parent in enumerate(skeleton.parents):
+        beneath[number] = parent >= 0 and (scaled[parent] or beneath[parent])
+    apart = [
+        bones[name].inherit_scale in _APART or not (beneath[number] or skeleton.children[number])
+        for number, name in enumerate(skeleton.names)
+    ]
     return np.array(
         [
             all(apart[child] for child in children or (number,))

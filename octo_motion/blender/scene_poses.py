@@ -10,6 +10,7 @@ from typing import Final
 import bpy
 import numpy as np
 
+from ..core.errors import ClipError
 from ..core.rotations import Floats
 from .playing import time_kept
 
@@ -51,7 +52,11 @@ def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Flo
 def assigned(
     armature: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.ActionSlot
 ) -> Iterator[None]:
-    """An action on the armature for a while; then what it had before."""
+    """An action on the armature for a while; then what it had before.
+
+    Raises:
+        ClipError: the armature is in NLA tweak mode, on another action.
+    """
     data = armature.animation_data
     had_none = data is None
     data = data or armature.animation_data_create()
@@ -60,6 +65,11 @@ def assigned(
     if before == action and slot_before == slot:
         yield
         return
+    if data.is_property_readonly("action"):
+        raise ClipError(
+            f"'{armature.name}' is in the tweak mode of the NLA editor.",
+            "Leave tweak mode there (Tab) and try again.",
+        )
     try:
         data.action = action
         data.action_slot = slot

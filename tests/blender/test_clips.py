@@ -252,6 +252,44 @@ def test_a_bone_that_stretches_alone_is_written_as_it_was_read(inherited: Any):
     assert np.abs(after[1] - before[1]).max() < 1e-4
 
 
+def test_a_bone_that_carries_no_other_keeps_its_scale():
+    armature = make_rig()
+    animate(armature)
+    bone = armature.pose.bones[-1]
+    for frame, size in ((1, 1.0), (9, 0.0), (17, 1.5)):
+        bone.scale = (size, size, 1.0)
+        bone.keyframe_insert("scale", frame=frame)
+    frames = [2, 8, 16]
+    before = as_blender_shows(armature, frames)
+    sizes = []
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        sizes.append(tuple(bone.scale))
+    clip = read_clip(armature)
+    assert clip.scales is not None
+    assert set(np.flatnonzero((clip.scales != 1.0).any(axis=(0, 2)))) == {len(MODES) - 1}
+    write_clip(armature, clip)
+    after = as_blender_shows(armature, frames)
+    assert np.abs(after[1] - before[1]).max() < 1e-4
+    for frame, size in zip(frames, sizes, strict=True):
+        bpy.context.scene.frame_set(frame)
+        assert tuple(bone.scale) == pytest.approx(size, abs=1e-6)
+
+
+@pytest.mark.parametrize("number", [2, len(MODES) - 1])
+def test_a_bone_that_is_scaled_to_nothing_does_not_turn(number: int):
+    """Scaled to zero, a bone and all it carries are hidden: artists do that with props."""
+    armature = make_rig()
+    animate(armature)
+    whole = read_clip(armature)
+    bone = armature.pose.bones[number]
+    for frame, size in ((1, 1.0), (9, 0.0)):
+        bone.scale = (size, size, size)
+        bone.keyframe_insert("scale", frame=frame)
+    clip = read_clip(armature)
+    assert angle_between(clip.rotations, whole.rotations).max() < ANGLE
+
+
 def test_the_object_may_have_parent_scale_delta_and_any_mode():
     armature = make_rig()
     parent = bpy.data.objects.new("Parent", None)
@@ -394,6 +432,58 @@ def test_each_thing_that_cannot_be_read_is_told():
     bpy.context.view_layer.update()
     with pytest.raises(ClipError, match="mirrored"):
         read_clip(armature)
+
+
+def test_keys_that_are_no_numbers_are_told():
+    armature = make_rig()
+    animate(armature)[4].keyframe_points[2].co.y = float("nan")
+    with pytest.raises(ClipError, match="Action 'RigAction' has keys that are no finite numbers"):
+        read_clip(armature)
+
+
+@pytest.mark.parametrize("how", ["object", "collection", "exclude", "unlink", "REST"])
+def test_what_the_scene_does_not_show_cannot_be_read_as_shown(how: str):
+    armature = make_rig()
+    animate(armature)
+    scene = bpy.context.scene
+    aside = bpy.data.collections.new("Aside")
+    scene.collection.children.link(aside)
+    scene.collection.objects.unlink(armature)
+    aside.objects.link(armature)
+    # An eye that is closed hides it from the artist alone.
+    armature.hide_set(state=True)
+    assert np.abs(np.diff(read_clip(armature, visual=True).rotations, axis=0)).max() > 0.1
+    if how == "REST":
+        armature.data.pose_position = "REST"
+    elif how == "object":
+        armature.hide_viewport = True
+    elif how == "collection":
+        aside.hide_viewport = True
+    elif how == "exclude":
+        bpy.context.view_layer.layer_collection.children["Aside"].exclude = True
+    else:
+        aside.objects.unlink(armature)
+    told = "is in its rest position" if how == "REST" else "'Rig' is not in the scene, or disabled"
+    with pytest.raises(ClipError, match=told):
+        read_clip(armature, visual=True)
+    read_clip(armature)
+
+
+def test_another_action_cannot_be_shown_in_tweak_mode():
+    armature = make_rig()
+    animate(armature)
+    data = armature.animation_data
+    action = data.action
+    other = action.copy()
+    track = data.nla_tracks.new()
+    track.strips.new("Strip", 1, action)
+    data.action = None
+    data.nla_tracks.active = track
+    data.use_tweak_mode = True
+    read_clip(armature, other)
+    read_clip(armature, action, visual=True)
+    with pytest.raises(ClipError, match="'Rig' is in the tweak mode of the NLA editor"):
+        read_clip(armature, other, visual=True)
 
 
 @pytest.mark.parametrize("switch", ["", "use_local_location", "use_inherit_rotation", "scale"])

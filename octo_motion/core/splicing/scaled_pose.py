@@ -3,11 +3,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from ..rotations import Floats, from_matrix, to_matrix
 from ..skeleton import Skeleton
 from .unpose import orientations_of, unposed
+
+_LEAST: Final = 1e-4
+"""Scale of what is scaled to nothing, to hide it: which way it points is still to be seen."""
 
 
 def without_scale(
@@ -23,6 +28,7 @@ def without_scale(
         locations: (frames, bones, 3) in each bone's rest frame.
         scales: (frames, bones, 3) in each bone's rest frame.
     """
+    scales = np.where(np.abs(scales) < _LEAST, _LEAST, scales)
     basis = np.zeros((*rotations.shape[:2], 4, 4))
     basis[..., :3, :3] = to_matrix(rotations) * scales[..., None, :]
     basis[..., :3, 3] = locations
