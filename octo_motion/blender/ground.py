@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import GroundError
+from ..core.locomotion.arm_skin import ArmSkin, arm_skin, nearest_bones
 from ..core.locomotion.chains import joint_positions
 from ..core.remembered import Remembered, key_of
 from ..core.rotations import Floats
@@ -34,7 +35,7 @@ _AT_LEAST: Final = 0.7
 """… but then this share lies nearer."""
 
 
-_radii_known: Final[Remembered[list[Floats]]] = Remembered(4)
+_skins_known: Final[Remembered[list[ArmSkin]]] = Remembered(4)
 _faces_known: Final[Remembered[Floats]] = Remembered(2)
 _corners_known: Final[Remembered[np.ndarray]] = Remembered(2)
 
@@ -101,34 +102,40 @@ def _read(mesh: bpy.types.Mesh, name: str, what: str, values: np.ndarray) -> Non
     data.data.foreach_get(what, values)
 
 
-def arm_radii(
+def arm_skins(
     armature: bpy.types.Object, skeleton: Skeleton, arms: Sequence[Sequence[str]]
-) -> list[Floats]:
-    """For each arm (bones + 1,) how far the skin is from each joint at rest, armature units.
+) -> list[ArmSkin]:
+    """How far the skin of each arm is from its bones at rest.
 
     Where no mesh hangs on the armature, arms are taken to be slender.
     """
     joints = [joint_positions(skeleton, bones) for bones in arms]
+    frames = [skeleton.rest_rotations[[skeleton.index[name] for name in bones]] for bones in arms]
     points = _skin(armature, float(np.ptp(np.concatenate(joints), axis=0).max()))
-    return _radii_known.get(key_of(points, joints), lambda: _arm_radii(points, joints))
+    return _skins_known.get(
+        key_of(points, joints, frames), lambda: _arm_skins(points, joints, frames)
+    )
 
 
-def _arm_radii(points: Floats, joints: Sequence[Floats]) -> list[Floats]:
-    """The same from points (n, 3) of the skin and each arm's joints (bones + 1, 3)."""
+def _arm_skins(points: Floats, joints: Sequence[Floats], frames: Sequence[Floats]) -> list[ArmSkin]:
+    """The same from points of the skin.
+
+    Args:
+        points: (n, 3).
+        joints: for each arm (bones + 1, 3).
+        frames: for each arm (bones, 4) its bones' rest orientations.
+    """
     lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
-    slender = [
-        length * np.linspace(*_SLENDER, len(each))
-        for length, each in zip(lengths, joints, strict=True)
-    ]
-    if len(points) == 0:
-        return slender
-    found = [_distances(points, each) for each in joints]
-    nearest = np.stack([distance for distance, _ in found]).argmin(axis=0)
-    radii = []
-    for arm, (distance, along) in enumerate(found):
-        own = (nearest == arm) & (distance < _THICKEST * lengths[arm])
-        radii.append(_radii(distance[own], along[own], slender[arm]))
-    return radii
+    found = [nearest_bones(points, each) for each in joints]
+    distances = np.stack([np.linalg.norm(off, axis=1) for _, _, off in found])
+    nearest = distances.argmin(axis=0)
+    skins = []
+    for arm, (bone, share, _) in enumerate(found):
+        own = (nearest == arm) & (distances[arm] < _THICKEST * lengths[arm])
+        slender = lengths[arm] * np.linspace(*_SLENDER, len(joints[arm]))
+        radii = _radii(distances[arm][own], (bone + share)[own], slender)
+        skins.append(arm_skin(points[own], joints[arm], frames[arm], radii))
+    return skins
 
 
 def _skin(armature: bpy.types.Object, size: float) -> Floats:
@@ -158,18 +165,6 @@ def _skin(armature: bpy.types.Object, size: float) -> Floats:
         parts.append(some @ place[:3, :3].T + place[:3, 3])
         passed += len(points)
     return np.concatenate(parts)
-
-
-def _distances(points: Floats, joints: Floats) -> tuple[Floats, Floats]:
-    """Distances (n,) of points from a chain, and where along it they are nearest, in joints."""
-    starts, steps = joints[:-1], np.diff(joints, axis=0)
-    seen = points[:, None] - starts
-    share = np.einsum("nsc,sc->ns", seen, steps) / np.maximum(np.sum(steps**2, axis=1), 1e-12)
-    share = np.clip(share, 0.0, 1.0)
-    apart = np.linalg.norm(seen - share[..., None] * steps, axis=-1)
-    segment = apart.argmin(axis=1)
-    rows = np.arange(len(points))
-    return apart[rows, segment], segment + share[rows, segment]
 
 
 def _radii(distance: Floats, along: Floats, otherwise: Floats) -> Floats:

@@ -16,7 +16,7 @@ from octo_motion.blender.contacts import (
     remove_markers,
     write_markers,
 )
-from octo_motion.blender.ground import arm_radii, read_triangles
+from octo_motion.blender.ground import arm_skins, read_triangles
 from octo_motion.blender.stretching import may_stretch, stretch_channels
 from octo_motion.core.errors import GroundError
 from tests.ui.rig import click, make_octopus
@@ -114,7 +114,7 @@ def test_the_skin_tells_how_thick_arms_are() -> None:
     armature: Any = bpy.context.object
     click("detect_arms")
     skeleton = read_skeleton(armature)
-    radii = arm_radii(armature, skeleton, arms_of(armature))
+    radii = [each.radii for each in arm_skins(armature, skeleton, arms_of(armature))]
     length = sum(armature.data.bones[name].length for name in arms_of(armature)[0])
     for each in radii:
         assert len(each) == 13
@@ -128,11 +128,15 @@ def test_a_skin_need_be_no_child_of_its_armature() -> None:
     click("add_octopus", with_mesh=True)
     armature: Any = bpy.context.object
     click("detect_arms")
-    as_child = arm_radii(armature, read_skeleton(armature), arms_of(armature))
+    as_child = [
+        each.radii for each in arm_skins(armature, read_skeleton(armature), arms_of(armature))
+    ]
     (skin,) = armature.children
     skin.parent = None
     bpy.context.view_layer.update()
-    by_modifier = arm_radii(armature, read_skeleton(armature), arms_of(armature))
+    by_modifier = [
+        each.radii for each in arm_skins(armature, read_skeleton(armature), arms_of(armature))
+    ]
     for before, after in zip(as_child, by_modifier, strict=True):
         np.testing.assert_array_equal(after, before)
 
@@ -140,7 +144,7 @@ def test_a_skin_need_be_no_child_of_its_armature() -> None:
 def test_arms_without_a_skin_are_slender() -> None:
     armature = make_octopus()
     bones = [f"Arm1_{number}.L" for number in range(1, 7)]
-    (radii,) = arm_radii(armature, read_skeleton(armature), [bones])
+    (radii,) = [each.radii for each in arm_skins(armature, read_skeleton(armature), [bones])]
     assert len(radii) == 7
     assert radii[0] == pytest.approx(0.03)
     assert radii[-1] == pytest.approx(0.008)

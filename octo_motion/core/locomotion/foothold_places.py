@@ -240,7 +240,14 @@ def peeled_to(limbs: Limbs, joint: int, joints: Floats, roots: Floats) -> Floats
 
 
 def laid(
-    limbs: Limbs, ground: Ground, joint: int, *, spot: Floats, heading: Floats, curl: Floats
+    limbs: Limbs,
+    ground: Ground,
+    joint: int,
+    *,
+    skins: Floats,
+    spot: Floats,
+    heading: Floats,
+    curl: Floats,
 ) -> Floats:
     """Joints from one on (arms, cycles, joints, 3) on the ground, segments as long as they are.
 
@@ -248,15 +255,16 @@ def laid(
         limbs: the arms.
         ground: what they lie on.
         joint: the one that touches first.
+        skins: (arms, cycles, joints) metres from each of them to the skin below it.
         spot: (arms, cycles, 3) where; its height is not looked at.
         heading: (arms, cycles) which way they lie, radians about world Z from +X.
         curl: (arms, cycles) radians by which they are bent to one side on the way to the tip.
     """
-    radii, lengths = limbs.radii[joint:], limbs.lengths[joint:]
+    lengths = limbs.lengths[joint:]
     span = np.maximum(lengths.sum(axis=0), 1e-12)
     place = spot.copy()
     first = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    place[..., 2] = _resting(ground, spot, radii[0][:, None], lengths[0][:, None], first)
+    place[..., 2] = _resting(ground, spot, skins[..., 0], lengths[0][:, None], first)
     joints, passed = [place], np.zeros(heading.shape[:1])
     for number, length in enumerate(lengths):
         middle = (passed + 0.5 * length) / span
@@ -268,7 +276,7 @@ def laid(
         for _ in range(4):
             level = place[..., :2] + step[..., None] * onward
             bones = lengths[number : number + 2].max(axis=0)[:, None]
-            rise = _resting(ground, level, radii[number + 1][:, None], bones, onward)
+            rise = _resting(ground, level, skins[..., number + 1], bones, onward)
             rise -= place[..., 2]
             step = step * length[:, None] / np.sqrt(step * step + rise * rise)
         ahead = np.concatenate([step[..., None] * onward, rise[..., None]], axis=-1)

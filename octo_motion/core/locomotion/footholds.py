@@ -67,6 +67,8 @@ class Footholds:
     """(arms, cycles, segments + 1 − c, 3) world: joints c … n as they lie on the ground."""
     normals: Floats
     """(arms, cycles, segments + 1 − c, 3) which way up the ground is there."""
+    skins: Floats
+    """(arms, cycles, segments + 1 − c) metres from each of these joints to the skin below it."""
     headings: Floats
     """(arms, cycles) radians about world Z from +X."""
     peeled_to: Floats
@@ -109,6 +111,7 @@ def lay(
     wishes: Sequence[Wish] = (),
     seed: int = 0,
     alike: bool = False,
+    skins: Floats | None = None,
 ) -> Footholds:
     """Lay all footholds of some arms.
 
@@ -123,6 +126,8 @@ def lay(
         wishes: the artist's; of arms by their number in the body.
         seed: of the small differences from step to step.
         alike: whether there are none, so that each cycle is like the one before.
+        skins: (arms, cycles, segments + 1 − c) metres from each joint that lies to the skin below
+            it; none for as many as all round it.
     """
     first, last = cycles
     shape = len(limbs.arms), last - first + 1
@@ -156,10 +161,14 @@ def lay(
     spot[..., :2] += found.distance[..., None] * aim
     side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if alike else numbers, seed)
     heading = np.where(wanted.turned, wanted.headings, np.arctan2(lie[..., 1], lie[..., 0]))
+    if skins is None:
+        round_about = limbs.radii[joint:].T[:, None]
+        skins = np.broadcast_to(round_about, (*shape, round_about.shape[-1]))
     joints = laid(
         limbs,
         ground,
         joint,
+        skins=skins,
         spot=np.where(wanted.moved[..., None], wanted.places, spot),
         heading=heading,
         curl=_CURL * (side - 0.5),
@@ -177,6 +186,7 @@ def lay(
         present=wanted.present,
         joints=joints,
         normals=normals(ground, joints),
+        skins=skins,
         headings=heading,
         peeled_to=peeled_to(limbs, joint, joints, roots_off),
         roots_on=roots_on,

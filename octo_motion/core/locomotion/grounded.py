@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ..rotations import Floats, conjugate, from_matrix, multiply, rotate
 from ..skeleton import Skeleton
 from .arm_shapes import unit
+from .arm_skin import ArmSkin
 from .chains import BodyFrame
 from .columns import turned
 from .course import Line
@@ -19,7 +21,8 @@ from .footholds import Footholds, Wish, cycles_at, lay
 from .generator import Build, Generator, twist
 from .ground import Ground
 from .limbs import Limbs, StanceSettings
-from .poses import Facing, bone_rotations, sucker_sides
+from .lying import Seen, skin_below
+from .poses import Facing, bone_rotations, carried_to, sucker_sides
 from .rhythm import Even, Rhythm
 from .stance import Batch, hold, pulled, stand, unheld
 from .steady import Steady
@@ -33,6 +36,8 @@ _MOST_TURN: Final = 0.6
 """The same from one bone to the next."""
 _FIRST_TURN: Final = 0.3
 """Share of it at the root, which the body's skin surrounds."""
+_LOOKS: Final = 16
+"""Moments of a cycle at which it is looked at which side of its skin an arm lies on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +130,8 @@ class GroundedWalk:
         wishes: the artist's footholds.
         rhythm: when arms hold on; none for the gait's own.
         alike: whether each cycle is like the one before.
+        skins: of each arm: where one is not round, it lies on the side that is below. None for
+            round ones.
     """
 
     def __init__(  # noqa: PLR0917 - what it is made of, in the order in which it is made
@@ -143,9 +150,10 @@ class GroundedWalk:
         wishes: Sequence[Wish] = (),
         rhythm: Rhythm | None = None,
         alike: bool = False,
+        skins: Sequence[ArmSkin] = (),
     ) -> None:
         self._generator, self._line, self._ground = generator, line, ground
-        self._settings, self._scale = settings, scale
+        self._settings, self._scale, self._alike = settings, scale, alike
         self._middle = generator.settings.gait.power_phase
         self._body_turn = from_matrix(body.rotation)
         self._stride = line.settings.stride
@@ -158,25 +166,72 @@ class GroundedWalk:
         self._sides = [sucker_sides(skeleton, arm.bones, down) for arm in generator.arms]
         # Where nothing varies at random, the seed does not matter.
         seed = generator.settings.seed if any(generator.settings.variation) else 0
+        laid = partial(
+            lay,
+            line=line,
+            ground=ground,
+            settings=settings,
+            rhythm=self._rhythm,
+            middle=self._middle,
+            cycles=self._cycles,
+            wishes=wishes,
+            seed=seed,
+            alike=alike,
+        )
         self._limbs: list[tuple[Build, Limbs, Footholds]] = []
         for build in generator.builds:
             for stretch in sorted({may_stretch[arm] for arm in build.arms}):
                 arms = tuple(arm for arm in build.arms if may_stretch[arm] == stretch)
                 part = Build(arms, build.chain, build.widths)
                 limbs = self._limbs_of(part, radii, stretch=stretch)
-                footholds = lay(
-                    limbs,
-                    line,
-                    ground,
-                    settings,
-                    self._rhythm,
-                    middle=self._middle,
-                    cycles=self._cycles,
-                    wishes=wishes,
-                    seed=seed,
-                    alike=alike,
+                self._limbs.append((part, limbs, laid(limbs)))
+        if not self._are_round(skins):
+            below = self._below(skins, phases)
+            self._limbs = [
+                (build, limbs, laid(limbs, skins=own))
+                for (build, limbs, _), own in zip(self._limbs, below, strict=True)
+            ]
+
+    def _are_round(self, skins: Sequence[ArmSkin]) -> bool:
+        return not skins or all(
+            skins[arm].is_round(self._sides[arm], holds.touching)
+            for build, _, holds in self._limbs
+            for arm in build.arms
+        )
+
+    def _below(self, skins: Sequence[ArmSkin], phases: tuple[float, float]) -> list[Floats]:
+        """For each build (arms, cycles, segments + 1 − c) metres from joints to the skin below.
+
+        Which side of a bone is below is what the arms show as they would lie if they were round.
+
+        Args:
+            skins: of all arms.
+            phases: the first and the last of the body's, radians.
+        """
+        looks = int(np.ceil((phases[1] - phases[0]) / _CYCLE * _LOOKS)) + 1
+        phase = np.linspace(*phases, looks)
+        centres, orientations = self._line.at(phase / _CYCLE * self._stride)
+        stood = self.pose(phase, np.zeros((looks, 2)), centres, orientations)
+        ends = np.cumsum([0] + [len(arm.bones) for arm in self._generator.arms])
+        to_world = multiply(orientations, conjugate(self._body_turn))
+        found: list[Floats] = []
+        for number, (build, _, holds) in enumerate(self._limbs):
+            below = np.empty(holds.skins.shape)
+            for place, arm in enumerate(build.arms):
+                own = stood.rotations[:, None, ends[arm] : ends[arm + 1]]
+                carried = carried_to([self._generator.rests[arm]], own)[:, 0]
+                cycles = stood.cycles[:, arm] - holds.first
+                seen = Seen(
+                    joints=stood.joints[number][:, place],
+                    orientations=multiply(to_world[:, None], carried),
+                    upward=holds.normals[place, cycles],
+                    rests=stood.lying[number][:, place, holds.touching :],
+                    cycles=0 * cycles if self._alike else cycles,
                 )
-                self._limbs.append((part, limbs, footholds))
+                known = holds.skins[place, :1] if self._alike else holds.skins[place]
+                below[place] = skin_below(skins[arm], seen, known, self._ground, scale=self._scale)
+            found.append(below)
+        return found
 
     def _limbs_of(self, build: Build, radii: Sequence[Floats], *, stretch: bool) -> Limbs:
         generator, columns = self._generator, list(build.arms)

@@ -182,6 +182,23 @@ def bone_rotations(
     return result
 
 
+def carried_to(rests: Sequence[ArmRest], rotations: Floats) -> Floats:
+    """Orientations (frames, arms, bones, 4) that bones are carried to, armature space.
+
+    Args:
+        rests: the arms, all of as many bones.
+        rotations: (frames, arms, bones, 4) in each bone's rest frame.
+    """
+    result = np.empty(rotations.shape)
+    for arm, rest in enumerate(rests):
+        for bone, follows in enumerate(rest.follows):
+            carried = rest.carried[bone]
+            if follows:
+                carried = multiply(result[:, arm, bone - 1], carried)
+            result[:, arm, bone] = multiply(carried, rotations[:, arm, bone])
+    return result
+
+
 def _swing(rests: Sequence[ArmRest], bone: int, carried: Floats, wanted: Floats) -> Floats:
     """Quaternions (4, batch), in the bone's rest frame, that bring its segment where it is wanted.
 

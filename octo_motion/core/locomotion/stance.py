@@ -84,6 +84,11 @@ through it …"""
 _LETTING_GO: Final = 3.0
 """… and how much faster it comes to keep its distance from it, where it has lain: without a jerk.
 """
+_STARTING: Final = 10.0
+"""Hold that it has lost, of the cube of the share of its way from the ground: as least jerk begins.
+"""
+_ROLLED: Final = 0.6
+"""Share of that way within which it may come to have rolled to any side."""
 _UNHELD: Final = 0.2
 """Share of its hold that an arm in the air has lost when all its movement is evened out."""
 _EARLIER: Final = 0.2
@@ -152,6 +157,8 @@ class Hold:
     """(3, batch) metres by which they have gone along with the body since, or still will."""
     normals: Floats
     """(segments + 1 − c, 3, batch) which way up the ground is there."""
+    skins: Floats
+    """(segments + 1 − c, batch) metres from each of these joints to the skin below it."""
     touching: int
     """c"""
 
@@ -165,6 +172,7 @@ class Hold:
             self.joints[..., chosen],
             self.carried[:, chosen],
             self.normals[..., chosen],
+            self.skins[:, chosen],
             self.touching,
         )
 
@@ -225,6 +233,7 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
         joints=np.ascontiguousarray(joints),
         carried=carried,
         normals=np.ascontiguousarray(np.moveaxis(footholds.normals[at], 0, -1)),
+        skins=np.ascontiguousarray(footholds.skins[at].T),
         touching=footholds.touching,
     )
 
@@ -279,8 +288,11 @@ def stand(
         whole = part.reach[-1]
         # What has lain is as high as its skin is thick, and no higher yet.
         rising = (settings.lift * away**2 + _OVER * let_go) * whole + part.lift
+        # In the air an arm may roll: any side of it may come to be below.
+        rolled = smooth_step(np.cbrt(away / _STARTING) / _ROLLED)
         near = part.radii.copy()
-        near[own.touching :] += own.weight * _crested(part, own, ground)
+        near[own.touching :] = own.skins + rolled * (near[own.touching :] - own.skins)
+        near[own.touching :] += own.weight * _crested(own, ground)
         most = np.max(part.radii, axis=0) + rising
         soft = _SOFT * (part.radii + let_go * (most - part.radii)) + _TINY
         directions = directions.copy()
@@ -303,14 +315,14 @@ def stand(
     return Stood(directions, strains, joints, np.sqrt(dot(missed, missed)) * (weight >= 1.0), lying)
 
 
-def _crested(batch: Batch, held: Hold, ground: Ground) -> Floats:
+def _crested(held: Hold, ground: Ground) -> Floats:
     """Metres (segments + 1 − c, batch) that joints lie higher than their skin is thick.
 
     Over a crest bones that are straight would cut into it: an arm that lays itself down there, or
     has just let go, stays above it as one that lies.
     """
     above = held.joints[:, 2] - ground.height(np.moveaxis(held.joints, 1, -1))
-    return np.maximum(above - batch.radii[held.touching :], 0.0)
+    return np.maximum(above - held.skins, 0.0)
 
 
 def _held(
@@ -367,13 +379,14 @@ def _held(
     # What is beyond the joint that is held can be raised without letting go; where it comes to
     # lie it needs no raising, or it would stay up until the last moment and then drop.
     beyond = (1.0 - to_goal) * smooth_step((batch.reach[1:] - held.lies_to) / batch.lengths)
-    soft = _SOFT * batch.radii + _TINY
+    skins = np.concatenate([batch.radii[: held.touching], held.skins])
+    soft = _SOFT * skins + _TINY
     own = raised(
         own,
         lengths,
         free=beyond,
         roots=batch.roots,
-        needed=batch.radii - soft,
+        needed=skins - soft,
         loose=loose,
         ground=ground,
         rounds=_RAISES_BETWEEN,

@@ -11,7 +11,7 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ...blender.ground import arm_radii, read_triangles
+from ...blender.ground import arm_skins, read_triangles
 from ...blender.stretching import may_stretch
 from ...blender.world import is_enabled
 from ...core.locomotion.bearings import Bearings
@@ -191,7 +191,8 @@ def read_standing(
         ground, warnings = _ground(
             settings, depsgraph, route=route, travel=travel, bearings=bearings, reach=reach
         )
-    radii = arm_radii(armature, skin, [arm.bones for arm in arms])
+    skins = arm_skins(armature, skin, [arm.bones for arm in arms])
+    radii = [each.radii for each in skins]
     stretch = [may_stretch(armature, arm.bones) for arm in arms]
     under = _under(generator, radii)
     if height is None:
@@ -250,6 +251,7 @@ def read_standing(
             wishes=wished,
             rhythm=rhythm,
             alike=alike,
+            skins=skins,
         )
 
     walk = build(line, wishes)
