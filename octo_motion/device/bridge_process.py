@@ -273,7 +273,9 @@ class Bridge:
     def _hear_calibration(self, message: CalibrationMessage) -> None:
         if message.phase == Phase.DONE:  # for a process at the devices that is started anew
             self._remembered[CalibrationMessage, message.pointer] = message
-        self._blender.send(message)
+        # While it is learned, the next word comes at once: a Blender that renders needs none twice.
+        learning = message.phase in {Phase.REST, Phase.REACH}
+        self._blender.send(message, droppable=learning)
 
     def _hear_device(self, message: DeviceMessage) -> None:
         if message.present:

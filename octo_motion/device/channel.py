@@ -29,8 +29,9 @@ _CHALLENGE: Final = struct.Struct(f"<4sH{_NONCE}s")
 _ANSWER: Final = struct.Struct(f"<4sH{_NONCE}s32s")
 _PATIENCE: Final = 3.0
 """s that a connection may take to prove itself, on a machine that has much else to do."""
-_MOST_WAITING: Final = 8_000_000
-"""Bytes that may wait for a peer which does not read; then it counts as gone."""
+_MOST_WAITING: Final = 100_000_000
+"""Bytes that may wait for a peer which does not read; then it counts as gone. A scene's meshes are
+sent at one go: two dozen of the largest."""
 _DROPPABLE_BEYOND: Final = 65_536
 """Bytes waiting from which on poses and the like are left out: the newest comes later anyway."""
 

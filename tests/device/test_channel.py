@@ -15,8 +15,21 @@ import numpy as np
 import pytest
 
 from octo_motion.device import channel as line
+from octo_motion.device.bridge_process import Bridge
+from octo_motion.device.calibration import NONE, Phase
 from octo_motion.device.channel import Channel, ChannelClosedError, Listener, connect, new_secret
-from octo_motion.device.messages import HEADER, MAGIC, VERSION, Buzz, Goodbye, Notice, Place, pack
+from octo_motion.device.messages import (
+    HEADER,
+    MAGIC,
+    VERSION,
+    Buzz,
+    CalibrationMessage,
+    Goodbye,
+    Notice,
+    ObstacleMessage,
+    Place,
+    pack,
+)
 
 SECRET = bytes(range(32))
 
@@ -214,9 +227,40 @@ def test_peer_that_dies_in_the_middle_of_a_message_is_noticed(
     assert "in the middle of a message" in caplog.text
 
 
-def test_peer_that_does_not_read_costs_no_poses_twice_and_at_last_its_place(
+def test_meshes_of_a_whole_scene_wait_for_a_bridge_that_is_still_starting(accepted: Begin) -> None:
+    client, server = pair(accepted)
+    far, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    for number in range(6):
+        corners = np.full((150_000, 3), float(number))
+        mesh = ObstacleMessage(number, 6, far, turn, far, far, -1.0, 0.0, corners)
+        client.send(mesh)
+    got: list[object] = []
+    end = time.monotonic() + 20.0
+    while len(got) < 6:
+        client.flush()
+        got += server.receive()
+        assert time.monotonic() < end
+    assert [each.number for each in got if isinstance(each, ObstacleMessage)] == list(range(6))
+    client.close()
+    server.close()
+
+
+def test_blender_that_renders_while_a_device_is_calibrated_does_not_lose_the_bridge(
     accepted: Begin,
 ) -> None:
+    client, server = pair(accepted)
+    bridge = Bridge(server, ())
+    for _ in range(60_000):  # two minutes of them
+        bridge._hear_calibration(CalibrationMessage.of(0, NONE, Phase.REACH))
+    assert len(server._waiting) < 1_000_000
+    client.close()
+    server.close()
+
+
+def test_peer_that_does_not_read_costs_no_poses_twice_and_at_last_its_place(
+    accepted: Begin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(line, "_MOST_WAITING", 8_000_000)
     client, server = pair(accepted)
     message = Place(np.zeros((4000, 3)), np.zeros((4000, 4)))
     for _ in range(200):
