@@ -35,6 +35,8 @@ _ANSWER_SECONDS: Final = 0.02
 _LOST_SECONDS: Final = 0.5
 _BUTTONS: Final = ("a", "b", "c")
 _FARTHEST: Final = 10.0
+_FASTEST: Final = 1000.0
+"""m, m/s: no hand is."""
 
 _MIDDLE: Final[Vector] = (0.0, -0.14, 0.15)
 """m: about the middle of the reach, where a service before 3.5 cannot be asked to count from it."""
@@ -210,7 +212,7 @@ def parse(text: str, device: str = "") -> tuple[str, Sample] | None:
         state = found["state"]
         position, velocity = _vector(state["cursor_position"]), _vector(state["cursor_velocity"])
         status = found.get("status") or {}
-        if max(map(abs, position)) > _FARTHEST:
+        if max(map(abs, position)) > _FARTHEST or max(map(abs, velocity)) > _FASTEST:
             return None
         orientation, buttons = _grip(message)
         return str(found["device_id"])[:64], Sample(
@@ -218,7 +220,9 @@ def parse(text: str, device: str = "") -> tuple[str, Sample] | None:
             # An arm that does not know where it is, or has no power, is given no force.
             held=bool(status.get("calibrated", True) and status.get("power_supply", True)),
         )
-    except (ValueError, KeyError, StopIteration, TypeError, AttributeError, RecursionError):
+    except (ValueError, KeyError, StopIteration, TypeError, AttributeError):
+        return None
+    except (RecursionError, OverflowError):  # nested too deep, a number beyond all floats
         return None
 
 

@@ -35,6 +35,10 @@ _BODIES: Final = {
 SIZES: Final = {kind: _HEAD.size + body.size for kind, body in _BODIES.items()}
 _WATCHDOG: Final = 20
 _FARTHEST: Final = 10.0
+_FASTEST: Final = 1000.0
+"""m/s and rad/s: no hand is."""
+_MOST: Final = 1000.0
+"""Newtons, and all else that a device says of itself."""
 _SILENCE: Final = 1.0
 """s without a packet after which the program counts as gone."""
 
@@ -144,7 +148,8 @@ def parse(data: bytes, key: bytes) -> Packet:
         return Force(sequence, answered, watchdog, _vector(rest[0:3]), _vector(rest[3:6]))
     sequence, buttons, held, *rest = values
     position, orientation = _vector(rest[0:3]), unit((rest[3], rest[4], rest[5], rest[6]))
-    if max(map(abs, position)) > _FARTHEST or orientation is None:
+    fastest = max(map(abs, rest[7:13]))
+    if max(map(abs, position)) > _FARTHEST or orientation is None or fastest > _FASTEST:
         raise PacketError("a pose that cannot be")
     return State(
         *(sequence, buttons, bool(held), position, orientation),
@@ -157,7 +162,8 @@ def _features(values: tuple[object, ...]) -> Features:
     assert isinstance(buttons, int)
     assert isinstance(name, bytes)
     dynamics = Dynamics(*(float(each) for each in numbers if isinstance(each, float)))
-    if buttons > 32 or dynamics.force <= 0.0 or min(astuple(dynamics)) < 0.0:
+    said = astuple(dynamics)
+    if buttons > 32 or dynamics.force <= 0.0 or min(said) < 0.0 or max(said) > _MOST:
         raise PacketError("a device that cannot be")
     text = name.rstrip(b"\0").decode(errors="replace")
     return Features("".join(each for each in text if each.isprintable()), buttons, dynamics)

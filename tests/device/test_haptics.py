@@ -274,6 +274,22 @@ def test_after_a_stall_the_force_rises_anew() -> None:
     assert shaper.force[0] <= 8.0 * PERIOD / RISE * 1.01
 
 
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e200])
+@pytest.mark.parametrize("which", ["force", "torque"])
+def test_what_is_no_number_becomes_no_force(bad: float, which: str) -> None:
+    shaper = Shaper(Limits(8.0, 0.4))
+    good: Vector = (8.0, 0.0, 0.0)
+    for _ in range(300):
+        shaper.shape(good, good, PERIOD, holding=True, age=0.0)
+    asked = (0.0, bad, 0.0)
+    pair = (asked, good) if which == "force" else (good, asked)
+    shaper.shape(*pair, PERIOD, holding=True, age=0.0)
+    assert (shaper.force, shaper.torque) == (ZERO, ZERO)
+    shaper.shape(good, good, PERIOD, holding=True, age=0.0)
+    assert 0.0 < shaper.force[0] < 0.05, "it rises anew"
+    assert freshness(math.nan) == 0.0
+
+
 # --- The local model -----------------------------------------------------------------------------
 
 

@@ -9,6 +9,8 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -19,6 +21,7 @@ from octo_motion.device import haply, network
 from octo_motion.device.driver import DeviceLostError, Dynamics, Kind, Sample
 from octo_motion.device.haply import Haply
 from octo_motion.device.network import Features, Force, PacketError, Port, State, parse
+from octo_motion.device.spatial import IDENTITY
 from octo_motion.device.websocket import FrameReader, WebSocket, WebSocketError, frame, masked
 from tests.device.parts import HaplyService
 
@@ -63,6 +66,10 @@ def test_packet_arrives_as_it_was_sent(packet: network.Packet) -> None:
         (b"GET / HTTP/1.1\r\n\r\n0123456789", "not one of our packets"),
         (b"OMDF\x02\0" + network.pack(STATE, KEY)[6:], "version 2"),
         (b"", "cut off"),
+        (network.pack(replace(STATE, velocity=(1e308, 0.0, 0.0)), KEY), "cannot be"),
+        (network.pack(replace(STATE, angular_velocity=(0.0, 0.0, -2e3)), KEY), "cannot be"),
+        (network.pack(replace(FEATURES, dynamics=Dynamics(1e300)), KEY), "cannot be"),
+        (network.pack(replace(FEATURES, dynamics=Dynamics(5.0, 0.2, 1e308)), KEY), "cannot be"),
     ],
 )
 def test_packet_that_is_none_is_refused(data: bytes, said: str) -> None:
@@ -376,6 +383,21 @@ def test_any_json_is_a_state_or_none(value: object) -> None:
     got = haply.parse(json.dumps({"inverse3": value}))
     assert got is None or all(map(math.isfinite, got[1].position))
     haply.parse(json.dumps(value))
+
+
+@pytest.mark.parametrize("number", ["1" + "0" * 400, "1e308", "-1e308", "NaN", "Infinity"])
+@pytest.mark.parametrize("place", ["cursor_position", "cursor_velocity", "orientation"])
+def test_numbers_beyond_any_hand_are_no_state(number: str, place: str) -> None:
+    """One damaged message must not end the program at all devices."""
+    good = {"x": 0.0, "y": 0.0, "z": 0.0}
+    state = {"cursor_position": good, "cursor_velocity": good}
+    message: dict[str, Any] = {"inverse3": [{"device_id": "1", "state": state}]}
+    if place == "orientation":
+        message["verse_grip"] = [{"state": {"orientation": {"w": 1.0, "x": "?"}}}]
+    else:
+        state[place] = {**good, "x": "?"}  # pyright: ignore[reportArgumentType]
+    got = haply.parse(json.dumps(message).replace('"?"', number))
+    assert got is None or (place == "orientation" and got[1].orientation == IDENTITY)
 
 
 @given(st.text(max_size=100))

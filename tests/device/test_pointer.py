@@ -175,6 +175,40 @@ def test_force_comes_back_gently_after_a_short_stall() -> None:
     assert table.force > 3.0
 
 
+def test_force_comes_back_gently_when_the_loop_itself_stood_still() -> None:
+    """A laptop that slept: the device let go long ago, and must not be given all at once."""
+    table = grabbed()
+    assert table.force > 3.0
+    table.now += 3.0
+    table.ticks(1, ROCK)
+    assert table.force < 0.05
+    table.ticks(10, ROCK)
+    assert 0.0 < table.force < 0.3
+    table.ticks(300, ROCK)
+    assert table.force > 3.0
+
+
+def test_loop_that_is_slow_by_itself_gives_force() -> None:
+    driver = FakeDriver()
+    pointer = Pointer(0, driver, 0.02, Settings())
+    pointer.want(grab=True)
+    now = 10.0
+    for index in range(100):
+        now += 0.02 if index % 3 else 0.03
+        driver.samples.append(Sample(now, (0.02 * min(1.0, 0.1 * index), 0.0, 0.0), IDENTITY))
+        pointer.hold(pointer.grab, ROCK, now, now)
+        pointer.tick(now)
+    assert length(driver.sent[-1][0]) > 0.1
+
+
+def test_device_never_gets_what_is_no_number() -> None:
+    table = grabbed()
+    table.pointer.workspace = Workspace(0, scale=5e-324)
+    table.ticks(50, ROCK)
+    assert all(math.isfinite(each) for force, _ in table.driver.sent for each in force)
+    assert table.force == 0.0
+
+
 def test_device_without_a_hand_on_it_gives_no_force() -> None:
     table = grabbed()
     table.hand_there = False
@@ -269,6 +303,20 @@ def test_space_mouse_moves_its_pointer_with_the_speed_of_the_push() -> None:
     table.pointer.place(Workspace(0, (1.0, 0.0, 0.0), IDENTITY, 2.0))
     table.ticks(500)
     assert table.pointer.position == pytest.approx((1.4, 0.0, 0.0))
+
+
+def test_device_that_is_being_calibrated_does_not_push() -> None:
+    """The hand moves it to its ends, and must be the only one that does."""
+    table = Table()
+    table.ticks(5)
+    table.pointer.test(table.now)
+    table.ticks(50)
+    table.pointer.calibrate(begin=True)
+    table.ticks(40)
+    assert table.force == 0.0
+    table.pointer.test(table.now)
+    table.ticks(100)
+    assert table.force == 0.0
 
 
 def test_test_of_a_device_is_a_gentle_push_each_way() -> None:

@@ -38,6 +38,8 @@ _GIVE_UP: Final = 0.25
 """s of ticks without a word from the simulation, after which the hand has let go for good."""
 MOST_HOLDS: Final = 0.1
 """s for which a local model is trusted at most, however long the simulation's steps take."""
+_STALL: Final = 3.0
+"""Periods without a tick that are no jitter, of a loop that is slow by itself."""
 _TEST_SECONDS: Final = 0.6
 _TEST_SHARE: Final = 0.15
 """Of the device's force, for the test of a device."""
@@ -83,6 +85,7 @@ class Pointer:
         self._told_place = False
         self._test_until = -math.inf
         self._last: tuple[Vector, Quaternion] | None = None
+        self._ticked = -math.inf
 
     @property
     def has_force(self) -> bool:
@@ -164,7 +167,8 @@ class Pointer:
 
     def test(self, now: float) -> None:
         """Let the hand feel that the device works: gently to the right, then to the left."""
-        self._test_until = now + _TEST_SECONDS
+        if self.calibrator is None:
+            self._test_until = now + _TEST_SECONDS
 
     # --- One tick --------------------------------------------------------------------------------
 
@@ -183,6 +187,10 @@ class Pointer:
             self._move(now)
         if not self.has_force:
             return
+        if now - self._ticked > max(FRESH_SECONDS, _STALL * self.period):
+            # The loop itself stood still, and the device has ended the force by itself.
+            self._shaper.drop()
+        self._ticked = now
         force, torque, age = self._asked(now)
         self._observe()
         velocity, spin = self.sample.velocity, self.sample.angular_velocity
@@ -207,6 +215,7 @@ class Pointer:
         self.want(grab=False)
         self.velocity = self.angular_velocity = ZERO
         self._last = None
+        self._test_until = -math.inf
         self.calibrator = Calibrator(self.driver.description.kind) if begin else None
 
     def correct(self, calibration: Calibration) -> None:

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Final
 
 from ..driver import FRESH_SECONDS
-from ..spatial import ZERO, Vector, add, scale, shortened, subtract
+from ..spatial import ZERO, Vector, add, dot, scale, shortened, subtract
 
 RISE: Final = 0.2
 """s from nothing to all of the force after a grab."""
@@ -32,8 +33,9 @@ class Limits:
 
 def freshness(age: float) -> float:
     """Share of the force for data of an age: 1 while fresh, fading, 0 from 20 ms on."""
-    left = (FRESH_SECONDS - age) / (FRESH_SECONDS * (1.0 - _FULL))
-    return max(0.0, min(1.0, left))
+    if not age < FRESH_SECONDS:  # an age that is no number is not fresh
+        return 0.0
+    return min(1.0, (FRESH_SECONDS - age) / (FRESH_SECONDS * (1.0 - _FULL)))
 
 
 @dataclass
@@ -60,8 +62,9 @@ class Shaper:
             age: s of the older of the two, the device's sample and the simulation's state.
         """
         fresh = freshness(age)
-        if fresh <= 0.0:
-            # Not a fade but the end of one: it began when half of the time was over.
+        if fresh <= 0.0 or not isfinite(dot(force, force) + dot(torque, torque)):
+            # Not a fade but the end of one: it began when half of the time was over. And what is
+            # no number, or beyond all of them, must not reach a motor.
             self.share, self.force, self.torque = 0.0, ZERO, ZERO
             return
         step = period / RISE if holding else -period / FALL
