@@ -166,14 +166,19 @@ def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Float
         RigError: the parent's scale is zero in some direction.
     """
     frame, turn = parent_frame(obj), _parent_turn(obj)
-    mode = obj.rotation_mode
-    own_rotations = multiply(
-        multiply(conjugate(delta_rotation(obj)), conjugate(turn)), normalized(quaternions)
-    )
     own_locations = np.linalg.solve(frame[:3, :3], (locations - frame[:3, 3]).T).T
+    return own_channels(obj, own_locations, multiply(conjugate(turn), normalized(quaternions)))
+
+
+def own_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
+    """The same, of places (frames, 3) and orientations (frames, 4) before parents and constraints:
+    delta transforms and rotation mode are taken off.
+    """
+    mode = obj.rotation_mode
+    rotations = multiply(conjugate(delta_rotation(obj)), quaternions)
     return [
-        Channel("location", own_locations - np.array(obj.delta_location), _OBJECT_GROUP),
-        Channel(_rotation_property(mode), _in_rotation_mode(own_rotations, mode), _OBJECT_GROUP),
+        Channel("location", locations - np.array(obj.delta_location), _OBJECT_GROUP),
+        Channel(_rotation_property(mode), _in_rotation_mode(rotations, mode), _OBJECT_GROUP),
     ]
 
 

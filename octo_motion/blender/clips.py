@@ -31,6 +31,7 @@ from .actions import (
     delta_rotation,
     location_channel,
     object_channels,
+    own_channels,
     parent_frame,
     rotation_channels,
     writable_armature,
@@ -121,14 +122,14 @@ def read_clip(
             return _shown_clip(armature, skeleton, action.name, times, per_second)
     unkeyed = unkeyed_pose(armature)
     rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
-    world = _object_motion(armature, curves, times)
+    world, own = _object_motion(armature, curves, times)
     if not all(np.isfinite(each).all() for each in (rotations, locations, world)):
         raise ClipError(
             f"Action '{action.name}' has keys that are no finite numbers.",
             "Repair or delete them, or choose another action.",
         )
     _check_scale(armature, world)
-    return Clip(action.name, skeleton, times, per_second, rotations, locations, world, scales)
+    return Clip(action.name, skeleton, times, per_second, rotations, locations, world, scales, own)
 
 
 def write_clip(
@@ -170,10 +171,7 @@ def write_clip(
         if (number := skeleton.index.get(bone.name)) is not None
         and (bone.scale[:] != (1.0, 1.0, 1.0) or (scales[:, number] != 1.0).any())
     ]
-    own = world_matrix(armature)
-    if np.abs(clip.world - own).max() > _STILL * max(1.0, np.abs(own).max()):
-        turns = from_matrix(clip.world[:, :3, :3] / clip.scale)
-        channels += object_channels(armature, clip.world[:, :3, 3], turns)
+    channels += _object_channels(armature, clip)
     keep_unkeyed_pose(armature)
     return write_action(
         armature,
@@ -183,6 +181,23 @@ def write_clip(
         previous=previous,
         settings_note=note,
     )
+
+
+def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
+    """The object's own motion; none where it stands as it does now."""
+    moved, still = clip.own, np.array(armature.matrix_basis, dtype=np.float64)
+    if moved is None:
+        moved, still = clip.world, world_matrix(armature)
+    if np.abs(moved - still).max() <= _STILL * max(1.0, np.abs(still).max()):
+        return []
+    if clip.own is None:
+        turns = from_matrix(moved[:, :3, :3] / clip.scale)
+        return object_channels(armature, moved[:, :3, 3], turns)
+    signs = np.sign(np.array(armature.scale) * np.array(armature.delta_scale))
+    turns = from_matrix(
+        moved[:, :3, :3] / (np.linalg.norm(moved[:, :3, :3], axis=1) * signs)[:, None]
+    )
+    return own_channels(armature, moved[:, :3, 3], turns)
 
 
 def _location_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
@@ -209,11 +224,11 @@ def _shown_clip(
     armature: bpy.types.Object, skeleton: Skeleton, name: str, times: Floats, rate: float
 ) -> Clip:
     _check_shown(armature)
-    matrices, world = shown_poses(armature, times)
+    matrices, world, own = shown_poses(armature, times)
     _check_scale(armature, world)
     orientations = from_matrix(orientations_of(matrices[..., :3, :3]))
     rotations, locations = unposed(skeleton, orientations, matrices[..., :3, 3])
-    return Clip(name, skeleton, times, rate, rotations, locations, world)
+    return Clip(name, skeleton, times, rate, rotations, locations, world, own=own)
 
 
 def _check_shown(armature: bpy.types.Object) -> None:
@@ -492,10 +507,15 @@ def _unit(quaternions: Floats) -> Floats:
     return np.where(np.any(unit, axis=-1, keepdims=True), unit, IDENTITY)
 
 
-def _object_motion(armature: bpy.types.Object, curves: _Curves, times: Floats) -> Floats:
-    """World matrices (frames, 4, 4) of the armature object."""
+def _object_motion(
+    armature: bpy.types.Object, curves: _Curves, times: Floats
+) -> tuple[Floats, Floats]:
+    """World matrices (frames, 4, 4) of the armature object, and what its own channels make."""
     if not any(not name for name, _ in curves):
-        return np.broadcast_to(world_matrix(armature), (len(times), 4, 4)).copy()
+        shape = (len(times), 4, 4)
+        basis = np.array(armature.matrix_basis, dtype=np.float64)
+        world = np.broadcast_to(world_matrix(armature), shape)
+        return world.copy(), np.broadcast_to(basis, shape).copy()
 
     def values(channel: str) -> Floats:
         return _values(curves, "", channel, tuple(getattr(armature, channel)), times)
@@ -513,7 +533,7 @@ def _object_motion(armature: bpy.types.Object, curves: _Curves, times: Floats) -
     own[:, :3, :3] = to_matrix(rotations) * scales[:, None, :]
     own[:, :3, 3] = values("location") + values("delta_location")
     own[:, 3, 3] = 1.0
-    return parent_frame(armature) @ own
+    return parent_frame(armature) @ own, own
 
 
 def _check_scale(armature: bpy.types.Object, world: Floats) -> None:

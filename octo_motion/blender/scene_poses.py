@@ -20,21 +20,22 @@ _CHANNELS: Final = (
 )
 
 
-def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats]:
+def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats, Floats]:
     """What an armature looks like at these frames of the current scene.
 
     The scene is played through and put back to its frame; what has no keys yet survives.
 
     Returns:
         Bone matrices (frames, bones, 4, 4) in armature space, in the order of the armature's
-        bones, and the object's world matrices (frames, 4, 4).
+        bones, the object's world matrices (frames, 4, 4), and what its own channels make of it
+        (frames, 4, 4), before parents and constraints.
     """
     scene = bpy.context.scene
     assert scene is not None
     assert armature.pose is not None
     count = len(armature.pose.bones)
     bones = np.empty((len(frames), count, 4, 4))
-    world = np.empty((len(frames), 4, 4))
+    world, own = np.empty((2, len(frames), 4, 4))
     buffer = np.empty(16 * count, dtype=np.float32)
     with _pose_kept(armature), time_kept(scene) as go_to:
         for number, frame in enumerate(frames):
@@ -44,8 +45,8 @@ def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Flo
             shown.pose.bones.foreach_get("matrix", buffer)
             # Blender hands over matrices column by column.
             bones[number] = buffer.reshape(count, 4, 4).transpose(0, 2, 1)
-            world[number] = shown.matrix_world
-    return bones, world
+            world[number], own[number] = shown.matrix_world, shown.matrix_basis
+    return bones, world, own
 
 
 @contextmanager

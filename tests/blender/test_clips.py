@@ -150,6 +150,13 @@ def animate(armature: Any, *, scale: bool = False) -> list[Any]:
     return list(data.action.layers[0].strips[0].channelbag(data.action_slot).fcurves)
 
 
+def curves_of(armature: Any) -> set[str]:
+    """Data paths of the curves that move an armature."""
+    data = armature.animation_data
+    channelbag = data.action.layers[0].strips[0].channelbag(data.action_slot)
+    return {curve.data_path for curve in channelbag.fcurves}
+
+
 def interpolate(curves: list[Any], *kinds: str) -> None:
     for number, curve in enumerate(curves):
         for key, point in enumerate(curve.keyframe_points):
@@ -304,6 +311,52 @@ def test_the_object_may_have_parent_scale_delta_and_any_mode():
     clip = read_clip(armature)
     assert clip.scale == pytest.approx(0.3, rel=1e-5)
     assert_shown(armature, clip, 10.0)
+
+
+def given_moving_parent(armature: Any) -> None:
+    parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    for frame, x in ((1, 0.0), (17, 8.0)):
+        parent.location, parent.rotation_euler = (x, 0.0, 1.0), (0.0, 0.1 * x, 0.2 * x)
+        parent.keyframe_insert("location", frame=frame)
+        parent.keyframe_insert("rotation_euler", frame=frame)
+    armature.parent = parent
+
+
+@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize("carried_by", ["parent", "constraint"])
+@pytest.mark.parametrize("visual", [False, True])
+def test_what_carries_the_armature_carries_a_result_just_as_far(
+    carried_by: str,
+    *,
+    moves: bool,
+    visual: bool,
+):
+    armature = make_rig()
+    animate(armature)
+    if not moves:
+        for curve in list(
+            armature.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+        ):
+            if not curve.data_path.startswith("pose"):
+                curve.mute = True
+    given_moving_parent(armature)
+    if carried_by == "constraint":
+        parent, armature.parent = armature.parent, None
+        armature.constraints.new("CHILD_OF").target = parent
+    armature.delta_location, armature.delta_rotation_euler = (3, 2, 1), (0.1, 0.2, 0.3)
+    frames = [1, 6, 17]
+    before = as_blender_shows(armature, frames)
+    bpy.context.scene.frame_set(4)
+    clip = read_clip(armature, visual=visual)
+    # As when other frames are looked at while a timing is dragged.
+    bpy.context.scene.frame_set(12)
+    write_clip(armature, clip)
+    after = as_blender_shows(armature, frames)
+    assert np.abs(after[0] - before[0]).max() < 10 * ANGLE
+    assert np.abs(after[1] - before[1]).max() < 20.0 * POSITION
+    moving = {path for path in curves_of(armature) if not path.startswith("pose")}
+    assert moving == ({"location", "rotation_euler"} if moves else set())
 
 
 def test_constraints_and_nla_are_read_as_shown():

@@ -32,6 +32,9 @@ class Clip:
     scales: Floats | None = None
     """(frames, bones, 3) of bones that get longer or thicker without bending those they carry; none
     if there are none. They go along with a part, and count for nothing else."""
+    own: Floats | None = None
+    """(frames, 4, 4) of ``world`` what the object's own channels make, where parents or constraints
+    may carry it further; none if nothing is known of that."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -59,4 +62,5 @@ class Clip:
             locations=self.locations[chosen],
             world=self.world[chosen],
             scales=None if self.scales is None else self.scales[chosen],
+            own=None if self.own is None else self.own[chosen],
         )
