@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -53,6 +53,15 @@ _APART: Final = frozenset({"ALIGNED", "AVERAGE", "NONE"})
 
 _STILL: Final = 1e-7
 """Of the skeleton's size: a location that is smaller is none."""
+
+_POSED: Final = frozenset({*AT_REST, "rotation_mode"})
+"""Properties of a bone that a clip is about, …"""
+
+_PLACED: Final = frozenset(
+    {"rotation_mode"}
+    | {f"{kind}{name}" for kind in ("", "delta_") for name in AT_REST if name != "scale"}
+)
+"""… and of an object; its size is not."""
 
 _Curves = dict[tuple[str, str], dict[int, bpy.types.FCurve]]
 """F-curves by bone ("" is the object itself) and property, then by component."""
@@ -139,6 +148,7 @@ def write_clip(
     name: str = "",
     note: str = "",
     previous: bpy.types.Action | None = None,
+    besides: Sequence[Channel] = (),
 ) -> bpy.types.Action:
     """Give an armature a clip as a new action, with keys on all bones.
 
@@ -151,6 +161,7 @@ def write_clip(
         name: name of the new action, the clip's if empty.
         note: what the clip was made from, kept with the action.
         previous: an action written here before, to be written anew if nobody has edited it.
+        besides: what else the action moves, see :func:`further_channels`.
 
     Returns:
         The action, assigned to the armature.
@@ -172,6 +183,7 @@ def write_clip(
         and (bone.scale[:] != (1.0, 1.0, 1.0) or (scales[:, number] != 1.0).any())
     ]
     channels += _object_channels(armature, clip)
+    channels += besides
     keep_unkeyed_pose(armature)
     return write_action(
         armature,
@@ -181,6 +193,53 @@ def write_clip(
         previous=previous,
         settings_note=note,
     )
+
+
+def further_channels(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    frames: Floats,
+) -> list[Channel]:
+    """What an action moves that is no part of a clip: custom properties, influences of constraints,
+    the object's size and visibility.
+
+    Args:
+        armature: the armature object.
+        action: the action.
+        slot: its slot; if none is given the one that the armature uses, or would.
+        frames: (frames,)
+
+    Raises:
+        ClipError: there is no slot for the armature.
+    """
+    bones = armature_data(armature).bones
+    found: dict[str, dict[int, bpy.types.FCurve]] = defaultdict(dict)
+    for curve in _channelbag_curves(action, slot or _slot_for(armature, action)):
+        start, _, rest = curve.data_path.partition('pose.bones["')
+        name, _, channel = rest.rpartition('"].')
+        if start:
+            told = curve.data_path in _PLACED
+        else:
+            told = channel in _POSED and bpy.utils.unescape_identifier(name) in bones
+        if is_shown(curve) and not told:
+            found[curve.data_path][curve.array_index] = curve
+    channels: list[Channel] = []
+    for path, components in found.items():
+        try:
+            value: Any = armature.path_resolve(path)
+        except ValueError:
+            # Of a bone or a property that is gone.
+            continue
+        # What has no curve keeps its value. Curves know choices from a list by their numbers.
+        now: list[Any] = [0.0]
+        if not isinstance(value, str):
+            now = [value] if isinstance(value, (bool, int, float)) else list(value)
+        values = _values({("", ""): components}, "", "", now, frames)
+        group = next(iter(components.values())).group
+        bone = path.removeprefix('pose.bones["').partition('"]')[0]
+        channels.append(Channel(path, values, group.name if group is not None else bone))
+    return channels
 
 
 def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:

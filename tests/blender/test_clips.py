@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.actions import MARK
-from octo_motion.blender.clips import read_clip, write_clip
+from octo_motion.blender.clips import further_channels, read_clip, write_clip
 from octo_motion.blender.unkeyed import AT_REST
 from octo_motion.core.errors import ClipError, RigError
 from octo_motion.core.rotations import angle_between, from_rotation_vector, multiply
@@ -227,6 +227,14 @@ def test_scaled_bones_carry_their_children():
     armature = make_rig()
     animate(armature, scale=True)
     assert_shown(armature, read_clip(armature), 20.0, y_only=True)
+
+
+def test_nothing_of_a_clip_is_among_what_else_an_action_moves():
+    armature = make_rig()
+    animate(armature, scale=True)
+    armature.pose.bones[0].keyframe_insert("rotation_mode", frame=1)
+    armature.keyframe_insert("delta_location", frame=1)
+    assert further_channels(armature, armature.animation_data.action, None, np.arange(3.0)) == []
 
 
 def test_scale_that_is_not_inherited_is_refused_unless_read_as_shown():

@@ -233,6 +233,49 @@ def test_base_and_clips_stay_as_they_are() -> None:
     assert stack_of(hero).result.name not in before
 
 
+def test_all_else_that_the_base_moves_goes_on_moving() -> None:
+    """Faces hang on custom properties, hands on influences of constraints, props on visibility."""
+    hero, _ = hero_and_source()
+    head, hand = hero.pose.bones["head"], hero.pose.bones["hand.L"]
+    head["smile"], head["pupils"], head["mute"] = 0.0, [0.5, 0.5], 0.0
+    copied = hand.constraints.new("COPY_ROTATION")
+    for frame, value in ((1, 0.0), (41, 1.0)):
+        head["smile"] = copied.influence = value
+        head["pupils"] = [value, 0.25]
+        hero.hide_render = frame > 20
+        head.keyframe_insert('["smile"]', frame=frame)
+        head.keyframe_insert('["mute"]', frame=frame)
+        head.keyframe_insert('["pupils"]', index=0, frame=frame)
+        copied.keyframe_insert("influence", frame=frame)
+        hero.keyframe_insert("hide_render", frame=frame)
+        hero.keyframe_insert("scale", frame=frame)
+    base = hero.animation_data.action
+    channelbag = base.layers[0].strips[0].channelbags[0]
+    channelbag.fcurves.find('pose.bones["head"]["mute"]').mute = True
+    channelbag.fcurves.new('pose.bones["gone"]["smile"]').keyframe_points.insert(1, 0.0)
+    OPERATORS.splice_add()
+    OPERATORS.splice_build()
+    result = hero.animation_data.action
+    missing = keys(base).keys() - keys(result).keys()
+    assert missing == {('pose.bones["head"]["mute"]', 0), ('pose.bones["gone"]["smile"]', 0)}
+    scene = bpy.context.scene
+    for frame in (1, 15, 30, 41):
+        scene.frame_set(frame)
+        shown = [head["smile"], *head["pupils"], copied.influence, hero.hide_render]
+        expected = [
+            channelbag.fcurves.find(path, index=index).evaluate(frame)
+            for path, index in (
+                ('pose.bones["head"]["smile"]', 0),
+                ('pose.bones["head"]["pupils"]', 0),
+                ('pose.bones["hand.L"].constraints["Copy Rotation"].influence', 0),
+                ("hide_render", 0),
+            )
+        ]
+        expected[2:2] = [0.25]
+        assert shown == pytest.approx(expected, abs=1e-6)
+    assert not is_edited(result)
+
+
 def test_built_again_the_result_is_made_anew_in_place() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()

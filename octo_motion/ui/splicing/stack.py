@@ -15,7 +15,7 @@ import bpy
 
 from ...blender import actions
 from ...blender.armature import armature_data, read_skeleton
-from ...blender.clips import read_clip, write_clip
+from ...blender.clips import further_channels, read_clip, write_clip
 from ...core.errors import ClipError, WriteError
 from ...core.splicing.alignment import Suggestion, suggest_timings
 from ...core.splicing.carry import Side, carriers
@@ -330,6 +330,7 @@ def write(stack: Stack, clip: Clip) -> Summary:
     if previous is not None and is_source(previous):
         # Someone splices from it: it stays as it is.
         previous = None
+    besides = _besides(armature, clip)
     kept, group.result = group.result, None
     try:
         action = write_clip(
@@ -338,8 +339,9 @@ def write(stack: Stack, clip: Clip) -> Summary:
             name=f"{stack.base.clip.name} Spliced",
             note=_note(settings),
             previous=previous,
+            besides=besides,
         )
-    except WriteError:
+    except BaseException:
         group.result = kept
         raise
     group.result = action
@@ -348,6 +350,15 @@ def write(stack: Stack, clip: Clip) -> Summary:
         write_landmarks(group.landmarks, stack.base.landmarks.bones)
     acting = sum(splice is not None for splice in stack.splices)
     return Summary(action.name, len(clip), acting)
+
+
+def _besides(armature: bpy.types.Object, clip: Clip) -> list[actions.Channel]:
+    """What the base moves besides the body, as it does."""
+    group = cast("Any", splicing_settings(armature))
+    if group.base is None:
+        return []
+    slot = group.base.slots.get(group.base_slot) if group.base_slot else None
+    return further_channels(armature, group.base, slot, clip.frames)
 
 
 def is_source(action: bpy.types.Action) -> bool:
