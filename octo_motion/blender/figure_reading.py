@@ -95,7 +95,8 @@ def read_rig(
         smallest: share of the figure's size below which bones only follow.
 
     Raises:
-        RigError: it is no armature, has no bones, no size, an uneven scale, or nothing to pose.
+        RigError: it is no armature, has no bones, no size, an uneven scale, or nothing to pose; or
+            it is shown at rest.
     """
     skeleton = read_skeleton(armature)
     if armature.pose is None or len(armature.pose.bones) != len(skeleton):
@@ -103,6 +104,11 @@ def read_rig(
     if armature.pose is None:
         raise RigError(
             f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+        )
+    if armature_data(armature).pose_position == "REST":
+        raise RigError(
+            f"'{armature.name}' is shown at rest, whatever its pose is.",
+            "Set its data to Pose Position (Properties > Data > Skeleton).",
         )
     scale = even_scale(armature)
     posed = posed_bones(armature, scale)

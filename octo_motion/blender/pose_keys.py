@@ -102,11 +102,24 @@ class PoseKeys:
         if target == "CURRENT" and data is not None and data.action is not None:
             _writable_action(data.action)
 
-    def insert(self, armature: bpy.types.Object, keyed: Iterable[Keyed], frame: float) -> list[str]:
+    def insert(
+        self,
+        armature: bpy.types.Object,
+        keyed: Iterable[Keyed],
+        frame: float,
+        *,
+        auto: bool = False,
+    ) -> list[str]:
         """Key bones as they are, by the scene's keying set and the settings of keying.
 
         Without a keying set the channels that posing moves get keys: rotation, and the location
         of bones that were moved as a whole.
+
+        Args:
+            armature: the armature object.
+            keyed: its bones.
+            frame: at which.
+            auto: whether this is auto keying, which has settings of its own.
 
         Returns:
             Names of the bones that got a key: with *Only Insert Needed* not all may.
@@ -117,9 +130,13 @@ class PoseKeys:
         bones = list(keyed)
         scene = bpy.context.scene
         assert scene is not None
+        known = len(self._noted)
         self._prepare(armature)
-        options, kind = _options(scene), _key_type(scene)
+        options, kind = _options(scene, auto=auto), _key_type(scene)
         active = scene.keying_sets_all.active
+        assert scene.tool_settings is not None
+        if auto and not scene.tool_settings.use_keyframe_insert_keyingset:
+            active = None
         if active is not None and active.is_path_absolute:
             how = _with_set(options, active), kind
             done = self._insert_paths(armature, active, frame, how)
@@ -136,8 +153,11 @@ class PoseKeys:
                 ]
                 if any(results):
                     done.append(each.bone)
+        if not done and len(self._noted) > known:
+            # No action is left behind that nothing went into.
+            self._take_back(armature, self._noted.pop())
         self.count += bool(done)
-        return done
+        return [name for name in done if name]
 
     def insert_motion(
         self,
@@ -353,6 +373,7 @@ class PoseKeys:
         frame: float,
         how: tuple[set[str], str],
     ) -> list[str]:
+        """Names of the bones that got keys, empty ones for other properties."""
         done: list[str] = []
         for path in keying_set.paths:
             if path.id != armature:
@@ -365,10 +386,7 @@ class PoseKeys:
                 continue
             single = not path.use_entire_array and hasattr(value, "__len__")
             component = path.array_index if single else -1
-            if (
-                self._insert(armature, path.data_path, frame, name, how, component=component)
-                and name
-            ):
+            if self._insert(armature, path.data_path, frame, name, how, component=component):
                 done.append(bpy.utils.unescape_identifier(name))
         return list(dict.fromkeys(done))
 
@@ -423,15 +441,20 @@ class PoseKeys:
             replace_stretch(curve, each)
 
 
-def _options(scene: bpy.types.Scene) -> set[str]:
-    """The artist's settings of keying, as Blender's Insert Keyframe takes them."""
+def _options(scene: bpy.types.Scene, *, auto: bool) -> set[str]:
+    """The artist's settings of keying, those of Insert Keyframe or of auto keying."""
     preferences = bpy.context.preferences
     assert preferences is not None
     assert scene.tool_settings is not None
     options: set[str] = set()
-    if preferences.edit.use_keyframe_insert_needed:
+    edit = preferences.edit
+    if edit.use_auto_keyframe_insert_needed if auto else edit.use_keyframe_insert_needed:
         options.add("INSERTKEY_NEEDED")
-    if preferences.edit.use_visual_keying:
+    if auto and edit.use_keyframe_insert_available:
+        options.add("INSERTKEY_AVAILABLE")
+    if auto and scene.tool_settings.auto_keying_mode == "REPLACE_KEYS":
+        options.add("INSERTKEY_REPLACE")
+    if edit.use_visual_keying:
         options.add("INSERTKEY_VISUAL")
     if scene.tool_settings.use_keyframe_cycle_aware:
         options.add("INSERTKEY_CYCLE_AWARE")

@@ -20,7 +20,7 @@ _STILL = 1e-6
 
 
 class Puppet:
-    """An armature in the hands of a session.
+    """An armature in the hands of a session, whatever it is called meanwhile.
 
     Args:
         armature: the armature object, local to this file.
@@ -29,6 +29,7 @@ class Puppet:
 
     def __init__(self, armature: bpy.types.Object, rig: Rig | None = None) -> None:
         self.name = armature.name
+        self._number = armature.session_uid
         self.rig = rig or read_rig(armature)
         self._bones = armature_bones(armature)
         # What the bones show already is not written: their own values stay exactly as they are.
@@ -46,11 +47,24 @@ class Puppet:
         Raises:
             RigError: it is gone, or its bones are others.
         """
-        found = bpy.data.objects.get((self.name, None))
-        if found is None or found.pose is None:
-            raise RigError(f"'{self.name}' is gone.", "Start posing again with another armature.")
+        found = self.found()
         if armature_bones(found) != self._bones:
             raise RigError(f"The bones of '{self.name}' have changed.", "Start posing again.")
+        return found
+
+    def found(self) -> bpy.types.Object:
+        """The armature object, whatever its bones are by now.
+
+        Raises:
+            RigError: it is gone.
+        """
+        found = bpy.data.objects.get((self.name, None))
+        if found is None or found.session_uid != self._number:
+            everything = (each for each in bpy.data.objects if each.session_uid == self._number)
+            found = next(everything, None)
+        if found is None or found.pose is None:
+            raise RigError(f"'{self.name}' is gone.", "Start posing again with another armature.")
+        self.name = found.name
         return found
 
     def read(self) -> Pose:

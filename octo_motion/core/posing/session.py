@@ -302,8 +302,12 @@ class Session:
         return sorted(self._touched)
 
     def adopt(self, pose: Pose) -> None:
-        """Take a pose that was given from elsewhere, at rest; the hand lets go."""
+        """Take a pose that was given from elsewhere, at rest; the hand lets go.
+
+        It is where the figure is touched from: what was bent before is there no more.
+        """
         self.release()
+        self._touched.clear()
         self.world.set_pose(pose)
         self._pin_again()
         self._reference = self.world.pose()

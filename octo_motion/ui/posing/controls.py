@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
 from typing import Any, Final, Protocol
 
@@ -113,9 +114,9 @@ class PoseControls:
         if self.session.measuring is not None:
             self.session.tick(seconds, self.hand)
             return
-        if self.session.core.grip is None:
+        if self.hand is not None and self.session.core.grip is None:
             # A change of frame has taken the puppet out of the hand.
-            self.hand = None
+            self._lose()
         self.session.tick(seconds, self.hand, self._turn)
 
     def handle(self, event: Any, view: EyeOn | None, x: float = 0.0, y: float = 0.0) -> Outcome:
@@ -185,8 +186,7 @@ class PoseControls:
         if body is None:
             self.said = "Point at a limb to measure its joint"
             return
-        self._latched = self._turning = False
-        self.hand = None
+        self._lose()
         try:
             self.session.measure(body)
             self.said = ""
@@ -225,7 +225,7 @@ class PoseControls:
         elif kind == "P":
             self._pin()
         elif kind == "K":
-            self._say_keys(session.key(all_bones=event.shift))
+            self._say_keys(lambda: session.key(all_bones=event.shift))
         elif kind == "O":
             self._record()
         elif kind == "M":
@@ -237,7 +237,7 @@ class PoseControls:
                 session.restore()
                 self.said = "As at the start"
         elif kind == "Z" and (event.ctrl or getattr(event, "oskey", False)) and not event.shift:
-            self.hand = None
+            self._lose()
             self.said = "Back" if session.step_back() else "Nothing to take back"
         else:
             return Outcome.PASSED
@@ -257,14 +257,18 @@ class PoseControls:
         self.said = ""
         return Outcome.TAKEN
 
-    def _let_go(self, *, keep: bool = True) -> None:
+    def _lose(self) -> None:
+        """The hand holds nothing any more."""
         self._latched = self._turning = False
         self.hand = None
+
+    def _let_go(self, *, keep: bool = True) -> None:
+        self._lose()
         if self.session.measuring is not None:
             self.session.measuring.release()
             return
         if keep:
-            self._say_keys(self.session.release(), quiet=True)
+            self._say_keys(self.session.release, quiet=True)
         else:
             self.session.step_back()
 
@@ -318,16 +322,30 @@ class PoseControls:
 
     def _record(self) -> None:
         if self.session.recording:
-            bones, count = self.session.stop_record()
+            try:
+                bones, count = self.session.stop_record()
+            except OctoMotionError as error:
+                self.said = str(error)
+                return
             self.said = f"Recorded {bones} bones on {count} key frames"
         else:
             self.session.record()
             self.said = "Recording while the frames go by: play, and drag"
 
-    def _say_keys(self, names: list[str], *, quiet: bool = False) -> None:
+    def _say_keys(self, key: Callable[[], list[str]], *, quiet: bool = False) -> None:
+        try:
+            names = key()
+        except OctoMotionError as error:
+            # Nothing was keyed, and nothing else is lost.
+            self.said = str(error)
+            return
         if names:
             self.said = f"Keyed {len(names)} bones at frame {self.session.scene().frame_current}"
-        elif not quiet:
+        elif quiet:
+            return
+        elif self.session.core.touched():
+            self.said = "Nothing keyed: by the settings of keying, no bone needs or takes a key"
+        else:
             self.said = "Nothing to key: no bone was moved"
 
     def told(self) -> str:
@@ -352,8 +370,7 @@ class PoseControls:
         told = session.told
         if told is not None and not told.resting and told.ratio < SLOW:
             parts.append(f"slower than real time: {100.0 * told.ratio:.0f} %")
-        if self.said:
-            parts.append(self.said)
+        parts += [each for each in (self.said, session.warning) if each]
         return "    ".join(parts)
 
 

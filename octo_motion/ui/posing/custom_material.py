@@ -9,6 +9,7 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
+from ...blender.armature import armature_data
 from ...blender.figure_reading import bone_materials, set_bone_material
 from ...core.errors import RigError
 from ...core.posing.figure import Figure
@@ -91,20 +92,19 @@ def keep_material(armature: bpy.types.Object, settings: Any, material: Material,
     settings.custom_settles = material.settles
 
 
-def kept_before(armature: bpy.types.Object, settings: Any, bone: str) -> Callable[[], None]:
-    """What puts back the material that there is now; asked for before ``keep_material``."""
-    name = armature.name
+def kept_before(
+    armature: bpy.types.Object, settings: Any, bone: str
+) -> Callable[[bpy.types.Object], None]:
+    """What puts back the armature's material of now; asked for before ``keep_material``."""
     values = {each: getattr(settings, each) for each in NAMES}
     own = bone_materials(armature).get(bone)
 
-    def put_back() -> None:
-        found = bpy.data.objects.get((name, None))
-        if found is None:
-            return
+    def put_back(armature: bpy.types.Object) -> None:
         if bone:
-            set_bone_material(found, bone, own)
+            if bone in armature_data(armature).bones:
+                set_bone_material(armature, bone, own)
             return
-        now = posing_settings(found)
+        now = posing_settings(armature)
         for each, value in values.items():
             setattr(now, each, value)
 

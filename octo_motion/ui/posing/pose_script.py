@@ -177,11 +177,14 @@ def play_file(armature: bpy.types.Object, scene: bpy.types.Scene, path: Path) ->
     before = {name: getattr(settings, name) for name in script.settings if hasattr(settings, name)}
     try:
         apply_settings(armature, script.settings)
+        frame, subframe = scene.frame_current, scene.frame_subframe
         session = PuppetSession(armature, scene, clock=None)
         player = Player(session, script)
         try:
             player.play()
         except BaseException:
+            if (scene.frame_current, scene.frame_subframe) != (frame, subframe):
+                scene.frame_set(frame, subframe=subframe)
             session.cancel()
             raise
         session.finish()

@@ -267,6 +267,9 @@ def marked_obstacles(scene: bpy.types.Scene) -> list[tuple[bpy.types.Object, str
     found: list[tuple[bpy.types.Object, str]] = []
     for item in scene.objects:
         own: Any = item
+        # Settings come into being when they are looked at: what has none is left without.
+        if not own.is_property_set("octo_motion"):
+            continue
         kind = own.octo_motion.posing.obstacle
         if kind != "NONE" and item.visible_get():
             found.append((item, kind))

@@ -129,10 +129,10 @@ class PuppetSession:
         settings: Any = posing_settings(armature)
         self.puppet = Puppet(armature, read_rig(armature, smallest=settings.smallest))
         self.keys = PoseKeys(armature, settings.keys_to, settings.action)
-        self._scene = scene.name
+        self._scene = scene.session_uid
         self._shown = _Shown.of(settings)
         self._materials = self._bone_materials(armature)
-        self._measured: list[Callable[[], None]] = []
+        self._measured: list[Callable[[bpy.types.Object], None]] = []
         self.measuring: MeasuringHand | None = None
         figure = replace(self.puppet.figure, elements=self._elements(self.puppet.figure))
         self.core = Session(
@@ -150,9 +150,12 @@ class PuppetSession:
         self._recorded: dict[float, _Moment] | None = None
         self._down = False
         self.told: Told | None = None
+        self.warning = ""
+        """What is wrong with the scene, and keeps nobody from posing."""
+        self._trouble: OctoMotionError | None = None
         self._one_thread = OneThread()
-        bpy.app.handlers.frame_change_post.append(self._follow)
-        bpy.app.handlers.load_pre.append(self._file_goes)
+        for called, handler in self._handlers():
+            called.append(handler)
         _active.append(self)
 
     # --- What is there --------------------------------------------------------------------------
@@ -178,9 +181,9 @@ class PuppetSession:
         Raises:
             RigError: it is gone.
         """
-        found = bpy.data.scenes.get(self._scene)
+        found = next((each for each in bpy.data.scenes if each.session_uid == self._scene), None)
         if found is None:
-            raise RigError(f"The scene '{self._scene}' is gone.", "Start posing again.")
+            raise RigError("The scene of the session is gone.", "Start posing again.")
         return found
 
     def bone(self, body: int) -> str:
@@ -263,7 +266,7 @@ class PuppetSession:
         self.core.release()
         tools = self.scene().tool_settings
         if tools.use_keyframe_insert_auto and self._recorded is None:
-            return self.key()
+            return self._insert(self.core.touched(), auto=True)
         return []
 
     def toggle_pin(self, body: int) -> bool:
@@ -287,6 +290,9 @@ class PuppetSession:
         Raises:
             RigError: the armature is gone, changed or in edit mode.
         """
+        trouble, self._trouble = self._trouble, None
+        if trouble is not None:
+            raise trouble
         armature = self.puppet.armature()
         if armature.mode == "EDIT":
             raise RigError(f"'{armature.name}' is in edit mode.", "Leave it and start again.")
@@ -380,10 +386,14 @@ class PuppetSession:
             bodies = [self.body(each) for each in bones]
         else:
             bodies = list(range(len(self.figure))) if all_bones else self.core.touched()
+        return self._insert(bodies)
+
+    def _insert(self, bodies: Iterable[int], *, auto: bool = False) -> list[str]:
         keyed = [Keyed(self.bone(body), self.puppet.places(body)) for body in bodies]
         if not keyed:
             return []
-        return self.keys.insert(self.puppet.armature(), keyed, self.scene().frame_current_final)
+        frame = self.scene().frame_current_final
+        return self.keys.insert(self.puppet.armature(), keyed, frame, auto=auto)
 
     @property
     def recording(self) -> bool:
@@ -442,12 +452,19 @@ class PuppetSession:
         return done
 
     def finish(self) -> None:
-        """End, and keep the pose and the keys; safe to call twice."""
-        if not self._down:
+        """End, and keep the pose and the keys; safe to call twice.
+
+        Raises:
+            OctoMotionError: what is still to be keyed cannot be; it is over all the same.
+        """
+        if self._down:
+            return
+        try:
             self.drop_measure()
-            self.core.release()
+            self.release()
             if self._recorded is not None:
                 self.stop_record()
+        finally:
             self._leave()
 
     def cancel(self) -> None:
@@ -457,13 +474,16 @@ class PuppetSession:
         self.core.release()
         self._leave()
         try:
-            armature = self.puppet.armature()
+            armature = self.puppet.found()
             scene = self.scene()
         except OctoMotionError:
             return
         for take_back in reversed(self._measured):
-            take_back()
+            take_back(armature)
         self.keys.take_back(armature)
+        if bpy.context.view_layer is not None:
+            # Keys that are written anew pose bones once more, and are to do it before the rest.
+            bpy.context.view_layer.update()
         restore_pose(armature, self._values)
         if scene.frame_current_final != self._started:
             # What has keys is at another frame now.
@@ -479,17 +499,25 @@ class PuppetSession:
         """Whether it is over."""
         return self._down
 
+    def _handlers(self) -> tuple[tuple[Any, Any], ...]:
+        """Blender's lists of what it calls, and what it is to call of this session."""
+        known = bpy.app.handlers
+        return (
+            (known.frame_change_post, self._follow),
+            (known.undo_post, self._undone),
+            (known.redo_post, self._undone),
+            (known.load_pre, self._file_goes),
+        )
+
     def _file_goes(self, *_: object) -> None:
         self.abandon()
 
     def _leave(self) -> None:
         self._down = True
         self._one_thread.end()
-        followers, loaders = bpy.app.handlers.frame_change_post, bpy.app.handlers.load_pre
-        if self._follow in followers:
-            followers.remove(self._follow)
-        if self._file_goes in loaders:
-            loaders.remove(self._file_goes)
+        for called, handler in self._handlers():
+            if handler in called:
+                called.remove(handler)
         if self in _active:
             _active.remove(self)
 
@@ -497,8 +525,20 @@ class PuppetSession:
 
     def _follow(self, scene: bpy.types.Scene, *_: object) -> None:
         """A change of frame poses the armature as its action says."""
-        if scene.name != self._scene or scene.frame_current_final == self._frame:
+        if scene.session_uid != self._scene or scene.frame_current_final == self._frame:
             return
+        self._see(scene)
+
+    def _undone(self, *_: object) -> None:
+        """Blender has put the file into another state: a recording of this one is over."""
+        self._recorded = None
+        try:
+            self._see(self.scene())
+        except OctoMotionError as error:
+            self._trouble = error
+
+    def _see(self, scene: bpy.types.Scene) -> None:
+        """Something else has posed the armature, and moved obstacles perhaps."""
         self._frame = scene.frame_current_final
         try:
             self.measuring = None
@@ -507,11 +547,19 @@ class PuppetSession:
                 self.core.adopt(self.puppet.read())
             else:
                 self._record_frame(self._frame)
-            if marked_obstacles(scene):
-                self.core.change_obstacles(self._obstacles())
-        except OctoMotionError:
-            # The next tick says what is wrong.
-            return
+        except OctoMotionError as error:
+            # The next tick says so.
+            self._trouble = error
+        if self._marked or marked_obstacles(scene):
+            self._see_obstacles()
+
+    def _see_obstacles(self) -> None:
+        """Take obstacles as they are now; with one that is damaged, they stay as they were."""
+        try:
+            self.core.change_obstacles(self._obstacles())
+            self.warning = ""
+        except OctoMotionError as error:
+            self.warning = str(error)
 
     def _moment(self) -> _Moment:
         pose = self.core.pose
@@ -537,7 +585,7 @@ class PuppetSession:
             self.core.change_elements(self._elements(self.figure))
             self.core.hand = hand_for(self.figure, shown.strength)
         if before.ground != shown.ground:
-            self.core.change_obstacles(self._obstacles())
+            self._see_obstacles()
         wanted = self._world_settings()
         self.core.change(
             gravity=wanted.gravity,
@@ -574,10 +622,11 @@ class PuppetSession:
         if self._shown.floor:
             height = self._shown.floor_height * self.unit
             obstacles.append(Plane(position=np.array([0.0, 0.0, height])))
-        if self._shown.use_obstacles:
-            obstacles += [
-                read_obstacle(item, kind, self.unit)
-                for item, kind in marked_obstacles(self.scene())
-                if item.name != self.puppet.name
-            ]
+        marked = marked_obstacles(self.scene()) if self._shown.use_obstacles else []
+        self._marked = bool(marked)
+        obstacles += [
+            read_obstacle(item, kind, self.unit)
+            for item, kind in marked
+            if item.name != self.puppet.name
+        ]
         return obstacles

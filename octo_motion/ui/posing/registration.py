@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
+from ...core.errors import OctoMotionError
 from .device_pose import active_hands
 from .overlay import take_down_all
 from .puppet_session import active_session
@@ -15,5 +18,6 @@ def unregister() -> None:
         hands.stop()
     session = active_session()
     if session is not None:
-        session.finish()
+        with suppress(OctoMotionError):
+            session.finish()
     take_down_all()

@@ -120,6 +120,8 @@ class SessionOperator(ArmatureOperator):
             finally:
                 if session is not None:
                     session.finish() if keep else session.cancel()
+        except OctoMotionError as error:
+            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
         finally:
             if overlay is not None:
                 overlay.take_down()
