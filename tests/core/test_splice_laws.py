@@ -182,6 +182,25 @@ def test_without_the_clavicle_the_hand_still_lands_exactly_where_it_reaches(seed
     assert (missed <= np.maximum(needed - arm, 0.0) + 0.6 * SOFT * arm).all()
 
 
+def test_an_arm_that_does_not_hang_on_its_collar_bone_comes_without_it():
+    random = np.random.default_rng(5)
+    skeleton = humanoid(random)
+    parents = list(skeleton.parents)
+    upper, clavicle = (skeleton.index[LANDMARKS[f"{name}.R"]] for name in ("upper_arm", "clavicle"))
+    assert parents[upper] == clavicle
+    parents[upper] = parents[clavicle]
+    base = motion(random, skeleton)
+    loose = motion(random, replace(skeleton, parents=tuple(parents)))
+    for ours, theirs in ((base, loose), (loose, base)):
+        with_it, without = (
+            spliced(
+                ours, LANDMARKS, Splice(RIGHT_ARM, theirs, FROM_START, LANDMARKS, clavicle=each)
+            )
+            for each in (True, False)
+        )
+        np.testing.assert_array_equal(with_it.rotations, without.rotations)
+
+
 def test_trunk_and_head_take_the_whole_orientation():
     random = np.random.default_rng(5)
     skeleton = humanoid(random)

@@ -324,7 +324,9 @@ def _piece_carrier(
     ours, theirs = base.humanoid(), splice.humanoid()
     kind, _, side = piece.partition(".")
     if kind == "arm" and clavicle:
-        clavicle = all(each.get(f"clavicle.{side}") for each in (ours, theirs))
+        clavicle = all(
+            _has_clavicle(each.skeleton, each.humanoid(), side) for each in (base, splice)
+        )
     from_pelvis = kind == "trunk" or (kind == "leg" and seen_from != "chest")
     with base.told():
         bones = piece_bones(piece, base.skeleton, ours, clavicle=clavicle)
@@ -365,6 +367,16 @@ def _piece_carrier(
         with splice.told():
             limb = our_limb, _three(splice.skeleton, theirs, names)
     return Carrier(base, splice, tuple(bones), frames, match, limb, spread, bent)
+
+
+def _has_clavicle(skeleton: Skeleton, landmarks: Landmarks, side: str) -> bool:
+    """Whether there is a collar bone, and the arm hangs on it."""
+    if landmarks.get(f"clavicle.{side}") is None:
+        return False
+    clavicle, upper = (
+        landmark_bone(skeleton, landmarks, f"{name}.{side}") for name in ("clavicle", "upper_arm")
+    )
+    return upper in beneath(skeleton, [clavicle])
 
 
 def _three(skeleton: Skeleton, landmarks: Landmarks, names: Sequence[str]) -> tuple[int, int, int]:
