@@ -826,6 +826,20 @@ def test_a_limb_that_is_no_chain_is_told_with_what_helps() -> None:
     assert_refused("'Source': 'hand.L' does not hang on .*bake its motion", "splice_build")
 
 
+def test_hips_that_are_fixed_to_their_parent_cannot_travel() -> None:
+    hero, _ = hero_and_source()
+    bpy.ops.object.mode_set(mode="EDIT")
+    hips = hero.data.edit_bones["hips"]
+    root = hero.data.edit_bones.new("root")
+    root.head, root.tail = (0.0, 0.3, 0.0), hips.head
+    hips.parent, hips.use_connect = root, True
+    bpy.ops.object.mode_set(mode="OBJECT")
+    OPERATORS.splice_add(part="LEGS")
+    OPERATORS.splice_build()
+    stack_of(hero).splices[0].with_travel = True
+    assert_refused("'hips' cannot travel: it is connected to 'root'", "splice_build")
+
+
 def test_a_clip_of_no_use_for_timing_is_told() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()

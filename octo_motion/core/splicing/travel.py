@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from ..errors import ClipError
 from ..rotations import (
     Floats,
     conjugate,
@@ -52,6 +53,9 @@ class Travel:
     Args:
         carrier: a leg, seen from the pelvis.
         ground: height of the ground on which the base stands, world units.
+
+    Raises:
+        ClipError: the base's hips cannot leave their parent.
     """
 
     def __init__(self, carrier: Carrier, ground: float) -> None:
@@ -59,6 +63,13 @@ class Travel:
         self._ground = ground
         self._other_ground = ground_height(carrier.splice)
         ours, theirs = carrier.base, carrier.splice
+        skeleton, hips = ours.skeleton, carrier.frames[0].bone
+        if skeleton.connected[hips] and skeleton.parents[hips] >= 0:
+            name, parent = skeleton.names[hips], skeleton.names[skeleton.parents[hips]]
+            raise ClipError(
+                f"'{name}' cannot travel: it is connected to '{parent}'.",
+                "Turn off its Connected (bone properties, Relations), or With Travel.",
+            )
         self._ratio = _leg(ours) * ours.clip.scale / (_leg(theirs) * theirs.clip.scale)
 
     def move(
