@@ -236,6 +236,8 @@ def further_channels(
         if not isinstance(value, str):
             now = [value] if isinstance(value, (bool, int, float)) else list(value)
         values = _values({("", ""): components}, "", "", now, frames)
+        if not np.isfinite(values).all():
+            continue
         group = next(iter(components.values())).group
         bone = path.removeprefix('pose.bones["').partition('"]')[0]
         channels.append(Channel(path, values, group.name if group is not None else bone))

@@ -229,11 +229,16 @@ def test_scaled_bones_carry_their_children():
     assert_shown(armature, read_clip(armature), 20.0, y_only=True)
 
 
-def test_nothing_of_a_clip_is_among_what_else_an_action_moves():
+def test_nothing_of_a_clip_and_no_damaged_key_is_among_what_else_an_action_moves():
     armature = make_rig()
     animate(armature, scale=True)
     armature.pose.bones[0].keyframe_insert("rotation_mode", frame=1)
     armature.keyframe_insert("delta_location", frame=1)
+    armature["broken"] = 1.0
+    armature.keyframe_insert('["broken"]', frame=1)
+    action = armature.animation_data.action
+    curve = action.layers[0].strips[0].channelbags[0].fcurves.find('["broken"]')
+    curve.keyframe_points[0].co.y = float("nan")
     assert further_channels(armature, armature.animation_data.action, None, np.arange(3.0)) == []
 
 
