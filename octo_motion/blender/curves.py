@@ -322,7 +322,10 @@ def _smooth_segments(points: Floats, cyclic: bool) -> Floats:  # noqa: FBT001
     The direction at a point is that of the parabola through it and its neighbours, which points
     at uneven distances do not sway.
     """
-    points = points[np.any(points != np.roll(points, 1, axis=0), axis=-1)]
+    moves = np.any(points != np.roll(points, 1, axis=0), axis=-1)
+    # An open line may come back to where it started.
+    moves[:1] |= not cyclic
+    points = points[moves]
     if len(points) < 3:
         return np.stack([points[:-1], points[:-1], points[1:], points[1:]], axis=1)
     before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)

@@ -241,6 +241,18 @@ def test_a_route_bent_by_a_modifier_is_followed_as_drawn(
     assert np.sum(tangent[1:] * tangent[:-1], axis=-1).min() > 0.9999
 
 
+def test_a_line_that_comes_back_to_its_start_keeps_its_first_piece() -> None:
+    data = new_curve()
+    data.resolution_u = 3
+    add_bezier(data, (*WAVE, WAVE[0]))
+    curve = linked(data)
+    bend(curve, on_points=False)
+    route, points = read_route(curve), drawn(curve)
+    assert not route.cyclic
+    assert len(route.controls) == len(points) - 1
+    assert distance_to(route, points) < 1e-4
+
+
 def test_a_switched_off_modifier_does_nothing() -> None:
     curve = linked(new_curve())
     add_bezier(curve.data, WAVE)
