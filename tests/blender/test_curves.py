@@ -244,7 +244,7 @@ def test_a_route_bent_by_a_modifier_is_followed_as_drawn(
 def test_a_line_that_comes_back_to_its_start_keeps_its_first_piece() -> None:
     data = new_curve()
     data.resolution_u = 3
-    add_bezier(data, (*WAVE, WAVE[0]))
+    add_bezier(data, [*WAVE, WAVE[0]])
     curve = linked(data)
     bend(curve, on_points=False)
     route, points = read_route(curve), drawn(curve)

@@ -69,6 +69,34 @@ def test_each_cycle_goes_on_from_where_the_one_before_has_led(walker: Any) -> No
     assert modifiers(lasting(longer, 90)) == modifiers(longer)
 
 
+@pytest.mark.parametrize("cut", [False, True])
+def test_all_curves_repeat_together(walker: Any, *, cut: bool) -> None:
+    """Also one whose keys end earlier, and where the artist has set a shorter range."""
+    action = walker.animation_data.action
+    curve = (
+        action.layers[0]
+        .strips[0]
+        .channelbags[0]
+        .fcurves.find('pose.bones["Bone"].rotation_euler', index=0)
+    )
+    while len(curve.keyframe_points) > 12:
+        curve.keyframe_points.remove(curve.keyframe_points[-1])
+    period = PERIOD
+    if cut:
+        action.use_frame_range, action.frame_start, action.frame_end = True, 3, 15
+        period = 12
+    before = keys(action)
+    once = read_clip(walker, action)
+    longer = lasting(action, 3 * period + 1)
+    clip = read_clip(walker, longer)
+    assert (len(once), len(clip)) == (period + 1, 3 * period + 1)
+    for start in (0, period, 2 * period):
+        # Where one cycle ends the next begins: here, with another pose.
+        rows = slice(start + 1, start + period)
+        assert angle_between(clip.rotations[rows], once.rotations[1:-1]).max() < 1e-5
+    assert keys(action) == before
+
+
 def test_a_longer_motion_is_cut(walker: Any) -> None:
     action = walker.animation_data.action
     shorter = lasting(action, 8)
