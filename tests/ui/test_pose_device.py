@@ -582,6 +582,23 @@ def test_turn_of_blenders_space_mouse_is_the_caps_own(monkeypatch: pytest.Monkey
         session.cancel()
 
 
+def test_force_that_was_chosen_holds_when_another_file_is_opened(tmp_path: Path) -> None:
+    """Whoever turned the force down must not feel all of it after File, Open."""
+    path = str(tmp_path / "other.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    settings = device_settings(bpy.context.window_manager)
+    settings.force, settings.toggle = 0.25, True
+    try:
+        bpy.ops.wm.open_mainfile(filepath=path)
+        settings = device_settings(bpy.context.window_manager)
+        assert (settings.force, settings.toggle) == (0.25, True)
+        bpy.ops.wm.read_homefile()
+        settings = device_settings(bpy.context.window_manager)
+        assert (settings.force, settings.toggle) == (0.25, True)
+    finally:
+        settings.force, settings.toggle = 1.0, False
+
+
 def test_settings_of_the_panel_are_told_in_the_bridges_units() -> None:
     settings = device_settings(bpy.context.window_manager)
     settings.force, settings.toggle, settings.speed, settings.reach = 0.5, True, 2.0, 0.1

@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import Any, Final, cast
 
 import bpy
+from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, FloatProperty, PointerProperty
 
 from ...device.messages import Settings
@@ -92,6 +93,38 @@ def message(settings: Any, size: float) -> Settings:
 CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PG_device,)
 
 
+_kept: Final[dict[str, Any]] = {}
+"""What holds while another file is opened: Blender then begins with settings as made."""
+
+
+@persistent
+def _before_loading(*_: object) -> None:
+    manager = bpy.context.window_manager
+    if manager is not None:
+        settings = device_settings(manager)
+        _kept.update((name, getattr(settings, name)) for name in _names(settings))
+
+
+@persistent
+def _after_loading(*_: object) -> None:
+    manager = bpy.context.window_manager
+    if manager is not None:
+        settings = device_settings(manager)
+        for name in _names(settings):
+            if name in _kept:
+                setattr(settings, name, _kept[name])
+
+
+def _names(settings: Any) -> list[str]:
+    own = settings.bl_rna.properties
+    return [each.identifier for each in own if each.identifier not in {"rna_type", "name"}]
+
+
+def _handlers() -> tuple[tuple[list[Any], Any], ...]:
+    known: Any = bpy.app.handlers
+    return ((known.load_pre, _before_loading), (known.load_post, _after_loading))
+
+
 def register() -> None:
     """Give the window manager its settings."""
     bpy.types.WindowManager.octo_motion_device = PointerProperty(  # type: ignore[attr-defined]
@@ -99,8 +132,14 @@ def register() -> None:
         description="How devices behave at this computer",
         type=OCTO_MOTION_PG_device,
     )
+    for known, handler in _handlers():
+        known.append(handler)
 
 
 def unregister() -> None:
     """Take them away."""
+    for known, handler in _handlers():
+        if handler in known:
+            known.remove(handler)
+    _kept.clear()
     del bpy.types.WindowManager.octo_motion_device  # type: ignore[attr-defined]
