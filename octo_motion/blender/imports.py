@@ -8,6 +8,7 @@ cannot be used leaves no data-block behind.
 from __future__ import annotations
 
 import gc
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -127,8 +128,9 @@ def import_clip(
             for each in made:
                 _take_off_tracks(each)
             own_rate = result.rate or _rate_of_keys(actions, result.placed_by)
+            starts = _starts(actions, takes=result.takes)
             for number, action in enumerate(actions, 1):
-                _place_keys(action, rate / result.placed_by, frame_start)
+                _place_keys(action, rate / result.placed_by, starts[action.name], frame_start)
                 progress(_IMPORTED + (1.0 - _IMPORTED) * number / len(actions))
                 action.use_fake_user = True
                 action[NOTE] = {"file": path.name, "rate": own_rate}
@@ -155,6 +157,8 @@ class _Result:
     placed_by: float
     rate: float | None
     notes: tuple[str, ...] = ()
+    takes: bool = False
+    """Whether actions are called "what moves|take", and those of one take play together."""
 
 
 def _import_bvh(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa: ARG001 - as all
@@ -210,7 +214,8 @@ def _import_fbx(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa:
     _content(path)
     _call(bpy.ops.import_scene.fbx, filepath=str(path))
     # The importer sets the scene's rate to the file's, and counts in whole frames a second.
-    return _Result(float(scene.render.fps), scene.render.fps / scene.render.fps_base)
+    own = scene.render.fps / scene.render.fps_base
+    return _Result(float(scene.render.fps), own, takes=True)
 
 
 def _import_gltf(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa: ARG001 - as all
@@ -383,21 +388,38 @@ def _rate_of_keys(actions: Iterable[bpy.types.Action], placed_by: float) -> floa
     return placed_by / usual if usual > 1e-3 else placed_by
 
 
-def _place_keys(action: bpy.types.Action, factor: float, frame_start: int) -> None:
-    """Stretch an action in time, and move its first key to a frame."""
+def _starts(actions: Iterable[bpy.types.Action], *, takes: bool) -> dict[str, float]:
+    """The first key of each action, by its name; of those of one take, the first of all."""
+    own: dict[str, float] = {}
+    shared: dict[str, float] = {}
+    for action in actions:
+        curves = (curve for curve in _curves(action) if len(curve.keyframe_points))
+        own[action.name] = min(float(_points(curve)[:, 0].min()) for curve in curves)
+        take = _take(action.name)
+        shared[take] = min(own[action.name], shared.get(take, np.inf))
+    return {name: shared[_take(name)] for name in own} if takes else own
+
+
+def _take(action: str) -> str:
+    """FBX: "Armature|Take 1|Layer"; a second such is called "Armature|Take 1|Layer.001"."""
+    return "|".join(re.sub(r"\.\d{3}$", "", action).split("|")[1:2])
+
+
+def _place_keys(action: bpy.types.Action, factor: float, start: float, frame_start: int) -> None:
+    """Stretch an action in time, and move a moment of it to a frame."""
     curves = [curve for curve in _curves(action) if len(curve.keyframe_points)]
-    first = min(float(_points(curve)[:, 0].min()) for curve in curves)
-    last = frame_start
+    first, last = np.inf, -np.inf
     for curve in curves:
         for name in ("co", "handle_left", "handle_right"):
             points = _points(curve, name).astype(np.float64)
-            points[:, 0] = frame_start + (points[:, 0] - first) * factor
+            points[:, 0] = frame_start + (points[:, 0] - start) * factor
             curve.keyframe_points.foreach_set(name, points.astype(np.float32).ravel())
             if name == "co":
+                first = min(first, float(points[:, 0].min()))
                 last = max(last, float(points[:, 0].max()))
         curve.update()
     action.use_frame_range = True
-    action.frame_start, action.frame_end = frame_start, last
+    action.frame_start, action.frame_end = first, last
 
 
 def _name(stem: str, armatures: list[bpy.types.Object], actions: list[bpy.types.Action]) -> None:

@@ -250,6 +250,40 @@ def test_a_rig_with_many_actions_shows_the_first_and_keeps_all(shared_data: Data
     assert armature.animation_data.action_slot is not None
 
 
+# Blender's exporter, with numpy.
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_what_belongs_to_one_take_of_an_fbx_file_stays_together(tmp_path: Path) -> None:
+    """A smile that begins in the middle of a walk does not begin with the walk."""
+    bpy.ops.object.armature_add()
+    armature: Any = bpy.context.object
+    bone = armature.pose.bones[0]
+    for frame in (1, 60):
+        bone.location.x = frame
+        bone.keyframe_insert("location", frame=frame)
+    bpy.ops.mesh.primitive_cube_add()
+    face: Any = bpy.context.object
+    face.parent = armature
+    face.shape_key_add(name="Basis")
+    smile = face.shape_key_add(name="Smile")
+    for frame, value in ((30, 0.0), (40, 1.0), (50, 0.0)):
+        smile.value = value
+        smile.keyframe_insert("value", frame=frame)
+    bpy.context.scene.frame_end = 60
+    path = tmp_path / "walk.fbx"
+    bpy.ops.export_scene.fbx(
+        filepath=str(path),
+        bake_anim_use_all_actions=False,
+        bake_anim_use_nla_strips=False,
+        bake_anim_force_startend_keying=False,
+    )
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    clip = import_clip(path, bpy.context, 11)
+    assert len(clip.actions) == len(bpy.data.actions) == 2
+    for action in bpy.data.actions:
+        assert (action.frame_start, action.frame_end) == (times(action)[0], times(action)[-1])
+    assert {action.frame_start for action in bpy.data.actions} == {11.0, 40.0}
+
+
 def test_one_damaged_file_stops_none_of_the_others(shared_data: Data, tmp_path: Path) -> None:
     for name in ("secondlife/avatar_walk.bvh", "malformed/10_zero_frames.bvh"):
         (tmp_path / Path(name).name).write_bytes(shared_data(name).read_bytes())
