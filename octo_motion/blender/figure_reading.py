@@ -170,7 +170,11 @@ def even_scale(armature: bpy.types.Object) -> float:
 
 
 def posed_bones(armature: bpy.types.Object, scale: float) -> PosedBones:
-    """All bones as they are shown now, in the world."""
+    """All bones as they are shown now, in the world.
+
+    Raises:
+        RigError: a bone is nowhere.
+    """
     shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert shown.pose is not None
     count = len(shown.pose.bones)
@@ -178,6 +182,11 @@ def posed_bones(armature: bpy.types.Object, scale: float) -> PosedBones:
     shown.pose.bones.foreach_get("matrix", buffer)
     # Blender hands over matrices column by column.
     matrices = buffer.reshape(count, 4, 4).transpose(0, 2, 1).astype(np.float64)
+    if not np.isfinite(matrices).all():
+        raise RigError(
+            f"'{armature.name}' has bones posed at undefined positions.",
+            "Clear their transforms (Pose > Clear Transform > All).",
+        )
     world = np.array(shown.matrix_world, dtype=np.float64)
     turned = world[:3, :3] @ matrices[:, :3, :3]
     sizes = np.linalg.norm(turned, axis=1)
@@ -209,7 +218,7 @@ def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
         for curve in armature.animation_data.drivers:
             start, _, rest = curve.data_path.partition('pose.bones["')
             name, _, channel = rest.partition('"].')
-            if not start and channel.startswith("rotation_"):
+            if not start and channel.startswith("rotation_") and not curve.mute:
                 found.add(bpy.utils.unescape_identifier(name))
     return frozenset(found)
 
@@ -248,7 +257,8 @@ def bone_materials(armature: bpy.types.Object) -> dict[str, Material]:
             bears, springs, settles, gives = (float(each) for each in values)
         except (TypeError, ValueError):
             continue
-        if min(springs, settles) > 0.0 and gives >= 0.0 and bears != 0.0:
+        known = not np.isnan((bears, springs)).any() and np.isfinite((settles, gives)).all()
+        if known and min(springs, settles) > 0.0 and gives >= 0.0 and bears != 0.0:
             found[bone.name] = Material(
                 bears if bears > 0.0 else float(np.inf), springs, settles, gives
             )
@@ -279,15 +289,17 @@ def set_bone_material(armature: bpy.types.Object, name: str, material: Material 
 def joint_limits(armature: bpy.types.Object) -> dict[str, JointLimits]:
     """Limits of bones, from Limit Rotation constraints and limits of inverse kinematics.
 
-    A range that a constraint gives goes before that of inverse kinematics about the same axis.
+    About axes that are locked, bones stay as they are. A range that a constraint gives goes before
+    that of inverse kinematics about the same axis.
     """
     assert armature.pose is not None
     found: dict[str, JointLimits] = {}
     for bone in armature.pose.bones:
         ranges = _ik_limits(bone) | _limit_constraint(bone)
-        if ranges:
+        x, y, z = np.array(bone.lock_rotation).tolist()
+        if ranges or x or y or z:
             found[bone.name] = JointLimits(
-                ranges.get("x", FREE), ranges.get("y", FREE), ranges.get("z", FREE)
+                ranges.get("x", FREE), ranges.get("y", FREE), ranges.get("z", FREE), (x, y, z)
             )
     return found
 

@@ -30,7 +30,7 @@ def read_obstacle(item: bpy.types.Object, kind: str, unit: float) -> Obstacle:
         unit: puppet metres of one metre in the world.
 
     Raises:
-        RigError: the object has no size, no surface, or too much of it.
+        RigError: the object has no size, no surface, or too much of it, or is nowhere.
     """
     shown = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     world = np.array(shown.matrix_world, dtype=np.float64)
@@ -38,7 +38,8 @@ def read_obstacle(item: bpy.types.Object, kind: str, unit: float) -> Obstacle:
     if not np.isfinite(world).all() or sizes.min() <= 0.0:
         raise RigError(f"The obstacle '{item.name}' has no size.", "Repair its scale.")
     axes = world[:3, :3] / sizes
-    axes[:, 2] *= np.sign(np.linalg.det(axes)) or 1.0
+    # Of what is mirrored, another axis than a plane's is turned round.
+    axes[:, 0] *= np.sign(np.linalg.det(axes)) or 1.0
     turn = from_matrix(axes)
     if kind == "PLANE":
         return Plane(position=world[:3, 3] * unit, orientation=turn)
@@ -63,6 +64,7 @@ def read_obstacle(item: bpy.types.Object, kind: str, unit: float) -> Obstacle:
 def _bounds(shown: bpy.types.Object) -> tuple[Floats, Floats]:
     """Lower and upper corner (3,) of an object in its own space."""
     corners = np.array([Vector(corner) for corner in shown.bound_box], dtype=np.float64)
+    _check_corners(shown, corners)
     low, high = corners.min(axis=0), corners.max(axis=0)
     if not (high > low).any():
         # Empties and the like show how large they are in their own way.
@@ -71,6 +73,13 @@ def _bounds(shown: bpy.types.Object) -> tuple[Floats, Floats]:
             raise RigError(f"The obstacle '{shown.name}' has no size.", "Repair its scale.")
         return np.full(3, -size), np.full(3, size)
     return low, high
+
+
+def _check_corners(shown: bpy.types.Object, places: np.ndarray) -> None:
+    if not np.isfinite(places).all():
+        raise RigError(
+            f"The obstacle '{shown.name}' has corners at undefined positions.", "Repair its mesh."
+        )
 
 
 def _triangles(shown: bpy.types.Object, *, convex: bool) -> Floats:
@@ -83,6 +92,9 @@ def _triangles(shown: bpy.types.Object, *, convex: bool) -> Floats:
         raise RigError(
             f"The obstacle '{shown.name}' has no faces.", "Choose another shape for it: a box."
         )
+    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", places)
+    _check_corners(shown, places)
     editable = bmesh.new()
     try:
         editable.from_mesh(mesh)

@@ -21,6 +21,7 @@ from ..core.keys import LOCATION, Limb, Track, reduce_keys
 from ..core.rotations import Floats
 from .actions import Channel, location_channel, rotation_channels, writable_armature
 from .key_arrays import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
+from .puppet import carrying_axes
 from .unkeyed import rotation_channel
 
 Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
@@ -198,7 +199,10 @@ class PoseKeys:
                 strict=True,
             )
         ]
-        placed = [location_channel(armature, name, each) for name, each in locations.items()]
+        placed = [
+            location_channel(armature, name, _placed(armature.pose.bones[name].bone, each))
+            for name, each in locations.items()
+        ]
         tracks = [Track(each.values, mode) for each, mode in zip(turned, modes, strict=True)]
         tracks += [Track(each.values, LOCATION) for each in placed]
         (found,) = reduce_keys(frames, [Limb(tracks, angle, distance)])
@@ -439,6 +443,11 @@ class PoseKeys:
                 group = channelbag.groups.get(channel.group)
                 curve.group = group or channelbag.groups.new(channel.group)
             replace_stretch(curve, each)
+
+
+def _placed(bone: bpy.types.Bone, locations: Floats) -> Floats:
+    """Locations (frames, 3) in a bone's rest frame, along the axes that it is placed in."""
+    return locations if bone.use_local_location else locations @ np.array(carrying_axes(bone)).T
 
 
 def _options(scene: bpy.types.Scene, *, auto: bool) -> set[str]:

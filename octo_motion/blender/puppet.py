@@ -6,6 +6,8 @@ Nothing of Blender's is held between calls: only names, and numbers that were re
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
@@ -15,6 +17,7 @@ from ..core.posing.figure import Figure, Pose
 from ..core.rotations import Floats, conjugate, from_matrix, multiply, rotate
 from .figure_reading import Rig, even_scale, posed_bones, read_rig
 
+_NOTHING = 1e-9
 _STILL = 1e-6
 """Quaternion components and puppet metres by which a body may be off its bone unnoticed."""
 
@@ -112,13 +115,31 @@ class Puppet:
         """Whether a body's bone is placed by its location too, not only turned."""
         return bool(self._places[body])
 
+    def with_followers(self, bodies: Iterable[int]) -> list[int]:
+        """Bodies that were turned, and those whose bones have other values because of it.
+
+        A bone that does not inherit rotation, or hangs on a limb by its place alone, does not go
+        along with it by itself.
+        """
+        turned = set(bodies)
+        parents = self.figure.parents
+        for body, carrier in enumerate(self._carriers.tolist()):
+            until = -1 if self._free_turn[body] else carrier
+            above = parents[body]
+            while above not in {-1, until} and body not in turned:
+                if above in turned:
+                    turned.add(body)
+                above = parents[above]
+        return sorted(turned)
+
     def _moved(self, pose: Pose) -> np.ndarray:
         """Bodies whose bones have to be written: those that are turned against their carrier."""
         count = len(self.figure)
         if self._written is None:
             return np.ones(count, dtype=bool)
         before, after = self._written, pose
-        turned = np.abs(_seen(self._carriers, before) - _seen(self._carriers, after)).max(axis=1)
+        carriers = np.where(self._free_turn, -1, self._carriers)
+        turned = np.abs(_seen(carriers, before) - _seen(carriers, after)).max(axis=1)
         shifted = np.abs(before.positions - after.positions).max(axis=1)
         return (turned > _STILL) | (self._places & (shifted > _STILL))
 
@@ -157,6 +178,8 @@ class Puppet:
                 turn = multiply(conjugate(turned[base]), turn)
                 place = rotate(conjugate(turned[base]), place - heads[base])
             self._turns[body], self._offsets[body] = turn, place
+        # What is scaled to nothing cannot be moved.
+        self._sizes[self._sizes < _NOTHING] = 1.0
         parents = np.array(rig.roles.parents)
         connected = np.array([rig.skeleton.connected[bone] for bone in bones])
         self._places = ((parents < 0) | (parents != self._carriers)) & ~connected
@@ -201,7 +224,10 @@ def set_rotation(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
             axis, angle = -axis, -angle
         bone.rotation_axis_angle = (angle, *axis)  # type: ignore[assignment]
     else:
-        bone.rotation_euler = turn.to_euler(mode, bone.rotation_euler)
+        angles = turn.to_euler(mode, bone.rotation_euler)
+        for axis in np.flatnonzero(np.array(bone.lock_rotation)).tolist():
+            angles[axis] = bone.rotation_euler[axis]
+        bone.rotation_euler = angles
 
 
 def carrying_axes(bone: bpy.types.Bone) -> Matrix:

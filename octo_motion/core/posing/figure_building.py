@@ -71,6 +71,8 @@ class JointLimits:
     twist: tuple[float, float] = FREE
     """About the bone, its Y."""
     z: tuple[float, float] = FREE
+    held: tuple[bool, bool, bool] = (False, False, False)
+    """About which of them the bone stays as it is, whatever the range."""
 
 
 def build_figure(
@@ -268,8 +270,11 @@ def _limits(
     ranges = np.array([(each.x, each.twist, each.z) for each in given])
     ranges = np.clip(np.sort(ranges, axis=2), *FREE)
     now = bends(turns)
-    least = np.minimum(ranges[..., 0], now - _SLACK)
-    most = np.maximum(ranges[..., 1], now + _SLACK)
+    held = np.array([each.held for each in given])
+    least = np.where(held, np.inf, ranges[..., 0])
+    most = np.where(held, -np.inf, ranges[..., 1])
+    least = np.minimum(least, now - _SLACK)
+    most = np.maximum(most, now + _SLACK)
     return Limits(np.clip(np.stack([least, most], axis=2), *FREE))
 
 

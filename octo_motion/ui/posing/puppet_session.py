@@ -266,7 +266,7 @@ class PuppetSession:
         self.core.release()
         tools = self.scene().tool_settings
         if tools.use_keyframe_insert_auto and self._recorded is None:
-            return self._insert(self.core.touched(), auto=True)
+            return self._insert(self._touched(), auto=True)
         return []
 
     def toggle_pin(self, body: int) -> bool:
@@ -385,8 +385,11 @@ class PuppetSession:
         if bones is not None:
             bodies = [self.body(each) for each in bones]
         else:
-            bodies = list(range(len(self.figure))) if all_bones else self.core.touched()
+            bodies = list(range(len(self.figure))) if all_bones else self._touched()
         return self._insert(bodies)
+
+    def _touched(self) -> list[int]:
+        return self.puppet.with_followers(self.core.touched())
 
     def _insert(self, bodies: Iterable[int], *, auto: bool = False) -> list[str]:
         keyed = [Keyed(self.bone(body), self.puppet.places(body)) for body in bodies]
@@ -416,13 +419,13 @@ class PuppetSession:
             moved |= set(turned_bodies(self.figure, moments[0].pose, each.pose, TOUCHED))
         if not moved:
             return 0, 0
+        bodies = self.puppet.with_followers(moved)
         rotations = {
-            self.bone(body): np.stack([each.rotations[body] for each in moments])
-            for body in sorted(moved)
+            self.bone(body): np.stack([each.rotations[body] for each in moments]) for body in bodies
         }
         locations = {
             self.bone(body): np.stack([each.locations[body] for each in moments])
-            for body in sorted(moved)
+            for body in bodies
             if self.puppet.places(body)
         }
         settings: Any = posing_settings(self.puppet.armature())
