@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.arm_shapes import bent, drawn, unit
+from octo_motion.core.locomotion.arm_shapes import bent, curve, drawn, opened, unit
 from octo_motion.core.locomotion.body_line import body_line
 from octo_motion.core.locomotion.foothold_places import easy_height
 from octo_motion.core.locomotion.limbs import StanceSettings
@@ -100,3 +100,61 @@ def test_an_arm_is_drawn_alike_whatever_the_unit_of_length(seed: int, size: floa
         )
 
     assert np.allclose(drawn_in(size), drawn_in(1.0), atol=1e-9)
+
+
+def arches(*, opening: bool) -> Floats:
+    """Directions (segments, 3, ratios) of arms that are slacker and slacker.
+
+    They leave and arrive nearly in line with the way to where they are held.
+
+    Args:
+        opening: whether their ends are opened as far as they have to be.
+    """
+    ratio = np.linspace(0.95, 0.72, 500)
+    count = len(ratio)
+    edges = np.cumsum([0.0, 0.17, 0.13, 0.13, 0.14, 0.14, 0.15, 0.14])
+    chord, upward, leaving, arriving = np.zeros((4, 3, count))
+    chord[0], upward[2] = ratio, 1.0
+    leaving[0], leaving[2] = np.cos(0.2), np.sin(0.2)
+    arriving[0], arriving[2] = np.cos(0.25), -np.sin(0.25)
+    if opening:
+        leaving, arriving = opened((leaving, arriving), chord, upward, ratio)
+    return curve(
+        leaving=leaving,
+        arriving=arriving,
+        chord=chord,
+        size=np.ones(count),
+        middles=0.5 * (edges[1:] + edges[:-1])[:, None, None] * np.ones(count),
+        parts=np.diff(edges)[:, None] * np.ones(count),
+    )
+
+
+def test_an_arm_in_line_with_where_it_is_held_arches_and_does_not_double_back_on_itself() -> None:
+    # At a point where it doubles back, a little more slack turns a segment over at once.
+    assert arches(opening=False)[:, 0].min() < -0.3
+    assert arches(opening=True)[:, 0].min() > 0.3
+
+
+@given(st.floats(0.7, 1.5), st.floats(0.72, 0.97))
+def test_an_arm_that_leaves_far_from_the_way_to_its_foothold_is_left_as_it_is(
+    apart: float, ratio: float
+) -> None:
+    leaving = np.array([[np.cos(apart)], [0.3 * np.sin(apart)], [np.sin(apart)]])
+    leaving /= np.linalg.norm(leaving)
+    arriving = leaving * np.array([[1.0], [1.0], [-1.0]])
+    chord, upward = np.array([[1.0], [0.0], [0.0]]), np.array([[0.0], [0.0], [1.0]])
+    ends = opened((leaving, arriving), chord, upward, np.array([ratio]))
+    np.testing.assert_array_equal(ends, (leaving, arriving))
+
+
+@given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(0.5, 1.0))
+def test_what_is_opened_stays_of_length_one_and_turns_to_either_side_of_the_way(
+    out: float, back: float, ratio: float
+) -> None:
+    leaving = np.array([[np.cos(out)], [0.0], [np.sin(out)]])
+    arriving = np.array([[np.cos(back)], [0.0], [-np.sin(back)]])
+    chord, upward = np.array([[1.0], [0.0], [0.0]]), np.array([[0.0], [0.0], [1.0]])
+    wider, steeper = opened((leaving, arriving), chord, upward, np.array([ratio]))
+    assert np.linalg.norm([wider, steeper], axis=1) == pytest.approx(1.0)
+    assert wider[2, 0] >= leaving[2, 0] - 1e-12
+    assert steeper[2, 0] <= arriving[2, 0] + 1e-12

@@ -21,6 +21,12 @@ _WEAK: Final = 0.02
 _SHORTEST: Final = 0.2
 _LONGEST: Final = 4.0
 """Handles of a curve, in its lengths."""
+_OPEN: Final = 0.36
+"""Share of the angle between a circle's arc and its chord that there is at a curve's ends at least.
+"""
+_OPENING: Final = 0.06
+"""Radians over which that comes."""
+_NO_CORNER: Final = 0.05
 _HALVINGS: Final = 7
 """Steps in which they are found."""
 _BACKWARDS: Final = 1e-4
@@ -34,6 +40,46 @@ _FIRM: Final = 1e-4
 _MANY: Final = 0.5
 """Share of a batch from which on all of it is raised, rather than those that are too low."""
 _TINY: Final = 1e-12
+
+
+def opened(
+    ways: tuple[Floats, Floats], chord: Floats, upward: Floats, ratio: Floats
+) -> tuple[Floats, Floats]:
+    """Ways in which a curve leaves and arrives, far enough from its chord for how long it is.
+
+    A cubic between ends that are in line with its chord can only be longer than that by doubling
+    back on itself, at a point where it turns over at once. The ends of a circle's arc as long would
+    be √(6 (1 − ratio)) from its chord, nearly; a share of that is needed, and what is lacking is
+    added to both, upwards.
+
+    Args:
+        ways: (3, batch) unit vectors both, at its start and at its end.
+        chord: (3, batch) from start to end.
+        upward: (3, batch) unit: which way it is to rise.
+        ratio: (batch,) of the chord to its length.
+    """
+    along = unit(chord)
+    up = unit(upward - dot(upward, along) * along)
+    apart = 0.5 * (_between(ways[0], along) + _between(ways[1], along))
+    lack = _OPEN * np.sqrt(6.0 * np.maximum(1.0 - ratio, 0.0)) - apart
+    near = np.maximum(lack + _OPENING, 0.0)
+    lack = np.where(lack > _OPENING, lack, near * near / (4.0 * _OPENING))
+    return _tipped(ways[0], along, up, lack), _tipped(ways[1], along, up, -lack)
+
+
+def _between(ways: Floats, along: Floats) -> Floats:
+    """Angles (batch,) between unit vectors (3, batch), without a corner where there is none."""
+    cosine = dot(ways, along)
+    across = ways - cosine * along
+    return np.arctan2(np.sqrt(dot(across, across) + _NO_CORNER**2), cosine)
+
+
+def _tipped(ways: Floats, along: Floats, up: Floats, angle: Floats) -> Floats:
+    """Vectors (3, batch) turned by angles (batch,) from one direction to another across it."""
+    ahead, rise = dot(ways, along), dot(ways, up)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turned_ahead, turned_rise = cosine * ahead - sine * rise, sine * ahead + cosine * rise
+    return ways + (turned_ahead - ahead) * along + (turned_rise - rise) * up
 
 
 def curve(

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .arm_shapes import bent, blended, curve, drawn, evened, raised, unit
+from .arm_shapes import bent, blended, curve, drawn, evened, opened, raised, unit
 from .columns import dot
 from .easing import least_jerk, smooth_step
 from .foothold_places import PEELING
@@ -534,6 +534,7 @@ def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Flo
     falling = _FALLING * slack
     arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
     leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
+    leaving, arriving = opened((leaving, arriving), chord, batch.upward, ratio / (1.0 + strain))
     size = held.lies_from * (1.0 + strain)
     middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
     parts = np.clip(held.lies_from - reach[:-1], 0.0, lengths)
