@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The process at the devices: reads them, gives force, a thousand times a second, and no more.
 
-One thread, no simulation, nothing that waits. Whoever started it is told what the hands do, and
-tells where the held bodies are.
+No simulation, nothing that waits: looking for devices has a thread of its own. Whoever started it
+is told what the hands do, and tells where the held bodies are.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _LET_GO_SECONDS: Final = 0.2
 """For taking all force away, once whoever started us is gone; a tick is enough, unless the system
 call of a driver does not return."""
 _LOOK_EVERY: Final = 0.1
-"""s between two looks for devices; how costly one may be is the discovery's business."""
+"""s between two words to the discovery that it may look for devices."""
 
 
 class HandLoop:

@@ -189,6 +189,47 @@ def waited_for(driver: Driver) -> Sample:
     return samples[-1]
 
 
+def test_two_devices_with_one_serial_number_are_both_read(
+    plug: Callable[..., uhid.VirtualDevice],
+) -> None:
+    both = [space_mouse(plug), space_mouse(plug)]
+    discovery = Discovery(HID_ALONE)
+    drivers: list[Driver] = []
+    wait_for(lambda: drivers.extend(discovery.look()) or len(drivers) == 2, "both are found")
+    assert len({each.description.identity for each in drivers}) == 2
+    for device in both:
+        device.report(b"\x03\x01\0\0\0")
+    wait_for(lambda: all(waited_for(each).buttons == 1 for each in drivers), "both are heard")
+    for each in drivers:
+        each.close()
+
+
+def test_device_that_does_not_say_what_it_can_keeps_the_others_moving(
+    plug: Callable[..., uhid.VirtualDevice],
+) -> None:
+    """The kernel waits five seconds for the answer of firmware that hangs."""
+    mute = plug("Hung", 0x1209, 0x0002, profile.report_descriptor(), serial="hung")
+    mute.hang()
+    loop = Loop()
+
+    def ticking(what: Callable[[], object]) -> Callable[[], object]:
+        return lambda: (loop.tick(), what())[1]
+
+    wait_for(ticking(lambda: mute.asked), "it is asked what it can do")
+    ticks = 0
+    while ticks < 100:
+        loop.tick()
+        assert not loop.notices, "the system still waits for the device; the loop does not"
+        ticks += 1
+    hand = force_device(plug)
+    wait_for(ticking(lambda: loop.devices), "the other one is found")
+    assert loop.devices[0].name == "Octo hand"
+    wait_for(ticking(lambda: loop.notices), "it is told")
+    assert "Hung does not follow the profile" in loop.notices[0].problem
+    loop.close()
+    hand.unplug()
+
+
 class Hand:
     """The hand on a virtual force device: moved by the test, reported as firmware would, by itself.
 
@@ -268,6 +309,7 @@ class Loop:
         schedule = Schedule(0.001)
         self.loop = HandLoop(self._here, Discovery(HID_ALONE), schedule, 0.001)
         self.devices: list[say.DeviceMessage] = []
+        self.notices: list[say.Notice] = []
         self.hand: say.HandMessage | None = None
 
     def close(self) -> None:
@@ -283,6 +325,8 @@ class Loop:
                 self.devices.append(message)
             elif isinstance(message, say.HandMessage):
                 self.hand = message
+            elif isinstance(message, say.Notice):
+                self.notices.append(message)
         if self.hand is not None and self.hand.grab:
             self.there.send(
                 say.HeldMessage(

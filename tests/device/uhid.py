@@ -44,6 +44,9 @@ class VirtualDevice:
         features: Callable[[int], bytes] = lambda _number: b"",
     ) -> None:
         self.outputs: list[bytes] = []
+        self.asked = False
+        """Whether it was asked for a feature report."""
+        self._hangs = False
         self._features = features
         self._file = os.open(DEVICE, os.O_RDWR)
         self._write(
@@ -58,6 +61,10 @@ class VirtualDevice:
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._open = True
         self._thread.start()
+
+    def hang(self) -> None:
+        """Answer no question any more, as firmware that is stuck."""
+        self._hangs = True
 
     @property
     def plugged_in(self) -> bool:
@@ -87,6 +94,9 @@ class VirtualDevice:
                 (size,) = struct.unpack_from("<H", data, 4 + _MOST)
                 self.outputs.append(data[4 : 4 + size])
             elif kind == _GET_REPORT:
+                self.asked = True
+                if self._hangs:
+                    continue
                 number, report = struct.unpack_from("<IB", data, 4)
                 answer = self._features(report)
                 error = 0 if answer else 5

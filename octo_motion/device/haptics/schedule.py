@@ -6,8 +6,9 @@ What Python adds to a loop, and what is done about it:
 - *Garbage collection* stops everything for milliseconds when it looks through all objects. What is
   there at the start is frozen (it is never looked through again) and the collector is switched
   off; a tick makes no cycles, so counting references frees all that it makes.
-- *The GIL* makes threads wait for each other, up to 5 ms each time. The loop's process has one
-  thread, and the simulation another process.
+- *The GIL* makes threads wait for each other, up to 5 ms each time. The simulation has another
+  process. Beside the loop there is one thread that looks for devices: it mostly waits for the
+  system, has to hand over ten times sooner, and rests while a hand holds something.
 - *Sleep* wakes late: by about 0.1 ms on an idle Linux, up to 1 ms on Windows. So the last stretch
   is waited for awake. Where the system allows, the process gets real-time priority.
 
@@ -93,6 +94,7 @@ def make_real_time() -> str:
     gc.collect()
     gc.freeze()
     gc.disable()
+    sys.setswitchinterval(5e-4)
     if (os.cpu_count() or 1) < 2:
         return "normal"  # the simulation needs the only processor as well
     if sys.platform == "linux":

@@ -54,11 +54,14 @@ class Found:
     usage: int
     name: str
     serial: str
+    twin: bool = False
+    """Whether another one that is there has the same serial number."""
 
     @property
     def identity(self) -> str:
         """The same when the device is plugged in again, as far as it has a serial number."""
-        return f"{self.vendor:04x}:{self.product:04x}:{self.serial or self.path.hex()}"
+        own = self.path.hex() if self.twin or not self.serial else self.serial
+        return f"{self.vendor:04x}:{self.product:04x}:{own}"
 
     @property
     def lasting(self) -> str:
