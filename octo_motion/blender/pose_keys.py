@@ -160,6 +160,24 @@ class PoseKeys:
         self.count += bool(done)
         return [name for name in done if name]
 
+    def check_motion(self, armature: bpy.types.Object) -> None:
+        """See whether a motion can be written into the action as it is.
+
+        Raises:
+            WriteError: what the action has is not what is shown.
+        """
+        data = armature.animation_data
+        if data is None or data.action is None or not data.use_nla:
+            return
+        if self._target == "LAYER" and not self._noted:
+            return
+        beneath = any(not track.mute for track in data.nla_tracks)
+        if beneath and (data.action_blend_type != "REPLACE" or data.action_influence < 1.0):
+            raise WriteError(
+                f"The action of '{armature.name}' adds to its NLA tracks, or is blended with them.",
+                "Let the keys go to a new layer, or set the action to Replace in the NLA editor.",
+            )
+
     def insert_motion(
         self,
         armature: bpy.types.Object,
@@ -521,6 +539,10 @@ def _has(data: bpy.types.AnimData, before: _Before) -> bool:
 
 
 def _chosen_action(number: int) -> bpy.types.Action:
+    if not number:
+        raise WriteError(
+            "No action is chosen for the keys.", "Choose one in the panel Pose, under Keys."
+        )
     action = _action_of(number)
     if action is None:
         raise WriteError("The action for the keys is gone.", "Choose another one.")

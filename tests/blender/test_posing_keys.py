@@ -237,8 +237,14 @@ def test_chosen_action_gets_the_keys(armature: Any) -> None:
 
 
 def test_chosen_action_that_is_gone_is_refused(armature: Any) -> None:
-    with pytest.raises(WriteError, match="The action for the keys is gone"):
+    with pytest.raises(WriteError, match="No action is chosen for the keys"):
         PoseKeys(armature, "CHOSEN")
+    chosen = bpy.data.actions.new("Chosen")
+    keys = PoseKeys(armature, "CHOSEN", chosen)
+    bpy.data.actions.remove(chosen)
+    with pytest.raises(WriteError, match="The action for the keys is gone"):
+        keys.insert(armature, [Keyed(ARM)], 1.0)
+    assert armature.animation_data is None
 
 
 def test_recorded_motion_is_a_few_keys_within_its_bound_and_replaces_what_was_there(

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -14,8 +16,11 @@ import pytest
 
 from octo_motion.blender.shown_pose import pose_values
 from octo_motion.core.errors import OctoMotionError, RigError
+from octo_motion.ui.posing import session_operator
 from octo_motion.ui.posing.controls import Outcome, PoseControls
 from octo_motion.ui.posing.puppet_session import PuppetSession, active_session
+from octo_motion.ui.posing.session_operator import tell
+from octo_motion.ui.posing.view import view_under
 from tests.ui.test_posing import MOVE, TICK, VIEW, Event, drag, keyed, over
 
 ARM, OTHER = "arm1.04.L", "arm2.04.L"
@@ -335,3 +340,127 @@ def test_armature_that_is_shown_at_rest_is_refused(octopus: Any) -> None:
     octopus.data.pose_position = "REST"
     with pytest.raises(OctoMotionError, match="'Octopus' is shown at rest"):
         PuppetSession(octopus, bpy.context.scene)
+
+
+# --- Other keys, other windows -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("modifier", ["shift", "ctrl", "alt"])
+def test_arrow_keys_with_others_are_left_to_blender(controls: PoseControls, modifier: str) -> None:
+    event = replace(Event("LEFT_ARROW"), **{modifier: True})
+    assert controls.handle(event, VIEW) is Outcome.PASSED
+    assert bpy.context.scene.frame_current == 1
+
+
+def test_arrow_keys_keep_to_the_frames_that_blender_keeps_to(controls: PoseControls) -> None:
+    for _ in range(3):
+        assert controls.handle(Event("LEFT_ARROW"), VIEW) is Outcome.TAKEN
+    assert bpy.context.scene.frame_current == 0
+
+
+def test_ctrl_o_opens_a_file_and_does_not_record(controls: PoseControls) -> None:
+    assert controls.handle(Event("O", ctrl=True), VIEW) is Outcome.PASSED
+    assert not controls.session.recording
+
+
+@pytest.mark.parametrize("modifier", ["ctrl", "alt"])
+@pytest.mark.parametrize("kind", ["G", "P", "K", "M", "R"])
+def test_keys_of_the_session_with_others_do_nothing(
+    controls: PoseControls, kind: str, modifier: str
+) -> None:
+    x, y = over(controls.session, ARM)
+    controls.handle(MOVE, VIEW, x, y)
+    pins = controls.session.pins()
+    controls.handle(replace(Event(kind), **{modifier: True}), VIEW, x, y)
+    assert not controls.holding
+    assert controls.session.measuring is None
+    assert controls.session.pins() == pins
+    assert controls.said == ""
+
+
+def test_motion_is_not_recorded_into_an_action_that_adds_to_others(
+    octopus: Any, controls: PoseControls
+) -> None:
+    """Keys would have to be what it adds: by keying one pose, Blender works that out."""
+    data = octopus.animation_data_create()
+    strip = data.nla_tracks.new().strips.new("Base", 1, bpy.data.actions.new("Base"))
+    assert strip is not None
+    octopus.pose.bones[ARM].keyframe_insert("rotation_quaternion", frame=1)
+    data.action_blend_type = "ADD"
+    controls.handle(Event("O"), VIEW)
+    assert not controls.session.recording
+    assert "adds to" in controls.said
+    data.action_blend_type = "REPLACE"
+    controls.handle(Event("O"), VIEW)
+    assert controls.session.recording
+
+
+def test_root_whose_place_is_locked_is_not_carried_about(octopus: Any) -> None:
+    octopus.octo_motion.posing.root = "FREE"
+    octopus.pose.bones["body"].lock_location = (True, True, True)
+    session = PuppetSession(octopus, bpy.context.scene, clock=None)
+    root = session.figure.names[0]
+    assert root == "body"
+    before = session.core.pose.positions[0].copy()
+    start = session.grab_bone(root, 0.5)
+    for number in range(40):
+        session.tick(TICK, start + np.array([0.02 * number, 0.0, 0.0]))
+    assert np.abs(session.core.pose.positions[0] - before).max() < 0.02
+    session.cancel()
+
+
+def test_each_of_four_views_is_looked_through_by_itself() -> None:
+    """Blender's quad view: four regions in one area."""
+
+    def region(x: int, y: int) -> Any:
+        return SimpleNamespace(type="WINDOW", x=x, y=y, width=100, height=100, data=(x, y))
+
+    regions = [region(x, y) for x in (0, 100) for y in (0, 100)]
+    space = SimpleNamespace(region_3d=(100, 100))
+    area = SimpleNamespace(type="VIEW_3D", regions=regions, spaces=SimpleNamespace(active=space))
+    window: Any = SimpleNamespace(screen=SimpleNamespace(areas=[area]))
+    for each in regions:
+        found = view_under(window, each.x + 30, each.y + 40)
+        assert found is not None
+        view, x, y = found
+        assert (view.region, view.data, x, y) == (each, each.data, 30, 40)
+
+
+def test_nothing_is_left_in_the_headers_of_other_workspaces(monkeypatch: Any) -> None:
+    """Where an artist has changed the workspace while posing."""
+    told: dict[str, Any] = {}
+
+    class Area:
+        type = "VIEW_3D"
+
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def header_text_set(self, text: str | None) -> None:
+            told[self.name] = text
+
+        def tag_redraw(self) -> None:
+            pass
+
+    class Workspace:
+        def __init__(self, name: str) -> None:
+            self.screens = [SimpleNamespace(areas=[Area(name)])]
+            self.name = name
+
+        def status_text_set(self, text: str | None) -> None:
+            told[f"status {self.name}"] = text
+
+    first, second = Workspace("first"), Workspace("second")
+    both = SimpleNamespace(screens=[*first.screens, *second.screens], workspaces=[first, second])
+    monkeypatch.setattr(session_operator, "bpy", SimpleNamespace(data=both))
+    manager = SimpleNamespace(windows=[])
+
+    def context(workspace: Any) -> Any:
+        return SimpleNamespace(
+            screen=workspace.screens[0], workspace=workspace, window_manager=manager
+        )
+
+    tell(context(first), "Posing")
+    tell(context(second), "Posing")
+    tell(context(second), None)
+    assert told == {"first": None, "second": None, "status first": None, "status second": None}

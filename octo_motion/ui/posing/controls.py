@@ -14,6 +14,7 @@ from ...core.posing.picking import Hit
 from ...core.rotations import IDENTITY, Floats, from_axis_angle, multiply
 from .measuring_hand import MeasuringHand
 from .puppet_session import PuppetSession
+from .scrubbing import go_to
 
 HELP: Final = (
     ("Drag", "pull"),
@@ -209,9 +210,12 @@ class PoseControls:
                 self._let_go()
                 return Outcome.TAKEN
             return self._take(view, x, y)
-        if kind in _ARROWS:
+        if _modified(event) and kind != "Z":
+            # Opening files and the like is Blender's; what else it does to a pose can wait.
+            return Outcome.TAKEN if kind in _OWN - {"O"} or kind == "M" else Outcome.PASSED
+        if kind in _ARROWS and not event.shift:
             scene = self.session.scene()
-            scene.frame_set(scene.frame_current + _ARROWS[kind])
+            go_to(scene, scene.frame_current + _ARROWS[kind])
             return Outcome.TAKEN
         return self._key(event, view, x, y)
 
@@ -236,7 +240,7 @@ class PoseControls:
             else:
                 session.restore()
                 self.said = "As at the start"
-        elif kind == "Z" and (event.ctrl or getattr(event, "oskey", False)) and not event.shift:
+        elif kind == "Z" and _modified(event) and not event.alt and not event.shift:
             self._lose()
             self.said = "Back" if session.step_back() else "Nothing to take back"
         else:
@@ -327,10 +331,13 @@ class PoseControls:
             except OctoMotionError as error:
                 self.said = str(error)
                 return
-            self.said = f"Recorded {bones} bones on {count} key frames"
-        else:
+            self.said = f"Recorded {_counted(bones, 'bone')} on {_counted(count, 'key frame')}"
+            return
+        try:
             self.session.record()
             self.said = "Recording while the frames go by: play, and drag"
+        except OctoMotionError as error:
+            self.said = str(error)
 
     def _say_keys(self, key: Callable[[], list[str]], *, quiet: bool = False) -> None:
         try:
@@ -340,7 +347,8 @@ class PoseControls:
             self.said = str(error)
             return
         if names:
-            self.said = f"Keyed {len(names)} bones at frame {self.session.scene().frame_current}"
+            frame = self.session.scene().frame_current
+            self.said = f"Keyed {_counted(len(names), 'bone')} at frame {frame}"
         elif quiet:
             return
         elif self.session.core.touched():
@@ -372,6 +380,14 @@ class PoseControls:
             parts.append(f"slower than real time: {100.0 * told.ratio:.0f} %")
         parts += [each for each in (self.said, session.warning) if each]
         return "    ".join(parts)
+
+
+def _modified(event: Any) -> bool:
+    return event.ctrl or event.alt or getattr(event, "oskey", False)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 SLOW: Final = 0.9

@@ -404,7 +404,12 @@ class PuppetSession:
         return self._recorded is not None
 
     def record(self) -> None:
-        """Begin to keep the pose at each frame, from this one on."""
+        """Begin to keep the pose at each frame, from this one on.
+
+        Raises:
+            WriteError: a motion could not be written.
+        """
+        self.keys.check_motion(self.puppet.armature())
         self._recorded = {self.scene().frame_current_final: self._moment()}
 
     def stop_record(self) -> tuple[int, int]:
@@ -613,9 +618,12 @@ class PuppetSession:
         )
 
     def _hold_root(self) -> None:
+        pose = self.puppet.armature().pose
+        assert pose is not None
         for body, parent in enumerate(self.figure.parents):
             if parent < 0:
-                if self._shown.root == "FREE":
+                locked = all(np.array(pose.bones[self.bone(body)].lock_location))
+                if self._shown.root == "FREE" and not locked:
                     self.core.pin(body, state=False)
                 else:
                     self.core.pin(body, state=True, firm=self._shown.root == "HELD")

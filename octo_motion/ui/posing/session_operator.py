@@ -140,10 +140,16 @@ def tell(
         line: none to show Blender's own again.
         keys: and what each does.
     """
-    for area in context.screen.areas if context.screen else ():
-        if area.type == "VIEW_3D":
-            area.header_text_set(line)
-            area.tag_redraw()
-    if context.workspace is not None:
-        shown = "    ".join(f"{key}: {what}" for key, what in keys)
-        context.workspace.status_text_set(None if line is None else shown)
+    screens, workspaces = [context.screen], [context.workspace]
+    if line is None:
+        # Another workspace may have been chosen meanwhile.
+        screens, workspaces = [*bpy.data.screens], [*bpy.data.workspaces]
+    for screen in screens:
+        for area in screen.areas if screen is not None else ():
+            if area.type == "VIEW_3D":
+                area.header_text_set(line)
+                area.tag_redraw()
+    shown = "    ".join(f"{key}: {what}" for key, what in keys)
+    for workspace in workspaces:
+        if workspace is not None:
+            workspace.status_text_set(None if line is None else shown)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -62,9 +62,8 @@ def view_under(window: bpy.types.Window, x: int, y: int) -> tuple[View, float, f
             if inside and region.type == "WINDOW":
                 main = region
         if main is not None:
-            space = area.spaces.active
-            assert isinstance(space, bpy.types.SpaceView3D)
-            data = space.region_3d
+            # Of four views in an area, each has its own.
+            data: Any = main.data
             if data is not None:
                 return View(main, data), x - main.x, y - main.y
     return None
