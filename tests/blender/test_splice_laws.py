@@ -462,6 +462,27 @@ def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: Share
                 ours, theirs = normalized(ours[:frames]), normalized(theirs[:frames])
                 # Bodies are built differently; a limb that points elsewhere is off by far more.
                 assert np.degrees(np.arccos(np.sum(ours * theirs, axis=-1).min())) < 40.0
+        for side in "LR":
+            ours, theirs = (
+                foot_in_pelvis(each, mark, side)[:frames]
+                for each, mark in ((result, landmarks), (other, others))
+            )
+            # One has toes, the other just an end.
+            assert np.degrees(np.arccos(np.sum(ours * theirs, axis=-1).min())) < 40.0
+
+
+def foot_in_pelvis(clip: Clip, landmarks: Landmarks, side: str) -> Floats:
+    """Where a foot points, (frames, 3), in the pelvis's frame."""
+    if landmarks.get(f"toe.{side}"):
+        toe, foot = (in_pelvis(clip, landmarks, f"{name}.{side}") for name in ("toe", "foot"))
+        return normalized(toe - foot)
+    frame = pelvis_frame(clip.skeleton, landmarks).orientation(
+        posture_of(clip.skeleton, clip.rotations, clip.locations)
+    )
+    foot = clip.skeleton.pose(clip.rotations, clip.locations)[0][
+        :, clip.skeleton.index[landmarks[f"foot.{side}"]]
+    ]
+    return rotate(multiply(conjugate(frame), foot), [0.0, 1.0, 0.0])
 
 
 def test_the_sources_own_experiment_becomes_new_actions(shared_data: SharedData):

@@ -64,6 +64,22 @@ class Correspondence:
     """Whether rest poses, axes and sizes are the same: locations can be taken over."""
 
 
+class _Foot:
+    """How a foot lies at rest on a body that may have no toes to say it."""
+
+    def __init__(self, skeleton: Skeleton, landmarks: Landmarks, foot: int, side: str) -> None:
+        self.toe, shin = (
+            skeleton.index.get(landmarks.get(f"{name}.{side}") or "") for name in ("toe", "shin")
+        )
+        end = skeleton.tails[foot] if self.toe is None else skeleton.heads[self.toe]
+        self.along = normalized(end - skeleton.heads[foot])
+        """(3,) where it points, armature space."""
+        above = skeleton.heads[foot if shin is None else shin]
+        leg = normalized(skeleton.heads[foot] - above)
+        self.pointed = bool(np.dot(self.along, leg) > _UNLIKE)
+        """Whether it goes on straight from the shin: nobody stands so."""
+
+
 def matched_bones(
     base: Skeleton,
     bones: Sequence[int],
@@ -111,7 +127,7 @@ def correspondence(
     splice: Skeleton,
     pairs: Mapping[int, int],
     frames_at_rest: tuple[Floats, Floats],
-    landmarks: Landmarks | None,
+    landmarks: tuple[Landmarks | None, Landmarks | None],
     *,
     aim_all: bool = False,
 ) -> Correspondence:
@@ -122,12 +138,13 @@ def correspondence(
         splice: the splice clip's.
         pairs: splice bone by base bone.
         frames_at_rest: orientations (4,) of the body's frame at rest, base and splice.
-        landmarks: the base's, or none for a chain.
+        landmarks: the base's and the splice clip's, none for a chain.
         aim_all: whether directions matter for all bones, as in a chain.
     """
     same_body = _same_body(base, splice, pairs)
     aim_all = aim_all or same_body
-    kinds = {} if landmarks is None else {name: key for key, name in landmarks.bones.items()}
+    marks, others = landmarks
+    kinds = {} if marks is None else {name: key for key, name in marks.bones.items()}
     our_back, their_back = (conjugate(each) for each in frames_at_rest)
     laid: dict[int, Floats] = {}
     constants: dict[int, Floats] = {}
@@ -136,7 +153,7 @@ def correspondence(
         landmark = kinds.get(base.names[bone], "")
         kind = landmark.partition(".")[0]
         lay = laid.get(base.parents[bone], _nearest(laid, base, bone))
-        follower = _follower(base, bone, pairs, landmarks, landmark)
+        follower = _follower(base, bone, pairs, marks, landmark)
         if follower is not None:
             ours = rotate(our_back, base.heads[follower] - base.heads[bone])
             theirs = rotate(their_back, splice.heads[pairs[follower]] - splice.heads[other])
@@ -146,6 +163,14 @@ def correspondence(
             aimed = aim_all or kind in _AIMED or not kind or np.dot(ours, theirs) < _UNLIKE
             if aimed and np.any(ours) and np.any(theirs):
                 lay = multiply(shortest_arc(theirs, ours), lay)
+        elif kind == "foot" and marks is not None and others is not None:
+            side = landmark.partition(".")[2]
+            feet = _Foot(base, marks, bone, side), _Foot(splice, others, other, side)
+            if any(each.toe is not None and each.pointed for each in feet) and not all(
+                each.pointed for each in feet
+            ):
+                ours, theirs = rotate(our_back, feet[0].along), rotate(their_back, feet[1].along)
+                lay = multiply(shortest_arc(rotate(lay, theirs), ours), lay)
         laid[bone] = lay
         rest = multiply(our_back, base.rest_rotations[bone])
         other_rest = multiply(their_back, splice.rest_rotations[other])
