@@ -20,11 +20,10 @@ from ..rotations import Floats
 from .bearings import Bearings
 from .changes import Change, between, sense_of
 from .easing import least_jerk
+from .gait import CYCLE
 from .route import Route
 from .stroke import stroke_distance
 from .travel import Travel, TravelSettings, travel_at, walked_at
-
-_CYCLE = 2.0 * np.pi
 
 
 class Line(Protocol):
@@ -65,7 +64,7 @@ class SwumLine:
 
     def phase(self, distance: Floats) -> Floats:
         """Phase of the gait (…,), radians."""
-        return self.settings.stroke_phase + _CYCLE * (distance - self.start) / self.settings.stride
+        return self.settings.stroke_phase + CYCLE * (distance - self.start) / self.settings.stride
 
     def travel(self, distance: Floats) -> Travel:
         """The body at distances (n,), where it shoots ahead of them and falls behind."""
@@ -74,7 +73,7 @@ class SwumLine:
         here = stroke_distance(phase, settings.burst, settings.stroke_phase) - phase
         middle = np.array(settings.stroke_phase)
         there = stroke_distance(middle, settings.burst, settings.stroke_phase) - middle
-        along = distance + settings.stride / _CYCLE * (here - there)
+        along = distance + settings.stride / CYCLE * (here - there)
         return travel_at(self.route, settings, self.bearings, along, phase)
 
     def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:

@@ -19,11 +19,11 @@ from ..rotations import Floats, rotate, rotate_in_plane
 from .course import Line
 from .draping import settled
 from .foothold_places import PEELING, Passing, hold_times, laid, peeled_to, spots
+from .gait import CYCLE
 from .ground import Ground, normals
 from .limbs import Limbs, StanceSettings
 from .rhythm import Rhythm
 
-_CYCLE: Final = 2.0 * np.pi
 UNROLLING: Final = 0.3
 """Share of a hold in which the arm lies down, from where it first touches to its tip."""
 _CURL: Final = np.radians(50.0)
@@ -94,7 +94,7 @@ def cycles_at(phases: Floats, middle: float) -> tuple[np.ndarray, Floats]:
 
     From half way through one swing to half way through the next it is one cycle.
     """
-    turns = (phases - middle) / _CYCLE
+    turns = (phases - middle) / CYCLE
     number = np.floor(turns + 0.5)
     return number.astype(np.int64), turns - number
 
@@ -136,7 +136,7 @@ def lay(
     shift = wanted.shift
 
     # Cycles of each arm at the middles that the gait gives to its holds.
-    given: Floats = np.broadcast_to(middle / _CYCLE + numbers.astype(np.float64), shape)
+    given: Floats = np.broadcast_to(middle / CYCLE + numbers.astype(np.float64), shape)
 
     def roots_at(since: Floats) -> tuple[Floats, Floats]:
         """World positions of the arms' roots, and the body's orientations, at such times."""

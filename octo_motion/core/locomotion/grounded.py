@@ -18,16 +18,16 @@ from .chains import BodyFrame
 from .columns import turned
 from .course import Line
 from .footholds import Footholds, Wish, cycles_at, lay
+from .gait import CYCLE
 from .generator import Build, Generator, twist
 from .ground import Ground
 from .limbs import Limbs, StanceSettings
 from .lying import Seen, skin_below
 from .poses import Facing, bone_rotations, carried_to, sucker_sides
 from .rhythm import Even, Rhythm
-from .stance import Batch, hold, pulled, stand, unheld
+from .stance import Batch, Hold, Stood, hold, pulled, stand, unheld
 from .steady import Steady
 
-_CYCLE: Final = 2.0 * np.pi
 _ASKEW: Final = np.radians(35.0)
 """How far from straight outward a foothold may lie, and an arm from there."""
 _TURN: Final = 6.0
@@ -208,9 +208,9 @@ class GroundedWalk:
             skins: of all arms.
             phases: the first and the last of the body's, radians.
         """
-        looks = int(np.ceil((phases[1] - phases[0]) / _CYCLE * _LOOKS)) + 1
+        looks = int(np.ceil((phases[1] - phases[0]) / CYCLE * _LOOKS)) + 1
         phase = np.linspace(*phases, looks)
-        centres, orientations = self._line.at(phase / _CYCLE * self._stride)
+        centres, orientations = self._line.at(phase / CYCLE * self._stride)
         stood = self.pose(phase, np.zeros((looks, 2)), centres, orientations)
         ends = np.cumsum([0] + [len(arm.bones) for arm in self._generator.arms])
         to_world = multiply(orientations, conjugate(self._body_turn))
@@ -257,7 +257,7 @@ class GroundedWalk:
 
     def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
-        return self._rhythm.phases(self._stride * np.asarray(phase) / _CYCLE)
+        return self._rhythm.phases(self._stride * np.asarray(phase) / CYCLE)
 
     def pose(
         self,
@@ -313,7 +313,7 @@ class GroundedWalk:
             facing = multiply(orientations[:, None], generator.outward[columns]).reshape(batch, 4).T
             shapes = turned(facing, shapes.reshape(segments, 3, batch))
             roots = centres[:, None] + rotate(orientations[:, None], limbs.roots[chosen])
-            held_by = Batch(
+            arms = Batch(
                 limbs,
                 np.tile(chosen, frames),
                 np.ascontiguousarray(roots.reshape(batch, 3).T),
@@ -321,13 +321,9 @@ class GroundedWalk:
                 turned(facing, np.array([0.0, 0.0, 1.0])[:, None]),
                 self._lifted(limbs, higher, chosen, columns, frames),
             )
-            held = hold(
-                held_by,
-                footholds,
-                cycles[:, columns].reshape(batch),
-                since[:, columns].reshape(batch),
-            )
-            longer, ways = pulled(held_by, shapes, held, self._ground, self._settings)
+            times = (each[:, columns].reshape(batch) for each in (cycles, since))
+            held = hold(arms, footholds, *times)
+            longer, ways = pulled(arms, shapes, held, self._ground, self._settings)
             each_frame = segments, 3, frames, many
             if higher is not None and higher.evened:
                 added = higher.evened[number][..., chosen].reshape(ways.shape)
@@ -336,25 +332,13 @@ class GroundedWalk:
                 before, share = ways, unheld(held).reshape(frames, many)
                 ways = steady.evened(ways.reshape(each_frame), share).reshape(ways.shape)
                 evened.append((ways - before).reshape(each_frame))
-            stood = stand(held_by, (longer, ways), held, self._ground, self._settings)
-            back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
-            in_armature = turned(back, stood.directions)
-            towards = turned(back, -held.upwards(segments)).reshape(segments, 3, frames, many)
-            most = min(_MOST_TURN, _TURN / segments)
-            along = np.minimum(_FIRST_TURN + np.arange(segments) / 3.0, 1.0)
-            turns = most * along[:, None, None] * held.weight.reshape(frames, many)
-            posed = bone_rotations(
-                [generator.rests[arm] for arm in columns],
-                in_armature.reshape(segments, 3, frames, many),
-                twist(build, own),
-                Facing([self._sides[arm] for arm in columns], towards, turns),
-            )
+            stood = stand(arms, (longer, ways), held, self._ground, self._settings)
+            posed = self._rotations(columns, stood, held, to_armature, twist(build, own))
             longer = stood.strains.reshape(segments, frames, many)
             for place, arm in enumerate(columns):
                 rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
                 strains[:, ends[arm] : ends[arm + 1]] = longer[:, :, place].T
-            whole = held_by.reach[-1]
-            misses[:, columns] = (stood.misses / whole).reshape(frames, many)
+            misses[:, columns] = (stood.misses / arms.reach[-1]).reshape(frames, many)
             joints.append(np.moveaxis(stood.joints.reshape(segments + 1, 3, frames, many), 1, -1))
             lying.append(stood.lying.reshape(segments + 1, frames, many))
         return GroundedPoses(
@@ -366,6 +350,32 @@ class GroundedWalk:
             cycles,
             tuple(asked),
             tuple(evened),
+        )
+
+    def _rotations(
+        self, columns: list[int], stood: Stood, held: Hold, to_armature: Floats, bank: Floats
+    ) -> Floats:
+        """Rotations (frames, arms, bones, 4) of arms that stand, their suckers to the ground.
+
+        Args:
+            columns: which arms.
+            stood: how they stand.
+            held: how they hold on.
+            to_armature: (frames, 4) from the world to the armature.
+            bank: (bones, frames, arms) radians that the gait twists them by.
+        """
+        segments, many = len(stood.directions), len(columns)
+        shape = segments, 3, len(to_armature), many
+        back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
+        towards = turned(back, -held.upwards(segments)).reshape(shape)
+        along = np.minimum(_FIRST_TURN + np.arange(segments) / 3.0, 1.0)
+        most = min(_MOST_TURN, _TURN / segments) * along
+        turns = most[:, None, None] * held.weight.reshape(shape[2:])
+        return bone_rotations(
+            [self._generator.rests[arm] for arm in columns],
+            turned(back, stood.directions).reshape(shape),
+            bank,
+            Facing([self._sides[arm] for arm in columns], towards, turns),
         )
 
     @staticmethod
@@ -418,8 +428,8 @@ class GroundedWalk:
                     at = place, cycle - laid.first
                     if not laid.present[at]:
                         continue
-                    turns = self._middle / _CYCLE + cycle + np.array([laid.on[at], laid.off[at]])
-                    ends = self._rhythm.distances([arm], turns[None])[0] * _CYCLE / self._stride
+                    turns = self._middle / CYCLE + cycle + np.array([laid.on[at], laid.off[at]])
+                    ends = self._rhythm.distances([arm], turns[None])[0] * CYCLE / self._stride
                     found.append(
                         Foothold(
                             arm,

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from ..rotations import Floats, multiply, normalized, rotate
 from .body_line import BodyLine
 from .crawl import CrawlSettings, Holds, Journey, plan_crawl
+from .gait import CYCLE
 
-_CYCLE: Final = 2.0 * np.pi
 _PER_REACH: Final = 32
 """Samples of a journey to the length of an arm."""
 _SPARE: Final = 6.0
@@ -81,11 +81,11 @@ class Even:
 
     def phases(self, distance: Floats) -> Floats:
         """(frames, arms)."""
-        return _CYCLE * distance[:, None] / self.stride + self.offsets
+        return CYCLE * distance[:, None] / self.stride + self.offsets
 
     def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
         """(arms, …)."""
-        ahead = self.offsets[list(arms)] / _CYCLE
+        ahead = self.offsets[list(arms)] / CYCLE
         return self.stride * (cycles - ahead.reshape(-1, *[1] * (cycles.ndim - 1)))
 
     def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
@@ -106,12 +106,12 @@ class Tabled:
 
     def phases(self, distance: Floats) -> Floats:
         """(frames, arms)."""
-        columns = [_CYCLE * table.cycles(distance) for table in self.tables]
+        columns = [CYCLE * table.cycles(distance) for table in self.tables]
         return np.stack(columns, axis=1) + self.middle
 
     def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
         """(arms, …)."""
-        since = cycles - self.middle / _CYCLE
+        since = cycles - self.middle / CYCLE
         return np.stack(
             [self.tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
         )
@@ -157,7 +157,7 @@ def at_rest(
         duty: share of a cycle that a hold takes.
     """
     if isinstance(rhythm, Even):
-        ends = (rhythm.phases(np.array([0.0, length])) - middle) / _CYCLE
+        ends = (rhythm.phases(np.array([0.0, length])) - middle) / CYCLE
         tables: Sequence[Table] = [
             _even_table(first, last, rhythm.stride, duty) for first, last in ends.T.tolist()
         ]

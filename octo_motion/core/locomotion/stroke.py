@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..rotations import Floats
+from .gait import CYCLE
 
-_CYCLE: Final = 2.0 * np.pi
 _REACH: Final = 0.25 * np.pi
 """The push lasts from this phase before its middle to this phase after it: β₁ of the swim table
 falls from +10° to −80° within π/2."""
@@ -52,7 +52,7 @@ def stroke_speed(phase: ArrayLike, burst: float, stroke_phase: float) -> Floats:
 
 def phase_at_distance(distance: float, burst: float, stroke_phase: float) -> float:
     """Inverse of :func:`stroke_distance` for one distance, by bisection."""
-    low, high = distance - _CYCLE, distance + _CYCLE
+    low, high = distance - CYCLE, distance + CYCLE
     while low < (middle := 0.5 * (low + high)) < high:
         if stroke_distance(middle, burst, stroke_phase) < distance:
             low = middle
@@ -63,12 +63,12 @@ def phase_at_distance(distance: float, burst: float, stroke_phase: float) -> flo
 
 def _wrapped(phase: Floats) -> Floats:
     """The phase from the middle of the push on, from −_REACH up to a cycle later."""
-    return np.mod(phase + _REACH, _CYCLE) - _REACH
+    return np.mod(phase + _REACH, CYCLE) - _REACH
 
 
 _K: Final = np.pi / _REACH
 _RATE: Final = 1.0 / _FADE
-_HEIGHT: Final = _RATE * _CYCLE / _REACH
+_HEIGHT: Final = _RATE * CYCLE / _REACH
 """Peak of the push, such that the speed's mean over a cycle is 1."""
 
 
@@ -78,7 +78,7 @@ def _driven(offset: Floats) -> Floats:
     return 0.5 * _HEIGHT * (_FADE + swing / (_RATE**2 + _K**2))
 
 
-_GLIDE: Final = float(np.exp(-_RATE * (_CYCLE - 2.0 * _REACH)))
+_GLIDE: Final = float(np.exp(-_RATE * (CYCLE - 2.0 * _REACH)))
 _EDGE: Final = float(_driven(np.array(_REACH)))
 # The push is as strong at its start as at its end, and the glide leads from its end to its start.
 _FADING: Final = (

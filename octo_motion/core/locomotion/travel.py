@@ -21,6 +21,7 @@ from ..errors import SettingsError
 from ..remembered import Remembered, key_of
 from ..rotations import Floats, from_axis_angle, multiply, rotate_in_plane
 from .bearings import Bearings, bearings
+from .gait import CYCLE
 from .route import Route
 from .stroke import phase_at_distance, stroke_distance
 
@@ -28,7 +29,6 @@ Manner = Literal["WALK", "SWIM"]
 Speed = Literal["EVEN", "NATURAL"]
 Heading = Literal["ALONG", "FIXED"]
 
-_CYCLE: Final = 2.0 * np.pi
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _LEFT: Final = np.array([1.0, 0.0])
 _SETTLE: Final = 1.0
@@ -229,11 +229,11 @@ def unhurried(
 
 def strides(route: Route, settings: TravelSettings) -> float:
     """Gait cycles from the start of the route to its end."""
-    return _last_phase(route, settings) / _CYCLE
+    return _last_phase(route, settings) / CYCLE
 
 
 def _last_phase(route: Route, settings: TravelSettings) -> float:
-    covered = _CYCLE * route.length / settings.stride
+    covered = CYCLE * route.length / settings.stride
     if settings.manner == "WALK":
         return covered
     return phase_at_distance(covered, settings.burst, settings.stroke_phase)

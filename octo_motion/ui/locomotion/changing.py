@@ -26,7 +26,7 @@ from ...core.locomotion.changes import (
 from ...core.locomotion.course import Course, Line, SwumLine, WalkedLine
 from ...core.locomotion.easing import least_jerk
 from ...core.locomotion.footholds import Wish
-from ...core.locomotion.gait import GaitTable
+from ...core.locomotion.gait import CYCLE, GaitTable
 from ...core.locomotion.generator import Generator
 from ...core.locomotion.grounded import GroundedWalk, Raise
 from ...core.locomotion.off_ground import afloat
@@ -46,7 +46,6 @@ _ROOM: Final = 0.5
 """Arm lengths that a body swims higher than it walks at least: room for its arms …"""
 _SETTLING: Final = 0.1
 """… and within which it comes down to that."""
-_CYCLE: Final = 2.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +329,7 @@ class Changing:
         way, line = self.ways[number], self.course.lines[number]
         if isinstance(line, SwumLine):
             return line.travel(distance)
-        phase = _CYCLE * distance / way.travel.stride
+        phase = CYCLE * distance / way.travel.stride
         bearings = way.standing.bearings if way.standing else bearings_of(line.route, way.travel)
         return travel_at(line.route, way.travel, bearings, distance, phase)
 
@@ -520,7 +519,7 @@ def _holds(
 ) -> list[tuple[tuple[Floats, Floats], np.ndarray]]:
     """For each arm, where its holds begin and end between two places, and their cycles."""
     found: list[list[tuple[float, float, int]]] = [[] for _ in range(arms)]
-    unit = way.travel.stride / _CYCLE
+    unit = way.travel.stride / CYCLE
     for each in walk.footholds() if walk is not None else ():
         on, off = unit * each.on, unit * each.off
         if first < 0.5 * (on + off) <= last:
