@@ -396,6 +396,52 @@ def test_the_result_says_what_it_was_made_from() -> None:
     assert note["splices"][0]["part"] == "RIGHT_ARM"
 
 
+def test_a_splice_that_changes_nothing_is_told(capfd: pytest.CaptureFixture[str]) -> None:
+    hero, _ = hero_and_source()
+    OPERATORS.splice_add()
+    OPERATORS.splice_add(part="HEAD")
+    OPERATORS.splice_build()
+    assert "Warning" not in capfd.readouterr().out
+    late, ended = stack_of(hero).splices
+    late.base_start = 42.5
+    ended.splice_start = 60.0
+    assert ended.after == "STOP"
+    for build in (OPERATORS.splice_build, OPERATORS.splice_drag_timing):
+        build()
+        told = capfd.readouterr().out
+        assert (
+            "Warning: 'Right Arm: Source Motion' changes nothing: it begins at frame 42.5, and the "
+            "base has frames 1 to 41." in told
+        )
+        assert (
+            "Warning: 'Head: Source Motion' changes nothing: it begins at frame 60 of its clip, "
+            "which has frames 1 to 41." in told
+        )
+    ended.mute = True
+    OPERATORS.splice_build()
+    assert "Head" not in capfd.readouterr().out
+
+
+def test_what_holds_spliced_bones_back_is_told(capfd: pytest.CaptureFixture[str]) -> None:
+    hero, _ = hero_and_source()
+    bones = hero.pose.bones
+    held = bones["forearm.R"].constraints.new("IK")
+    bones["hand.R"].constraints.new("COPY_ROTATION").target = hero
+    bones["foot.L"].constraints.new("COPY_ROTATION").target = hero
+    OPERATORS.splice_add()
+    OPERATORS.splice_build()
+    told = capfd.readouterr().out
+    assert "Warning: Constraints or drivers act on 'forearm.R', 'hand.R' after their keys" in told
+    assert "foot.L" not in told
+    held.mute = True
+    bones["hand.R"].constraints[0].influence = 0.0
+    OPERATORS.splice_build()
+    assert "Warning" not in capfd.readouterr().out
+    OPERATORS.splice_add(part="CHAIN", bone="thigh.L")
+    OPERATORS.splice_build()
+    assert "act on 'foot.L' after its keys" in capfd.readouterr().out
+
+
 def test_landmarks_that_were_found_stand_in_the_table_afterwards() -> None:
     hero, source = hero_and_source()
     assert not stack_of(hero).landmarks.hips

@@ -178,7 +178,8 @@ def splice(
     prepared = prepare(armature)
     made = write(prepared, prepared.compute())
     first, last = (round(each) for each in bpy.data.actions[made.action].frame_range)
-    return SpliceSummary(made.message, made.frames, first, last, tuple(clips.warnings))
+    warnings = (*clips.warnings, *made.warnings)
+    return SpliceSummary(made.message, made.frames, first, last, warnings)
 
 
 def _stack(armature: bpy.types.Object) -> Any:

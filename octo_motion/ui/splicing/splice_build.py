@@ -11,7 +11,7 @@ from bpy.props import IntProperty
 from ...core.splicing.alignment import Suggestion
 from ..locomotion.arm_items import assign
 from .splice_list import SpliceOperator, StackOperator
-from .stack import Stack, prepare, suggestions, write
+from .stack import Stack, Summary, prepare, suggestions, write
 
 MOST_SUGGESTIONS: Final = 5
 
@@ -38,7 +38,7 @@ class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
         settings: Any,  # noqa: ARG002
     ) -> None:
         stack = prepare(armature)
-        self.report({"INFO"}, write(stack, stack.compute()).message)
+        tell(self, write(stack, stack.compute()))
 
 
 class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
@@ -80,10 +80,11 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
         stack = stack.retimed(number, chosen.base_start, chosen.splice_start)
         clip = stack.compute()
         set_timing(settings.splices[number], chosen.base_start, chosen.splice_start)
-        write(stack, clip)
+        made = write(stack, clip)
         lines = [_line(rank, each) for rank, each in enumerate(found, 1)]
         self.told = "\n".join(lines)
-        self.report({"INFO"}, f"Begins at {chosen.base_start:g}. Best first: {'; '.join(lines)}.")
+        told = f"Begins at {chosen.base_start:g}. Best first: {'; '.join(lines)}."
+        tell(self, made, told)
 
 
 def _line(rank: int, found: Suggestion) -> str:
@@ -96,8 +97,8 @@ def build_retimed(
     number: int,
     starts: tuple[float, float],
     prepared: Stack | None = None,
-) -> str:
-    """Set where a splice begins, on base and clip, and build; the message to show.
+) -> Summary:
+    """Set where a splice begins, on base and clip, and build.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right; nothing has changed.
@@ -105,7 +106,14 @@ def build_retimed(
     stack = (prepared or prepare(armature)).retimed(number, *starts)
     clip = stack.compute()
     set_timing(settings.splices[number], *starts)
-    return write(stack, clip).message
+    return write(stack, clip)
+
+
+def tell(operator: bpy.types.Operator, made: Summary, message: str = "") -> None:
+    """Report what was made, and then, to stay on screen, what is to be looked at."""
+    operator.report({"INFO"}, message or made.message)
+    for each in made.warnings:
+        operator.report({"WARNING"}, each)
 
 
 CLASSES: Final[tuple[type, ...]] = (

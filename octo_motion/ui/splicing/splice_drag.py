@@ -13,7 +13,7 @@ from ...blender.armature import active_armature
 from ...core.errors import ClipError, OctoMotionError
 from .. import at_work
 from .properties import splicing_settings
-from .splice_build import build_retimed
+from .splice_build import build_retimed, tell
 from .splice_list import SpliceOperator, active_splice
 from .stack import local_object, prepare
 from .timing_drag import DragSession
@@ -76,7 +76,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
             self.base_start if given("base_start") else item.base_start,
             self.splice_start if given("splice_start") else item.splice_start,
         )
-        self.report({"INFO"}, build_retimed(armature, settings, settings.active_splice, starts))
+        tell(self, build_retimed(armature, settings, settings.active_splice, starts))
 
     def invoke(
         self, context: bpy.types.Context, event: bpy.types.Event
@@ -149,7 +149,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         settings = cast("Any", splicing_settings(armature))
         # For the panel of the last operation.
         self.base_start, self.splice_start = starts
-        self.report({"INFO"}, build_retimed(armature, settings, number, starts, stack))
+        tell(self, build_retimed(armature, settings, number, starts, stack))
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:

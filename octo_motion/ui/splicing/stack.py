@@ -8,6 +8,7 @@ plain arrays alone; :func:`write` changes the file.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
@@ -22,9 +23,9 @@ from ...core.splicing.carry import Side, carriers
 from ...core.splicing.clip import Clip
 from ...core.splicing.landmarks import LANDMARKS, OPTIONAL, Landmarks
 from ...core.splicing.mapping import map_skeleton
-from ...core.splicing.parts import PARTS, Part, chain
+from ...core.splicing.parts import PARTS, Part, chain, part_bones
 from ...core.splicing.splice import Reach, SeenFrom, Splice, build
-from ...core.splicing.timing import After, Timing
+from ...core.splicing.timing import After, Timing, window
 from ..plain import plain
 from .landmark_properties import read_landmarks, write_landmarks
 from .properties import OCTO_MOTION_PG_splicing, splicing_settings
@@ -86,6 +87,8 @@ class Summary:
     frames: int
     splices: int
     """How many were not muted."""
+    warnings: tuple[str, ...] = ()
+    """What one may not see on the armature, and why: sentences."""
 
     @property
     def message(self) -> str:
@@ -349,7 +352,43 @@ def write(stack: Stack, clip: Clip) -> Summary:
         # What was used is what the table shows from now on.
         write_landmarks(group.landmarks, stack.base.landmarks.bones)
     acting = sum(splice is not None for splice in stack.splices)
-    return Summary(action.name, len(clip), acting)
+    return Summary(action.name, len(clip), acting, tuple(_warnings(stack, group.splices)))
+
+
+def _warnings(stack: Stack, items: Any) -> Iterator[str]:
+    """Why something that was built cannot be seen."""
+    base = stack.base.clip
+    held: dict[str, None] = {}
+    for splice, item in zip(stack.splices, items, strict=False):
+        if splice is None:
+            continue
+        timing, clip = splice.timing, splice.clip
+        if not window(timing, base, clip).weights.any():
+            told, start, frames = "", timing.base_start, base.frames
+            if timing.after == "stop" and timing.splice_start >= clip.frames[-1]:
+                told, start, frames = " of its clip, which", timing.splice_start, clip.frames
+            yield (
+                f"'{item.name}' changes nothing: it begins at frame {start:g}"
+                f"{told or ', and the base'} has frames {frames[0]:g} to {frames[-1]:g}."
+            )
+        held |= dict.fromkeys(_held(stack.base, splice))
+    if held:
+        names, whose = ", ".join(f"'{each}'" for each in held), "its" if len(held) == 1 else "their"
+        yield (
+            f"Constraints or drivers act on {names} after {whose} keys: mute them if the splice "
+            "does not show."
+        )
+
+
+def _held(base: Source, splice: Splice) -> list[str]:
+    """Bones of a splice that constraints or drivers move, of a body those that are landmarks."""
+    skeleton, part = base.clip.skeleton, splice.part
+    bones = part_bones(part, skeleton, base.landmarks, clavicle=splice.clavicle)
+    if part.pieces and base.landmarks is not None:
+        # Rigs have machinery beneath them that is to follow.
+        known = set(base.landmarks.bones.values())
+        bones = tuple(each for each in bones if each in known)
+    return [each for each in bones if skeleton.constrained[skeleton.index[each]]]
 
 
 def _besides(armature: bpy.types.Object, clip: Clip) -> list[actions.Channel]:
