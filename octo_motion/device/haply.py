@@ -91,7 +91,7 @@ class Haply:
         self._device = ""
         self._greeted = self._centred = version < _CONFIGURABLE
         self._asked = 0.0
-        self._answered = time.perf_counter()
+        self._answered = self._told = time.perf_counter()
         self._force: Vector = ZERO
         self._description = Description(
             name="Haply Inverse3",
@@ -143,7 +143,10 @@ class Haply:
         if state is None:
             if not self._device:
                 self._say({})  # no device yet: ask again
+            elif now - self._told > _LOST_SECONDS:
+                raise DeviceLostError(self._description.name)  # pulled out; the service goes on
             return None
+        self._told = now
         self._device, sample = state
         if self._version < _CONFIGURABLE:
             sample = sample._replace(position=subtract(sample.position, _MIDDLE))

@@ -238,7 +238,8 @@ class Port:
         self.number: int = self._socket.getsockname()[1]
         self._peer: socket.socket | None = None
         self._address: tuple[str, int] | None = None
-        self._got = b""
+        self._got = self._unsent = b""
+        self._known: Features | None = None
         self._features: Features | None = None
         self._state: State | None = None
         self._answered = 0
@@ -249,7 +250,10 @@ class Port:
         """The program that came, once it has said what its device can do."""
         self._fill()
         features, self._features = self._features, None
-        return NetworkDevice(self, features) if features else None
+        if features is None:
+            return None
+        self._known = features
+        return NetworkDevice(self, features)
 
     @property
     def silent(self) -> bool:
@@ -268,7 +272,10 @@ class Port:
         with contextlib.suppress(OSError):
             if self._stream:
                 if self._peer is not None:
-                    self._peer.send(data)
+                    # A program that does not read misses whole packets, never a part of one.
+                    if len(self._unsent) < len(data):
+                        self._unsent += data
+                    self._unsent = self._unsent[self._peer.send(self._unsent) :]
             elif self._address is not None:
                 self._socket.sendto(data, self._address)
 
@@ -276,8 +283,8 @@ class Port:
         """Be ready for another program."""
         if self._peer is not None:
             self._peer.close()
-        self._peer, self._address, self._got = None, None, b""
-        self._features, self._state = None, None
+        self._peer, self._address, self._got, self._unsent = None, None, b"", b""
+        self._features, self._state, self._known = None, None, None
 
     def close(self) -> None:
         """Close the port."""
@@ -285,17 +292,19 @@ class Port:
         self._socket.close()
 
     def _fill(self) -> None:
+        if not self._stream:
+            self._fill_from_datagrams()
+            return
         try:
-            if self._stream:
-                self._fill_from_stream()
-            else:
-                self._fill_from_datagrams()
+            self._fill_from_stream()
         except PacketError as error:
-            if str(error) != self._complained:
-                self._complained = str(error)
-                log.warning("Port %d: %s", self.number, error)
-            if self._stream:
-                self.forget()
+            self._complain(error)
+            self.forget()
+
+    def _complain(self, error: PacketError) -> None:
+        if str(error) != self._complained:
+            self._complained = str(error)
+            log.warning("Port %d: %s", self.number, error)
 
     def _fill_from_datagrams(self) -> None:
         for _ in range(64):
@@ -303,18 +312,20 @@ class Port:
                 data, address = self._socket.recvfrom(2048)
             except OSError:
                 return
-            packet = parse(data, self._key)
+            try:
+                packet = parse(data, self._key)
+                self._take(packet)
+            except PacketError as error:
+                self._complain(error)
+                continue
             self._address = address
-            self._take(packet)
 
     def _fill_from_stream(self) -> None:
+        # Who says nothing of a device keeps the port only until somebody else comes.
+        if self._peer is None or (self._known is None and self.silent):
+            self._accept()
         if self._peer is None:
-            try:
-                self._peer, _ = self._socket.accept()
-            except OSError:
-                return
-            self._peer.settimeout(0.0)
-            self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return
         try:
             data = self._peer.recv(65536)
         except (BlockingIOError, InterruptedError):
@@ -333,10 +344,21 @@ class Port:
             packet, self._got = parse(self._got[:size], self._key), self._got[size:]
             self._take(packet)
 
+    def _accept(self) -> None:
+        try:
+            peer, _ = self._socket.accept()
+        except OSError:
+            return
+        self.forget()
+        self._peer, self._heard = peer, time.perf_counter()
+        peer.settimeout(0.0)
+        peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
     def _take(self, packet: Packet) -> None:
         self._heard = time.perf_counter()
         if isinstance(packet, Features):
-            self._features = packet
+            if packet != self._known:  # some say it again and again, for it may get lost
+                self._features = packet
         elif isinstance(packet, State):
             self._state, self._answered = packet, packet.sequence
         else:

@@ -150,6 +150,77 @@ def test_program_that_falls_silent_is_lost(
     device.close()
 
 
+def test_program_may_say_again_what_its_device_can_do(port: tuple[Port, socket.socket]) -> None:
+    """Over UDP it may get lost, so careful programs repeat it: that is no other device."""
+    here, program = port
+    program.sendall(network.pack(FEATURES, KEY))
+    device = wait_for(here.device)
+    assert isinstance(device, network.NetworkDevice)
+    program.sendall(network.pack(FEATURES, KEY))
+    program.sendall(network.pack(STATE, KEY))
+    assert wait_for(device.read)
+    assert here.device() is None
+    program.sendall(network.pack(replace(FEATURES, name="Another"), KEY))
+    other = wait_for(here.device)
+    assert isinstance(other, network.NetworkDevice)
+    assert other.description.name == "Another"
+
+
+def test_garbage_does_not_keep_poses_from_arriving() -> None:
+    here = Port("udp", 0, KEY)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
+        program.connect(("127.0.0.1", here.number))
+        program.send(network.pack(FEATURES, KEY))
+        device = wait_for(here.device)
+        assert isinstance(device, network.NetworkDevice)
+        for _ in range(30):
+            program.send(b"garbage")
+        program.send(network.pack(STATE, KEY))
+        assert device.read() is not None, "loopback delivers at once"
+    here.close()
+
+
+def test_program_that_reads_slowly_gets_whole_packets() -> None:
+    here = Port("tcp", 0, KEY)
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as program:
+        program.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        program.connect(("127.0.0.1", here.number))
+        program.settimeout(5.0)
+        program.sendall(network.pack(FEATURES, KEY))
+        device = wait_for(here.device)
+        assert isinstance(device, network.NetworkDevice)
+        for number in range(100_000):  # a minute and a half of them
+            device.send((float(number), 0.0, 0.0), (0.0, 0.0, 0.0))
+        got = b""
+        size = network.SIZES[network.FORCE]
+        last = 0
+        while last < 100_010:
+            device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            got += program.recv(1 << 20)
+            while len(got) >= size:
+                packet = parse(got[:size], KEY)
+                assert isinstance(packet, Force)
+                assert packet.sequence > last
+                got, last = got[size:], packet.sequence
+    here.close()
+
+
+def test_stranger_who_says_nothing_does_not_keep_the_port(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Port("tcp", 0, KEY)
+    with socket.create_connection(("127.0.0.1", here.number)) as stranger:
+        wait_for(lambda: here.device() or here._peer)
+        with socket.create_connection(("127.0.0.1", here.number)) as program:
+            program.sendall(network.pack(FEATURES, KEY))
+            later = time.perf_counter() + 2.0
+            monkeypatch.setattr(network.time, "perf_counter", lambda: later)
+            assert wait_for(here.device)
+        stranger.settimeout(5.0)
+        assert stranger.recv(1) == b""
+    here.close()
+
+
 def test_key_of_another_length_opens_no_port() -> None:
     with pytest.raises(ValueError, match="16"):
         Port("udp", 0, b"short")
@@ -344,6 +415,29 @@ def test_haply_service_that_falls_silent_is_a_lost_device(
     monkeypatch.setattr(haply.time, "perf_counter", lambda: later)
     with pytest.raises(DeviceLostError):
         device.read()
+    device.close()
+
+
+def test_haply_pulled_out_while_its_service_goes_on_is_a_lost_device(
+    service: HaplyService, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a hand would hold its limb, where it was, for ever."""
+    device = open_haply(service)
+    wait_for(device.read)
+    service.with_device = False
+    start, clock = time.perf_counter(), time.perf_counter
+    monkeypatch.setattr(haply.time, "perf_counter", lambda: start + 20.0 * (clock() - start))
+
+    def go_on() -> None:
+        end = time.monotonic() + 10.0
+        while time.monotonic() < end:
+            device.read()
+            device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            time.sleep(0.001)
+
+    with pytest.raises(DeviceLostError):
+        go_on()
+    assert len(service.received) > 3, "the service has answered all the while"
     device.close()
 
 
