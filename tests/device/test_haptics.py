@@ -16,6 +16,7 @@ from octo_motion.device.haptics.coupling import DAMPER_SHARE, SHARE, gains_for, 
 from octo_motion.device.haptics.local_model import Held, LocalModel, Pull
 from octo_motion.device.haptics.passivity import DAMPING, STORED, Observer
 from octo_motion.device.haptics.safety import FALL, RISE, Limits, Shaper, freshness
+from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.haptics.timing import Histogram
 from octo_motion.device.simulated_hand import Hand, rest
 from octo_motion.device.spatial import (
@@ -360,6 +361,32 @@ def test_slow_simulation_feels_like_a_fast_one(every: int) -> None:
 
 
 # --- Time and turns ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("system_wakes_late", [0.0, 0.0006, 0.0012])
+def test_loop_that_need_not_be_exact_leaves_the_processor_to_others(
+    system_wakes_late: float,
+) -> None:
+    """And yet its turns come, on average, as often as they should."""
+    now = slept = 0.0
+
+    def clock() -> float:
+        nonlocal now
+        now += 1e-6
+        return now
+
+    def sleep(seconds: float) -> None:
+        nonlocal now, slept
+        slept += seconds
+        now += seconds + system_wakes_late
+
+    schedule = Schedule(2e-3, clock, sleep, awake=0.00015)
+    for _ in range(1000):
+        schedule.begin()
+        schedule.end()
+    assert schedule.missed == 0
+    assert now == pytest.approx(2.0, rel=0.01)
+    assert slept > 0.3 * now
 
 
 @given(st.lists(st.floats(0.0, 0.1), min_size=1, max_size=200))

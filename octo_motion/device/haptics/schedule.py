@@ -33,15 +33,24 @@ _AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015
 
 
 class Schedule:
-    """A loop of fixed period."""
+    """A loop of fixed period.
+
+    Args:
+        period: s
+        clock: Seconds.
+        sleep: Waits for so many seconds, or somewhat longer.
+        awake: s before a deadline from which on the loop does not sleep.
+    """
 
     def __init__(
         self,
         period: float,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
+        awake: float = _AWAKE,
     ) -> None:
         self.period = period
+        self._awake = awake
         self._clock = clock
         self._sleep = sleep
         self.late = Histogram()
@@ -65,8 +74,8 @@ class Schedule:
             left_out = int(late / self.period) + 1
             self.missed += left_out
             self._deadline += left_out * self.period
-        if self._deadline - now > _AWAKE:
-            self._sleep(self._deadline - now - _AWAKE)
+        if self._deadline - now > self._awake:
+            self._sleep(self._deadline - now - self._awake)
             now = self._clock()
         while now < self._deadline:
             now = self._clock()
