@@ -183,9 +183,13 @@ class Parent:
             if not byte:
                 break
             line += byte
-        self.secret = bytes.fromhex(line.decode("ascii", "replace").strip())
+        try:
+            self.secret = bytes.fromhex(line.decode("ascii", "replace").strip())
+        except ValueError:
+            self.secret = b""
         if len(self.secret) != 32:
-            raise ValueError("a secret has 32 bytes")
+            # Whoever started us is gone already, or is a person who tries it out.
+            sys.exit("This is started by Blender. Try: list, watch or descriptor." if line else 2)
         self.gone = False
 
     def end_with(self, seconds: float = 0.0) -> None:

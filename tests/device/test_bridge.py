@@ -234,6 +234,23 @@ def test_libraries_that_came_with_the_extension_are_handed_over(tmp_path: Path) 
 # --- The command line ----------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("command", ["bridge", "hands"])
+@pytest.mark.parametrize("said", ["", "hello\n"])
+def test_program_without_blender_ends_without_a_riddle(command: str, said: str) -> None:
+    """Blender killed in the moment of starting it, or a person who tries it out."""
+    ended = subprocess.run(
+        [sys.executable, str(process.LAUNCHER), command],
+        input=said,
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    assert ended.returncode != 0
+    assert "Traceback" not in ended.stderr
+    assert ("started by Blender" in ended.stderr) == bool(said)
+
+
 def test_descriptor_is_printed_for_firmware_and_for_people(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
