@@ -118,7 +118,7 @@ class HandLoop:
             case Settings():
                 self._take_settings(message)
             case Workspace():
-                if message.scale > 0.0 and len(self._workspaces) < MOST_POINTERS:
+                if message.scale > 0.0 and message.pointer < MOST_POINTERS:
                     self._workspaces[message.pointer] = message
                     if message.pointer in self._pointers:
                         self._pointers[message.pointer].place(message)
@@ -211,11 +211,13 @@ class HandLoop:
 
     def _welcome(self, driver: Driver) -> None:
         who = driver.description
-        number = self._numbers.setdefault(who.identity, len(self._numbers))
-        if number >= MOST_POINTERS:
-            del self._numbers[who.identity]
+        number = self._number_for(who.identity)
+        if number is None:
+            log.warning("%s is one device too many", who.name)
             driver.close()
             return
+        if number in self._pointers:  # the same program, and another device
+            self._say_device(self._pointers[number], present=False)
         pointer = Pointer(number, driver, self._period, self._settings)
         if isinstance(driver, SpaceMouse):
             with contextlib.suppress(MessageError):
@@ -227,6 +229,23 @@ class HandLoop:
         self._pointers[number] = pointer
         log.info("Found: %s", who.name)
         self._say_device(pointer, present=True)
+
+    def _number_for(self, identity: str) -> int | None:
+        """The pointer's number: the one that the device had before, or one that is free."""
+        number = self._numbers.pop(identity, None)
+        if number is None:
+            given = set(self._numbers.values())
+            number = next((each for each in range(MOST_POINTERS) if each not in given), None)
+        if number is None:
+            # Without serial numbers some are another one each time that they are plugged in.
+            gone = (each for each, used in self._numbers.items() if used not in self._pointers)
+            longest = next(gone, None)
+            if longest is None:
+                return None
+            number = self._numbers.pop(longest)
+            self._corrections.pop(number, None)
+        self._numbers[identity] = number
+        return number
 
     def _lose(self, number: int) -> None:
         pointer = self._pointers.pop(number)

@@ -13,6 +13,7 @@ import pytest
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.posing.world import WorldSettings
 from octo_motion.device import messages as say
+from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.channel import Channel, ChannelClosedError, Listener, connect
 from octo_motion.device.driver import Description, Driver, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
@@ -166,6 +167,68 @@ def test_device_that_goes_leaves_the_other_alone_and_comes_back_as_itself(desk: 
     assert [(each.pointer, each.present) for each in devices] == [
         (0, True),
         (1, True),
+        (0, False),
+        (0, True),
+    ]
+
+
+def test_device_that_is_another_one_each_time_is_never_refused(desk: Desk) -> None:
+    """A Mac names a device without serial number anew each time that it is plugged in."""
+    keeps = Named("keeps")
+    desk.discovery.coming = [keeps]
+    desk.ticks(2, keeps)
+    for time_plugged in range(20):
+        loose = Named(f"loose {time_plugged}")
+        desk.discovery.coming = [loose]
+        desk.ticks(200, keeps, loose)
+        assert len(list(desk.loop.pointers)) == 2
+        loose.gone = True
+        desk.ticks(2, keeps)
+    numbers = {each.pointer for each in desk.told(say.DeviceMessage, 41)}
+    assert numbers == set(range(8))
+    assert [each.number for each in desk.loop.pointers] == [0]
+
+
+def test_number_that_another_device_had_comes_without_its_calibration(desk: Desk) -> None:
+    own = Calibration(rest=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
+    for number in range(8):
+        first = Named(f"first {number}")
+        desk.discovery.coming = [first]
+        desk.ticks(200, first)
+        desk.there.send(say.CalibrationMessage.of(number, own))
+        desk.ticks(20, first)
+        first.gone = True
+        desk.ticks(2)
+    other = Named("other")
+    desk.discovery.coming = [other]
+    desk.ticks(200, other)
+    (pointer,) = desk.loop.pointers
+    assert pointer.number == 0
+    assert pointer.calibration == NONE
+
+
+def test_eight_devices_follow_the_view(desk: Desk) -> None:
+    devices = [Named(str(number)) for number in range(9)]
+    desk.discovery.coming = list(devices)
+    desk.ticks(2, *devices)
+    assert len(list(desk.loop.pointers)) == 8, "and a ninth is left alone"
+    assert devices[8].closed == 1
+    for height in (1.0, 2.0):
+        for number in range(8):
+            desk.there.send(say.Workspace(number, (0.0, 0.0, height)))
+        desk.ticks(50, *devices)
+        assert {each.workspace.origin[2] for each in desk.loop.pointers} == {height}
+
+
+def test_program_that_becomes_another_device_is_another_one(desk: Desk) -> None:
+    first, second = Named("program"), Named("program")
+    desk.discovery.coming = [first]
+    desk.ticks(2, first)
+    desk.discovery.coming = [second]
+    desk.ticks(200, second)
+    told = desk.told(say.DeviceMessage, 3)
+    assert [(each.pointer, each.present) for each in told] == [
+        (0, True),
         (0, False),
         (0, True),
     ]

@@ -16,7 +16,7 @@ import pytest
 from octo_motion.blender import device_store
 from octo_motion.blender.device_store import load_calibrations
 from octo_motion.device import messages as say
-from octo_motion.device.calibration import Calibration
+from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.client import Client, State
 from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.controls import Outcome
@@ -520,6 +520,19 @@ def test_calibration_that_was_kept_is_told_to_a_device_that_comes_again(
     hands.tick(TOLD, room())
     told = [each for each in sent if isinstance(each, say.CalibrationMessage)]
     assert [each.calibration() for each in told] == [kept]
+
+
+def test_device_is_told_as_well_that_nothing_was_learned_of_it(
+    hands: DeviceHands, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its pointer's number may have been another device's, whose calibration would bend it."""
+    sent: list[say.Message] = []
+    send = hands.client.send
+    monkeypatch.setattr(hands.client, "send", lambda each: (sent.append(each), send(each)))
+    wait(hands, hands.shown, "the hand is there")
+    hands.tick(TOLD, room())
+    told = [each for each in sent if isinstance(each, say.CalibrationMessage)]
+    assert [each.calibration() for each in told] == [NONE]
 
 
 def test_two_blenders_keep_what_each_has_learned(on_stage: DeviceHands) -> None:

@@ -296,9 +296,9 @@ class DeviceHands:
         present = {number: device.identity for number, device in client.devices.items()}
         for number, identity in present.items():
             if self._corrected.get(number) != identity:
-                wanted = self.calibrations.get(identity)
-                if wanted is not None or number in self._corrected:
-                    client.send(CalibrationMessage.of(number, wanted or NONE))
+                # Also where none was learned: another device may have had its number.
+                wanted = self.calibrations.get(identity, NONE)
+                client.send(CalibrationMessage.of(number, wanted))
         self._corrected = present
 
     def _fit(self, number: int, device: DeviceMessage) -> None:
