@@ -156,28 +156,25 @@ class Puppet:
         sizes = posed.lengths / np.maximum(rig.skeleton.lengths, 1e-12)
         sizes /= even_scale(armature)
 
-        count = len(bones)
-        self._turns = np.zeros((count, 4))
-        self._offsets = np.zeros((count, 3))
-        self._sizes = np.ones(count)
-        self._free_turn = np.zeros(count, dtype=bool)
-        for body, bone in enumerate(bones):
-            parent = rig.skeleton.parents[bone]
-            if parent < 0:
-                turn, place = rest[bone], rest_heads[bone]
-            else:
-                carry = multiply(turned[parent], conjugate(rest[parent]))
-                turn = multiply(carry, rest[bone])
-                way = rest_heads[bone] - rest_heads[parent]
-                self._sizes[body] = sizes[parent]
-                place = heads[parent] + sizes[parent] * rotate(carry, way)
-            self._free_turn[body] = not rig.skeleton.inherits_rotation[bone]
-            carrier = self._carriers[body]
-            if carrier >= 0:
-                base = bones[carrier]
-                turn = multiply(conjugate(turned[base]), turn)
-                place = rotate(conjugate(turned[base]), place - heads[base])
-            self._turns[body], self._offsets[body] = turn, place
+        # Carried by the bones that they hang on in Blender, …
+        above = np.array(rig.skeleton.parents)[bones]
+        hangs = above >= 0
+        above = above[hangs]
+        turn, place = rest[bones], rest_heads[bones]
+        carry = multiply(turned[above], conjugate(rest[above]))
+        way = rotate(carry, place[hangs] - rest_heads[above])
+        turn[hangs] = multiply(carry, turn[hangs])
+        place[hangs] = heads[above] + sizes[above, None] * way
+        self._sizes = np.ones(len(bones))
+        self._sizes[hangs] = sizes[above]
+        # … seen from the bodies that carry those.
+        rides = self._carriers >= 0
+        base = np.array(bones)[self._carriers[rides]]
+        back = conjugate(turned[base])
+        turn[rides] = multiply(back, turn[rides])
+        place[rides] = rotate(back, place[rides] - heads[base])
+        self._turns, self._offsets = turn, place
+        self._free_turn = ~np.array(rig.skeleton.inherits_rotation)[bones]
         # What is scaled to nothing cannot be moved.
         self._sizes[self._sizes < _NOTHING] = 1.0
         parents = np.array(rig.roles.parents)

@@ -397,3 +397,20 @@ def test_an_obstacle_without_faces_is_told():
             kind(corners=np.zeros((2, 3, 3)))
         with pytest.raises(SettingsError):
             kind(corners=np.zeros((0, 3, 3)))
+
+
+def test_few_large_faces_among_many_small_ones_are_found_like_any_others():
+    """A detailed statue on a wide slope: the grid is no finer than memory allows."""
+    rng = np.random.default_rng(3)
+    small = rng.uniform(-1.0, 1.0, (500, 1, 3)) + 0.01 * rng.normal(size=(500, 3, 3))
+    slope = np.array([[[-50.0, -50.0, -20.0], [50.0, -50.0, -10.0], [50.0, 50.0, 10.0]]])
+    mesh = Mesh(corners=np.concatenate([small, slope]))
+    assert mesh.thickness < 0.1
+    normal = np.cross(slope[0, 1] - slope[0, 0], slope[0, 2] - slope[0, 0])
+    normal /= np.linalg.norm(normal)
+    shares = rng.dirichlet(np.ones(3), 40)
+    points = shares @ slope[0] + 0.05 * normal
+    points = points[np.linalg.norm(points, axis=1) > 3.0]
+    distances, ways = mesh.closest(points, 0.1)
+    np.testing.assert_allclose(distances, 0.05, atol=1e-9)
+    np.testing.assert_allclose(ways, np.tile(normal, (len(points), 1)), atol=1e-9)

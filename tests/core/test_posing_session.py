@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A hand that holds a puppet, and the time that passes meanwhile."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -227,3 +229,20 @@ def test_pose_of_another_frame_is_taken_over_at_rest() -> None:
     assert session.pose.positions == pytest.approx(other.positions, abs=1e-12)
     ticks(session, 30)
     assert session.pose.positions == pytest.approx(other.positions, abs=1e-4)
+
+
+def test_pose_whose_joints_are_elsewhere_is_taken_over_as_it_is() -> None:
+    """Bones that are stretched or moved at another frame: nothing jumps back to where they were."""
+    session = session_of()
+    session.pin(2, state=True)
+    longer = clay()
+    anchors = longer.anchors * np.array([[1.0], [1.3], [0.8], [1.1]])
+    other = posed(replace(longer, anchors=anchors), np.tile([0.2, 0.0, 0.1], (4, 1)))
+    session.adopt(other)
+    assert session.pose.positions == pytest.approx(other.positions, abs=1e-12)
+    assert session.pins == {0, 2}
+    ticks(session, 30)
+    assert session.pose.positions == pytest.approx(other.positions, abs=1e-4)
+    pull(session, (0.1, 0.0, 0.0))
+    ways = np.linalg.norm(np.diff(session.pose.positions, axis=0), axis=1)
+    assert ways == pytest.approx(np.linalg.norm(np.diff(other.positions, axis=0), axis=1))

@@ -310,3 +310,23 @@ def test_script_with_settings_is_refused_for_linked_armatures(tmp_path: Path) ->
     with pytest.raises(RuntimeError, match="is linked from"):
         bpy.ops.octo_motion.pose_script(filepath=str(path))
     assert found.octo_motion.posing.material == "CLAY"
+
+
+def test_limb_that_stands_elsewhere_at_another_frame_is_left_there() -> None:
+    armature = legs()
+    armature.data.bones["root"].use_deform = False
+    foot, shin = armature.pose.bones["foot"], armature.pose.bones["shin"]
+    for frame, size in ((1, 0.0), (21, 0.2)):
+        foot.location.x, shin.scale.y = size, 1.0 + size
+        foot.keyframe_insert("location", frame=frame)
+        shin.keyframe_insert("scale", frame=frame)
+    scene = bpy.context.scene
+    scene.frame_set(1)
+    session = PuppetSession(armature, scene, clock=None)
+    scene.frame_set(21)
+    for _ in range(10):
+        session.tick(TICK)
+    assert foot.location.x == pytest.approx(0.2, abs=1e-6)
+    shown = Puppet(armature).read()
+    assert session.core.pose.positions == pytest.approx(shown.positions, abs=1e-5)
+    session.cancel()

@@ -111,10 +111,7 @@ def build_figure(
     axes = rotate(conjugate(rotations), ends - heads)
     lengths = np.linalg.norm(axes, axis=1)
 
-    anchors = np.zeros((count, 3))
-    anchors[hanging] = rotate(
-        conjugate(rotations[parents[hanging]]), heads[hanging] - heads[parents[hanging]]
-    )
+    anchors = joints_of(roles.parents, Pose(heads, rotations))
     at_rest = multiply(posed.turn, skeleton.rest_rotations[bones])
     rest = at_rest.copy()
     rest[hanging] = multiply(conjugate(at_rest[parents[hanging]]), at_rest[hanging])
@@ -276,6 +273,17 @@ def _limits(
     least = np.minimum(least, now - _SLACK)
     most = np.maximum(most, now + _SLACK)
     return Limits(np.clip(np.stack([least, most], axis=2), *FREE))
+
+
+def joints_of(parents: Sequence[int], pose: Pose) -> Floats:
+    """(bodies, 3) where joints sit in the frames of their parents, in a pose; zeros for roots."""
+    hanging = np.array(parents) >= 0
+    above = np.array(parents)[hanging]
+    anchors = np.zeros((len(parents), 3))
+    anchors[hanging] = rotate(
+        conjugate(pose.orientations[above]), pose.positions[hanging] - pose.positions[above]
+    )
+    return anchors
 
 
 def turned_bodies(figure: Figure, before: Pose, after: Pose, angle: float) -> list[int]:

@@ -18,6 +18,9 @@ from ..rotations import IDENTITY, Floats, cross, normalized
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _TINY: Final = 1e-12
+_MOST_CELLS: Final = 100_000
+_MOST_EACH: Final = 64
+"""In so many cells, and so many for each triangle, the triangles of a mesh may lie."""
 
 Integers = NDArray[np.int64]
 
@@ -188,7 +191,7 @@ class Mesh(Obstacle):
         object.__setattr__(self, "_normals", normals)
         object.__setattr__(self, "_grid", grid)
         if self.thickness <= 0.0:
-            object.__setattr__(self, "thickness", grid.cell)
+            object.__setattr__(self, "thickness", grid.usual)
 
     def _grid_within(self, reach: float) -> TriangleGrid:
         if reach > self._grid.cell:
@@ -234,13 +237,17 @@ class TriangleGrid:
 
     def __init__(self, corners: Floats, least: float = 0.0) -> None:
         low, high = corners.min(axis=1), corners.max(axis=1)
-        self.cell = float(max(np.median((high - low).max(axis=1)), least, _TINY))
         self._low = low.min(axis=0)
         # No more than 2²⁰ cells along an axis, so that a cell's number fits.
-        self.cell = max(self.cell, float((high.max(axis=0) - self._low).max()) / 2**20)
-        first = np.floor((low - self._low) / self.cell).astype(np.int64)
-        last = np.floor((high - self._low) / self.cell).astype(np.int64)
-        counts = last - first + 1
+        finest = float((high.max(axis=0) - self._low).max()) / 2**20
+        self.usual = float(max(np.median((high - low).max(axis=1)), _TINY, finest))
+        """Size of the triangles."""
+        self.cell = max(self.usual, least)
+        first, counts = self._span(low, high)
+        while counts.prod(axis=1, dtype=np.float64).sum() > _MOST_CELLS + _MOST_EACH * len(corners):
+            # A few triangles are much larger than most: a floor about a detailed statue.
+            self.cell *= 2.0
+            first, counts = self._span(low, high)
         totals = counts.prod(axis=1)
         triangles = np.repeat(np.arange(len(corners)), totals)
         within = np.arange(totals.sum()) - np.repeat(np.cumsum(totals) - totals, totals)
@@ -254,6 +261,12 @@ class TriangleGrid:
         self._cells, self._starts, self._counts = np.unique(
             keys[order], return_index=True, return_counts=True
         )
+
+    def _span(self, low: Floats, high: Floats) -> tuple[Integers, Integers]:
+        """(triangles, 3) the first cell of each triangle along each axis, and how many."""
+        first = np.floor((low - self._low) / self.cell).astype(np.int64)
+        last = np.floor((high - self._low) / self.cell).astype(np.int64)
+        return first, last - first + 1
 
     @staticmethod
     def _keys(cells: Integers) -> Integers:

@@ -24,7 +24,7 @@ from ..rotations import (
 )
 from .coupling import Coupling, Grab
 from .figure import Elements, Figure, Pose
-from .figure_building import turned_bodies
+from .figure_building import joints_of, turned_bodies
 from .obstacles import Obstacle
 from .picking import Hit
 from .world import World, WorldSettings, WorldState
@@ -43,6 +43,8 @@ STILL: Final = 2e-3
 """m/s and rad/s below which a puppet that nobody holds stands still."""
 REST_TIME: Final = 0.3
 """Seconds that it must be so before nothing is computed any more."""
+ELSEWHERE: Final = 1e-5
+"""Of a bone's length: where a joint counts as being elsewhere than the figure has it."""
 MOST_STEPS_BACK: Final = 64
 GENTLE: Final = 0.1
 """Of the firmest coupling, with joints that just bear what hangs on them."""
@@ -308,6 +310,12 @@ class Session:
         """
         self.release()
         self._touched.clear()
+        anchors = joints_of(self.figure.parents, pose)
+        apart = np.linalg.norm(anchors - self.figure.anchors, axis=1)
+        if (apart > ELSEWHERE * self.figure.lengths).any():
+            # Bones are stretched there, or moved.
+            self.figure = replace(self.figure, anchors=anchors)
+            self._rebuild(replace(self.world.settings, pinned=frozenset()))
         self.world.set_pose(pose)
         self._pin_again()
         self._reference = self.world.pose()
