@@ -29,9 +29,7 @@ _CHALLENGE: Final = struct.Struct(f"<4sH{_NONCE}s")
 _ANSWER: Final = struct.Struct(f"<4sH{_NONCE}s32s")
 _PATIENCE: Final = 3.0
 """s that a connection may take to prove itself, on a machine that has much else to do."""
-_MOST_WAITING: Final = 100_000_000
-"""Bytes that may wait for a peer which does not read; then it counts as gone. A scene's meshes are
-sent at one go: two dozen of the largest."""
+_MOST_WAITING: Final = 8_000_000
 _DROPPABLE_BEYOND: Final = 65_536
 """Bytes waiting from which on poses and the like are left out: the newest comes later anyway."""
 
@@ -60,6 +58,8 @@ class Channel:
         self._socket = connection
         self._got = bytearray()
         self._waiting = bytearray()
+        self.most_waiting = _MOST_WAITING
+        """Bytes that may wait for a peer which does not read; then it counts as gone."""
         self.closed = False
 
     def fileno(self) -> int:
@@ -81,7 +81,7 @@ class Channel:
             return
         self._waiting += pack(message)
         self.flush()
-        if len(self._waiting) > _MOST_WAITING:
+        if len(self._waiting) > self.most_waiting:
             self.close()
             raise ChannelClosedError("the other side does not read")
 

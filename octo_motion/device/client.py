@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import IO
+from typing import IO, Final
 
 from ..core.errors import DeviceError
 from ..core.posing.figure import Figure, Pose
@@ -39,6 +39,9 @@ from .messages import (
     Times,
 )
 from .process import Child
+
+_MOST_WAITING: Final = 100_000_000
+"""Bytes: a scene's meshes are sent at one go, two dozen of the largest."""
 
 
 class State(Enum):
@@ -106,6 +109,7 @@ class Client:
         self.times = self.hello = None
         self.lost_devices = self._placed = 0
         self._child = Child.start(("bridge", *arguments), python, log_to)
+        self._child.channel.most_waiting = _MOST_WAITING
         self.state = State.RUNNING
         self.heard = time.monotonic()
 

@@ -112,6 +112,20 @@ def test_nonsense_is_answered_with_a_notice_and_nothing_breaks(client: Client) -
     assert client.state is State.RUNNING
 
 
+def test_meshes_of_a_whole_scene_wait_for_a_bridge_that_is_still_starting(client: Client) -> None:
+    client.start(OPTIONS)
+    client.send_figure(FIGURE, POSE)
+    far, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    # As large as the largest, and each of them refused, which takes no time: a corner is missing.
+    corners = np.zeros((149_999, 3))
+    meshes = [say.ObstacleMessage(n, 5, far, turn, far, far, -1.0, 0.0, corners) for n in range(6)]
+    for mesh in meshes:
+        client.send(mesh)
+    wait_for(client, lambda: client.devices, "the hand is there")
+    wait_for(client, lambda: len(client.notices) == 6, "all have come")
+    assert client.state is State.RUNNING
+
+
 def test_bridge_that_is_stopped_ends_at_once_and_is_not_lost(client: Client) -> None:
     holding(client)
     process_id = client.process_id

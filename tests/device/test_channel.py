@@ -26,7 +26,6 @@ from octo_motion.device.messages import (
     CalibrationMessage,
     Goodbye,
     Notice,
-    ObstacleMessage,
     Place,
     pack,
 )
@@ -227,24 +226,6 @@ def test_peer_that_dies_in_the_middle_of_a_message_is_noticed(
     assert "in the middle of a message" in caplog.text
 
 
-def test_meshes_of_a_whole_scene_wait_for_a_bridge_that_is_still_starting(accepted: Begin) -> None:
-    client, server = pair(accepted)
-    far, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-    for number in range(6):
-        corners = np.full((150_000, 3), float(number))
-        mesh = ObstacleMessage(number, 6, far, turn, far, far, -1.0, 0.0, corners)
-        client.send(mesh)
-    got: list[object] = []
-    end = time.monotonic() + 20.0
-    while len(got) < 6:
-        client.flush()
-        got += server.receive()
-        assert time.monotonic() < end
-    assert [each.number for each in got if isinstance(each, ObstacleMessage)] == list(range(6))
-    client.close()
-    server.close()
-
-
 def test_blender_that_renders_while_a_device_is_calibrated_does_not_lose_the_bridge(
     accepted: Begin,
 ) -> None:
@@ -258,9 +239,8 @@ def test_blender_that_renders_while_a_device_is_calibrated_does_not_lose_the_bri
 
 
 def test_peer_that_does_not_read_costs_no_poses_twice_and_at_last_its_place(
-    accepted: Begin, monkeypatch: pytest.MonkeyPatch
+    accepted: Begin,
 ) -> None:
-    monkeypatch.setattr(line, "_MOST_WAITING", 8_000_000)
     client, server = pair(accepted)
     message = Place(np.zeros((4000, 3)), np.zeros((4000, 4)))
     for _ in range(200):
