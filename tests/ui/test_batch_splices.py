@@ -2,6 +2,7 @@
 """Splices as the command line and job files ask for them."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from octo_motion.ui.batch.job import Job, JobError, read_job
 from octo_motion.ui.batch.known import check_file, known
 from octo_motion.ui.batch.motion_files import check_motion, files_within
 from octo_motion.ui.batch.splice_job import parse_splice, read_splices
+from octo_motion.ui.batch.splice_stage import import_base
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 CLIPS = REPOSITORY / "docs" / "examples" / "clips"
@@ -222,3 +224,27 @@ def test_files_that_a_gltf_file_consists_of_are_its_inputs_too(tmp_path: Path) -
     (tmp_path / "walk.gltf").write_text(json.dumps({"buffers": buffers}), encoding="utf-8")
     assert files_within(tmp_path / "walk.gltf") == (tmp_path / "walk.bin",)
     assert files_within(tmp_path / "walk.glb") == ()
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+@pytest.mark.parametrize(
+    ("written", "rate"),
+    [
+        ("0.041708", (24, 1.001)),
+        ("0.0333667", (30, 1.001)),
+        ("0.033366666", (30, 1.001)),
+        ("0.016683", (60, 1.001)),
+        ("0.033333", (30, 1.0)),
+        ("0.008333", (120, 1.0)),
+        ("0.08", (13, 1.04)),
+    ],
+)
+def test_scene_of_a_base_has_the_rate_that_its_file_means(
+    tmp_path: Path, written: str, rate: tuple[int, float]
+) -> None:
+    text = (CLIPS / "walk.bvh").read_text(encoding="utf-8")
+    path = tmp_path / "walk.bvh"
+    path.write_text(re.sub(r"(?<=Frame Time: )\S+", written, text), encoding="utf-8")
+    armature, _ = import_base(path, None)
+    render = armature.users_scene[0].render
+    assert (render.fps, render.fps_base) == (rate[0], pytest.approx(rate[1], abs=1e-6))

@@ -23,6 +23,9 @@ from .setting_values import Value, unknown
 
 _FIRST_FRAME: Final = 1
 
+_BROADCAST: Final = 1.001
+"""What whole rates are divided by for television."""
+
 _SPARE_EASE: Final = 0.25
 """Of a clip's length, as in the panel: longer easing would leave little of a short clip."""
 
@@ -125,8 +128,12 @@ def _alone(path: Path, fps: float | None) -> Clips:
 
 
 def _rounded(rate: float) -> float:
-    """Files round the time of a frame: 0.033333 s are 30 frames per second."""
-    return float(round(rate)) if abs(rate - round(rate)) < 1e-3 * rate else rate
+    """Files round the time of a frame: 0.033333 s are 30 frames per second, 0.041708 s are 23.976,
+    as in broadcasting.
+    """
+    usual = (float(round(rate)), round(_BROADCAST * rate) / _BROADCAST)
+    nearest = min(usual, key=lambda each: abs(rate - each))
+    return nearest if abs(rate - nearest) < 1e-3 * rate else rate
 
 
 def has_splices(armature: bpy.types.Object) -> bool:
