@@ -373,6 +373,16 @@ def _read_skin(armature: bpy.types.Object, skeleton: Skeleton) -> _Skin:
     )
 
 
+def is_part_of(item: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    """Whether an object goes along with an armature: as its skin, or hung on it."""
+    above: bpy.types.Object | None = item
+    while above is not None:
+        if above == armature or above.find_armature() == armature:
+            return True
+        above = above.parent
+    return False
+
+
 def _carrying_bone(item: bpy.types.Object, armature: bpy.types.Object) -> str | None:
     """The bone on which a stiff part hangs, itself or by its parents."""
     each: bpy.types.Object | None = item

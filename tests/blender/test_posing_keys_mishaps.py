@@ -289,3 +289,12 @@ def test_own_keying_set_says_itself_whether_only_needed_keys_are_made(armature: 
     assert curves(action) == before
     own.use_insertkey_needed = False
     assert PoseKeys(armature).insert(armature, [Keyed(ARM)], 20.0) == [ARM]
+
+
+def test_layer_is_refused_where_the_nla_is_switched_off(armature: Any) -> None:
+    action = animate(armature)
+    armature.animation_data.use_nla = False
+    with pytest.raises(WriteError, match="The NLA of 'Octopus' is switched off"):
+        PoseKeys(armature, "LAYER").insert(armature, [Keyed(BODY)], 5.0)
+    assert armature.animation_data.action == action
+    assert list(armature.animation_data.nla_tracks) == []

@@ -290,6 +290,19 @@ def test_mesh_that_is_no_mesh_is_told() -> None:
             read_obstacle(item, kind, 1.0)
 
 
+def test_puppets_own_skin_and_what_it_holds_do_not_stop_it() -> None:
+    """Marked so that they stop another puppet."""
+    bpy.ops.octo_motion.add_octopus(arms=4, joints=4)
+    octopus: Any = bpy.context.object
+    held, other = empty(parent=octopus, parent_type="BONE", parent_bone="arm1.04.L"), empty()
+    for each in (*octopus.children, held, other):
+        each.octo_motion.posing.obstacle = "BOX"
+    session = PuppetSession(octopus, bpy.context.scene, clock=None)
+    (only,) = session.core.world.obstacles
+    assert only.position == pytest.approx([0.0, 0.0, 0.0])
+    session.cancel()
+
+
 # --- Scripts -------------------------------------------------------------------------------------
 
 

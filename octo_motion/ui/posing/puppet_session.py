@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ...blender.actions import writable_armature
-from ...blender.figure_reading import bone_materials, read_rig
+from ...blender.figure_reading import bone_materials, is_part_of, read_rig
 from ...blender.obstacle_reading import read_obstacle
 from ...blender.pose_keys import Keyed, PoseKeys
 from ...blender.puppet import Puppet
@@ -633,11 +633,12 @@ class PuppetSession:
         if self._shown.floor:
             height = self._shown.floor_height * self.unit
             obstacles.append(Plane(position=np.array([0.0, 0.0, height])))
+        armature = self.puppet.found()
         marked = marked_obstacles(self.scene()) if self._shown.use_obstacles else []
         self._marked = bool(marked)
         obstacles += [
             read_obstacle(item, kind, self.unit)
             for item, kind in marked
-            if item.name != self.puppet.name
+            if not is_part_of(item, armature)
         ]
         return obstacles
