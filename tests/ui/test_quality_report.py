@@ -178,6 +178,20 @@ def test_a_button_goes_to_the_worst_frame_and_is_no_step_of_undo(small: Any) -> 
     assert "UNDO" not in quality_report.OCTO_MOTION_OT_quality_jump.bl_options
 
 
+def test_its_tooltip_says_in_full_what_a_narrow_sidebar_cuts_off(small: Any) -> None:
+    operator: Any = quality_report.OCTO_MOTION_OT_quality_jump
+    turn = SimpleNamespace(kind="TURN")
+    assert operator.description(bpy.context, turn) == operator.bl_description
+    generate(small)
+    item = figures(small)["TURN"]
+    told = operator.description(bpy.context, turn)
+    assert told.startswith("How far a bone turns from one frame to the next. ")
+    assert f"Go to frame {item.frame}, where it is worst. Turn: " in told
+    assert told.endswith(f"°, {item.arm}")
+    bpy.context.view_layer.objects.active = None
+    assert operator.description(bpy.context, turn) == operator.bl_description
+
+
 def test_what_is_not_known_is_told(small: Any) -> None:
     with pytest.raises(RuntimeError, match=r"Nothing is known of slip. Generate a motion first."):
         click("quality_jump", kind="SLIP")

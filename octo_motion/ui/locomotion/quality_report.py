@@ -19,7 +19,7 @@ from bpy.props import (
 
 from ...blender.armature import active_armature
 from ...blender.overrides import linked_names
-from ...core.errors import SettingsError
+from ...core.errors import RigError, SettingsError
 from ...core.locomotion.figures import TOLD, Figure
 from ..armature_operator import ArmatureOperator
 from .gait_properties import OVERRIDE, OVERRIDE_LIST
@@ -139,6 +139,12 @@ def _told(item: Any) -> str:
     return f"{told}, {item.arm}" if item.arm else told
 
 
+def _figure(context: bpy.types.Context, kind: str) -> Any:
+    """What is known of one kind, None if nothing is."""
+    settings = cast("Any", active_armature(context)).octo_motion.locomotion
+    return next((each for each in known_figures(settings) if each.kind == kind), None)
+
+
 class OCTO_MOTION_OT_quality_jump(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.quality_jump"
     bl_label = "Go to Worst Frame"
@@ -148,10 +154,20 @@ class OCTO_MOTION_OT_quality_jump(ArmatureOperator, bpy.types.Operator):
 
     kind: EnumProperty(name="Kind", description="Which figure", items=KINDS)
 
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: Any) -> str:
+        """What the figure means, and all of what the sidebar may be too narrow for."""
+        try:
+            item = _figure(context, properties.kind)
+        except RigError:
+            item = None
+        if item is None:
+            return cls.bl_description
+        meaning = next(told for kind, _, told, _ in KINDS if kind == item.kind)
+        return f"{meaning}. Go to frame {item.frame}, where it is worst. {_told(item)}"
+
     def run(self, context: bpy.types.Context) -> None:
-        armature = active_armature(context)
-        settings = cast("Any", armature).octo_motion.locomotion
-        item = next((each for each in known_figures(settings) if each.kind == self.kind), None)
+        item = _figure(context, self.kind)
         if item is None:
             raise SettingsError(
                 f"Nothing is known of {_NAMES[self.kind].lower()}.", "Generate a motion first."
