@@ -292,7 +292,7 @@ class PoseKeys:
         elif self._target == "LAYER" and action is not None and slot is not None:
             if not data.use_nla:
                 raise WriteError(
-                    f"The NLA of '{armature.name}' is switched off, so that no layer would be seen.",
+                    f"The NLA of '{armature.name}' is switched off: no layer would be seen.",
                     "Switch it on in the NLA editor, or let the keys go to a copy.",
                 )
             track = data.nla_tracks.new()
