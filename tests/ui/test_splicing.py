@@ -342,6 +342,28 @@ def test_a_result_that_is_spliced_onto_another_body_is_never_replaced() -> None:
     assert all(np.array_equal(values, keys(first)[path]) for path, values in before.items())
 
 
+@pytest.mark.parametrize("rate", [0.25, 0.4, 1.0])
+def test_a_clip_that_is_slowed_down_moves_as_smoothly_as_its_curves(rate: float) -> None:
+    hero = make_humanoid("Hero")
+    clip = give_motion(hero, 3, name="Other")
+    give_motion(hero, 2)
+    path = 'pose.bones["forearm.R"].rotation_quaternion'
+    curve = clip.layers[0].strips[0].channelbags[0].fcurves.find(path, index=1)
+    curve.keyframe_points.clear()
+    for frame, value in ((1, 0.0), (5, 0.9), (9, -0.9), (13, 0.9), (41, 0.0)):
+        curve.keyframe_points.insert(frame, value)
+    select(hero)
+    OPERATORS.splice_add(action="Other")
+    (item,) = stack_of(hero).splices
+    item.rate, item.ease_in, item.ease_out, item.after = rate, 0.0, 0.0, "HOLD"
+    OPERATORS.splice_build()
+    moments = 1.0 + rate * np.arange(41.0)
+    wanted = read_clip(hero, clip, frames=moments).rotations
+    found = read_clip(hero, stack_of(hero).result).rotations
+    bone = hero.data.bones.find("forearm.R")
+    assert angle_between(found[:, bone], wanted[:, bone]).max() < np.radians(0.5)
+
+
 def test_muted_splices_are_left_out_and_come_back() -> None:
     hero, _ = hero_and_source()
     base = hero.animation_data.action

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
 import bpy
+import numpy as np
 
 from ...blender import actions
 from ...blender.armature import armature_data, read_skeleton
@@ -32,6 +33,11 @@ from .properties import OCTO_MOTION_PG_splicing, splicing_settings
 
 ARM_PARTS: Final = frozenset({"RIGHT_ARM", "LEFT_ARM"})
 """Parts that may begin at the collar bone."""
+
+_FINER: Final = 4
+"""Samples per frame of a clip that is slowed down, …"""
+_MOST: Final = 20_000
+"""… and how many of them at most."""
 
 LEG_PARTS: Final = frozenset({"LEGS", "RIGHT_LEG", "LEFT_LEG"})
 """Parts that can bring their travel along."""
@@ -157,13 +163,29 @@ class Reader:
                 f"The action of splice '{item.name}' is gone, or was never chosen.",
                 "Choose it in the panel Splicing, mute the splice or remove it.",
             )
-        return self.source(item.source, item.action, item.slot, visual=item.visual)
+        # Slowed down, what a clip does between its frames is seen. To play the scene takes longer.
+        between = item.rate < 1.0 and not item.visual
+        return self.source(item.source, item.action, item.slot, visual=item.visual, between=between)
 
     def source(
-        self, armature: bpy.types.Object, action: bpy.types.Action, slot: str, *, visual: bool
+        self,
+        armature: bpy.types.Object,
+        action: bpy.types.Action,
+        slot: str,
+        *,
+        visual: bool,
+        between: bool = False,
     ) -> Source:
-        """A clip by armature, action, and identifier of its slot ("" for the one that fits)."""
-        key = (armature.name_full, action.name_full, slot, visual)
+        """A clip by armature, action, and identifier of its slot ("" for the one that fits).
+
+        Args:
+            armature: the armature.
+            action: the action.
+            slot: the slot's identifier.
+            visual: whether it is read as the scene shows it.
+            between: whether it is read between whole frames as well.
+        """
+        key = (armature.name_full, action.name_full, slot, visual, between)
         if key not in self._sources:
             chosen = None
             if slot:
@@ -174,6 +196,11 @@ class Reader:
                         "Choose one of its slots in the panel Splicing, or leave the slot empty.",
                     )
             clip = read_clip(armature, action, chosen, visual=visual)
+            finer = min(_FINER, _MOST // len(clip)) if between else 1
+            if finer > 1:
+                count = finer * (len(clip) - 1) + 1
+                frames = np.linspace(clip.frames[0], clip.frames[-1], count)
+                clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
             self._sources[key] = Source(armature.name, clip, *known_landmarks(armature))
         return self._sources[key]
 
