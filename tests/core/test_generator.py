@@ -2,6 +2,7 @@
 """Arms of any build follow their gait: on target, in one piece, without a pop or a twist."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -379,6 +380,40 @@ def test_give_takes_the_snap_out_of_an_arm_that_straightens() -> None:
     assert snaps(0.08) < 0.5 * snaps(0.0)
     # What it lets an arm reach beyond its targets is not missed, and nothing else is.
     assert posed(generated(rig, give=0.08)).misses.max() <= 1e-3
+
+
+def with_segments(
+    rig: tuple[Skeleton, tuple[Arm, ...], BodyFrame], shares: Sequence[float], root: float
+) -> tuple[Skeleton, tuple[Arm, ...], BodyFrame]:
+    """A rig whose straight arms have segments of these lengths, so far from the body's axis."""
+    skeleton, arms, body = rig
+    matrices, lengths = skeleton.rest_matrices.copy(), skeleton.lengths.copy()
+    for arm in arms:
+        bones = [skeleton.index[bone] for bone in arm.bones]
+        outward = matrices[bones[0], :3, 1]
+        for bone, start, share in zip(bones, np.cumsum([root, *shares]), shares, strict=False):
+            matrices[bone, :3, 3], lengths[bone] = start * outward, share
+    return dataclasses.replace(skeleton, rest_matrices=matrices, lengths=lengths), arms, body
+
+
+@pytest.mark.parametrize("name", ["swim", "jet_escape"])
+@pytest.mark.parametrize(
+    "shares",
+    [
+        # Two bones to the first group, one of them short: its elbow is sharp.
+        (0.1, 0.35, 0.35, 0.2),
+        (1.0 / 6.0,) * 6,
+        (1.0 / 7.0,) * 7,
+    ],
+)
+def test_an_elbow_of_two_bones_does_not_change_sides_at_a_stroke(
+    name: str, shares: tuple[float, ...]
+) -> None:
+    """At 48 frames a cycle; before, it did by 22 to 31° within one."""
+    rig = with_segments(body_with_arms(1, len(shares)), shares, 0.1)
+    generator = generated(rig, gait=PRESETS[name], give=0.08, steady=0.08)
+    turns = posed(generator).rotations
+    assert np.degrees(angle_between(turns[:-1], turns[1:]).max()) < 14.0
 
 
 def test_walking_and_swimming_arms_do_not_wring_themselves() -> None:

@@ -50,6 +50,10 @@ _OPPOSITE: Final = 1e-4
 """Where a group has to be turned with more care: a chord of hardly any length, of the unit that
 lengths are in, and one plus the cosine of what is nearly half a turn."""
 _TINY: Final = 1e-12
+_PAIR: Final = 2
+"""Segments of a group that has one bend alone."""
+_HARDLY: Final = 0.1
+"""Share of the sway with which such a group changes sides where it is straight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +66,11 @@ class Chain:
     """Segments in each group."""
     weights: Floats
     """(segments,) weight a of the joint at each segment's root, in (0, 1] [Octopus, eq. 3.7]."""
+    pairs_as_asked: bool = False
+    """Whether a group of two segments bends to the side that its own link turns to, and its one
+    bend is not softened. The more its link turns, the shorter a group gets: so that bend comes
+    from nothing and goes to nothing where it changes sides. Where the links before and after have
+    a say in it, a bend of many degrees changes sides from one frame to the next."""
 
     @property
     def groups(self) -> tuple[slice, ...]:
@@ -70,6 +79,12 @@ class Chain:
         return tuple(
             slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True)
         )
+
+    @property
+    def pairs(self) -> tuple[slice, ...]:
+        """The groups whose one bend is as asked for."""
+        each = zip(self.groups, self.sizes, strict=True)
+        return tuple(group for group, size in each if size == _PAIR and self.pairs_as_asked)
 
 
 def solve(
@@ -106,8 +121,11 @@ def solve(
         root = root + chord(directions[segments], lengths)
     rounds = SOFTENINGS if softness > 0.0 or floor is not None else 0
     for number in range(1, rounds + 1):
+        before = directions
         for _ in range(_SPREADS):
             directions = softened(directions, softness)
+        for segments in chain.pairs:
+            directions[segments] = before[segments]
         if floor is not None:
             directions = lifted(directions, chain.lengths, floor)
         # Only the last closing has to be exact.
@@ -139,18 +157,25 @@ def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
     after = 0.5 * angles[[1, 2, 2]]
     asked = np.sum(before**2 + after**2, axis=1, keepdims=True)
     swaying = sway * (_SLIGHT**2 / (_SLIGHT**2 + asked))
+    # Where groups before give, those after them are still bent while their links are straight.
+    gives = False
     shape = np.zeros((len(chain.lengths), 3, angles.shape[-1]))
     shape[:, 0] = 1.0
     for group, segments in enumerate(chain.groups):
         lengths = chain.lengths[segments]
         if len(lengths) == 1:
             continue
+        leading, aside = after[group], (-1.0) ** group * swaying[group]
+        if segments in chain.pairs:
+            leading = np.zeros_like(leading)
+            aside = aside if gives else _HARDLY * aside
+        gives = True
         reach = np.cumsum(lengths)
         along = ((reach - 0.5 * lengths) / reach[-1])[:, None, None]
         turn = (
             before[group] * (1.0 - 4.0 * along + 3.0 * along**2)
-            + after[group] * (3.0 * along**2 - 2.0 * along)
-            + (-1.0) ** group * swaying[group] * (1.0 - 2.0 * along)
+            + leading * (3.0 * along**2 - 2.0 * along)
+            + aside * (1.0 - 2.0 * along)
         )
         # Cosines and sines by the tangent of half of the angle, which is quicker.
         half = np.tan(0.5 * turn)

@@ -470,7 +470,8 @@ class Generator:
             sizes = split_groups(shares)
             along = np.cumsum(shares) - shares
             sampled = np.interp(along, np.linspace(0.0, 1.0, len(weights)), weights)
-            chain = Chain(shares, sizes, sampled)
+            afloat = not self._settings.gait.on_ground
+            chain = Chain(shares, sizes, sampled, pairs_as_asked=afloat)
             builds.append(Build(tuple(arms), chain, group_lengths(shares, sizes)))
         return tuple(builds)
 
