@@ -416,6 +416,33 @@ def test_an_elbow_of_two_bones_does_not_change_sides_at_a_stroke(
     assert np.degrees(angle_between(turns[:-1], turns[1:]).max()) < 14.0
 
 
+def test_a_body_that_lies_closes_its_arms_before_its_face_and_opens_them_all_round() -> None:
+    """Its arms point to the front and the sides at rest, none to the back, where its mantle is."""
+    skeleton, arms, body = body_with_arms(16, 6)
+    ahead = [
+        arm for arm in arms if body.to_body(skeleton.heads[skeleton.index[arm.bones[0]]])[1] < 0
+    ]
+    body = dataclasses.replace(body, center=np.zeros(3))
+    generator = Generator(
+        skeleton, ahead, body, GaitSettings(PRESETS["swim"], give=0.08, lean=0.5 * np.pi)
+    )
+    assert len(ahead) == 8
+    turns = posed(generator).rotations
+    tips = np.stack(
+        [posed_joints(skeleton, arm, turns, generator.bones)[:, -1] for arm in ahead], axis=1
+    )
+    closed, opened = tips[24], tips[6]
+    assert np.all(closed[:, 1] < -0.6)
+    assert np.all(np.linalg.norm(closed[:, [0, 2]], axis=1) < 0.7)
+    # Seen from ahead they leave no gap wider than a quarter of the round, and none behind.
+    around = np.sort(np.arctan2(opened[:, 0], opened[:, 2]))
+    assert np.max(np.diff(around, append=around[0] + 2.0 * np.pi)) < np.radians(95.0)
+    assert np.all(opened[:, 1] > -0.4)
+    # Those in the middle of the fan go over the top, and left stays left.
+    left = np.array([arm.side == "LEFT" for arm in ahead])
+    assert np.all((opened[:, 0] > 0.0) == left)
+
+
 def test_walking_and_swimming_arms_do_not_wring_themselves() -> None:
     # Twist about its own bone: what a straight arm carried along the same way would not have.
     for name in ("walk", "swim"):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.chains import BodyFrame, body_frame
-from octo_motion.core.locomotion.mantle import find_mantle, stretched
+from octo_motion.core.locomotion.mantle import find_mantle, lies_back, stretched
 from octo_motion.core.rotations import Floats, angle_between, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import body_with_arms, bone_matrix, skeleton_of
@@ -80,9 +80,42 @@ def test_the_more_is_asked_for_the_straighter_they_are() -> None:
     assert np.all(np.diff(upright) > 0.0)
 
 
-@pytest.mark.parametrize("lean", [80.0, 120.0])
-def test_a_part_that_lies_across_the_body_is_not_bent_up(lean: float) -> None:
-    assert find_mantle(*octopus(lean)) == ()
+def turned_aside(lean: float) -> tuple[Skeleton, list[tuple[str, ...]], BodyFrame]:
+    """The same with a body that takes its left for its front: the mantle leans to a side."""
+    skeleton, arms, _ = octopus(lean)
+    return skeleton, arms, body_frame(skeleton, arms, "Z", "X")
+
+
+@pytest.mark.parametrize("body", [octopus(120.0), turned_aside(80.0)])
+def test_a_part_that_hangs_down_or_lies_across_the_body_is_left_alone(
+    body: tuple[Skeleton, list[tuple[str, ...]], BodyFrame],
+) -> None:
+    assert find_mantle(*body) == ()
+
+
+@pytest.mark.parametrize("lean", [80.0, 90.0, 100.0])
+def test_a_mantle_that_lies_flat_is_swum_along_as_it_lies(lean: float) -> None:
+    skeleton, arms, body = octopus(lean)
+    mantle = find_mantle(skeleton, arms, body)
+    assert mantle == ("head", "mantle")
+    # The head stands upright: it is the mantle's own lean that counts.
+    assert np.degrees(lies_back(skeleton, mantle, body)) == pytest.approx(lean)
+
+
+def test_a_mantle_that_can_be_raised_does_not_lie() -> None:
+    skeleton, arms, body = octopus(70.0)
+    assert lies_back(skeleton, find_mantle(skeleton, arms, body), body) == 0.0
+    assert lies_back(skeleton, (), body) == 0.0
+
+
+def test_a_flat_mantle_may_be_level_with_the_arms_or_a_little_lower() -> None:
+    skeleton, arms, body = octopus(92.0)
+    matrices = skeleton.rest_matrices.copy()
+    for name in ("head", "mantle", "eye", "siphon"):
+        matrices[skeleton.index[name], 2, 3] -= 0.2
+    low = dataclasses.replace(skeleton, rest_matrices=matrices)
+    assert body.to_body(low.tails[low.index["mantle"]])[2] < 0.0
+    assert find_mantle(low, arms, body) == ("head", "mantle")
 
 
 def test_stalks_that_stand_higher_than_a_mantle_that_lies_back_are_not_taken_for_it() -> None:

@@ -384,6 +384,19 @@ def test_a_swimming_body_leans_back_with_its_front_up(name: str) -> None:
     np.testing.assert_allclose(front[:, 2], np.sqrt(1.0 - mantle[:, 2] ** 2), atol=1e-5)
 
 
+@pytest.mark.parametrize("lean", [60.0, 90.0])
+def test_a_body_whose_mantle_lies_flat_swims_as_it_lies(lean: float) -> None:
+    """Its mantle along the way, its back to the sky: it is not reared up."""
+    route, angle = ROUTES["S"], np.radians(lean)
+    travel = plan_travel(route, replace(SWIM, lean=angle), times)
+    mantle = rotate(travel.rotations, np.array([0.0, np.sin(angle), np.cos(angle)]))
+    wanted = direction(route, travel)
+    assert np.all(np.sum(mantle * wanted, axis=-1) > np.cos(np.radians(1.0)))
+    assert np.all(rotate(travel.rotations, UP)[:, 2] > np.sin(angle) - 0.02)
+    # The arms trail behind the same way, and steer as they did.
+    np.testing.assert_array_equal(travel.turn, plan_travel(route, SWIM, times).turn)
+
+
 def test_a_vertical_start_already_faces_the_way_it_will_lean() -> None:
     # Up, then off towards (1, 1): it leans back over its own back, so it faces (−1, −1).
     travel = plan_travel(ROUTES["climb"], SWIM, times)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -30,6 +30,7 @@ from .arm import GROUPS, group_lengths, split_groups
 from .ccd import Chain, asked_shape, overreach, raised, solve
 from .chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
 from .columns import running, turned
+from .crown import opened
 from .gait import GaitCurve, GaitTable, evaluate, variation
 from .poses import ArmRest, arm_rest, bone_rotations
 from .targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
@@ -38,6 +39,7 @@ MOST_STEADY: Final = 0.25
 """Cycles over which movement may be evened out: more, and it is no longer there."""
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
+_SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
 _CHUNK: Final = 4096
 """Arms solved at a time, counted over frames: what stays within a processor's cache."""
 _FEW: Final = 100
@@ -106,11 +108,15 @@ class GaitSettings:
     """WALK: whether targets that lie deeper than most are raised to a floor where most are, so
     that many arms stand on the ground together, and not the tip of one. The source's walk, whose
     targets are the table's alone, knows no ground."""
+    lean: float = 0.0
+    """SWIM: how far from the body's +Z towards its back the way lies that its arms trail behind;
+    see ``TravelSettings``. Radians."""
 
     def __post_init__(self) -> None:
         numbers = (
             *(self.contraction, self.softness, self.give, self.sway, self.phase_spread),
-            *(self.turning, self.steady, self.heading, *self.weights, *self.variation),
+            *(self.turning, self.steady, self.heading, self.lean),
+            *(*self.weights, *self.variation),
         )
         if not np.all(np.isfinite(numbers)):
             raise SettingsError("A setting of the gait is not a number.", "Set it anew.")
@@ -180,8 +186,15 @@ class Generator:
         self._lengths = np.array([float(each.sum()) for each in segments])
         self._roots = np.array([each[0] for each in joints])
         # From an arm's own frame to the body's: azimuth counts from the front, −Y.
-        azimuths = arm_azimuths(skeleton, [arm.bones for arm in self._arms], body)
-        self._outward = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
+        bones = [arm.bones for arm in self._arms]
+        lean = 0.0 if gait.on_ground else settings.lean
+        find = partial(opened, lean=lean) if lean else arm_azimuths
+        azimuths = find(skeleton, bones, body)
+        # The same to a body whose +Z is the way that it swims along.
+        self._round = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
+        self._outward = self._round
+        if lean:
+            self._outward = multiply(from_axis_angle(_SIDEWAYS, -lean), self._round)
         # From an arm's own frame to armature space.
         self._to_armature = multiply(from_matrix(body.rotation), self._outward)
         self._rests = [
@@ -327,7 +340,7 @@ class Generator:
             steady=steady,
         )
         # Towards the goal: by the part of the turn that lies across the arm.
-        across = rotate(self._outward, np.array([0.0, 1.0, 0.0]))[:, :2]
+        across = rotate(self._round, np.array([0.0, 1.0, 0.0]))[:, :2]
         steering = settings.turning * np.asarray(turn, dtype=np.float64) @ across.T
         return self._mirrored(angles), steering
 

@@ -31,6 +31,7 @@ Heading = Literal["ALONG", "FIXED"]
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _LEFT: Final = np.array([1.0, 0.0])
+_SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
 _SETTLE: Final = 1.0
 """Strides within which a body that is not upright after a loop comes most of the way."""
 _LAID_FORWARD: Final = np.array([0.0, 0.0, np.sqrt(0.5), -np.sqrt(0.5)])
@@ -69,6 +70,9 @@ class TravelSettings:
     """Strides ahead at which the goal lies for turning; at most the whole of a closed route."""
     bank: float = 0.0
     """SWIM: roll into turns; at 1 a turn of θ per stride rolls the body by atan θ."""
+    lean: float = 0.0
+    """SWIM: how far from +Z towards the back the way lies that goes along travel, for bodies whose
+    mantle lies flat behind them; at 90° they swim backwards, upright."""
     keep_upright: bool = True
     """WALK: whether the body stays upright, or tilts with the slope of the route."""
     corner: float = 0.2
@@ -78,7 +82,7 @@ class TravelSettings:
     def __post_init__(self) -> None:
         numbers = (
             *(self.ease_in, self.ease_out, self.stride, self.heading_angle, self.burst),
-            *(self.stroke_phase, self.look_ahead, self.bank, self.corner),
+            *(self.stroke_phase, self.look_ahead, self.bank, self.corner, self.lean),
         )
         if not np.all(np.isfinite(numbers)):
             raise SettingsError("A setting of the travel is not a number.", "Set it anew.")
@@ -120,7 +124,8 @@ class Travel:
     """(frames, 4) world orientations of the canonical body, signs continuous along the route."""
     turn: Floats
     """(frames, 2) direction in the body's XY plane towards which travel will have turned a look
-    ahead from here; its length is the angle, at most π. Zero where the route is straight."""
+    ahead from here; its length is the angle, at most π. Zero where the route is straight. Of a body
+    that swims as it lies, in the plane across its way."""
 
 
 def bearings_of(route: Route, settings: TravelSettings) -> Bearings:
@@ -286,6 +291,8 @@ def _swum(
         roll = roll + settings.bank * np.arctan(sideways)
     rotations = multiply(table.carried_at(distance), from_axis_angle(_UP, roll))
     turn = rotate_in_plane(table.bend_at(ahead) - table.bend_at(distance), -roll)
+    if settings.lean:
+        rotations = multiply(rotations, from_axis_angle(_SIDEWAYS, settings.lean))
     return rotations, turn
 
 

@@ -58,8 +58,16 @@ def generator_of(
     return _generators.get(key, lambda: Generator(skeleton, arms, body, settings))
 
 
-def gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> GaitSettings:
-    """How the arms move."""
+def gait_settings(
+    settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, lean: float = 0.0
+) -> GaitSettings:
+    """How the arms move.
+
+    Args:
+        settings: of the armature.
+        gait: which gait.
+        lean: radians from the body's +Z back to the way that it swims along.
+    """
     if settings.use_weight_curve:
         drawn = sample_weight_curve(settings.weight_curve, _WEIGHT_SAMPLES)
         weights = tuple(float(each) for each in np.clip(drawn, 0.01, 1.0))
@@ -80,6 +88,7 @@ def gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> GaitS
         turning=settings.turning,
         heading=_heading(settings),
         stand=settings.stand,
+        lean=0.0 if gait.on_ground else lean,
     )
 
 
@@ -91,9 +100,16 @@ def _heading(settings: OCTO_MOTION_PG_locomotion) -> float:
 
 
 def travel_settings(
-    settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, stride: float
+    settings: OCTO_MOTION_PG_locomotion, gait: GaitTable, stride: float, lean: float = 0.0
 ) -> TravelSettings:
-    """How the body travels; the stride in metres."""
+    """How the body travels.
+
+    Args:
+        settings: of the armature.
+        gait: which gait.
+        stride: metres.
+        lean: radians from the body's +Z back to the way that it swims along.
+    """
     travel = TravelSettings(
         manner="WALK" if gait.on_ground else "SWIM",
         speed=settings.speed_mode,
@@ -108,6 +124,7 @@ def travel_settings(
         bank=settings.bank_in_turns,
         keep_upright=settings.keep_upright,
         corner=settings.corner,
+        lean=0.0 if gait.on_ground else lean,
     )
     return travel_in_place(travel) if settings.travel_on == "NONE" else travel
 

@@ -360,7 +360,7 @@ class OCTO_MOTION_PG_locomotion(
     streamline: FloatProperty(
         name="Streamline",
         description="Swimming: how far head and mantle stretch out along the way. At 0 they lean "
-        "back as they do at rest",
+        "back as they do at rest. A body whose mantle lies flat behind it swims as it lies instead",
         subtype="FACTOR",
         default=1.0,
         min=0.0,

@@ -26,7 +26,7 @@ from ...core.locomotion.footholds import Wish
 from ...core.locomotion.gait import GaitTable
 from ...core.locomotion.generator import Generator
 from ...core.locomotion.loops import route_in_place
-from ...core.locomotion.mantle import find_mantle, stretched
+from ...core.locomotion.mantle import find_mantle, lies_back, stretched
 from ...core.locomotion.travel import unhurried
 from ..plain import plain
 from .apart import read_apart
@@ -121,19 +121,22 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         skeleton, carriers = posed, []
         body = listed_body(settings, posed, arms, detection)
     gait = read_gait(settings)
-    generator = generator_of(skeleton, arms, body, gait_settings(settings, gait))
+    # Arms that are switched off are no mantle either.
+    listed = [tuple(bone.name for bone in item.bones) for item in settings.arms if item.bones]
+    head = find_mantle(skeleton, listed or [arm.bones for arm in arms], body)
+    lean = settings.streamline * lies_back(skeleton, head, body)
+    generator = generator_of(skeleton, arms, body, gait_settings(settings, gait, lean))
     stride = gait.stride * generator.arm_length * scale
     if settings.route is None or in_place:
         route = route_in_place(stride, settings.cycles)
     else:
         route = read_route(settings.route, depsgraph, settings.spline)
     mantle: tuple[str, ...] = ()
-    # Arms that are switched off are no mantle either.
-    listed = [tuple(bone.name for bone in item.bones) for item in settings.arms if item.bones]
-    head = find_mantle(skeleton, listed or [arm.bones for arm in arms], body)
-    if gait.manner == "SWIM" and settings.streamline > 0.0:
+    # A mantle that lies flat is swum along as it is.
+    stretches = settings.streamline > 0.0 and not lean
+    if gait.manner == "SWIM" and stretches:
         mantle = head
-    travel = travel_settings(settings, gait, stride)
+    travel = travel_settings(settings, gait, stride, lean)
     rest = resting(settings)
     if gait.on_ground and any(rest):
         slow = settings.ground.rest_within * stride
@@ -149,7 +152,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
 
     def read_way(table: GaitTable, own: Generator, wished: Sequence[Wish]) -> Way:
         """One way of moving along this route."""
-        going = travel_settings(settings, table, table.stride * own.arm_length * scale)
+        going = travel_settings(settings, table, table.stride * own.arm_length * scale, lean)
         holding = None
         if table.on_ground and settings.ground.use:
             holding = read_standing(
@@ -176,7 +179,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     def read_gait_of(name: str) -> Way:
         """One of the ways that the gait changes to."""
         table = presets.load_gait(name)
-        own = generator_of(skeleton, arms, body, gait_settings(settings, table))
+        own = generator_of(skeleton, arms, body, gait_settings(settings, table, lean))
         return read_way(table, own, ())
 
     first = read_way(gait, generator, wishes)
@@ -190,7 +193,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         numbers = {gait.name: 0, **{name: number + 1 for number, name in enumerate(names)}}
         changes = read_changes(settings.change, numbers, route, reach, first)
         changing = plan_changes(ways, changes, route, wishes, [len(arm.bones) for arm in arms])
-        if any(not way.gait.on_ground for way in changing.ways) and settings.streamline > 0.0:
+        if any(not way.gait.on_ground for way in changing.ways) and stretches:
             mantle = head
     apart = None
     tell_overlaps = settings.tell_overlaps and not live
