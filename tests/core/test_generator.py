@@ -416,6 +416,24 @@ def test_an_elbow_of_two_bones_does_not_change_sides_at_a_stroke(
     assert np.degrees(angle_between(turns[:-1], turns[1:]).max()) < 14.0
 
 
+@pytest.mark.parametrize("shares", [(0.1, 0.35, 0.35, 0.2), (1.0 / 12.0,) * 12])
+def test_arms_that_spring_from_one_point_trail_side_by_side(shares: tuple[float, ...]) -> None:
+    """Before, their outer halves trailed in one line, none 0.02 arm lengths beside it."""
+    rig = with_segments(body_with_arms(8, len(shares)), shares, 0.0)
+    generator = generated(rig, gait=PRESETS["jet_escape"], give=0.08, steady=0.08)
+    turns = posed(generator).rotations
+    joints = np.stack([posed_joints(rig[0], arm, turns, generator.bones) for arm in rig[1]], axis=1)
+    outer = joints[:, :, len(shares) // 2 :, :2]
+    assert np.linalg.norm(outer, axis=-1).mean(axis=1).min() > 0.07
+
+
+def test_arms_with_room_at_their_roots_trail_as_the_gait_says() -> None:
+    rig = body_with_arms(8, 12)
+    near, far = (with_segments(rig, (1.0 / 12.0,) * 12, root) for root in (0.11, 0.3))
+    one, other = (posed(generated(each, gait=PRESETS["jet_escape"])) for each in (near, far))
+    assert np.max(angle_between(one.rotations, other.rotations)) <= 1e-6
+
+
 def test_a_body_that_lies_closes_its_arms_before_its_face_and_opens_them_all_round() -> None:
     """Its arms point to the front and the sides at rest, none to the back, where its mantle is."""
     skeleton, arms, body = body_with_arms(16, 6)

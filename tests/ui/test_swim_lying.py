@@ -96,6 +96,10 @@ def test_a_rig_that_lies_trails_its_arms_and_turns_none_at_a_stroke(
     mantle = rotate(shot.orientations, np.array([1.0, 0.0, 0.0]))
     assert np.median(np.sum(mantle * way, axis=1)) > 0.95
     assert np.median(rotate(shot.orientations, np.array([0.0, 0.0, 1.0]))[:, 2]) > 0.8
-    # Before: 28°.
+    # Before: 28°, and arms by 2.4 radii in each other.
     assert steps(shot.rotations).max() < 16.0
+    assert shot.apart is not None
+    alone = type(shot.apart)(**{**vars(shot.apart), "still": ()})
+    found, _ = alone.measure(shot.rotations, shot.strains)
+    assert found.worst is None or found.worst.depth < 0.2
     assert prepare(armature, bpy.context).mantle == ()

@@ -50,6 +50,10 @@ _STANDING: Final = 0.3
 """Share of a cycle in which an arm would reach deeper than the floor."""
 _LEAST_DEPTH: Final = 0.1
 """Arm lengths: a gait that reaches less deep moves its arms level, and stands on nothing."""
+_ROOM: Final = 0.1
+"""Arm lengths beside the way of a swimming body at which its arms trail, at least."""
+_TRAILING: Final = 0.75
+"""Share of its length that the first group of an arm that trails spans: such a group is bent."""
 
 
 @dataclass(frozen=True)
@@ -339,10 +343,45 @@ class Generator:
             period=settings.period if period is None else period,
             steady=steady,
         )
+        if not settings.gait.on_ground:
+            angles = self._beside(angles)
         # Towards the goal: by the part of the turn that lies across the arm.
         across = rotate(self._round, np.array([0.0, 1.0, 0.0]))[:, :2]
         steering = settings.turning * np.asarray(turn, dtype=np.float64) @ across.T
         return self._mirrored(angles), steering
+
+    def _beside(self, angles: Floats) -> Floats:
+        """Angles (frames, arms, links, 3) with which no arm trails in the line of all others.
+
+        Arms that spring from one point would all come to lie in it as they close. They turn in
+        less far with their first links, and what is left with their second ones: so they trail
+        side by side.
+        """
+        off = self._asides > 0.0
+        if not np.any(off):
+            return angles
+        result = angles.copy()
+        head, aside = angles[:, off, 0, HEAD], self._asides[off]
+        # All of it where an arm trails in the line of the others, little before.
+        closed = head / (0.5 * np.pi)
+        short = -aside * closed * np.abs(closed)
+        result[:, off, 0, HEAD] += short
+        result[:, off, 1, HEAD] -= short
+        return result
+
+    @cached_property
+    def _asides(self) -> Floats:
+        """By how far the first link of each arm (arms,) has to point beside the way, radians."""
+        result = np.zeros(len(self._arms))
+        if len(self._arms) < 2:
+            return result
+        out = rotate(self._outward, np.array([1.0, 0.0, 0.0]))
+        roots = np.sum(self._roots * out, axis=-1) / self._lengths
+        for build in self._builds:
+            columns = list(build.arms)
+            short = np.maximum(_ROOM - roots[columns], 0.0) / (_TRAILING * build.widths[0])
+            result[columns] = np.arcsin(np.minimum(short, 1.0))
+        return result
 
     @property
     def arms(self) -> tuple[Arm, ...]:
