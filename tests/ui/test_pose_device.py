@@ -12,6 +12,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from octo_motion.blender import device_store
 from octo_motion.blender.device_store import load_calibrations
@@ -593,6 +594,49 @@ def test_turn_of_blenders_space_mouse_is_the_caps_own(monkeypatch: pytest.Monkey
         assert hands._turn == pytest.approx((np.cos(half), 0.0, 0.0, np.sin(half)))
     finally:
         session.cancel()
+
+
+@dataclasses.dataclass
+class Through:
+    """A view through a camera, as Blender's window tells it."""
+
+    window_matrix: Matrix
+    view_matrix: Matrix
+    view_distance: float = 3.0
+
+
+CAMERA = Matrix.Translation((0.0, -9.0, 1.0)) @ Matrix.Rotation(np.pi / 2, 4, "X")
+"""Nine metres before the origin."""
+
+
+LENS = Matrix(((2.0, 0.0, 0.0, 0.0), (0.0, 3.0, 0.5, 0.0), (0.0, 0.0, -1.0, -0.2), (0, 0, -1, 0)))
+FLAT = Matrix(((0.5, 0.0, 0.0, 0.0), (0.0, 0.75, 0.0, 0.5), (0.0, 0.0, -0.02, -1.0), (0, 0, 0, 1)))
+
+
+@pytest.mark.parametrize("lens", [LENS, FLAT])
+@pytest.mark.parametrize("figure", [(1.0, 0.0, 1.0), (-3.0, 200.0, 1.0), (0.0, -50.0, 1.0)])
+def test_pointer_is_in_the_picture_of_a_camera(
+    lens: Matrix, figure: tuple[float, float, float]
+) -> None:
+    """Not where the view turned before one looked through the camera."""
+    seen = Through(lens, CAMERA.inverted())
+    place = device_pose.camera_room(seen, 1.0, np.array(figure))
+    np.testing.assert_allclose(place.axes, FRONT, atol=1e-6)
+
+    def on_screen(point: np.ndarray) -> np.ndarray:
+        told = np.array(lens @ seen.view_matrix) @ np.append(point, 1.0)
+        return told[:2] / told[3]
+
+    np.testing.assert_allclose(on_screen(place.middle), 0.0, atol=1e-6)
+    side = place.middle + 0.5 * place.width * place.axes[:, 0]
+    np.testing.assert_allclose(on_screen(side), [0.7, 0.0], atol=1e-6)
+    depth, there = place.middle[1] + 9.0, figure[1] + 9.0
+    assert depth == pytest.approx(there if there > 0.0 else 3.0, rel=0.1)
+    twice = device_pose.camera_room(seen, 2.0, np.array(figure))
+    assert twice.width == pytest.approx(2.0 * place.width)
+    a_step = np.array([0.0, 0.01 * there, 0.0])
+    moved = device_pose.camera_room(seen, 1.0, np.array(figure) + a_step)
+    np.testing.assert_allclose(moved.middle, place.middle, err_msg="a step does not move the room")
 
 
 def test_force_that_was_chosen_holds_when_another_file_is_opened(tmp_path: Path) -> None:

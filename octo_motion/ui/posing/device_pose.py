@@ -10,6 +10,7 @@ import numpy as np
 from bpy.props import IntProperty
 
 from ...core.errors import DeviceError, SettingsError
+from ...core.rotations import Floats
 from ...device.client import Client, State
 from ...device.messages import Notice
 from ..operator_base import OctoOperator
@@ -35,6 +36,8 @@ HELP: Final = (
     ("Enter", "keep"),
     ("Esc", "as it was"),
 )
+_COVERS: Final = 0.7
+"""Of what a camera sees from left to right: as much as of a view that is none."""
 _KEYS: Final = frozenset({"ESC", "RET", "NUMPAD_ENTER", "G", "K", "P", "O", "R", "HOME", "B", "Z"})
 
 Hands = DeviceHands | NdofHands
@@ -47,7 +50,7 @@ def active_hands() -> Hands | None:
     return _going_on[0] if _going_on else None
 
 
-def room_of(context: bpy.types.Context, scale: float) -> Room | None:
+def room_of(context: bpy.types.Context, scale: float, session: PuppetSession) -> Room | None:
     """What the largest 3D viewport of the window shows."""
     areas = (
         [each for each in context.screen.areas if each.type == "VIEW_3D"] if context.screen else []
@@ -57,10 +60,42 @@ def room_of(context: bpy.types.Context, scale: float) -> Room | None:
     data = space.region_3d if isinstance(space, bpy.types.SpaceView3D) else None
     if data is None:
         return None
-    axes = np.array(data.view_matrix.inverted(), dtype=np.float64)[:3, :3]
-    axes /= np.linalg.norm(axes, axis=0)
+    if data.view_perspective == "CAMERA":
+        return camera_room(data, scale, session.capsules()[0].reshape(-1, 3).mean(axis=0))
     middle = np.array(data.view_location, dtype=np.float64)
-    return Room(middle, axes, scale * max(float(data.view_distance), 1e-6))
+    return Room(middle, _axes(data), scale * max(float(data.view_distance), 1e-6))
+
+
+def camera_room(data: Any, scale: float, figure: Floats) -> Room:
+    """What is seen through a camera, at the depth of a figure.
+
+    Where the view turns and how far it is from there, as Blender tells it, is then that of another
+    view: the one before.
+
+    Args:
+        data: ``RegionView3D``.
+        scale: of the room.
+        figure: (3,) middle of the figure, world.
+    """
+    axes = _axes(data)
+    eye = np.array(data.view_matrix.inverted(), dtype=np.float64)[:3, 3]
+    lens = np.array(data.window_matrix, dtype=np.float64)
+    depth = float((eye - figure) @ axes[:, 2])
+    if depth <= 0.0:  # behind the camera: nobody sees it anyway
+        depth = float(data.view_distance)
+    # In steps of a fifth: a figure that moves must not move the room, for that lets go.
+    depth = float(np.exp2(np.round(4.0 * np.log2(max(depth, 1e-6))) / 4.0))
+    # Of the view's own axes: a perspective one widens with the depth.
+    reach = 1.0 if lens[3, 3] else depth
+    beside = (-lens[:2, 3] if lens[3, 3] else depth * lens[:2, 2]) / (lens[0, 0], lens[1, 1])
+    middle = eye + axes @ np.array([*beside, -depth])
+    return Room(middle, axes, scale * _COVERS * 2.0 * reach / abs(float(lens[0, 0])))
+
+
+def _axes(data: Any) -> Floats:
+    """(3, 3) as columns: right, up, and towards the eye."""
+    axes = np.array(data.view_matrix.inverted(), dtype=np.float64)[:3, :3]
+    return axes / np.linalg.norm(axes, axis=0)
 
 
 def start_bridge(settings: Any) -> Client:
@@ -132,7 +167,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         settings = device_settings(context.window_manager)
         was_holding = hands.holding
         told = self._told(settings)
-        for button in hands.tick(told, room_of(context, settings.scale)):
+        for button in hands.tick(told, room_of(context, settings.scale, hands.session)):
             if button.pressed and button.button == told.key_button:
                 self._key(hands, all_bones=False)
         if was_holding and not hands.holding:
@@ -163,7 +198,8 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         settings = device_settings(context.window_manager)
         told = self._told(settings)
         if event.type == "NDOF_MOTION":
-            room, motion = room_of(context, settings.scale), event.ndof_motion
+            room = room_of(context, settings.scale, hands.session)
+            motion = event.ndof_motion
             if room is not None and motion is not None:
                 hands.move(*(motion.translation, motion.rotation, motion.time_delta, room, told))
         elif event.type in GRAB_BUTTONS:
