@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Quaternion
 
-from .actions import curves_of, is_generated
+from .actions import curves_of, flattened, is_generated
 from .fcurves import is_shown
 
 AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
@@ -177,7 +177,7 @@ def _moved(armature: bpy.types.Object) -> Iterator[tuple[str, str]]:
         acting += [
             (strip.action, strip.action_slot)
             for track in tracks
-            for strip in track.strips
+            for strip in flattened(track.strips)
             if not strip.mute
         ]
     for action, slot in acting:

@@ -451,6 +451,31 @@ def test_what_another_action_left_behind_is_no_part_of_a_clip_but_a_pose_without
     assert np.array_equal(again.rotations, clip.rotations)
 
 
+def test_a_pose_that_comes_of_a_meta_strip_is_no_pose_without_keys():
+    armature = make_rig()
+    animate(armature)
+    data = armature.animation_data
+    action = data.action
+    track = data.nla_tracks.new()
+    strip = track.strips.new("Strip", 1, action)
+    data.action = None
+    track.select = strip.select = True
+    window = bpy.context.window_manager.windows[0]
+    area = window.screen.areas[0]
+    area.type = "NLA_EDITOR"
+    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+        assert bpy.ops.nla.meta_add() == {"FINISHED"}
+    assert track.strips[0].type == "META"
+    bpy.context.scene.frame_set(9)
+    other = bpy.data.actions.new("Other")
+    data.action = other
+    armature.pose.bones[0].keyframe_insert("location", frame=1)
+    armature.pose.bones[0].keyframe_insert("location", frame=9)
+    data.action = None
+    clip = read_clip(armature, other)
+    assert angle_between(clip.rotations, (1.0, 0.0, 0.0, 0.0)).max() == 0.0
+
+
 def test_slots_are_told_apart():
     armature, other = make_rig(), make_rig()
     animate(armature)
