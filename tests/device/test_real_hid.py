@@ -36,6 +36,7 @@ pytestmark = pytest.mark.skipif(not uhid.available(), reason=uhid.WHY_NOT)
 SECRET = bytes(32)
 HID_ALONE = Sources(haply=False)
 OPTIONS = ("--no-haply", "--rate", "50")
+PERIOD = 0.02
 """An emulated machine with one processor is no place for 1 kHz."""
 DYNAMICS = Dynamics(8.0, 0.4, 0.5, 0.0012)
 PATIENCE = 100.0
@@ -204,6 +205,22 @@ def test_two_devices_with_one_serial_number_are_both_read(
         each.close()
 
 
+def test_force_device_obeys_one_blender_alone(
+    plug: Callable[..., uhid.VirtualDevice],
+) -> None:
+    device = force_device(plug)
+    first, second = Discovery(HID_ALONE), Discovery(HID_ALONE)
+    driver = found_by(first)
+    wait_for(lambda: list(second.look()) or second.problems, "the second one is told")
+    assert second.problems[0].problem == "Octo hand is in use by another Blender."
+    assert device.plugged_in
+    driver.close()
+    driver.close()
+    taken: list[Driver] = []
+    wait_for(lambda: taken.extend(second.look()) or taken, "it is free for the second one")
+    taken[0].close()
+
+
 def test_device_that_does_not_say_what_it_can_keeps_the_others_moving(
     plug: Callable[..., uhid.VirtualDevice],
 ) -> None:
@@ -306,8 +323,8 @@ class Loop:
         thread.join()
         assert got[0]
         self._here = got[0]
-        schedule = Schedule(0.001)
-        self.loop = HandLoop(self._here, Discovery(HID_ALONE), schedule, 0.001)
+        schedule = Schedule(PERIOD)
+        self.loop = HandLoop(self._here, Discovery(HID_ALONE), schedule, PERIOD)
         self.devices: list[say.DeviceMessage] = []
         self.notices: list[say.Notice] = []
         self.hand: say.HandMessage | None = None
@@ -357,7 +374,7 @@ def test_force_is_reported_in_mid_grab_ends_with_the_plug_and_begins_anew(
     wait_for(ticking(lambda: loop.devices), "the device is found")
     hand.buttons = 1
     wait_for(ticking(lambda: loop.hand and loop.hand.grab), "it grabs")
-    hand.position = (0.004, 0.0, 0.0)
+    hand.position = (0.04, 0.0, 0.0)
     wait_for(ticking(feels), "the hand feels it")
     strongest = max(hand.forces(), key=lambda each: float(np.linalg.norm(each.force)))
     assert strongest.enabled
@@ -373,13 +390,13 @@ def test_force_is_reported_in_mid_grab_ends_with_the_plug_and_begins_anew(
     hand = Hand(force_device(plug))
     wait_for(ticking(lambda: len(loop.devices) == 3), "the device is found again")
     assert loop.devices[-1].pointer == loop.devices[0].pointer
-    hand.position = (0.01, 0.0, 0.0)
+    hand.position = (0.04, 0.0, 0.0)
     wait_for(ticking(lambda: len(hand.forces()) > 20), "it is told to give no force")
     assert not any(each.enabled for each in hand.forces())
     hand.buttons = 1
     hand.position = ZERO
     wait_for(ticking(lambda: loop.hand and loop.hand.grab), "it grabs again")
-    hand.position = (0.004, 0.0, 0.0)
+    hand.position = (0.04, 0.0, 0.0)
     wait_for(ticking(feels), "the hand feels it again")
     loop.close()
     assert not hand.last_command().enabled

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from contextlib import suppress
 
 from ...core.errors import DeviceError
 from ..driver import Description, DeviceLostError, Kind, Sample
 from ..spatial import ZERO, Vector
 from . import force_profile as profile
-from .system import Found, Handle, Line, open_device
+from .system import Found, Handle, Line, claim, open_device
 
 
 def is_force_device(found: Found) -> bool:
@@ -21,8 +22,15 @@ def is_force_device(found: Found) -> bool:
 class ForceDevice:
     """One force device."""
 
-    def __init__(self, found: Found, handle: Handle, features: profile.Features) -> None:
+    def __init__(
+        self,
+        found: Found,
+        handle: Handle,
+        features: profile.Features,
+        set_free: Callable[[], None] = lambda: None,
+    ) -> None:
         self._sequence = 0
+        self._set_free = set_free
         self._description = Description(
             name=found.name or "Force device",
             identity=found.identity,
@@ -38,20 +46,27 @@ class ForceDevice:
         """Open a device that was found, and ask what it can do.
 
         Raises:
-            DeviceError: the system does not let us, or the device follows another version.
+            DeviceError: the system does not let us, another Blender has it, or the device follows
+                another version.
         """
         handle = open_device(found)
+        try:
+            set_free = claim(found)
+        except DeviceError:
+            handle.close()
+            raise
         try:
             size = profile.SIZES[profile.FEATURES]
             report = bytes(handle.get_feature_report(profile.FEATURES, size))
             features = profile.parse_features(report)
         except (OSError, ValueError) as error:
             handle.close()
+            set_free()
             raise DeviceError(
                 f"{found.name or 'The force device'} does not follow the profile: {error}.",
                 f"Its firmware must follow version {profile.VERSION} of the profile.",
             ) from error
-        return cls(found, handle, features)
+        return cls(found, handle, features, set_free)
 
     @property
     def description(self) -> Description:
@@ -91,3 +106,5 @@ class ForceDevice:
         with suppress(DeviceLostError, profile.ReportError):
             self.send(ZERO, ZERO)
         self._line.close()
+        set_free, self._set_free = self._set_free, lambda: None
+        set_free()

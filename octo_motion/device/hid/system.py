@@ -11,12 +11,15 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Protocol
 
 from ...core.errors import DeviceError
 from ..driver import DeviceLostError
+from .models import USAGE, USAGE_PAGE
 
 UDEV_FILE: Final = "/etc/udev/rules.d/70-octo-motion.rules"
 _MOST_REPORT_BYTES: Final = 256
@@ -136,14 +139,48 @@ def open_device(found: Found) -> Handle:
     return device
 
 
+def claim(found: Found) -> Callable[[], None]:
+    """Keep others of us from a device that is open: two forces in turn would shake the hand.
+
+    On Linux alone; elsewhere nothing is kept from anyone.
+
+    Returns:
+        What sets it free again; so does the end of this process.
+
+    Raises:
+        DeviceError: another Blender has it.
+    """
+    if sys.platform != "linux":
+        return lambda: None
+    import fcntl  # noqa: PLC0415 - Linux's
+
+    try:
+        number = os.open(found.path, os.O_RDONLY | os.O_NONBLOCK)
+    except OSError:
+        return lambda: None  # pulled out meanwhile: whoever reads it will see
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(number)
+        raise DeviceError(
+            f"{found.name or 'The device'} is in use by another Blender.",
+            "End Pose with Device there.",
+        ) from error
+    return partial(os.close, number)
+
+
 def _refusal(found: Found) -> DeviceError:
     name = found.name or "The device"
     if sys.platform == "linux":
         path = Path(os.fsdecode(found.path))
         if path.exists() and not os.access(path, os.R_OK | os.W_OK):
+            pushed = (found.page, found.usage) == (USAGE_PAGE, USAGE)
+            begin = (
+                "If Blender has it itself, just push it. Else, as root," if pushed else "As root,"
+            )
             return DeviceError(
                 f"{name} is plugged in, but this user may not read {path}.",
-                f"As root, write this line into {UDEV_FILE}, then plug the device in again: "
+                f"{begin} write this line into {UDEV_FILE}, then plug the device in again: "
                 f"{udev_rule(found.vendor, found.product)}",
             )
     return DeviceError(
