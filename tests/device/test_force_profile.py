@@ -79,6 +79,17 @@ def test_features_survive() -> None:
         assert getattr(got.dynamics, name) == pytest.approx(getattr(DYNAMICS, name), rel=1e-3)
 
 
+def test_device_stronger_than_a_command_can_say_is_used_as_far_as_that() -> None:
+    strong = profile.pack_features(profile.Features(2, Dynamics(60.0, 6.0, 0.5, 0.001)))
+    dynamics = profile.parse_features(strong).dynamics
+    assert (dynamics.force, dynamics.torque) == pytest.approx((32.767, 3.2767))
+    force, torque = (dynamics.force, 0.0, 0.0), (0.0, -dynamics.torque, 0.0)
+    told = profile.Command(1, 20, enabled=True, force=force, torque=torque)
+    command = profile.parse_command(profile.pack_command(told))
+    assert command.force == pytest.approx(force)
+    assert command.torque == pytest.approx(torque)
+
+
 def test_other_version_of_the_profile_is_refused() -> None:
     report = bytearray(profile.pack_features(profile.Features(2, DYNAMICS)))
     report[1] = 2
@@ -112,6 +123,23 @@ def test_newest_whole_report_counts() -> None:
     assert sample
     assert sample.buttons == 3
     assert device.read() is None
+
+
+@pytest.mark.parametrize(("held", "powered"), [(True, False), (False, True), (False, False)])
+def test_motors_without_power_are_given_no_force_that_would_come_with_it(
+    held: bool,  # noqa: FBT001
+    powered: bool,  # noqa: FBT001
+) -> None:
+    """Whoever unlocks the emergency stop in mid-grab must not be struck."""
+    device, handle = opened()
+    handle.reports.append(profile.pack_state(state(held=held, powered=powered)))
+    sample = device.read()
+    assert sample
+    assert not sample.held
+    handle.reports.append(profile.pack_state(state()))
+    sample = device.read()
+    assert sample
+    assert sample.held
 
 
 def test_letting_go_disables_the_motors_and_closing_does_so_once_more() -> None:

@@ -84,7 +84,9 @@ class ForceDevice:
                 state = profile.parse_state(report)
                 return Sample(
                     *(time.perf_counter(), state.position, state.orientation),
-                    *(state.velocity, state.angular_velocity, state.buttons, state.held),
+                    *(state.velocity, state.angular_velocity, state.buttons),
+                    # Without power on its motors it gets no force, lest all come with the power.
+                    held=state.held and state.powered,
                 )
         return None
 

@@ -259,6 +259,8 @@ def parse_features(report: bytes) -> Features:
         raise ReportError(f"{buttons} buttons")
     if force == 0:
         raise ReportError("a force device without force")
+    # No command carries more; one cut along some axes would push another way than it was meant.
+    force, torque = min(force, _LIMITS["h"][1]), min(torque, _LIMITS["h"][1])
     b, angular_b, friction, angular_friction, step, angular_step, delay = rest
     return Features(
         buttons,
