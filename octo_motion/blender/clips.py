@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, Final
 
 import bpy
@@ -24,6 +24,7 @@ from ..core.rotations import (
 )
 from ..core.skeleton import Skeleton
 from ..core.splicing.clip import Clip
+from ..core.splicing.parts import beneath
 from ..core.splicing.scaled_pose import without_scale
 from ..core.splicing.unpose import orientations_of, unposed
 from .actions import (
@@ -161,7 +162,8 @@ def write_clip(
         name: name of the new action, the clip's if empty.
         note: what the clip was made from, kept with the action.
         previous: an action written here before, to be written anew if nobody has edited it.
-        besides: what else the action moves, see :func:`further_channels`.
+        besides: what else the action moves, and what it moves otherwise than the clip; see
+            :func:`further_channels` and :func:`scaled_channels`.
 
     Returns:
         The action, assigned to the armature.
@@ -183,6 +185,8 @@ def write_clip(
         and (bone.scale[:] != (1.0, 1.0, 1.0) or (scales[:, number] != 1.0).any())
     ]
     channels += _object_channels(armature, clip)
+    besides_paths = {each.data_path for each in besides}
+    channels = [each for each in channels if each.data_path not in besides_paths]
     channels += besides
     keep_unkeyed_pose(armature)
     return write_action(
@@ -242,6 +246,59 @@ def further_channels(
         bone = path.removeprefix('pose.bones["').partition('"]')[0]
         channels.append(Channel(path, values, group.name if group is not None else bone))
     return channels
+
+
+def scaled_channels(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    frames: Floats,
+    changed: Collection[str],
+) -> tuple[list[Channel], list[str]]:
+    """Bones that are scaled and carry others, of which a clip has the places, not the size.
+
+    Where none of what they carry is changed, all of it can be as the action has it.
+
+    Args:
+        armature: the armature object.
+        action: the action that the clip was read from.
+        slot: its slot; if none is given the one that the armature uses, or would.
+        frames: (frames,)
+        changed: names of the bones that no longer move as the action says.
+
+    Returns:
+        Channels to write in place of the clip's, and names of the bones that lose their size.
+    """
+    skeleton = read_skeleton(armature)
+    curves = _curves_of(action, slot or _slot_for(armature, action), skeleton)
+    unkeyed = unkeyed_pose(armature)
+    modes = _rotation_modes(armature, skeleton)
+
+    def values(name: str, channel: str) -> Floats:
+        otherwise = unkeyed.get((name, channel), AT_REST[channel])
+        return _values(curves, name, channel, otherwise, frames)
+
+    off = np.array([np.abs(values(name, "scale") - 1.0).max() for name in skeleton.names])
+    scaled = off > _ROUNDING
+    channels: list[Channel] = []
+    lost: list[str] = []
+    done: set[int] = set()
+    for number in np.flatnonzero(scaled & ~_stretches_apart(armature, skeleton, scaled)).tolist():
+        if number in done:
+            continue
+        carried = beneath(skeleton, [number])
+        done.update(carried)
+        names = [skeleton.names[each] for each in carried]
+        if any(name in changed for name in names):
+            lost.append(skeleton.names[number])
+            continue
+        assert armature.pose is not None
+        channels += [
+            Channel(armature.pose.bones[name].path_from_id(channel), values(name, channel), name)
+            for name in names
+            for channel in ("location", rotation_channel(modes[name]), "scale")
+        ]
+    return channels, lost
 
 
 def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:

@@ -276,6 +276,41 @@ def test_all_else_that_the_base_moves_goes_on_moving() -> None:
     assert not is_edited(result)
 
 
+def test_what_is_scaled_beside_the_part_keeps_its_size(capfd: pytest.CaptureFixture[str]) -> None:
+    """A head that is larger, or squashed, with eyes and jaw in it."""
+    hero, _ = hero_and_source()
+    bpy.ops.object.mode_set(mode="EDIT")
+    jaw = hero.data.edit_bones.new("jaw")
+    jaw.parent = hero.data.edit_bones["head"]
+    jaw.head, jaw.tail = jaw.parent.tail, np.add(jaw.parent.tail, (0.0, -0.1, 0.0))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    head = hero.pose.bones["head"]
+    for frame, scale in ((1, (1.3, 1.3, 1.3)), (41, (1.6, 0.7, 1.6))):
+        head.scale = scale
+        head.keyframe_insert("scale", frame=frame)
+    hero.pose.bones["jaw"].rotation_quaternion = (0.9, 0.1, 0.0, 0.2)
+    OPERATORS.splice_add()
+
+    def shown(name: str) -> list[np.ndarray]:
+        found = []
+        for frame in (1, 20, 41):
+            bpy.context.scene.frame_set(frame)
+            found.append(np.array(hero.pose.bones[name].matrix))
+        return found
+
+    before = {name: shown(name) for name in ("head", "jaw")}
+    for _ in range(2):
+        OPERATORS.splice_build()
+        for name, matrices in before.items():
+            np.testing.assert_allclose(shown(name), matrices, atol=1e-5)
+    assert "Warning" not in capfd.readouterr().out
+    stack_of(hero).splices[0].part = "HEAD"
+    OPERATORS.splice_build()
+    assert "Warning: 'head' is scaled and loses its size" in capfd.readouterr().out
+    bpy.context.scene.frame_set(20)
+    assert tuple(head.scale) == (1.0, 1.0, 1.0)
+
+
 def test_built_again_the_result_is_made_anew_in_place() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()

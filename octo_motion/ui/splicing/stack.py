@@ -8,7 +8,7 @@ plain arrays alone; :func:`write` changes the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from ...blender import actions
 from ...blender.armature import armature_data, read_skeleton
-from ...blender.clips import further_channels, read_clip, write_clip
+from ...blender.clips import further_channels, read_clip, scaled_channels, write_clip
 from ...core.errors import ClipError, WriteError
 from ...core.splicing.alignment import Suggestion, suggest_timings
 from ...core.splicing.carry import Side, carriers
@@ -360,7 +360,7 @@ def write(stack: Stack, clip: Clip) -> Summary:
     if previous is not None and is_source(previous):
         # Someone splices from it: it stays as it is.
         previous = None
-    besides = _besides(armature, clip)
+    besides, lost = _besides(armature, stack, clip)
     kept, group.result = group.result, None
     try:
         action = write_clip(
@@ -379,7 +379,15 @@ def write(stack: Stack, clip: Clip) -> Summary:
         # What was used is what the table shows from now on.
         write_landmarks(group.landmarks, stack.base.landmarks.bones)
     acting = sum(splice is not None for splice in stack.splices)
-    return Summary(action.name, len(clip), acting, tuple(_warnings(stack, group.splices)))
+    warnings = list(_warnings(stack, group.splices))
+    if lost:
+        verbs = "is scaled and loses its" if len(lost) == 1 else "are scaled and lose their"
+        warnings.append(f"{_listed(lost)} {verbs} size: of what they carry a part is spliced.")
+    return Summary(action.name, len(clip), acting, tuple(warnings))
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(f"'{each}'" for each in names)
 
 
 def _warnings(stack: Stack, items: Any) -> Iterator[str]:
@@ -400,17 +408,17 @@ def _warnings(stack: Stack, items: Any) -> Iterator[str]:
             )
         held |= dict.fromkeys(_held(stack.base, splice))
     if held:
-        names, whose = ", ".join(f"'{each}'" for each in held), "its" if len(held) == 1 else "their"
+        whose = "its" if len(held) == 1 else "their"
         yield (
-            f"Constraints or drivers act on {names} after {whose} keys: mute them if the splice "
-            "does not show."
+            f"Constraints or drivers act on {_listed(held)} after {whose} keys: mute them if the "
+            "splice does not show."
         )
 
 
 def _held(base: Source, splice: Splice) -> list[str]:
     """Bones of a splice that constraints or drivers move, of a body those that are landmarks."""
     skeleton, part = base.clip.skeleton, splice.part
-    bones = part_bones(part, skeleton, base.landmarks, clavicle=splice.clavicle)
+    bones = _changed(base, splice)
     if part.pieces and base.landmarks is not None:
         # Rigs have machinery beneath them that is to follow.
         known = set(base.landmarks.bones.values())
@@ -418,13 +426,30 @@ def _held(base: Source, splice: Splice) -> list[str]:
     return [each for each in bones if skeleton.constrained[skeleton.index[each]]]
 
 
-def _besides(armature: bpy.types.Object, clip: Clip) -> list[actions.Channel]:
-    """What the base moves besides the body, as it does."""
+def _besides(
+    armature: bpy.types.Object, stack: Stack, clip: Clip
+) -> tuple[list[actions.Channel], list[str]]:
+    """What the base moves besides the body, as it does; and bones that lose their size."""
     group = cast("Any", splicing_settings(armature))
     if group.base is None:
-        return []
+        return [], []
     slot = group.base.slots.get(group.base_slot) if group.base_slot else None
-    return further_channels(armature, group.base, slot, clip.frames)
+    found = further_channels(armature, group.base, slot, clip.frames)
+    if group.visual:
+        return found, []
+    changed: set[str] = set()
+    for splice in stack.splices:
+        if splice is not None:
+            changed.update(_changed(stack.base, splice))
+    scaled, lost = scaled_channels(armature, group.base, slot, clip.frames, changed)
+    return found + scaled, lost
+
+
+def _changed(base: Source, splice: Splice) -> tuple[str, ...]:
+    """Names of the base's bones that a splice moves otherwise."""
+    marks = base.landmarks
+    bones = part_bones(splice.part, base.clip.skeleton, marks, clavicle=splice.clavicle)
+    return (*bones, marks["hips"]) if splice.travel and marks is not None else bones
 
 
 def is_source(action: bpy.types.Action) -> bool:
