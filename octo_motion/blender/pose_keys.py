@@ -342,7 +342,8 @@ class PoseKeys:
                     break
         if keyed is not None and before.made and keyed.users <= keyed.use_fake_user:
             bpy.data.actions.remove(keyed)
-        if not before.had_data and data is not None and data.action is None:
+        unused = data is not None and not (data.action or data.nla_tracks or data.drivers)
+        if not before.had_data and unused:
             armature.animation_data_clear()
 
     # --- Single keys ------------------------------------------------------------------------

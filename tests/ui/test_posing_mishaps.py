@@ -464,3 +464,37 @@ def test_nothing_is_left_in_the_headers_of_other_workspaces(monkeypatch: Any) ->
     tell(context(second), "Posing")
     tell(context(second), None)
     assert told == {"first": None, "second": None, "status first": None, "status second": None}
+
+
+# --- What is not keyed yet -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("target", ["CURRENT", "COPY", "LAYER"])
+@pytest.mark.parametrize("how", ["key", "record"])
+def test_keys_of_one_limb_leave_the_pose_of_others_that_has_no_keys(
+    octopus: Any, how: str, target: str
+) -> None:
+    scene, other = bpy.context.scene, octopus.pose.bones["arm2.02.L"]
+    other.keyframe_insert("rotation_quaternion", frame=1)
+    octopus.pose.bones["root"].keyframe_insert("location", frame=1)
+    octopus.octo_motion.posing.keys_to = target
+    session = PuppetSession(octopus, scene, clock=None)
+    controls = PoseControls(session)
+    if how == "record":
+        session.record()
+        drag(controls, ARM, (-60.0, 20.0), ticks=10)
+        scene.frame_set(2)
+        drag(controls, ARM, (-60.0, 20.0), ticks=10)
+        scene.frame_set(3)
+    other.rotation_quaternion = turned = (0.8, 0.6, 0.0, 0.0)
+    octopus.pose.bones["root"].location = moved = (0.1, 0.2, 0.3)
+    if how == "record":
+        session.stop_record()
+    else:
+        drag(controls, ARM, (-60.0, 20.0), ticks=10)
+        controls.handle(Event("K"), VIEW)
+    assert keyed(octopus)[ARM]
+    bpy.context.view_layer.update()
+    session.abandon()
+    assert tuple(other.rotation_quaternion) == pytest.approx(turned)
+    assert tuple(octopus.pose.bones["root"].location) == pytest.approx(moved)

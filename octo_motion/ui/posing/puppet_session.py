@@ -7,7 +7,8 @@ Points are in the world and in Blender's units; the puppet's own metres stay ins
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
@@ -90,6 +91,22 @@ class _Moment:
     """(bodies, 4) of the bones, from rest."""
     locations: Floats
     """(bodies, 3)"""
+
+
+@contextmanager
+def _pose_kept(armature: bpy.types.Object) -> Iterator[None]:
+    """Let bones without keys keep their pose.
+
+    For an action that is new on the armature, or has new curves, Blender would pose all bones by
+    their keys, those that are posed and not keyed yet as well.
+    """
+    values = pose_values(armature)
+    try:
+        yield
+    finally:
+        if bpy.context.view_layer is not None:
+            bpy.context.view_layer.update()
+        restore_pose(armature, values)
 
 
 _active: list[PuppetSession] = []
@@ -395,8 +412,9 @@ class PuppetSession:
         keyed = [Keyed(self.bone(body), self.puppet.places(body)) for body in bodies]
         if not keyed:
             return []
-        frame = self.scene().frame_current_final
-        return self.keys.insert(self.puppet.armature(), keyed, frame, auto=auto)
+        frame, armature = self.scene().frame_current_final, self.puppet.armature()
+        with _pose_kept(armature):
+            return self.keys.insert(armature, keyed, frame, auto=auto)
 
     @property
     def recording(self) -> bool:
@@ -414,6 +432,11 @@ class PuppetSession:
 
     def stop_record(self) -> tuple[int, int]:
         """Write what was kept as few keys; number of bones and of key frames."""
+        armature = self.puppet.armature()
+        with _pose_kept(armature):
+            return self._write_record()
+
+    def _write_record(self) -> tuple[int, int]:
         recorded, self._recorded = self._recorded, None
         if recorded is None or len(recorded) < 2:
             return 0, 0
@@ -486,12 +509,10 @@ class PuppetSession:
             scene = self.scene()
         except OctoMotionError:
             return
-        for take_back in reversed(self._measured):
-            take_back(armature)
-        self.keys.take_back(armature)
-        if bpy.context.view_layer is not None:
-            # Keys that are written anew pose bones once more, and are to do it before the rest.
-            bpy.context.view_layer.update()
+        with _pose_kept(armature):
+            for take_back in reversed(self._measured):
+                take_back(armature)
+            self.keys.take_back(armature)
         restore_pose(armature, self._values)
         if scene.frame_current_final != self._started:
             # What has keys is at another frame now.
@@ -577,7 +598,7 @@ class PuppetSession:
         assert self._recorded is not None
         if self._recorded and frame < max(self._recorded):
             # Playback has come round, or someone has gone back: the take is complete.
-            self.stop_record()
+            self._write_record()
             self.core.adopt(self.puppet.read())
             return
         self._recorded[frame] = self._moment()
