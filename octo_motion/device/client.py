@@ -44,6 +44,10 @@ _MOST_WAITING: Final = 100_000_000
 """Bytes: a scene's meshes are sent at one go, two dozen of the largest."""
 
 
+_SILENT: Final = 5.0
+"""s; it speaks once a second at least."""
+
+
 class State(Enum):
     """Whether there is a bridge."""
 
@@ -252,6 +256,11 @@ class Client:
                 "The pose and all keys are kept; start it again to go on.",
             )
         )
+
+    @property
+    def silent(self) -> bool:
+        """Whether a bridge that runs has not said a word for long: it hangs, or gave up."""
+        return self.state is State.RUNNING and time.monotonic() - self.heard > _SILENT
 
     @property
     def process_id(self) -> int | None:

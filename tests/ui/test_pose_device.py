@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import signal
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -304,6 +307,23 @@ def test_bridge_that_cannot_be_started_again_leaves_the_session(
     hands.client._python = python
     press(hands, Key("B"))
     wait(hands, hands.shown, "the hand is back")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="stops a process by a signal")
+def test_bridge_that_hangs_is_told_and_can_be_started_again(hands: DeviceHands) -> None:
+    wait(hands, lambda: hands.client.times, "it goes well")
+    assert "does not answer" not in device_pose.line(hands)
+    process = hands.client.process_id
+    assert process
+    os.kill(process, signal.SIGSTOP)
+    hands.tick(TOLD, room())
+    hands.client.heard -= 10.0
+    hands.tick(TOLD, room())
+    assert "does not answer: B starts it again" in device_pose.line(hands)
+    press(hands, Key("B"))
+    assert "does not answer" not in device_pose.line(hands)
+    wait(hands, hands.shown, "the hand is back")
+    assert hands.client.process_id != process
 
 
 def test_obstacle_that_stays_where_it_is_is_told_once(

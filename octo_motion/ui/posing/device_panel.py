@@ -62,6 +62,11 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         if isinstance(hands, NdofHands):
             box.label(text=NAME, icon="ORIENTATION_GIMBAL")
             return
+        if client.silent:
+            box.alert = True
+            box.label(text="The program does not answer", icon="ERROR")
+            box.label(text="B over the viewport starts it again")
+            return
         if not client.devices:
             box.label(text="No device is plugged in", icon="INFO")
         forces = {each.number: each for each in hands.shown()}

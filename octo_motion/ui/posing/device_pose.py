@@ -281,6 +281,8 @@ def line(hands: Hands) -> str:
     shown = hands.shown()
     if hands.client.state is State.LOST:
         parts.append("The device's program has ended: B starts it again")
+    elif hands.client.silent:
+        parts.append("The device's program does not answer: B starts it again")
     elif not shown:
         is_blenders = isinstance(hands, NdofHands)
         parts.append(NAME if is_blenders else "No device yet: plug one in")
