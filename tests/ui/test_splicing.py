@@ -943,6 +943,32 @@ def test_hips_that_are_fixed_to_their_parent_cannot_travel() -> None:
     assert_refused("'hips' cannot travel: it is connected to 'root'", "splice_build")
 
 
+@pytest.mark.parametrize("mixed", [("ADD", 1.0), ("REPLACE", 0.5)])
+def test_a_base_that_would_be_mixed_with_its_tracks_twice_is_told(mixed: tuple[Any, float]) -> None:
+    hero, _ = hero_and_source()
+    base = hero.animation_data.action
+    layer = give_motion(hero, 9, name="Layer")
+    data = hero.animation_data
+    track = data.nla_tracks.new()
+    track.strips.new("Layer", 1, layer).action_slot = layer.slots[0]
+    data.action, data.action_slot = base, base.slots[0]
+    OPERATORS.splice_add(part="HEAD")
+    stack_of(hero).visual = True
+
+    def shown() -> np.ndarray:
+        bpy.context.scene.frame_set(11)
+        return np.array(hero.pose.bones["foot.L"].matrix)
+
+    before = shown()
+    OPERATORS.splice_build()
+    np.testing.assert_allclose(shown(), before, atol=1e-5)
+    data.action, data.action_slot = base, base.slots[0]
+    data.action_blend_type, data.action_influence = mixed
+    assert_refused("mixed with the NLA tracks of 'Hero' twice", "splice_build")
+    track.mute = True
+    OPERATORS.splice_build()
+
+
 def test_a_clip_of_no_use_for_timing_is_told() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()

@@ -145,6 +145,8 @@ class Reader:
                 f"'{armature.name}' has no base action, or it is gone.",
                 "Choose the base in the panel Splicing.",
             )
+        if settings.visual:
+            _check_mixing(armature)
         return self.source(armature, settings.base, settings.base_slot, visual=settings.visual)
 
     def item(self, item: Any) -> Source:
@@ -203,6 +205,23 @@ class Reader:
                 clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
             self._sources[key] = Source(armature.name, clip, *known_landmarks(armature))
         return self._sources[key]
+
+
+def _check_mixing(armature: bpy.types.Object) -> None:
+    """As shown, a base has its NLA tracks in it; so the result must act alone."""
+    data = armature.animation_data
+    if (
+        data is None
+        or not data.use_nla
+        or not any(len(track.strips) and not track.mute for track in data.nla_tracks)
+    ):
+        return
+    if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
+        raise ClipError(
+            f"As shown, the base would be mixed with the NLA tracks of '{armature.name}' twice.",
+            "In the NLA editor set the action's Blending to Replace and its Influence to 1, mute "
+            "the tracks, or turn off Base As Shown.",
+        )
 
 
 def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, bool]:
