@@ -12,7 +12,15 @@ from octo_motion.core.locomotion.chain_turning import joints_of, turned_towards
 from octo_motion.core.locomotion.over_time import blurred, covered, reach
 from octo_motion.core.locomotion.parting import parted
 from octo_motion.core.locomotion.separation import Capsules, measure
-from octo_motion.core.locomotion.touching import GIVEN, NEAR, Crowd, Touches, aside
+from octo_motion.core.locomotion.touching import (
+    GIVEN,
+    NEAR,
+    Crowd,
+    Opened,
+    Touches,
+    Touching,
+    aside,
+)
 from octo_motion.core.rotations import Floats
 
 SEEDS = st.integers(0, 2**31)
@@ -304,6 +312,20 @@ def test_a_part_of_the_motion_is_made_like_the_whole() -> None:
     assert whole is not None
     assert part is not None
     np.testing.assert_allclose(part, whole[some], atol=1e-9)
+
+
+def test_arms_that_open_otherwise_than_they_lie_belong_there_while_they_do() -> None:
+    """A swimmer that lies: what is beside another arm at rest is above it in the water."""
+    one, other = straight(np.zeros(FRAMES), 0.1), straight(np.zeros(FRAMES), 0.1, at=0.05)
+    group = crowd(one, other)
+    share = np.linspace(0.0, 1.0, FRAMES)
+    swum = replace(group, opened=Opened(np.array([-UP, UP]), share))
+    walked, opened = (Touching(each, []).now() for each in (group, swum))
+    first, last = (opened.side[:, opened.frame == frame] for frame in (0, FRAMES - 1))
+    np.testing.assert_allclose(first, walked.side[:, walked.frame == 0], atol=1e-9)
+    up_or_down = np.where(opened.arms[0] == 1, 1.0, -1.0)[opened.frame == FRAMES - 1]
+    np.testing.assert_allclose(last, up_or_down * UP[:, None], atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(opened.side, axis=0), 1.0, atol=1e-9)
 
 
 def test_arms_that_keep_apart_are_not_touched() -> None:

@@ -203,9 +203,7 @@ class Generator:
         self._to_armature = multiply(from_matrix(body.rotation), self._outward)
         self._rests = [
             replace(arm_rest(skeleton, arm.bones), outward=outward)
-            for arm, outward in zip(
-                self._arms, rotate(self._to_armature, np.array([1.0, 0.0, 0.0])), strict=True
-            )
+            for arm, outward in zip(self._arms, self.opens_to, strict=True)
         ]
         self._hands = np.array([arm.handedness for arm in self._arms])
         self._pairs = tuple(arm.pair for arm in self._arms)
@@ -417,6 +415,11 @@ class Generator:
     def outward(self) -> Floats:
         """(arms, 4) from an arm's own frame, x outward and z up, to the body's."""
         return self._outward
+
+    @property
+    def opens_to(self) -> Floats:
+        """(arms, 3) unit: where each arm leads out of the body, armature space."""
+        return rotate(self._to_armature, np.array([1.0, 0.0, 0.0]))
 
     @property
     def rests(self) -> tuple[ArmRest, ...]:

@@ -20,7 +20,7 @@ from .columns import product
 from .ground import Ground
 from .parting import parted
 from .separation import Capsules
-from .touching import Crowd
+from .touching import Crowd, Opened
 
 MOST_CAPSULES: Final = 16
 """Of an arm; those of more bones are taken together."""
@@ -61,6 +61,8 @@ class Bulk:
     """Parts of the body, one frame each."""
     upward: Floats
     """(3,) unit: the body's, armature space."""
+    opened: Opened | None = None
+    """Where arms stand round a body that swims as it lies, none for others."""
 
 
 def joints_that_count(bones: int) -> np.ndarray:
@@ -123,6 +125,7 @@ def kept_apart(
         ),
         kept=busy,
         upward=bulk.upward,
+        opened=bulk.opened,
         up=rotate(conjugate(orientations), _UP),
     )
     floor = Surface(ground, locations, orientations, scale) if ground is not None else None

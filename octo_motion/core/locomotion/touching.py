@@ -33,6 +33,16 @@ _TINY: Final = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
+class Opened:
+    """Arms that stand otherwise round the body for some time than they do at rest."""
+
+    outward: Floats
+    """(arms, 3) unit: where each leads to then, seen from the body, armature space."""
+    share: Floats
+    """(frames,) how far they do so, 0…1."""
+
+
+@dataclass(frozen=True, eq=False)
 class Crowd:
     """All arms of a body over time, in the armature's space."""
 
@@ -50,6 +60,8 @@ class Crowd:
     """(3,) unit: the body's."""
     up: Floats
     """(frames, 3) unit: the world's."""
+    opened: Opened | None = None
+    """Where arms stand for some time; none if that is where they do at rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +130,13 @@ class Touching:
         self._crowd, self._parts = crowd, parts
         self._arms, self._joints = arms, joints
         self._radii, self._owner = parts.radii, parts.owner
-        self._sides = _sides(_places(crowd, len(body)))
+        places = _places(crowd, len(body))
+        self._sides = _sides(places)
+        self._apart: Floats | None = None
+        if crowd.opened is not None:
+            # The same before they are made unit, at rest and opened: (2, 3, chains, chains).
+            both = (places, _opened_places(crowd.opened, places))
+            self._apart = np.stack([each.T[:, :, None] - each.T[:, None] for each in both])
         own = arms * (joints - 1)
         # Points of the body after those of all arms: where a capsule starts and, next, ends.
         self._body = np.stack([parts.starts[:, 0, own:], parts.ends[:, 0, own:]], axis=2)
@@ -161,12 +179,17 @@ class Touching:
         half = 0.5 * np.sqrt(dot(*[np.moveaxis(steps, 0, -2)] * 2)).ravel()
         first, second = frame * len(self._owner) + one, frame * len(self._owner) + other
         apart = middles.take(first, axis=1) - middles.take(second, axis=1)
-        return dot(apart, self._side(one, other)) <= half[first] + half[second]
+        return dot(apart, self._side(frame, one, other)) <= half[first] + half[second]
 
-    def _side(self, one: np.ndarray, other: np.ndarray) -> Floats:
-        """On which side (3, capsules) of others some belong."""
+    def _side(self, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Floats:
+        """On which side (3, capsules) of others some belong at a frame."""
         chains = self._owner[one] * self._sides.shape[2] + self._owner[other]
-        return self._sides.reshape(3, -1).take(chains, axis=1)
+        if self._apart is None or self._crowd.opened is None:
+            return self._sides.reshape(3, -1).take(chains, axis=1)
+        share = self._crowd.opened.share[frame]
+        closed, opened = (each.reshape(3, -1).take(chains, axis=1) for each in self._apart)
+        apart = (1.0 - share) * closed + share * opened
+        return apart / np.maximum(np.sqrt(dot(apart, apart)), _TINY)
 
     def at(self, joints: Floats) -> Touches:
         """What is near to what, for joints (frames, arms, joints, 3)."""
@@ -203,7 +226,7 @@ class Touching:
             distance=np.sqrt(dot(gap, gap)),
             wide=here + there,
             thin=np.maximum(np.minimum(here, there), _TINY),
-            side=self._side(one, other),
+            side=self._side(frame, one, other),
             pair=one * len(self._owner) + other,
         )
 
@@ -214,6 +237,16 @@ def _places(crowd: Crowd, body: int) -> Floats:
     middle = np.broadcast_to(crowd.at_rest[:, 0].mean(axis=0), (body, 3))
     places = np.concatenate([roots, middle])
     return places - (places @ crowd.upward)[:, None] * crowd.upward
+
+
+def _opened_places(opened: Opened, places: Floats) -> Floats:
+    """Where chains (chains, 3) begin that have opened, as far from the body as before."""
+    arms = len(opened.outward)
+    middle = places[:arms].mean(axis=0)
+    away = np.sqrt(np.mean(np.sum((places[:arms] - middle) ** 2, axis=1)))
+    result = np.broadcast_to(middle, places.shape).copy()
+    result[:arms] += away * opened.outward
+    return result
 
 
 def _sides(places: Floats) -> Floats:

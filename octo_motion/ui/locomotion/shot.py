@@ -30,6 +30,7 @@ from ...core.locomotion.off_ground import off_ground
 from ...core.locomotion.placement import object_transforms, root_bone_transforms
 from ...core.locomotion.route import Route
 from ...core.locomotion.steady import Steady
+from ...core.locomotion.touching import Opened
 from ...core.locomotion.travel import Travel, TravelSettings, plan_travel
 from ...core.rotations import IDENTITY, Floats, from_matrix, rotate
 from ...core.skeleton import Skeleton
@@ -417,7 +418,7 @@ class Shot:
             self.warnings.append(too_many)
             return
         moved = kept_apart(
-            self.apart.bulk,
+            replace(self.apart.bulk, opened=self._opened()),
             posed.rotations,
             posed.strains,
             lying=posed.lying,
@@ -430,6 +431,17 @@ class Shot:
         )
         if moved is not None:
             posed.rotations = moved
+
+    def _opened(self) -> Opened | None:
+        """Where arms stand round a body that swims as it lies, none if it never does."""
+        known = [self.generator]
+        if self.changing is not None:
+            known = [way.generator for way in self.changing.ways]
+        lying = next((each for each in known if each.settings.lean), None)
+        if lying is None:
+            return None
+        share = np.ones(len(self.moments)) if self.swimming is None else self.swimming
+        return Opened(lying.opens_to, share)
 
     def _look(self, posed: _Posed, going: tuple[Floats, Floats]) -> None:
         """Look where arms overlap, and keep what figures are taken from."""
