@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far out an arm touches the ground, for how long it can hold on there, and how it lies.
+"""How far out an arm touches the ground, and for how long it can hold on there.
 
 Everything is by arm and cycle at once, (arms, cycles): there are some hundred footholds to a route.
 """
@@ -237,77 +237,3 @@ def peeled_to(limbs: Limbs, joint: int, joints: Floats, roots: Floats) -> Floats
         apart = np.linalg.norm(start + within * (end - start) - roots, axis=-1)
         result = np.where(apart >= _SLACK * place, np.maximum(result, place), result)
     return result
-
-
-def laid(
-    limbs: Limbs,
-    ground: Ground,
-    joint: int,
-    *,
-    skins: Floats,
-    spot: Floats,
-    heading: Floats,
-    curl: Floats,
-) -> Floats:
-    """Joints from one on (arms, cycles, joints, 3) on the ground, segments as long as they are.
-
-    Args:
-        limbs: the arms.
-        ground: what they lie on.
-        joint: the one that touches first.
-        skins: (arms, cycles, joints) metres from each of them to the skin below it.
-        spot: (arms, cycles, 3) where; its height is not looked at.
-        heading: (arms, cycles) which way they lie, radians about world Z from +X.
-        curl: (arms, cycles) radians by which they are bent to one side on the way to the tip.
-    """
-    lengths = limbs.lengths[joint:]
-    span = np.maximum(lengths.sum(axis=0), 1e-12)
-    place = spot.copy()
-    first = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    place[..., 2] = _resting(ground, spot, skins[..., 0], lengths[0][:, None], first)
-    joints, passed = [place], np.zeros(heading.shape[:1])
-    for number, length in enumerate(lengths):
-        middle = (passed + 0.5 * length) / span
-        # More and more to one side: an arm that lies slack ends in a curl.
-        turn = heading + curl * (middle * middle)[:, None] * 2.0
-        onward = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-        step = np.broadcast_to(length[:, None], heading.shape)
-        rise = np.zeros(heading.shape)
-        for _ in range(4):
-            level = place[..., :2] + step[..., None] * onward
-            bones = lengths[number : number + 2].max(axis=0)[:, None]
-            rise = _resting(ground, level, skins[..., number + 1], bones, onward)
-            rise -= place[..., 2]
-            step = step * length[:, None] / np.sqrt(step * step + rise * rise)
-        ahead = np.concatenate([step[..., None] * onward, rise[..., None]], axis=-1)
-        ahead *= (length[:, None] / np.sqrt(step * step + rise * rise))[..., None]
-        place = place + ahead
-        joints.append(place)
-        passed = passed + length
-    return np.stack(joints, axis=2)
-
-
-def _resting(
-    ground: Ground, points: Floats, radius: Floats, bones: Floats, ahead: Floats
-) -> Floats:
-    """Height (…,) of a joint such that the skin of the bones at it lies on the ground.
-
-    Between its ends a bone is straight. Over a crest both are higher, by what it would cut off.
-
-    Args:
-        ground: what it lies on.
-        points: (…, 2 or 3) where the joint is.
-        radius: (…,) metres from it to the skin below.
-        bones: (…,) metres that these bones are long.
-        ahead: (…, 2) unit: which way they lie.
-    """
-    points = points[..., :2]
-    slope = ground.slope(points)
-    height = ground.height(points)
-    half = 0.5 * bones[..., None] * ahead
-    chord = 0.5 * (ground.height(points + half) + ground.height(points - half))
-    return (
-        height
-        + np.maximum(height - chord, 0.0)
-        + radius * np.sqrt(1.0 + np.sum(slope * slope, axis=-1))
-    )

@@ -18,10 +18,11 @@ import numpy as np
 from ..rotations import Floats, rotate, rotate_in_plane
 from .course import Line
 from .draping import settled
-from .foothold_places import PEELING, Passing, hold_times, laid, peeled_to, spots
+from .foothold_places import PEELING, Passing, hold_times, peeled_to, spots
 from .gait import CYCLE
 from .ground import Ground, normals
 from .limbs import Limbs, StanceSettings
+from .lying import laid
 from .rhythm import Rhythm
 
 UNROLLING: Final = 0.3

@@ -22,9 +22,9 @@ from .gait import CYCLE
 from .generator import Build, Generator, twist
 from .ground import Ground
 from .limbs import Limbs, StanceSettings
-from .lying import Seen, skin_below
 from .poses import Facing, bone_rotations, carried_to, sucker_sides
 from .rhythm import Even, Rhythm
+from .skin_below import Seen, skin_below
 from .stance import Batch, Hold, Stood, hold, pulled, stand, unheld
 from .steady import Steady
 
