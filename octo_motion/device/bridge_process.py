@@ -218,9 +218,9 @@ class Bridge:
                 self._lag += _LAG_SHARE * (time.perf_counter() - told.time - self._lag)
             self._blender.send(self._pointer(told, hand), droppable=True)
         if simulation is not None and simulation.changed:
-            simulation.changed = False
             pose = simulation.world.pose()
-            self._blender.send(
+            # What was left out is said once Blender reads again: it may be the last for long.
+            simulation.changed = not self._blender.send(
                 PoseMessage(
                     *(self._placed, simulation.steps, simulation.time),
                     *(pose.positions, pose.orientations),

@@ -66,24 +66,28 @@ class Channel:
         """For ``select``."""
         return self._socket.fileno()
 
-    def send(self, message: Message, *, droppable: bool = False) -> None:
+    def send(self, message: Message, *, droppable: bool = False) -> bool:
         """Send a message, or keep it until the peer reads.
 
         Args:
             message: What to say.
             droppable: A newer one will replace it: leave it out if the peer is slow.
 
+        Returns:
+            Whether it is on its way; else it was left out.
+
         Raises:
             ChannelClosedError: the peer is gone, or has not read for very long.
         """
         if droppable and len(self._waiting) > _DROPPABLE_BEYOND:
             self.flush()
-            return
+            return False
         self._waiting += pack(message)
         self.flush()
         if len(self._waiting) > self.most_waiting:
             self.close()
             raise ChannelClosedError("the other side does not read")
+        return True
 
     def flush(self) -> None:
         """Send what waits, as far as the peer takes it."""

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from octo_motion.core.posing.figure import Pose
 from octo_motion.device import channel as line
 from octo_motion.device.bridge_process import Bridge
 from octo_motion.device.calibration import NONE, Phase
@@ -24,11 +25,14 @@ from octo_motion.device.messages import (
     VERSION,
     Buzz,
     CalibrationMessage,
+    FigureMessage,
     Goodbye,
     Notice,
     Place,
+    PoseMessage,
     pack,
 )
+from tests.core.puppets import chain, posed
 
 SECRET = bytes(range(32))
 
@@ -234,6 +238,34 @@ def test_blender_that_renders_while_a_device_is_calibrated_does_not_lose_the_bri
     for _ in range(60_000):  # two minutes of them
         bridge._hear_calibration(CalibrationMessage.of(0, NONE, Phase.REACH))
     assert len(server._waiting) < 1_000_000
+    client.close()
+    server.close()
+
+
+def test_pose_in_which_a_puppet_came_to_rest_reaches_a_blender_that_was_busy(
+    accepted: Begin,
+) -> None:
+    client, server = pair(accepted)
+    bridge = Bridge(server, ())
+    figure = chain(2)
+    pose = posed(figure)
+    bridge._hear_blender(FigureMessage.of(figure))
+    bridge._hear_blender(Place(pose.positions, pose.orientations))
+    while len(server._waiting) < 100_000:
+        server.send(Notice("x" * 900, ""))
+    assert bridge.simulation
+    bridge._tell_blender()
+    bridge.simulation.world.set_pose(Pose(pose.positions + 1.0, pose.orientations))
+    bridge._tell_blender()
+    end = time.monotonic() + 10.0
+    poses: list[PoseMessage] = []
+    while not poses:
+        poses += [each for each in client.receive() if isinstance(each, PoseMessage)]
+        server.flush()
+        bridge._tell_blender()
+        assert time.monotonic() < end
+    np.testing.assert_allclose(poses[-1].positions, pose.positions + 1.0)
+    assert not bridge.simulation.changed
     client.close()
     server.close()
 
