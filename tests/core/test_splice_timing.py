@@ -142,3 +142,22 @@ def test_a_clip_is_found_within_the_clip_that_it_was_cut_from(rate: float):
     assert all(best.cost < other.cost for other in others)
     apart = np.diff(sorted(each.base_start for each in (best, *others)))
     assert (apart >= 0.2 * rate).all()
+
+
+def test_only_as_much_of_a_clip_as_is_spliced_counts():
+    random = np.random.default_rng(3)
+    base = replace(motion(random, humanoid(random), 300, strength=0.4), rate=24.0)
+    order = np.r_[60:84, 200:280]
+    splice = replace(
+        base,
+        frames=np.arange(1.0, len(order) + 1.0),
+        rotations=base.rotations[order],
+        locations=base.locations[order],
+        world=base.world[order],
+    )
+    whole, *_ = suggest_timings((base, LANDMARKS), (splice, LANDMARKS))
+    assert whole.base_start == pytest.approx(201.0 - 24.0, abs=8.0)
+    for rate in (1.0, 0.5):
+        slow = replace(base, rate=base.rate * rate)
+        first, *_ = suggest_timings((slow, LANDMARKS), (splice, LANDMARKS), rate=rate, length=23.0)
+        assert first.base_start == pytest.approx(61.0, abs=1.0)

@@ -59,6 +59,7 @@ def suggest_timings(
     *,
     splice_start: float | None = None,
     rate: float = 1.0,
+    length: float | None = None,
     count: int = 3,
 ) -> list[Suggestion]:
     """The best moments for a splice to begin, best first, none close to another.
@@ -68,6 +69,7 @@ def suggest_timings(
         splice: the splice clip and its landmarks.
         splice_start: frame of the splice clip to begin with, its first if none is given.
         rate: speed of the splice clip.
+        length: frames of the base that the splice lasts; none: as long as there is motion.
         count: at most how many.
 
     Raises:
@@ -75,9 +77,12 @@ def suggest_timings(
     """
     ours, theirs = Side(*base), Side(*splice)
     start = splice[0].frames[0] if splice_start is None else splice_start
-    seconds = max((splice[0].frames[-1] - start) / splice[0].rate / rate, 1e-3)
+    end = splice[0].frames[-1]
+    if length is not None:
+        end = min(end, start + length / base[0].rate * splice[0].rate * rate)
+    seconds = max((end - start) / splice[0].rate / rate, 1e-3)
     pace = min(_RATE, _LONGEST / seconds)
-    splice_frames = np.arange(start, splice[0].frames[-1] + 1e-6, splice[0].rate * rate / pace)
+    splice_frames = np.arange(start, end + 1e-6, splice[0].rate * rate / pace)
     theirs_seen = _legs(theirs, ours, splice_frames, pace)
     step = base[0].rate / pace
     first, last = base[0].frames[0], base[0].frames[-1]

@@ -352,6 +352,7 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
         (splice.clip, splice.landmarks),
         splice_start=splice.timing.splice_start,
         rate=splice.timing.rate,
+        length=splice.timing.length,
         count=count,
     )
     if not found:
