@@ -12,6 +12,7 @@ import pytest
 from octo_motion.core.posing.coupling import Coupling
 from octo_motion.core.posing.world import WorldSettings
 from octo_motion.core.rotations import from_rotation_vector
+from octo_motion.device.calibration import Calibration
 from octo_motion.device.driver import DeviceLostError, Kind, Sample
 from octo_motion.device.haptics.local_model import Held, Pull
 from octo_motion.device.haptics.pointer import Pointer
@@ -282,6 +283,31 @@ def test_moving_the_workspace_lets_go_first() -> None:
     table.ticks(31, ROCK)
     assert table.pointer.grab == 0
     assert table.force == 0.0
+
+
+@pytest.mark.parametrize("what", ["view", "calibration", "calibrating"])
+def test_what_moves_the_hands_place_under_it_does_not_push_the_hand(what: str) -> None:
+    """It lets go, and what the place jumps by must not be felt while the force fades."""
+    table = Table()
+    table.buttons = 1
+    table.ticks(5, ROCK)
+    table.place = (0.0005, 0.0, 0.0)
+    table.ticks(400, ROCK)
+    before = table.force
+    assert 0.1 < before < 1.0
+    match what:
+        case "view":
+            table.pointer.place(Workspace(0, (1.0, 0.0, 0.0)))
+        case "calibration":
+            table.pointer.correct(Calibration(rest=(0.2, 0.0, 0.0, 0.0, 0.0, 0.0)))
+        case _:
+            table.pointer.calibrate(begin=True)
+            table.place = (0.1, 0.0, 0.0)
+    count = len(table.driver.sent)
+    table.ticks(60)
+    forces = [length(force) for force, _ in table.driver.sent[count:]]
+    assert max(forces) <= before
+    assert forces[-1] == 0.0
 
 
 def test_scaled_workspace_is_as_stiff_to_the_hand() -> None:

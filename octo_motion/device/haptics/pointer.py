@@ -124,7 +124,7 @@ class Pointer:
             if moved:
                 self.position, self.orientation = workspace.origin, workspace.orientation
         else:
-            self.want(grab=False)
+            self._lift()
 
     def want(self, *, grab: bool) -> None:
         """Grab what is near, or let go."""
@@ -133,6 +133,11 @@ class Pointer:
             self.grab = self._grabs
         elif not grab:
             self.grab = 0
+
+    def _lift(self) -> None:
+        """Let go, and feel no more of what was held: the hand will be elsewhere beside it."""
+        self.want(grab=False)
+        self._answered = 0
 
     def hold(self, grab: int, held: Held, time: float, now: float, holds: float = 0.0) -> None:
         """Take over where the simulation says that the held body is.
@@ -212,7 +217,7 @@ class Pointer:
 
     def calibrate(self, *, begin: bool) -> None:
         """Begin to learn the device's zero and range, or stop without having learned any."""
-        self.want(grab=False)
+        self._lift()
         self.velocity = self.angular_velocity = ZERO
         self._last = None
         self._test_until = -math.inf
@@ -220,7 +225,7 @@ class Pointer:
 
     def correct(self, calibration: Calibration) -> None:
         """Take over the device's zero and range; lets go, for nothing may jump."""
-        self.want(grab=False)
+        self._lift()
         self.calibration = calibration
         self._last = None
         if isinstance(self.driver, SpaceMouse):
