@@ -310,6 +310,34 @@ def test_what_moves_the_hands_place_under_it_does_not_push_the_hand(what: str) -
     assert forces[-1] == 0.0
 
 
+@pytest.mark.parametrize(
+    ("place", "turn"),
+    [((0.2, 0.0, 0.0), IDENTITY), (ZERO, (0.0, 1.0, 0.0, 0.0))],
+)
+def test_device_that_is_reset_in_mid_grab_does_not_push(place: Vector, turn: Quaternion) -> None:
+    """Firmware that starts anew counts from another place."""
+    table = Table()
+    table.buttons = 1
+    table.ticks(300, ROCK)
+    table.place, table.turn = place, turn
+    count = len(table.driver.sent)
+    table.ticks(60, ROCK)
+    assert max(length(force) for force, _ in table.driver.sent[count:]) < 0.01
+    assert max(length(torque) for _, torque in table.driver.sent[count:]) < 1e-3
+    assert table.pointer.grab == 0
+
+
+def test_hand_that_is_torn_away_as_fast_as_a_hand_can_still_holds() -> None:
+    table = Table()
+    table.buttons = 1
+    table.ticks(300, ROCK)
+    for index in range(20):
+        table.place = (0.006 * index, 0.0, 0.0)  # 6 m/s
+        table.ticks(1, ROCK)
+    assert table.pointer.grab
+    assert table.force > 3.0
+
+
 def test_scaled_workspace_is_as_stiff_to_the_hand() -> None:
     table = Table()
     table.pointer.place(Workspace(0, ZERO, IDENTITY, 10.0))

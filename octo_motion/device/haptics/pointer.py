@@ -19,6 +19,7 @@ from ..spatial import (
     add,
     add_scaled,
     conjugate,
+    length,
     multiply,
     rotate,
     scale,
@@ -38,6 +39,13 @@ _GIVE_UP: Final = 0.25
 """s of ticks without a word from the simulation, after which the hand has let go for good."""
 MOST_HOLDS: Final = 0.1
 """s for which a local model is trusted at most, however long the simulation's steps take."""
+_LEAP: Final = 0.02
+_FASTEST: Final = 10.0
+"""m, and m/s beyond it: a hand that holds something does not move farther from one sample to the
+next."""
+_SWING: Final = 0.5
+_FASTEST_TURN: Final = 100.0
+"""rad, and rad/s beyond it, likewise."""
 _STALL: Final = 3.0
 """Periods without a tick that are no jitter, of a loop that is slow by itself."""
 _TEST_SECONDS: Final = 0.6
@@ -188,7 +196,10 @@ class Pointer:
             self._learn(now, sample)
         elif sample is not None:
             self._press(sample.buttons)
-            self.sample = self._centred(sample)
+            sample = self._centred(sample)
+            if self._answered and self._leaps(sample):
+                self._lift()
+            self.sample = sample
             self._move(now)
         if not self.has_force:
             return
@@ -278,6 +289,16 @@ class Pointer:
         elif now - sample.time < _FULL_PUSH:
             self.position = add_scaled(self.position, self.velocity, self.period)
             self.orientation = turned(self.orientation, self.angular_velocity, self.period)
+
+    def _leaps(self, sample: Sample) -> bool:
+        """Whether a device is where no hand can have brought it: it was reset, or is damaged."""
+        if self._last is None:
+            return False
+        seconds = max(self.period, sample.time - self.sample.time)
+        place, turn = self._last
+        moved = length(subtract(sample.position, place))
+        swung = length(to_rotation_vector(multiply(sample.orientation, conjugate(turn))))
+        return moved > _LEAP + _FASTEST * seconds or swung > _SWING + _FASTEST_TURN * seconds
 
     def _asked(self, now: float) -> tuple[Vector, Vector, float]:
         """Force and torque that the coupling asks for, in the device's axes, and how old it is."""
