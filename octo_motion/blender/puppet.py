@@ -111,6 +111,10 @@ class Puppet:
         self._written = None
         self._set_frames(self.armature())
 
+    def is_moved(self) -> bool:
+        """Whether the armature object has been moved since ``forget``, or the start."""
+        return not np.array_equal(np.array(self.armature().matrix_world), self._world)
+
     def places(self, body: int) -> bool:
         """Whether a body's bone is placed by its location too, not only turned."""
         return bool(self._places[body])
@@ -148,6 +152,7 @@ class Puppet:
         rig = self.rig
         bones = list(rig.roles.bodies)
         self._carriers = np.array(rig.roles.carriers)
+        self._world = np.array(armature.matrix_world)
         object_turn = _object_turn(armature)
         posed = posed_bones(armature, even_scale(armature))
         turned = multiply(conjugate(object_turn), posed.rotations)

@@ -498,3 +498,58 @@ def test_keys_of_one_limb_leave_the_pose_of_others_that_has_no_keys(
     session.abandon()
     assert tuple(other.rotation_quaternion) == pytest.approx(turned)
     assert tuple(octopus.pose.bones["root"].location) == pytest.approx(moved)
+
+
+@pytest.mark.parametrize("ends", ["pressed", "round"])
+def test_recording_over_a_figure_that_travels_leaves_its_travel(octopus: Any, ends: str) -> None:
+    """The body stands still under the hand meanwhile, and afterwards goes where it went before."""
+    scene, root = bpy.context.scene, octopus.pose.bones["root"]
+    for frame, x in ((1, 0.0), (31, 3.0)):
+        root.location.x = x
+        root.keyframe_insert("location", frame=frame)
+    scene.frame_set(1)
+    session = PuppetSession(octopus, scene, clock=None)
+    session.record()
+    start = session.grab_bone(ARM, 1.0)
+    for number in range(1, 31):
+        session.tick(TICK, start + np.array([-0.01 * number, 0.0, 0.01 * number]))
+        scene.frame_set(1 + number)
+    if ends == "pressed":
+        session.stop_record()
+    else:
+        scene.frame_set(1)
+    assert not session.recording
+    session.tick(TICK)
+    session.finish()
+    assert len(keyed(octopus)[ARM]) > 1
+    assert "body" not in keyed(octopus)
+    for frame, x in ((31, 3.0), (1, 0.0)):
+        scene.frame_set(frame)
+        bpy.context.view_layer.update()
+        assert octopus.pose.bones["body"].head.x == pytest.approx(x, abs=1e-5)
+
+
+def test_figure_that_is_moved_as_an_object_is_posed_where_it_is(
+    octopus: Any, controls: PoseControls
+) -> None:
+    drag(controls, ARM, (-60.0, 20.0), ticks=10)
+    octopus.location, octopus.rotation_euler.z = (1.0, 0.0, 0.0), 0.5
+    bpy.context.view_layer.update()
+    controls.tick(TICK)
+    drag(controls, ARM, (-30.0, 20.0), ticks=10)
+    bpy.context.view_layer.update()
+    ends = controls.session.capsules()[0]
+    for bone in (ARM, "arm2.02.R", "body"):
+        head = octopus.matrix_world @ octopus.pose.bones[bone].head
+        start = ends[controls.session.body(bone), 0]
+        radius = controls.session.capsules()[1][controls.session.body(bone)]
+        assert np.linalg.norm(np.array(head) - start) < 1.01 * radius
+
+
+def test_figure_that_is_scaled_wrongly_meanwhile_is_told(
+    octopus: Any, controls: PoseControls
+) -> None:
+    octopus.scale = (1.0, 2.0, 1.0)
+    bpy.context.view_layer.update()
+    with pytest.raises(RigError, match="scaled unequally"):
+        controls.tick(TICK)

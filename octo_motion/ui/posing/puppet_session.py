@@ -20,7 +20,7 @@ from ...blender.figure_reading import bone_materials, is_part_of, read_rig
 from ...blender.obstacle_reading import read_obstacle
 from ...blender.pose_keys import Keyed, PoseKeys
 from ...blender.puppet import Puppet
-from ...blender.shown_pose import pose_values, restore_pose
+from ...blender.shown_pose import PoseValues, pose_values, restore_pose
 from ...core.errors import OctoMotionError, RigError, SettingsError
 from ...core.posing.blas_threads import OneThread
 from ...core.posing.figure import Figure, Pose
@@ -165,6 +165,8 @@ class PuppetSession:
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
         self._recorded: dict[float, _Moment] | None = None
+        self._own: PoseValues = {}
+        """Of the bones, when a recording was begun."""
         self._down = False
         self.told: Told | None = None
         self.warning = ""
@@ -314,6 +316,11 @@ class PuppetSession:
         if armature.mode == "EDIT":
             raise RigError(f"'{armature.name}' is in edit mode.", "Leave it and start again.")
         self._apply_settings(armature)
+        if self._recorded is None and self.puppet.is_moved():
+            # By hand, at the same frame.
+            self.measuring = None
+            self.puppet.forget()
+            self.core.adopt(self.puppet.read())
         sample = None
         if self.measuring is not None:
             if position is not None:
@@ -428,25 +435,48 @@ class PuppetSession:
             WriteError: a motion could not be written.
         """
         self.keys.check_motion(self.puppet.armature())
+        self._own = pose_values(self.puppet.armature())
         self._recorded = {self.scene().frame_current_final: self._moment()}
 
     def stop_record(self) -> tuple[int, int]:
         """Write what was kept as few keys; number of bones and of key frames."""
         armature = self.puppet.armature()
         with _pose_kept(armature):
-            return self._write_record()
+            bones, count = self._write_record()
+        if self._go_along(armature, bones) and bpy.context.view_layer is not None:
+            bpy.context.view_layer.update()
+            self.puppet.forget()
+            self.core.adopt(self.puppet.read())
+        return len(bones), count
 
-    def _write_record(self) -> tuple[int, int]:
+    def _go_along(self, armature: bpy.types.Object, recorded: Iterable[str]) -> bool:
+        """Let what stood still in the recording go on with what carries it; whether anything did.
+
+        While a root bone travels, the figure's own root is held back to stay in its place, and is
+        to be no further off once that is over: unless it was moved, it has got no keys.
+        """
+        loose = {self.bone(body) for body in range(len(self.figure)) if self.puppet.places(body)}
+        now = pose_values(armature)
+        back = {
+            bone: own
+            for bone, own in self._own.items()
+            if bone in loose.difference(recorded) and now.get(bone) != own
+        }
+        restore_pose(armature, back)
+        return bool(back)
+
+    def _write_record(self) -> tuple[list[str], int]:
+        """Names of the bones that got keys, and the number of key frames."""
         recorded, self._recorded = self._recorded, None
         if recorded is None or len(recorded) < 2:
-            return 0, 0
+            return [], 0
         frames = np.array(sorted(recorded))
         moments = [recorded[frame] for frame in frames]
         moved: set[int] = set()
         for each in moments[1:]:
             moved |= set(turned_bodies(self.figure, moments[0].pose, each.pose, TOUCHED))
         if not moved:
-            return 0, 0
+            return [], 0
         bodies = self.puppet.with_followers(moved)
         rotations = {
             self.bone(body): np.stack([each.rotations[body] for each in moments]) for body in bodies
@@ -466,7 +496,7 @@ class PuppetSession:
             angle=settings.record_angle,
             distance=_LOCATION_SHARE * size,
         )
-        return len(rotations), count
+        return list(rotations), count
 
     # --- Ends -----------------------------------------------------------------------------------
 
@@ -598,7 +628,8 @@ class PuppetSession:
         assert self._recorded is not None
         if self._recorded and frame < max(self._recorded):
             # Playback has come round, or someone has gone back: the take is complete.
-            self._write_record()
+            bones, _ = self._write_record()
+            self._go_along(self.puppet.armature(), bones)
             self.core.adopt(self.puppet.read())
             return
         self._recorded[frame] = self._moment()
