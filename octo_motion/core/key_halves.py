@@ -85,8 +85,18 @@ def joined(frames: NDArray[Any], halves: NDArray[Any]) -> NDArray[Any]:
     return result
 
 
+def half_way(values: Floats, slopes: Floats) -> Floats:
+    """What is played half way from each frame to the next (frames − 1, …).
+
+    Args:
+        values: (frames, …) of keys with automatic handles.
+        slopes: (frames, …) of these, per frame.
+    """
+    return 0.5 * (values[:-1] + values[1:]) + 0.375 * _HANDLE * (slopes[:-1] - slopes[1:])
+
+
 def _halves(values: Floats) -> Floats:
     """Half way from each frame's values (frames, components) to the next one's."""
     slopes = np.gradient(values, axis=0)
     slopes[[0, -1]] = 0.0
-    return 0.5 * (values[:-1] + values[1:]) + 0.375 * _HANDLE * (slopes[:-1] - slopes[1:])
+    return half_way(values, slopes)

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from ..key_halves import half_way
 from ..rotations import Floats, continuous, normalized, rotate
 from . import quality
 from .arm_frames import ArmFrames
@@ -20,8 +21,6 @@ from .ground import Ground
 from .quality import Worst
 from .separation import Separation
 
-_HANDLE: Final = 1.0 / 2.5614
-"""Length of an automatic handle, as a share of the time between two keys."""
 KINDS: Final = ("SLIP", "DEPTH", "STRAIN", "MISS", "TURN", "OVERLAP")
 """What is measured: arm lengths that an arm slides over the ground that it holds, that its joints
 are below the ground, by which share a bone is longer or shorter than at rest, arm lengths that an
@@ -118,7 +117,7 @@ def _automatic(values: Floats, *, cyclic: bool, turns: bool = False) -> Floats:
         sign = np.where(same < 0.0, -1.0, 1.0) if turns else 1.0
         slopes[0] = 0.5 * (values[1] - values[0] + sign * (values[-1] - values[-2]))
         slopes[-1] = sign * slopes[0]
-    half = 0.5 * (values[:-1] + values[1:]) + 0.375 * _HANDLE * (slopes[:-1] - slopes[1:])
+    half = half_way(values, slopes)
     return normalized(half) if turns else half
 
 
