@@ -8,7 +8,6 @@ cannot be used leaves no data-block behind.
 from __future__ import annotations
 
 import gc
-import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -401,8 +400,8 @@ def _starts(actions: Iterable[bpy.types.Action], *, takes: bool) -> dict[str, fl
 
 
 def _take(action: str) -> str:
-    """FBX: "Armature|Take 1|Layer"; a second such is called "Armature|Take 1|Layer.001"."""
-    return "|".join(re.sub(r"\.\d{3}$", "", action).split("|")[1:2])
+    """FBX: "Armature|Take 1|Layer"."""
+    return action.split("|", 1)[-1]
 
 
 def _place_keys(action: bpy.types.Action, factor: float, start: float, frame_start: int) -> None:

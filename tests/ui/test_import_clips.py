@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.blender import imports
 from octo_motion.blender.armature import read_skeleton
 from octo_motion.blender.imports import NOTE, import_clip
 from octo_motion.core.errors import ClipError
@@ -282,6 +283,42 @@ def test_what_belongs_to_one_take_of_an_fbx_file_stays_together(tmp_path: Path) 
     for action in bpy.data.actions:
         assert (action.frame_start, action.frame_end) == (times(action)[0], times(action)[-1])
     assert {action.frame_start for action in bpy.data.actions} == {11.0, 40.0}
+
+
+def test_each_take_of_an_fbx_file_begins_at_the_first_frame(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Called as Blender's own exporter calls the actions of an armature, and others their takes."""
+
+    def importer(**_: str) -> set[str]:
+        bpy.ops.object.armature_add()
+        armature: Any = bpy.context.object
+        bone = armature.pose.bones[0]
+        for name, start in (
+            ("Armature|Armature|Walk", 1),
+            ("Face|Armature|Walk", 5),
+            ("Armature|Armature|Run", 30),
+            ("Armature|Take 1|Base", 60),
+            ("Face|Take 1|Base", 58),
+        ):
+            armature.animation_data_clear()
+            bone.keyframe_insert("location", frame=start)
+            bone.keyframe_insert("location", frame=start + 20)
+            armature.animation_data.action.name = name
+        return {"FINISHED"}
+
+    operators = SimpleNamespace(import_scene=SimpleNamespace(fbx=importer))
+    monkeypatch.setattr(imports, "bpy", SimpleNamespace(**vars(bpy) | {"ops": operators}))
+    (tmp_path / "takes.fbx").write_bytes(b"Kaydara")
+    clip = import_clip(tmp_path / "takes.fbx", bpy.context)
+    starts = {name: bpy.data.actions[name].frame_start for name in clip.actions}
+    assert starts == {
+        "takes Armature|Walk": 1.0,
+        "takes Armature|Walk.001": 5.0,
+        "takes Armature|Run": 1.0,
+        "takes Take 1|Base": 3.0,
+        "takes Take 1|Base.001": 1.0,
+    }
 
 
 def test_one_damaged_file_stops_none_of_the_others(shared_data: Data, tmp_path: Path) -> None:
