@@ -53,7 +53,7 @@ def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Flo
 def assigned(
     armature: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.ActionSlot
 ) -> Iterator[None]:
-    """An action on the armature for a while; then what it had before.
+    """An action on the armature for a while; then what it had before, its pose included.
 
     Raises:
         ClipError: the armature is in NLA tweak mode, on another action.
@@ -71,16 +71,20 @@ def assigned(
             f"'{armature.name}' is in the tweak mode of the NLA editor.",
             "Leave tweak mode there (Tab) and try again.",
         )
-    try:
-        data.action = action
-        data.action_slot = slot
-        yield
-    finally:
-        data.action = before
-        if before is not None:
-            data.action_slot = slot_before
-        if had_none:
-            armature.animation_data_clear()
+    with _pose_kept(armature):
+        try:
+            data.action = action
+            data.action_slot = slot
+            yield
+        finally:
+            data.action = before
+            if before is not None:
+                data.action_slot = slot_before
+            if had_none:
+                armature.animation_data_clear()
+            if bpy.context.view_layer is not None:
+                # Blender poses all by its keys for that: now, and not when it draws next.
+                bpy.context.view_layer.update()
 
 
 @contextmanager
