@@ -346,7 +346,13 @@ def _shown_clip(
     _check_scale(armature, world)
     orientations = from_matrix(orientations_of(matrices[..., :3, :3]))
     rotations, locations = unposed(skeleton, orientations, matrices[..., :3, 3])
-    return Clip(name, skeleton, times, rate, rotations, locations, world, own=own)
+    sizes = np.linalg.norm(matrices[..., :3, :3], axis=-2)
+    scaled = np.abs(sizes - 1.0).max(axis=(0, 2)) > _ROUNDING
+    # What constraints and drivers scale they will scale again.
+    alone = scaled & ~_beneath(skeleton, scaled) & ~np.array(skeleton.constrained)
+    alone &= np.array([not each for each in skeleton.children])
+    scales = np.where(alone[:, None], sizes, 1.0) if alone.any() else None
+    return Clip(name, skeleton, times, rate, rotations, locations, world, scales, own)
 
 
 def _check_shown(armature: bpy.types.Object) -> None:
@@ -560,11 +566,9 @@ def _stretches_apart(
     chain, whether the bone itself does, or has nothing scaled above it.
     """
     bones = armature_data(armature).bones
-    beneath = np.zeros(len(skeleton), dtype=bool)
-    for number, parent in enumerate(skeleton.parents):
-        beneath[number] = parent >= 0 and (scaled[parent] or beneath[parent])
+    inside = _beneath(skeleton, scaled)
     apart = [
-        bones[name].inherit_scale in _APART or not (beneath[number] or skeleton.children[number])
+        bones[name].inherit_scale in _APART or not (inside[number] or skeleton.children[number])
         for number, name in enumerate(skeleton.names)
     ]
     return np.array(
@@ -573,6 +577,14 @@ def _stretches_apart(
             for number, children in enumerate(skeleton.children)
         ]
     )
+
+
+def _beneath(skeleton: Skeleton, chosen: np.ndarray) -> np.ndarray:
+    """Which bones hang on one of these, (bones,)."""
+    inside = np.zeros(len(skeleton), dtype=bool)
+    for number, parent in enumerate(skeleton.parents):
+        inside[number] = parent >= 0 and (chosen[parent] or inside[parent])
+    return inside
 
 
 def _location_axes(skeleton: Skeleton, bone: int) -> Floats:
