@@ -12,6 +12,7 @@ from bpy.props import IntProperty
 from ...core.errors import DeviceError, SettingsError
 from ...core.rotations import Floats
 from ...device.client import Client, State
+from ...device.driver import Kind
 from ...device.messages import Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
@@ -148,8 +149,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             self._tick(context, hands)
             return Outcome.PASSED
         if event.type.startswith("NDOF_"):
-            self._push(context, hands, event)
-            return Outcome.TAKEN
+            return self._push(context, hands, event)
         return self._handle(hands, event)
 
     def put_down(self) -> None:
@@ -187,11 +187,14 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         frame = hands.session.scene().frame_current
         hands.said = f"Keyed {len(names)} bones at frame {frame}" if names else "Nothing to key"
 
-    def _push(self, context: bpy.types.Context, hands: Hands, event: Any) -> None:
+    def _push(self, context: bpy.types.Context, hands: Hands, event: Any) -> Outcome:
         """Blender has a space mouse itself: without a force device, that one poses."""
         if isinstance(hands, DeviceHands):
-            if any(each.force > 0.0 for each in hands.client.devices.values()) or hands.holding:
-                return
+            devices = hands.client.devices.values()
+            if any(each.force > 0.0 for each in devices) or hands.holding:
+                # Beside a force device it turns the view, unless the bridge has it for a pointer.
+                points = any(each.kind == Kind.RATE for each in devices)
+                return Outcome.TAKEN if points else Outcome.PASSED
             hands.stop()
             assert self._session is not None
             hands = self.replace(hands, NdofHands(self._session))
@@ -209,6 +212,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
                     self._let_go(context, hands)
         elif event.type in KEY_BUTTONS and event.value == "PRESS":
             self._key(hands, all_bones=False)
+        return Outcome.TAKEN
 
     def replace(self, old: Hands, new: NdofHands) -> NdofHands:
         """Let other hands take over the session."""
