@@ -31,6 +31,8 @@ _ASKEW: Final = 0.6
 """Share of its radius up to which a skin that reaches no further counts as it is …"""
 _ROUND: Final = 0.8
 """… and from which on it is round: points are few, and none may be just below a bone."""
+_NEAREST: Final = 0.12
+"""Radii that a skin is taken to reach at least: bones that lie need room for what keys lose."""
 _FARTHEST: Final = 1.5
 """Radii that a skin is taken to reach at most: what is further is a web, or a fin."""
 _TINY: Final = 1e-12
@@ -77,7 +79,7 @@ class ArmSkin:
     def below(self, down: Floats, first: int = 0) -> Floats:
         """How far the skin reaches down at both ends of bones (…, bones, 2), armature units.
 
-        Never less than nothing: a bone that is outside its skin is not in the ground either.
+        A bone that is outside its skin is not in the ground either.
 
         Args:
             down: (…, bones, 2, 3) which way is down there, in the bones' rest frames.
@@ -95,7 +97,7 @@ class ArmSkin:
             [np.roll(self._parts, step, axis=-1) for step in range(-steps, steps + 1)], axis=0
         )
         one, other = rolled[bones, ends, low], rolled[bones, ends, (low + 1) % _SIDES]
-        part = np.clip(one + share * (other - one), 0.0, _FARTHEST)
+        part = np.clip(one + share * (other - one), _NEAREST, _FARTHEST)
         rounder = smooth_step((part - _ASKEW) / (_ROUND - _ASKEW))
         part += np.maximum(1.0 - part, 0.0) * rounder
         return part * np.stack([self.radii[first:-1], self.radii[first + 1 :]], axis=-1)

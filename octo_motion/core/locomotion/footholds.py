@@ -10,7 +10,7 @@ it while the body moves on.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -72,6 +72,8 @@ class Footholds:
     """(arms, cycles, segments + 1 − c) metres from each of these joints to the skin below it."""
     headings: Floats
     """(arms, cycles) radians about world Z from +X."""
+    curls: Floats
+    """(arms, cycles) radians by which they are bent to one side on the way to the tip."""
     peeled_to: Floats
     """(arms, cycles) metres along the arm up to which it is peeled off as the hold ends."""
     roots_on: Floats
@@ -112,7 +114,6 @@ def lay(
     wishes: Sequence[Wish] = (),
     seed: int = 0,
     alike: bool = False,
-    skins: Floats | None = None,
 ) -> Footholds:
     """Lay all footholds of some arms.
 
@@ -127,8 +128,6 @@ def lay(
         wishes: the artist's; of arms by their number in the body.
         seed: of the small differences from step to step.
         alike: whether there are none, so that each cycle is like the one before.
-        skins: (arms, cycles, segments + 1 − c) metres from each joint that lies to the skin below
-            it; none for as many as all round it.
     """
     first, last = cycles
     shape = len(limbs.arms), last - first + 1
@@ -162,18 +161,11 @@ def lay(
     spot[..., :2] += found.distance[..., None] * aim
     side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if alike else numbers, seed)
     heading = np.where(wanted.turned, wanted.headings, np.arctan2(lie[..., 1], lie[..., 0]))
-    if skins is None:
-        round_about = limbs.radii[joint:].T[:, None]
-        skins = np.broadcast_to(round_about, (*shape, round_about.shape[-1]))
-    joints = laid(
-        limbs,
-        ground,
-        joint,
-        skins=skins,
-        spot=np.where(wanted.moved[..., None], wanted.places, spot),
-        heading=heading,
-        curl=_CURL * (side - 0.5),
-    )
+    curl: Floats = np.broadcast_to(_CURL * (side - 0.5), shape)
+    round_about = limbs.radii[joint:].T[:, None]
+    skins = np.broadcast_to(round_about, (*shape, round_about.shape[-1]))
+    spot = np.where(wanted.moved[..., None], wanted.places, spot)
+    joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
     on = np.maximum(shift - found.half, -_EARLIEST)
     off = np.minimum(shift + found.half, _EARLIEST)
     # Shifted holds are told from the middle that the gait gives them.
@@ -189,10 +181,32 @@ def lay(
         normals=normals(ground, joints),
         skins=skins,
         headings=heading,
+        curls=curl,
         peeled_to=peeled_to(limbs, joint, joints, roots_off),
         roots_on=roots_on,
         roots_off=roots_off,
         short=found.short,
+    )
+
+
+def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) -> Footholds:
+    """The same footholds of arms that lie otherwise.
+
+    Args:
+        footholds: of these arms.
+        limbs: the arms.
+        ground: what they lie on.
+        skins: (arms, cycles, segments + 1 − c) metres from each joint to the skin below it.
+    """
+    joint, spot = footholds.touching, footholds.joints[:, :, 0]
+    turns = {"heading": footholds.headings, "curl": footholds.curls}
+    joints = laid(limbs, ground, joint, skins=skins, spot=spot, **turns)
+    return replace(
+        footholds,
+        joints=joints,
+        normals=normals(ground, joints),
+        skins=skins,
+        peeled_to=peeled_to(limbs, joint, joints, footholds.roots_off),
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -17,7 +16,7 @@ from .arm_skin import ArmSkin
 from .chains import BodyFrame
 from .columns import turned
 from .course import Line
-from .footholds import Footholds, Wish, cycles_at, lay
+from .footholds import Footholds, Wish, cycles_at, lay, relaid
 from .gait import CYCLE
 from .generator import Build, Generator, twist
 from .ground import Ground
@@ -166,30 +165,30 @@ class GroundedWalk:
         self._sides = [sucker_sides(skeleton, arm.bones, down) for arm in generator.arms]
         # Where nothing varies at random, the seed does not matter.
         seed = generator.settings.seed if any(generator.settings.variation) else 0
-        laid = partial(
-            lay,
-            line=line,
-            ground=ground,
-            settings=settings,
-            rhythm=self._rhythm,
-            middle=self._middle,
-            cycles=self._cycles,
-            wishes=wishes,
-            seed=seed,
-            alike=alike,
-        )
         self._limbs: list[tuple[Build, Limbs, Footholds]] = []
         for build in generator.builds:
             for stretch in sorted({may_stretch[arm] for arm in build.arms}):
                 arms = tuple(arm for arm in build.arms if may_stretch[arm] == stretch)
                 part = Build(arms, build.chain, build.widths)
                 limbs = self._limbs_of(part, radii, stretch=stretch)
-                self._limbs.append((part, limbs, laid(limbs)))
+                footholds = lay(
+                    limbs,
+                    line,
+                    ground,
+                    settings,
+                    self._rhythm,
+                    middle=self._middle,
+                    cycles=self._cycles,
+                    wishes=wishes,
+                    seed=seed,
+                    alike=alike,
+                )
+                self._limbs.append((part, limbs, footholds))
         if not self._are_round(skins):
             below = self._below(skins, phases)
             self._limbs = [
-                (build, limbs, laid(limbs, skins=own))
-                for (build, limbs, _), own in zip(self._limbs, below, strict=True)
+                (build, limbs, relaid(holds, limbs, ground, own))
+                for (build, limbs, holds), own in zip(self._limbs, below, strict=True)
             ]
 
     def _are_round(self, skins: Sequence[ArmSkin]) -> bool:
