@@ -22,7 +22,7 @@ from ..core.rotations import Floats
 from . import keying
 from .actions import Channel, location_channel, rotation_channels, writable_armature
 from .key_arrays import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
-from .puppet import carrying_axes
+from .shown_pose import carrying_axes
 
 Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
 

@@ -10,12 +10,13 @@ from collections.abc import Iterable
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Quaternion, Vector
+from mathutils import Quaternion, Vector
 
 from ..core.errors import RigError
 from ..core.posing.figure import Figure, Pose
 from ..core.rotations import Floats, conjugate, from_matrix, multiply, rotate
 from .figure_reading import Rig, even_scale, posed_bones, read_rig
+from .shown_pose import carrying_axes
 
 _NOTHING = 1e-9
 _STILL = 1e-6
@@ -230,12 +231,6 @@ def set_rotation(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
         for axis in np.flatnonzero(np.array(bone.lock_rotation)).tolist():
             angles[axis] = bone.rotation_euler[axis]
         bone.rotation_euler = angles
-
-
-def carrying_axes(bone: bpy.types.Bone) -> Matrix:
-    """A bone's axes, seen along those in which its location is given when it is not local."""
-    axes = bone.matrix_local.to_3x3()
-    return axes if bone.parent is None else bone.parent.matrix_local.to_3x3().inverted() @ axes
 
 
 def _object_turn(armature: bpy.types.Object) -> Floats:

@@ -62,11 +62,11 @@ def show_pose(
         if bone is not None:
             place = Vector(location)
             if not bone.bone.use_local_location:
-                place = _carrying_axes(bone.bone) @ place
+                place = carrying_axes(bone.bone) @ place
             bone.matrix_basis = Matrix.LocRotScale(place[:], Quaternion(rotation), size)
 
 
-def _carrying_axes(bone: bpy.types.Bone) -> Matrix:
+def carrying_axes(bone: bpy.types.Bone) -> Matrix:
     """A bone's axes, seen along those in which its location is given when it is not local."""
     axes = bone.matrix_local.to_3x3()
     return axes if bone.parent is None else bone.parent.matrix_local.to_3x3().inverted() @ axes
