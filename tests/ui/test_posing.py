@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,27 +51,6 @@ class Event:
 
 VIEW = FromAbove()
 MOVE = Event("MOUSEMOVE", "NOTHING")
-
-
-@pytest.fixture
-def octopus() -> Any:
-    """A small one: four arms of four bones along the axes' diagonals."""
-    bpy.ops.octo_motion.add_octopus(with_mesh=False, arms=4, joints=4)
-    return bpy.context.object
-
-
-@pytest.fixture
-def session(octopus: Any) -> Iterator[PuppetSession]:
-    made = PuppetSession(octopus, bpy.context.scene, clock=None)
-    # Long steps: what is tested here does not hang on them.
-    made.core.change(step=4e-3)
-    yield made
-    made.abandon()
-
-
-@pytest.fixture
-def controls(session: PuppetSession) -> PoseControls:
-    return PoseControls(session)
 
 
 def over(session: PuppetSession, bone: str, share: float = 0.5) -> tuple[float, float]:

@@ -22,21 +22,10 @@ BONE = "arm1.02.L"
 
 
 @pytest.fixture
-def octopus() -> Any:
-    bpy.ops.octo_motion.add_octopus(with_mesh=False, arms=4, joints=4)
-    return bpy.context.object
-
-
-@pytest.fixture
 def session(octopus: Any) -> Iterator[PuppetSession]:
     made = PuppetSession(octopus, bpy.context.scene, clock=None)
     yield made
     made.abandon()
-
-
-@pytest.fixture
-def controls(session: PuppetSession) -> PoseControls:
-    return PoseControls(session)
 
 
 def settings_of(octopus: Any) -> Any:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,25 +23,6 @@ from octo_motion.ui.posing.view import view_under
 from tests.ui.test_posing import MOVE, TICK, VIEW, Event, drag, keyed, over
 
 ARM, OTHER = "arm1.04.L", "arm2.04.L"
-
-
-@pytest.fixture
-def octopus() -> Any:
-    bpy.ops.octo_motion.add_octopus(with_mesh=False, arms=4, joints=4)
-    return bpy.context.object
-
-
-@pytest.fixture
-def session(octopus: Any) -> Iterator[PuppetSession]:
-    made = PuppetSession(octopus, bpy.context.scene, clock=None)
-    made.core.change(step=4e-3)
-    yield made
-    made.abandon()
-
-
-@pytest.fixture
-def controls(session: PuppetSession) -> PoseControls:
-    return PoseControls(session)
 
 
 def auto_key(*, available: bool = False) -> None:

@@ -31,12 +31,6 @@ Play = Callable[..., set[str]]
 
 
 @pytest.fixture
-def octopus() -> Any:
-    bpy.ops.octo_motion.add_octopus(with_mesh=False, arms=4, joints=4)
-    return bpy.context.object
-
-
-@pytest.fixture
 def play(tmp_path: Path) -> Play:
     def run(*steps: dict[str, Any], **settings: Any) -> set[str]:
         path = tmp_path / "wave.json"
