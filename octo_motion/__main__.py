@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 from importlib.util import find_spec
 
-from .ui.batch.command_line import parse
+from .command_line.command_line import parse
 
 PROGRAM = "python -m octo_motion"
 
@@ -26,7 +26,7 @@ def main() -> int:
         )
         return 2
     from . import register, unregister  # noqa: PLC0415
-    from .ui.batch import commands  # noqa: PLC0415
+    from .command_line import commands  # noqa: PLC0415
 
     register()
     try:

@@ -116,8 +116,8 @@ def test_gait_file_that_is_shown_can_be_imported(block: str, clean_blender: Path
 
 @pytest.mark.parametrize("block", code_blocks(BATCH, "toml"))
 def test_job_that_is_shown_has_no_faults(block: str, clean_blender: Path) -> None:
-    from octo_motion.ui.batch.job import read_job
-    from octo_motion.ui.batch.known import known
+    from octo_motion.command_line.job_file import read_job
+    from octo_motion.command_line.vocabulary import known
 
     file = clean_blender / "job.toml"
     file.write_text(block, encoding="utf-8")
@@ -199,15 +199,13 @@ def described(group: str) -> dict[str, list[str]]:
 
 
 def group_class(group: str) -> Any:
-    from octo_motion.ui.locomotion import (
-        arm_properties,
-        change_properties,
-        gait_properties,
-        ground_properties,
-        properties,
-        quality_report,
-        reach_properties,
-    )
+    from octo_motion.ui.locomotion.settings import arms as arm_properties
+    from octo_motion.ui.locomotion.settings import changes as change_properties
+    from octo_motion.ui.locomotion.settings import gait as gait_properties
+    from octo_motion.ui.locomotion.settings import ground as ground_properties
+    from octo_motion.ui.locomotion.settings import properties
+    from octo_motion.ui.locomotion.settings import quality as quality_report
+    from octo_motion.ui.locomotion.settings import reaches as reach_properties
     from octo_motion.ui.posing.properties import OCTO_MOTION_PG_posing
     from octo_motion.ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
     from octo_motion.ui.splicing.properties import OCTO_MOTION_PG_splicing
@@ -357,7 +355,7 @@ def test_ranges_of_the_octopus_are_the_operators_own() -> None:
 
 @pytest.mark.parametrize("word", ["generate", "splice", "bake", "pose"])
 def test_every_option_of_the_command_line_is_described(word: str) -> None:
-    from octo_motion.ui.batch.command_line import parser
+    from octo_motion.command_line.command_line import parser
 
     commands: Any = parser("octo_motion", has_open_file=True)._subparsers
     command = commands._group_actions[0].choices[word]
@@ -368,20 +366,20 @@ def test_every_option_of_the_command_line_is_described(word: str) -> None:
 
 
 def test_every_key_of_a_job_is_described() -> None:
-    from octo_motion.ui.batch.job import KEYS
+    from octo_motion.command_line.job_file import KEYS
 
     assert set(rows(section("## Job files", BATCH))) == set(KEYS)
 
 
 def test_every_parameter_of_a_new_octopus_is_named_for_jobs() -> None:
-    from octo_motion.ui.batch import job
+    from octo_motion.command_line import job_file as job
 
     text = rows(section("## Job files", BATCH))["octopus"][0]
     assert [name for name in job._OCTOPUS_KEYS if f"`{name}`" not in text] == []
 
 
 def test_every_gait_that_comes_along_is_in_the_guide() -> None:
-    from octo_motion.core.locomotion import gait
+    from octo_motion.core.locomotion.gait import table as gait
 
     guide = text_of(REPOSITORY / "docs" / "guide.md")
     assert [name for name in gait.presets() if f"`{name}`" not in guide] == []

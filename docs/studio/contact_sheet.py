@@ -18,7 +18,7 @@ from mathutils import Vector
 from shots import Performance
 from stage import Pixels, Points
 
-from octo_motion.core.locomotion.chains import AXES
+from octo_motion.core.locomotion.rig.arm_chains import AXES
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _PHASES: Final = 8

@@ -17,10 +17,10 @@ import stage
 from mathutils import Matrix
 from stage import Colour, Points
 
-from octo_motion.blender.armature import read_skeleton
+from octo_motion.blender.rig.armature import read_skeleton
 from octo_motion.core.skeleton import Skeleton
-from octo_motion.core.splicing.landmarks import Landmarks
-from octo_motion.core.splicing.mapping import map_skeleton
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 
 _SIDES: Final = 20
 _RINGS: Final = 7

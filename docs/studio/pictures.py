@@ -26,7 +26,7 @@ import stage
 from stage import Pixels
 
 import octo_motion
-from octo_motion.core.locomotion import gait
+from octo_motion.core.locomotion.gait import table as gait
 
 _WIDE: Final = (768, 432)
 _CELL: Final = (264, 198)

@@ -14,7 +14,7 @@ import stage
 from mathutils import Vector
 from stage import Colour, Pixels
 
-from octo_motion.core.locomotion.gait import GaitTable
+from octo_motion.core.locomotion.gait.table import GaitTable
 from octo_motion.core.rotations import Floats
 
 _LINKS: Final[tuple[tuple[str, Colour], ...]] = (

@@ -10,10 +10,10 @@ import numpy as np
 import plot
 from stage import Pixels
 
-from octo_motion.core.posing.figure import Elements, Figure, Limits, Pose
-from octo_motion.core.posing.plastic import PlasticLaw
-from octo_motion.core.posing.presets import elements_for
-from octo_motion.core.posing.world import World, WorldSettings
+from octo_motion.core.posing.puppet.figure import Elements, Figure, Limits, Pose
+from octo_motion.core.posing.puppet.materials import elements_for
+from octo_motion.core.posing.puppet.plastic_element import PlasticLaw
+from octo_motion.core.posing.solver.world import World, WorldSettings
 
 _BONES: Final = 6
 _LENGTH: Final = 0.15

@@ -23,7 +23,7 @@ from mathutils import Vector
 from stage import Pixels, Points
 
 import octo_motion
-from octo_motion.ui.locomotion import setups as ours
+from octo_motion.ui.locomotion.operators import setups as ours
 
 BUMPS: Final = 0.3
 """Height of the bumps from valley to top, in arm lengths."""

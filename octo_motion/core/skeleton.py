@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .remembered import key_of
+from .content_cache import key_of
 from .rotations import Floats, from_matrix, multiply, rotate
 
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .discovery import Sources
     from .driver import Driver
+    from .sources.discovery import Sources
 
 # Arrays here are small: threads of a numerical library would only wait for each other. This must be
 # set before numpy is first imported.
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _list()
     if options.command == "descriptor":
         return _descriptor(table=options.table)
-    from .process import end_now  # noqa: PLC0415
+    from .ipc.process import end_now  # noqa: PLC0415
 
     sources = _sources(parser, options)
     if not 50.0 <= options.rate <= 4000.0:
@@ -77,8 +77,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Sources:
-    from .discovery import Sources  # noqa: PLC0415 - numpy after the variables above
-    from .network import KEY_BYTES  # noqa: PLC0415
+    from .sources.discovery import Sources  # noqa: PLC0415 - numpy after the variables above
+    from .sources.network import KEY_BYTES  # noqa: PLC0415
 
     if options.udp is not None and options.tcp is not None:
         parser.error("--udp and --tcp exclude each other")
@@ -150,8 +150,8 @@ def _descriptor(*, table: bool) -> int:
 
 
 def _watch(sources: Sources, seconds: float) -> int:
-    from .discovery import Discovery  # noqa: PLC0415
     from .driver import DeviceLostError  # noqa: PLC0415
+    from .sources.discovery import Discovery  # noqa: PLC0415
 
     discovery = Discovery(sources)
     drivers: list[Driver] = []

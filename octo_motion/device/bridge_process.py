@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Final
 
 from ..core.errors import DeviceError, OctoMotionError
-from ..core.posing.figure import Pose
-from ..core.posing.world import WorldSettings
+from ..core.posing.puppet.figure import Pose
+from ..core.posing.solver.world import WorldSettings
 from .calibration import Phase
-from .channel import Channel, ChannelClosedError, Listener
 from .haptics.schedule import Schedule
-from .messages import (
+from .ipc.channel import Channel, ChannelClosedError, Listener
+from .ipc.messages import (
     Button,
     Buzz,
     Calibrate,
@@ -48,7 +48,7 @@ from .messages import (
     Workspace,
     WorldMessage,
 )
-from .process import Child, Parent
+from .ipc.process import Child, Parent
 from .simulation import Hand, Simulation
 
 log = logging.getLogger(__name__)

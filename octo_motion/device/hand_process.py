@@ -16,13 +16,12 @@ from typing import Final
 
 from ..core.errors import DeviceError
 from .calibration import Calibration, Phase
-from .channel import Channel, ChannelClosedError, Listener
-from .discovery import Discovery, Sources
 from .driver import DeviceLostError, Driver
 from .haptics.pointer import Pointer
 from .haptics.schedule import Schedule, make_real_time
 from .hid.space_mouse import SpaceMouse
-from .messages import (
+from .ipc.channel import Channel, ChannelClosedError, Listener
+from .ipc.messages import (
     Button,
     Buzz,
     Calibrate,
@@ -40,7 +39,8 @@ from .messages import (
     Settings,
     Workspace,
 )
-from .process import Parent
+from .ipc.process import Parent
+from .sources.discovery import Discovery, Sources
 
 log = logging.getLogger(__name__)
 

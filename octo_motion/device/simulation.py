@@ -12,12 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from ..core.posing.coupling import Coupling
-from ..core.posing.coupling import Grab as Handle
-from ..core.posing.figure import Figure, Pose
-from ..core.posing.obstacles import Obstacle
 from ..core.posing.picking import capsules_in_world
-from ..core.posing.world import World, WorldSettings
+from ..core.posing.puppet.figure import Figure, Pose
+from ..core.posing.solver.hand_spring import Coupling
+from ..core.posing.solver.hand_spring import Grab as Handle
+from ..core.posing.solver.obstacles import Obstacle
+from ..core.posing.solver.world import World, WorldSettings
 from ..core.rotations import (
     Floats,
     conjugate,
@@ -27,7 +27,7 @@ from ..core.rotations import (
     to_rotation_vector,
 )
 from .haptics.local_model import Pull
-from .messages import DeviceMessage, HandMessage, HeldMessage, Settings
+from .ipc.messages import DeviceMessage, HandMessage, HeldMessage, Settings
 from .spatial import IDENTITY, ZERO, Vector
 
 log = logging.getLogger(__name__)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, cast
 import bpy
 from bpy.props import EnumProperty
 
-from ..blender.armature import active_armature
 from ..blender.overrides import linked_names
+from ..blender.rig.armature import active_armature
 from ..core.errors import RigError
 from .armature_operator import ArmatureOperator
 

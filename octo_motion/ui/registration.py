@@ -8,27 +8,27 @@ from typing import Any
 
 import bpy
 
+from ..command_line import blender_command as command_line
 from . import at_work, settings
-from .batch import registration as command_line
-from .locomotion import (
+from .locomotion import panels
+from .locomotion.operators import (
     add_octopus,
     add_route,
-    arm_list,
-    change_list,
-    change_properties,
     contacts,
-    gait_properties,
     gait_table,
     generate,
-    ground_properties,
     live,
-    panels,
-    properties,
-    quality_report,
-    reach_list,
-    reach_properties,
     setups,
 )
+from .locomotion.operators import arms as arm_list
+from .locomotion.operators import changes as change_list
+from .locomotion.operators import reaches as reach_list
+from .locomotion.settings import changes as change_properties
+from .locomotion.settings import gait as gait_properties
+from .locomotion.settings import ground as ground_properties
+from .locomotion.settings import properties
+from .locomotion.settings import quality as quality_report
+from .locomotion.settings import reaches as reach_properties
 from .posing import (
     device_calibrate,
     device_panel,

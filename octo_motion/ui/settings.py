@@ -9,8 +9,8 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
-from .locomotion.ground_properties import OCTO_MOTION_PG_contact
-from .locomotion.properties import OCTO_MOTION_PG_locomotion, make_overridable
+from .locomotion.settings.ground import OCTO_MOTION_PG_contact
+from .locomotion.settings.properties import OCTO_MOTION_PG_locomotion, make_overridable
 from .posing.properties import OCTO_MOTION_PG_posing
 from .splicing.properties import OCTO_MOTION_PG_splicing
 

@@ -39,7 +39,7 @@ Measured = dict[str, Any]
 def main(words: list[str]) -> None:
     """Measure what the command line asks for, and print a table."""
     import octo_motion
-    from octo_motion.ui.locomotion import setups
+    from octo_motion.ui.locomotion.operators import setups
 
     parser = argparse.ArgumentParser(prog="python -m tests.bench apart", description=__doc__)
     parser.add_argument("names", nargs="*", help=f"of {', '.join(setups.ORDER)}; all if none is")
@@ -109,7 +109,7 @@ def _both(name: str, ground: str, route: str, seed: int) -> tuple[Measured, ...]
 def _measured(octopus: Any, *, keep_apart: bool) -> Measured:
     import bpy
 
-    from octo_motion.ui.locomotion import workflow
+    from octo_motion.ui.locomotion import generate_motion as workflow
 
     octopus.octo_motion.locomotion.keep_apart = keep_apart
     shot = workflow.prepare(octopus, bpy.context)

@@ -15,9 +15,10 @@ from pathlib import Path
 import bpy
 
 import octo_motion
-from octo_motion.blender import actions
-from octo_motion.core.locomotion import generator
-from octo_motion.ui.locomotion import shot, workflow
+from octo_motion.blender.animation import actions
+from octo_motion.core.locomotion.gait import gait_poser as generator
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion.writing import write_motion as shot
 from tests.bench import blender_way, scene
 from tests.bench.stopwatch import Place, Stopwatch
 

@@ -54,7 +54,7 @@ def _measured(
     """How many times fewer keys there are, and the seconds that it takes to find them."""
     import numpy as np
 
-    from octo_motion.ui.locomotion.workflow import generate
+    from octo_motion.ui.locomotion.generate_motion import generate
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.octo_motion.add_octopus(with_mesh=False)

@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from octo_motion.core.rotations import conjugate, multiply
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.landmarks import Landmarks
-from octo_motion.core.splicing.parts import part_bones
-from octo_motion.core.splicing.posture import sampled, slerp
-from octo_motion.core.splicing.splice import Splice
-from octo_motion.core.splicing.timing import window
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.posture import sampled, slerp
+from octo_motion.core.splicing.clip.timing import window
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.transfer.parts import part_bones
+from octo_motion.core.splicing.transfer.splice import Splice
 
 
 def plain_copy(base: Clip, landmarks: Landmarks, splice: Splice) -> Clip:

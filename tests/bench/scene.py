@@ -8,14 +8,18 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from octo_motion.blender.curves import add_route_curve
-from octo_motion.core.locomotion.arm import group_lengths, split_groups
-from octo_motion.core.locomotion.chains import arm_azimuths, joint_positions
-from octo_motion.core.locomotion.gait import evaluate
-from octo_motion.core.locomotion.targets import contraction, link_rotations, pseudo_targets
-from octo_motion.core.locomotion.travel import plan_travel
+from octo_motion.blender.scene.curves import add_route_curve
+from octo_motion.core.locomotion.gait.joint_groups import group_lengths, split_groups
+from octo_motion.core.locomotion.gait.pseudo_targets import (
+    contraction,
+    link_rotations,
+    pseudo_targets,
+)
+from octo_motion.core.locomotion.gait.table import evaluate
+from octo_motion.core.locomotion.path.travel import plan_travel
+from octo_motion.core.locomotion.rig.arm_chains import arm_azimuths, joint_positions
 from octo_motion.core.rotations import Floats, from_axis_angle, rotate
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.ui.locomotion.generate_motion import prepare
 
 _CYCLE_FRAMES = 48
 """Two seconds at 24 frames a second: the default of the settings."""

@@ -98,7 +98,7 @@ def _body(name: str, scale: float) -> Any:
     """An armature of 65 bones with Euler angles, as files of motion capture have them."""
     import bpy
 
-    from octo_motion.core.splicing.landmarks import LANDMARKS
+    from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS
     from tests.core.humanoids import humanoid
 
     skeleton = humanoid({each: each for each in LANDMARKS}, scale=scale)
@@ -134,11 +134,11 @@ def _body(name: str, scale: float) -> Any:
 
 def _move(armature: Any, frames: int, seed: int) -> None:
     """Let all bones swing, and the body walk away."""
-    from octo_motion.blender.actions import MARK
-    from octo_motion.blender.armature import read_skeleton, world_matrix
-    from octo_motion.blender.clips import write_clip
+    from octo_motion.blender.animation.actions import MARK
+    from octo_motion.blender.animation.clips import write_clip
+    from octo_motion.blender.rig.armature import read_skeleton, world_matrix
     from octo_motion.core.rotations import from_rotation_vector
-    from octo_motion.core.splicing.clip import Clip
+    from octo_motion.core.splicing.clip.clip import Clip
 
     skeleton = read_skeleton(armature)
     random = np.random.default_rng(seed)
@@ -158,7 +158,7 @@ def _move(armature: Any, frames: int, seed: int) -> None:
 def _run(frames: int) -> Result:
     import bpy
 
-    from octo_motion.blender import actions, clips
+    from octo_motion.blender.animation import actions, clips
     from octo_motion.ui.splicing import stack
     from tests.bench.case import peak_megabytes
     from tests.bench.stopwatch import Place, Stopwatch

@@ -19,15 +19,16 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from octo_motion.blender.clips import read_clip
-from octo_motion.blender.imports import import_clip
+from octo_motion.blender.animation.clips import read_clip
+from octo_motion.blender.scene.imports import import_clip
+from octo_motion.command_line.shot_request import frame_rate
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import Floats
-from octo_motion.core.splicing.bvh_check import check_bvh
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.landmarks import Landmarks
-from octo_motion.core.splicing.mapping import map_skeleton
-from octo_motion.core.splicing.parts import LEGS, PARTS, part_bones
+from octo_motion.core.splicing.clip.bvh_check import check_bvh
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.timing import Timing, window
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.quality import (
     feet_at_rest,
     foot_slip,
@@ -37,9 +38,8 @@ from octo_motion.core.splicing.quality import (
     seams,
     turn_error,
 )
-from octo_motion.core.splicing.splice import Splice, spliced
-from octo_motion.core.splicing.timing import Timing, window
-from octo_motion.ui.batch.entry import frame_rate
+from octo_motion.core.splicing.transfer.parts import LEGS, PARTS, part_bones
+from octo_motion.core.splicing.transfer.splice import Splice, spliced
 from tests.bench.plain_copy import plain_copy
 
 EXAMPLES: Final = Path(__file__).resolve().parents[2] / "docs" / "examples" / "clips"

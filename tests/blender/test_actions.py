@@ -9,11 +9,11 @@ import mathutils
 import numpy as np
 import pytest
 
-from octo_motion.blender import actions
-from octo_motion.blender.actions import Channel
+from octo_motion.blender.animation import actions
+from octo_motion.blender.animation.actions import Channel
 from octo_motion.core import rotations
 from octo_motion.core.errors import RigError
-from octo_motion.core.locomotion import figures
+from octo_motion.core.locomotion.metrics import report as figures
 from octo_motion.core.rotations import EULER_ORDERS, Floats
 
 ROTATION_MODES = ("QUATERNION", "AXIS_ANGLE", *EULER_ORDERS)

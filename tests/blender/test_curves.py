@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix, Vector
 
-from octo_motion.blender.curves import add_route_curve, read_route, suggested_control_points
+from octo_motion.blender.scene.curves import add_route_curve, read_route, suggested_control_points
 from octo_motion.core.errors import RouteError
-from octo_motion.core.locomotion.route import Route
+from octo_motion.core.locomotion.path.route import Route
 from octo_motion.core.rotations import Floats
 
 WAVE = [(0, 0, 0), (1, 2, 0), (3, 1, 1), (4, -1, 0), (6, 0, 2), (7, 2, 1), (8, 0, 0), (9, 1, 1)]

@@ -9,11 +9,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.armature import read_skeleton
-from octo_motion.blender.arms import world_directions
+from octo_motion.blender.rig.armature import read_skeleton
+from octo_motion.blender.rig.arms import world_directions
 from octo_motion.core.errors import RigError
-from octo_motion.core.locomotion.chains import ArmChain
-from octo_motion.core.locomotion.detection import Detection, detect_arms
+from octo_motion.core.locomotion.rig.arm_chains import ArmChain
+from octo_motion.core.locomotion.rig.detection import Detection, detect_arms
 
 Data = Callable[[str], Path]
 

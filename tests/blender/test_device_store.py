@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from octo_motion.blender import device_store
-from octo_motion.blender.device_store import load_calibrations, save_calibrations
+from octo_motion.blender.files import device_store
+from octo_motion.blender.files.device_store import load_calibrations, save_calibrations
 from octo_motion.core.errors import WriteError
 from octo_motion.device.calibration import Calibration
 

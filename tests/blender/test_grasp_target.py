@@ -7,11 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.grasp_target import hangs_on, may_move, read_form, read_places
-from octo_motion.blender.skin_radii import skin_radii
+from octo_motion.blender.rig.skin_radii import skin_radii
+from octo_motion.blender.scene.grasp_target import hangs_on, may_move, read_form, read_places
 from octo_motion.core.errors import RigError
-from octo_motion.core.locomotion.coil import profile_of
-from octo_motion.core.locomotion.octopus_shape import OctopusShape
+from octo_motion.core.locomotion.octopus.shape import OctopusShape
+from octo_motion.core.locomotion.reaching.winding import profile_of
 from octo_motion.core.rotations import rotate
 from tests.core import objects
 

@@ -8,16 +8,16 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.armature import read_skeleton
-from octo_motion.blender.contacts import (
+from octo_motion.blender.animation.stretching import may_stretch, stretch_channels
+from octo_motion.blender.rig.armature import read_skeleton
+from octo_motion.blender.scene.contact_markers import (
     Contact,
     markers,
     read_markers,
     remove_markers,
     write_markers,
 )
-from octo_motion.blender.ground import arm_skins, read_triangles
-from octo_motion.blender.stretching import may_stretch, stretch_channels
+from octo_motion.blender.scene.ground import arm_skins, read_triangles
 from octo_motion.core.errors import GroundError
 from tests.ui.rig import click, make_octopus
 

@@ -13,10 +13,10 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.armature import read_skeleton
+from octo_motion.blender.rig.armature import read_skeleton
 from octo_motion.core.skeleton import Skeleton
-from octo_motion.core.splicing.landmarks import LANDMARKS
-from octo_motion.core.splicing.mapping import SkeletonMapping, map_skeleton
+from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS
+from octo_motion.core.splicing.humanoid.mapping import SkeletonMapping, map_skeleton
 
 Data = Callable[[str], Path]
 

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Quaternion
 
-from octo_motion.blender.armature import SUCKER_PROPERTY, read_skeleton
-from octo_motion.blender.octopus import add_octopus
+from octo_motion.blender.rig.armature import SUCKER_PROPERTY, read_skeleton
+from octo_motion.blender.scene.octopus import add_octopus
 from octo_motion.core.errors import WriteError
-from octo_motion.core.locomotion.arm import segment_lengths
-from octo_motion.core.locomotion.detection import detect_arms
-from octo_motion.core.locomotion.octopus_mesh import build_mesh
-from octo_motion.core.locomotion.octopus_rig import (
+from octo_motion.core.locomotion.gait.joint_groups import segment_lengths
+from octo_motion.core.locomotion.octopus.mesh import build_mesh
+from octo_motion.core.locomotion.octopus.rig import (
     FIRST_ARM_BONE,
     arm_bone_names,
     arm_pairs,
     build_bones,
 )
-from octo_motion.core.locomotion.octopus_shape import OctopusShape
+from octo_motion.core.locomotion.octopus.shape import OctopusShape
+from octo_motion.core.locomotion.rig.detection import detect_arms
 
 EXTREMES = {
     "default": OctopusShape(),

@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender import actions
-from octo_motion.blender.actions import Channel
+from octo_motion.blender.animation import actions
+from octo_motion.blender.animation.actions import Channel
 from octo_motion.core.errors import RigError, WriteError
 
 BONES = ("Arm", "Tip", "Eye")

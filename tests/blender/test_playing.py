@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.grasp_target import read_places
-from octo_motion.blender.playing import time_kept
-from octo_motion.blender.scene_poses import shown_poses
+from octo_motion.blender.animation.scene_playback import time_kept
+from octo_motion.blender.animation.scene_poses import shown_poses
+from octo_motion.blender.scene.grasp_target import read_places
 from tests.ui.rig import make_octopus
 
 

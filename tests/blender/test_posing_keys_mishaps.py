@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.actions import curves_of
-from octo_motion.blender.pose_keys import Keyed, PoseKeys
+from octo_motion.blender.animation.actions import curves_of
+from octo_motion.blender.animation.pose_keys import Keyed, PoseKeys
 from octo_motion.core.errors import WriteError
 from octo_motion.core.rotations import from_axis_angle
 
@@ -267,7 +267,7 @@ def test_failing_on_its_way_changes_nothing(armature: Any, monkeypatch: Any) -> 
     def broken(*_: Any) -> Any:
         raise WriteError("No.", "No.")
 
-    monkeypatch.setattr("octo_motion.blender.pose_keys._writable_action", broken)
+    monkeypatch.setattr("octo_motion.blender.animation.pose_keys._writable_action", broken)
     with pytest.raises(WriteError):
         keys.insert(armature, [Keyed(ARM)], 5.0)
     data = armature.animation_data

@@ -11,10 +11,10 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.figure_reading import mark_bones, moved_bones, read_rig
-from octo_motion.blender.puppet import Puppet
+from octo_motion.blender.rig.puppet import Puppet
+from octo_motion.blender.rig.puppet_reading import mark_bones, moved_bones, read_rig
 from octo_motion.core.errors import RigError
-from octo_motion.core.posing.figure import Figure, Pose
+from octo_motion.core.posing.puppet.figure import Figure, Pose
 from octo_motion.core.rotations import (
     angle_between,
     conjugate,

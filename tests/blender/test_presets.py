@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.blender import presets
+from octo_motion.blender.files import presets
 from octo_motion.core.errors import GaitError, WriteError
-from octo_motion.core.locomotion import gait
+from octo_motion.core.locomotion.gait import table as gait
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.clips import read_clip, write_clip
+from octo_motion.blender.animation.clips import read_clip, write_clip
 from octo_motion.core.rotations import (
     Floats,
     angle_between,
@@ -20,17 +20,24 @@ from octo_motion.core.rotations import (
     normalized,
     rotate,
 )
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.frames import chest_frame, pelvis_frame
-from octo_motion.core.splicing.joint_rotation import SOFT
-from octo_motion.core.splicing.landmarks import Landmarks
-from octo_motion.core.splicing.mapping import map_skeleton
-from octo_motion.core.splicing.parts import LEFT_ARM, LEGS, PARTS, RIGHT_ARM, Part, part_bones
-from octo_motion.core.splicing.posture import posture_of, sampled
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.posture import posture_of, sampled
+from octo_motion.core.splicing.clip.timing import Timing, window
+from octo_motion.core.splicing.clip.unpose import unposed
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.quality import feet_at_rest, limb_length
-from octo_motion.core.splicing.splice import Reach, Splice, build, spliced
-from octo_motion.core.splicing.timing import Timing, window
-from octo_motion.core.splicing.unpose import unposed
+from octo_motion.core.splicing.transfer.body_frames import chest_frame, pelvis_frame
+from octo_motion.core.splicing.transfer.limb_rotation import SOFT
+from octo_motion.core.splicing.transfer.parts import (
+    LEFT_ARM,
+    LEGS,
+    PARTS,
+    RIGHT_ARM,
+    Part,
+    part_bones,
+)
+from octo_motion.core.splicing.transfer.splice import Reach, Splice, build, spliced
 
 # Blender's importer leaves the file open.
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")

@@ -7,7 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.weight_curve import curve_node, ensure_weight_curve, sample_weight_curve
+from octo_motion.blender.files.weight_curve import (
+    curve_node,
+    ensure_weight_curve,
+    sample_weight_curve,
+)
 from octo_motion.core.errors import SettingsError
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from octo_motion.core.posing.blas_threads import OneThread
+from octo_motion.core.posing.solver.blas_threads import OneThread
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -7,23 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from octo_motion.core.locomotion.body_line import BodyLine, body_line, leaning
-from octo_motion.core.locomotion.chains import BodyFrame
-from octo_motion.core.locomotion.footholds import Wish, cycles_at
-from octo_motion.core.locomotion.gait import presets
-from octo_motion.core.locomotion.generator import GaitSettings, Generator
-from octo_motion.core.locomotion.ground import Ground, HeightField, Plane
-from octo_motion.core.locomotion.grounded import GroundedPoses, GroundedWalk
-from octo_motion.core.locomotion.limbs import StanceSettings
-from octo_motion.core.locomotion.placement import object_transforms
-from octo_motion.core.locomotion.rhythm import Even, at_rest
-from octo_motion.core.locomotion.route import Route
-from octo_motion.core.locomotion.travel import (
+from octo_motion.core.locomotion.gait.gait_poser import GaitSettings, Generator
+from octo_motion.core.locomotion.gait.table import presets
+from octo_motion.core.locomotion.ground.body_height import BodyLine, body_line, leaning
+from octo_motion.core.locomotion.ground.contact_timing import Even, at_rest
+from octo_motion.core.locomotion.ground.footholds import Wish, cycles_at
+from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
+from octo_motion.core.locomotion.ground.surface import Ground, HeightField, Plane
+from octo_motion.core.locomotion.ground.walk import GroundedPoses, GroundedWalk
+from octo_motion.core.locomotion.path.route import Route
+from octo_motion.core.locomotion.path.travel import (
     TravelSettings,
     bearings_of,
     plan_travel,
     unhurried,
 )
+from octo_motion.core.locomotion.rig.arm_chains import BodyFrame
+from octo_motion.core.locomotion.rig.placement import object_transforms
 from octo_motion.core.rotations import Floats, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import body_with_arms

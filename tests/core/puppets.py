@@ -8,17 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from octo_motion.core.posing.coupling import Coupling
-from octo_motion.core.posing.figure import Elements, Figure, Limits, Pose
-from octo_motion.core.posing.kinematics import pose_of, product
-from octo_motion.core.posing.limits import bends
-from octo_motion.core.posing.world import World
-from octo_motion.core.rotations import (
-    Floats,
-    from_rotation_vector,
-    normalized,
-    rotate,
-)
+from octo_motion.core.posing.puppet.figure import Elements, Figure, Limits, Pose
+from octo_motion.core.posing.puppet.joint_limits import bends
+from octo_motion.core.posing.puppet.kinematics import pose_of, product
+from octo_motion.core.posing.solver.hand_spring import Coupling
+from octo_motion.core.posing.solver.world import World
+from octo_motion.core.rotations import Floats, from_rotation_vector, normalized, rotate
 
 DENSITY = 1000.0
 HANDS = 2

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from octo_motion.core.locomotion.chains import BodyFrame, body_frame
-from octo_motion.core.locomotion.generator import Arm
+from octo_motion.core.locomotion.gait.gait_poser import Arm
+from octo_motion.core.locomotion.rig.arm_chains import BodyFrame, body_frame
 from octo_motion.core.rotations import Floats, from_axis_angle, rotate
 from octo_motion.core.skeleton import Skeleton
 

@@ -15,9 +15,9 @@ from octo_motion.core.rotations import (
     to_matrix,
 )
 from octo_motion.core.skeleton import Skeleton
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.landmarks import Landmarks
-from octo_motion.core.splicing.unpose import unposed
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.unpose import unposed
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from tests.core.rigs import skeleton_of
 
 _TRUNK = (

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.arm_frames import ArmFrames, arm_frames
-from octo_motion.core.locomotion.arms_together import alike
+from octo_motion.core.locomotion.rig.arm_batches import alike
+from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, arm_frames
 from octo_motion.core.rotations import Floats, normalized
 from tests.core.rigs import body_with_arms
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 
 from octo_motion.core.errors import ClipError
-from octo_motion.core.splicing.bvh_check import check_bvh
+from octo_motion.core.splicing.clip.bvh_check import check_bvh
 
 SOUND = """HIERARCHY
 ROOT hip

@@ -6,14 +6,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion import ccd
-from octo_motion.core.rotations import (
-    Floats,
-    from_axis_angle,
-    normalized,
-    rotate,
-    shortest_arc,
-)
+from octo_motion.core.locomotion.gait import ccd
+from octo_motion.core.rotations import Floats, from_axis_angle, normalized, rotate, shortest_arc
 
 seeds = st.integers(0, 2**31)
 counts = st.integers(2, 12)
@@ -153,7 +147,7 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
     mirrored = np.array([1.0, -1.0])
 
     def solved(angles: Floats, sway: Floats) -> Floats:
-        from octo_motion.core.locomotion.targets import (
+        from octo_motion.core.locomotion.gait.pseudo_targets import (
             contraction,
             link_rotations,
             pseudo_targets,
@@ -176,7 +170,7 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
 def test_the_asked_shape_joins_smoothly_from_link_to_link() -> None:
     chain = ccd.Chain(np.full(300, 1 / 300), (100, 100, 100), np.full(300, 0.4))
     angles = np.radians(np.array([[[20.0, 0.0], [-50.0, 10.0], [30.0, -20.0]]]))
-    from octo_motion.core.locomotion.targets import link_rotations
+    from octo_motion.core.locomotion.gait.pseudo_targets import link_rotations
 
     shape = columns(ccd.asked_shape(chain, np.moveaxis(angles, 0, -1), np.zeros((2, 1))))
     links = link_rotations(np.concatenate([angles, np.zeros((1, 3, 1))], axis=-1))

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion.changes import (
+from octo_motion.core.locomotion.path.gait_changes import (
     Change,
     between,
     changes_by_height,

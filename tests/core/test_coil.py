@@ -7,7 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import RigError
-from octo_motion.core.locomotion.coil import Coil, Profile, Skins, Start, Winding, profile_of, wind
+from octo_motion.core.locomotion.reaching.winding import (
+    Coil,
+    Profile,
+    Skins,
+    Start,
+    Winding,
+    profile_of,
+    wind,
+)
 from octo_motion.core.rotations import Floats, from_axis_angle, normalized, rotate
 from tests.core import objects
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion import columns
+from octo_motion.core import batched as columns
 from octo_motion.core.rotations import normalized, rotate
 
 

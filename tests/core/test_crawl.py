@@ -10,10 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion.crawl import CrawlSettings, Holds, Journey, plan_crawl
-from octo_motion.core.locomotion.elbow_room import Outline
-from octo_motion.core.locomotion.foothold_places import span
-from octo_motion.core.locomotion.limbs import StanceSettings
+from octo_motion.core.locomotion.ground.arm_clearance import Outline
+from octo_motion.core.locomotion.ground.crawl_planner import (
+    CrawlSettings,
+    Holds,
+    Journey,
+    plan_crawl,
+)
+from octo_motion.core.locomotion.ground.foothold_reach import span
+from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
 
 EIGHT = np.radians([22.5, -22.5, 67.5, -67.5, 112.5, -112.5, 157.5, -157.5])
 

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.chains import BodyFrame, arm_azimuths, body_frame
-from octo_motion.core.locomotion.crown import opened
+from octo_motion.core.locomotion.gait.swim_spread import opened
+from octo_motion.core.locomotion.rig.arm_chains import BodyFrame, arm_azimuths, body_frame
 from octo_motion.core.rotations import Floats
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import UP, bone_matrix, skeleton_of

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import RigError
-from octo_motion.core.locomotion.chains import (
+from octo_motion.core.locomotion.rig.arm_chains import (
     ArmChain,
     Side,
     arrange,
@@ -25,7 +25,7 @@ from octo_motion.core.locomotion.chains import (
     nearest_axis,
     place_added,
 )
-from octo_motion.core.locomotion.detection import Detection, control_chain, detect_arms
+from octo_motion.core.locomotion.rig.detection import Detection, control_chain, detect_arms
 from octo_motion.core.rotations import Floats
 from octo_motion.core.skeleton import Skeleton
 

@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from octo_motion.core.locomotion.draping import settled
-from octo_motion.core.locomotion.ground import Ground, HeightField, Plane
+from octo_motion.core.locomotion.ground.foothold_relaxation import settled
+from octo_motion.core.locomotion.ground.surface import Ground, HeightField, Plane
 from octo_motion.core.rotations import rotate_in_plane
 
 ROOTS = np.tile(np.array([0.0, 0.0, 0.16]), (8, 5, 1))

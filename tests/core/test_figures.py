@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.arm_frames import ArmFrames
-from octo_motion.core.locomotion.figures import KINDS, Figure, Measured, Poses, figures
-from octo_motion.core.locomotion.ground import Plane
-from octo_motion.core.locomotion.poses import ArmRest
-from octo_motion.core.locomotion.separation import Overlap, Separation
+from octo_motion.core.locomotion.clearance.capsule_overlap import Overlap, Separation
+from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, Poses, figures
+from octo_motion.core.locomotion.rig.arm_frames import ArmFrames
+from octo_motion.core.locomotion.rig.bone_rotations import ArmRest
 from octo_motion.core.rotations import IDENTITY, from_axis_angle
 
 COUNT = 5

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import GaitError
-from octo_motion.core.locomotion import gait
+from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.rotations import Floats
 from tests.core import oracle
 

@@ -10,16 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import RigError, SettingsError
-from octo_motion.core.locomotion import gait
-from octo_motion.core.locomotion.chains import BodyFrame
-from octo_motion.core.locomotion.generator import Arm, ArmPoses, GaitSettings, Generator
-from octo_motion.core.rotations import (
-    Floats,
-    angle_between,
-    from_axis_angle,
-    normalized,
-    rotate,
-)
+from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.core.locomotion.gait.gait_poser import Arm, ArmPoses, GaitSettings, Generator
+from octo_motion.core.locomotion.rig.arm_chains import BodyFrame
+from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import UP, body_with_arms, posed_joints
 
@@ -101,7 +95,11 @@ def test_the_reported_miss_is_the_one_that_the_bones_show(name: str) -> None:
     solved = posed_joints(skeleton, arm, poses.rotations, generator.bones)
     local = rotate(from_axis_angle(UP, 0.25 * np.pi), solved - solved[:, :1])
 
-    from octo_motion.core.locomotion.targets import contraction, link_rotations, pseudo_targets
+    from octo_motion.core.locomotion.gait.pseudo_targets import (
+        contraction,
+        link_rotations,
+        pseudo_targets,
+    )
 
     angles = generator.settings.gait.curve(arm.pair).evaluate(generator.arm_phases(cycle(48))[:, 0])
     angles[..., 1] *= -1.0  # left: towards the front is clockwise
@@ -115,7 +113,7 @@ def test_the_reported_miss_is_the_one_that_the_bones_show(name: str) -> None:
 
 
 def generator_sizes(lengths: Floats) -> tuple[int, int, int]:
-    from octo_motion.core.locomotion.arm import split_groups
+    from octo_motion.core.locomotion.gait.joint_groups import split_groups
 
     return split_groups(lengths)
 

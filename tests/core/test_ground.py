@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import GroundError
-from octo_motion.core.locomotion.ground import (
+from octo_motion.core.locomotion.ground.surface import (
     HeightField,
     Plane,
     along_path,

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.arm_frames import ArmFrames, arm_frames
-from octo_motion.core.locomotion.chains import body_frame
-from octo_motion.core.locomotion.keeping_apart import Bulk, kept_apart
-from octo_motion.core.locomotion.separation import Capsules, measure
+from octo_motion.core.locomotion.clearance.arm_separation import Bulk, kept_apart
+from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure
+from octo_motion.core.locomotion.rig.arm_chains import body_frame
+from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, arm_frames
 from octo_motion.core.rotations import IDENTITY, Floats, from_axis_angle, multiply
 from tests.core.rigs import UP, bone_matrix, skeleton_of
 

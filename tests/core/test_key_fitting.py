@@ -7,14 +7,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.key_curves import Curves
-from octo_motion.core.key_errors import Errors
-from octo_motion.core.key_halves import Fine, looked_at, with_halves
-from octo_motion.core.key_limbs import SCALE, Limb, Track
-from octo_motion.core.key_model import Model
-from octo_motion.core.key_search import Search
-from octo_motion.core.keys import reduce_keys
-from octo_motion.core.played import values_at
+from octo_motion.core.keyframes.curves import Curves
+from octo_motion.core.keyframes.linear_model import Model
+from octo_motion.core.keyframes.playback import values_at
+from octo_motion.core.keyframes.reduction import reduce_keys
+from octo_motion.core.keyframes.residuals import Errors
+from octo_motion.core.keyframes.search import Search
+from octo_motion.core.keyframes.subframes import Fine, looked_at, with_halves
+from octo_motion.core.keyframes.tracks import SCALE, Limb, Track
 from octo_motion.core.rotations import (
     Floats,
     angle_between,

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.keys import (
+from octo_motion.core.keyframes.reduction import (
     LOCATION,
     SCALE,
     BezierKeys,

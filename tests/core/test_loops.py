@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion import gait
-from octo_motion.core.locomotion.generator import Arm, GaitSettings, Generator
-from octo_motion.core.locomotion.loops import (
+from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.core.locomotion.gait.gait_poser import Arm, GaitSettings, Generator
+from octo_motion.core.locomotion.path.in_place import (
     breaths,
     route_in_place,
     travel_in_place,
     whole_frames,
 )
-from octo_motion.core.locomotion.travel import TravelSettings, plan_travel
+from octo_motion.core.locomotion.path.travel import TravelSettings, plan_travel
 from octo_motion.core.rotations import Floats, angle_between
 from tests.core.rigs import body_with_arms
 

@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.octopus_mesh import build_mesh
-from octo_motion.core.locomotion.octopus_rig import (
+from octo_motion.core.locomotion.octopus.mesh import build_mesh
+from octo_motion.core.locomotion.octopus.rig import (
     EYE_LEFT,
     EYE_RIGHT,
     FIRST_ARM_BONE,
     OctopusBones,
     build_bones,
 )
-from octo_motion.core.locomotion.octopus_shape import OctopusShape
-from octo_motion.core.locomotion.octopus_surface import Material, OctopusMesh
+from octo_motion.core.locomotion.octopus.shape import OctopusShape
+from octo_motion.core.locomotion.octopus.surface import Material, OctopusMesh
 from octo_motion.core.rotations import Floats
 
 SHAPES = {

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion.octopus_rig import (
+from octo_motion.core.locomotion.octopus.rig import (
     ARM_COLLECTIONS,
     FIRST_ARM_BONE,
     OctopusBones,
@@ -17,7 +17,7 @@ from octo_motion.core.locomotion.octopus_rig import (
     arm_pairs,
     build_bones,
 )
-from octo_motion.core.locomotion.octopus_shape import ARMS, JOINTS, OctopusShape
+from octo_motion.core.locomotion.octopus.shape import ARMS, JOINTS, OctopusShape
 
 # The source's example, [Octopus] eq. 3.1 and 3.2: 12 joints, w₀ = 1, τ = 0.01.
 SOURCE_DIAMETERS = (1.0, 0.99, 0.98, 0.97, 0.96, 0.95, 0.94, 0.93, 0.92, 0.91, 0.9, 0.89)

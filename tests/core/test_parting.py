@@ -8,11 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.chain_turning import joints_of, turned_towards
-from octo_motion.core.locomotion.over_time import blurred, covered, reach
-from octo_motion.core.locomotion.parting import parted
-from octo_motion.core.locomotion.separation import Capsules, measure
-from octo_motion.core.locomotion.touching import (
+from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure
+from octo_motion.core.locomotion.clearance.chain_solver import joints_of, turned_towards
+from octo_motion.core.locomotion.clearance.overlap_contacts import (
     GIVEN,
     NEAR,
     Crowd,
@@ -21,7 +19,9 @@ from octo_motion.core.locomotion.touching import (
     Touching,
     aside,
 )
+from octo_motion.core.locomotion.clearance.overlap_solver import parted
 from octo_motion.core.rotations import Floats
+from octo_motion.core.temporal_filter import blurred, covered, reach
 
 SEEDS = st.integers(0, 2**31)
 UP = np.array([0.0, 0.0, 1.0])

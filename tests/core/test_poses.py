@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.poses import ArmRest, arm_rest, bone_rotations
+from octo_motion.core.locomotion.rig.bone_rotations import ArmRest, arm_rest, bone_rotations
 from octo_motion.core.rotations import Floats, angle_between, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import bone_matrix, skeleton_of

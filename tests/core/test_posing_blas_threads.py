@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.blas_threads import OneThread, thread_counts
+from octo_motion.core.posing.solver.blas_threads import OneThread, thread_counts
 
 
 def test_threads_are_one_for_a_while_and_then_as_before() -> None:

@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.posing.contacts import Detector, nearest_on_segments
-from octo_motion.core.posing.figure import Figure
-from octo_motion.core.posing.obstacles import (
+from octo_motion.core.posing.puppet.figure import Figure
+from octo_motion.core.posing.puppet.materials import elements_for
+from octo_motion.core.posing.solver.contact_detection import Detector, nearest_on_segments
+from octo_motion.core.posing.solver.obstacles import (
     Box,
     Capsule,
     Hull,
@@ -23,8 +24,7 @@ from octo_motion.core.posing.obstacles import (
     Sphere,
     nearest_on_triangles,
 )
-from octo_motion.core.posing.presets import elements_for
-from octo_motion.core.posing.world import World, WorldSettings
+from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import (
     Floats,
     from_axis_angle,

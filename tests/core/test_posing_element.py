@@ -11,18 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.posing.figure import Elements, Pose
-from octo_motion.core.posing.measuring import measure
-from octo_motion.core.posing.plastic import PlasticLaw
-from octo_motion.core.posing.presets import MATERIALS, elements_for, joint_loads
-from octo_motion.core.posing.world import World, WorldSettings
-from octo_motion.core.rotations import (
-    Floats,
-    angle_between,
-    from_rotation_vector,
-    multiply,
-    rotate,
-)
+from octo_motion.core.posing.puppet.figure import Elements, Pose
+from octo_motion.core.posing.puppet.material_fit import measure
+from octo_motion.core.posing.puppet.materials import MATERIALS, elements_for, joint_loads
+from octo_motion.core.posing.puppet.plastic_element import PlasticLaw
+from octo_motion.core.posing.solver.world import World, WorldSettings
+from octo_motion.core.rotations import Floats, angle_between, from_rotation_vector, multiply, rotate
 from tests.core.puppets import chain, doll, free, octopus, posed, puppet, soft
 
 # [Plastic, Fig. 5]: 0.1 kg pushed with 1 N for 5 s, then let go.

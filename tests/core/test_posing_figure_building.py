@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.posing.bone_roles import RigFacts, find_roles
-from octo_motion.core.posing.figure import Figure, Pose
-from octo_motion.core.posing.figure_building import (
+from octo_motion.core.posing.puppet.bone_roles import RigFacts, find_roles
+from octo_motion.core.posing.puppet.build import (
     JointLimits,
     PosedBones,
     build_figure,
     turned_bodies,
 )
-from octo_motion.core.posing.kinematics import pose_of
+from octo_motion.core.posing.puppet.figure import Figure, Pose
+from octo_motion.core.posing.puppet.kinematics import pose_of
 from octo_motion.core.rotations import (
     IDENTITY,
     Floats,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import RigError
-from octo_motion.core.posing.bone_roles import RigFacts, find_roles, is_helper_name
+from octo_motion.core.posing.puppet.bone_roles import RigFacts, find_roles, is_helper_name
 from octo_motion.core.skeleton import Skeleton
 from tests.core.humanoids import PARENTS, humanoid
 from tests.core.rigs import body_with_arms, bone_matrix, skeleton_of

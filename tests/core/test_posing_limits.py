@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.posing.coupling import Coupling
-from octo_motion.core.posing.figure import Figure, Limits
-from octo_motion.core.posing.kinematics import product
-from octo_motion.core.posing.limits import bends, slopes
-from octo_motion.core.posing.obstacles import Plane
-from octo_motion.core.posing.presets import elements_for
+from octo_motion.core.posing.puppet.figure import Figure, Limits
+from octo_motion.core.posing.puppet.joint_limits import bends, slopes
+from octo_motion.core.posing.puppet.kinematics import product
+from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.session import hand_for
-from octo_motion.core.posing.world import World, WorldSettings
+from octo_motion.core.posing.solver.hand_spring import Coupling
+from octo_motion.core.posing.solver.obstacles import Plane
+from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import (
     Floats,
     from_axis_angle,

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.posing.limits import bends
-from octo_motion.core.posing.measuring import Bend, measure_bend, measure_shown
-from octo_motion.core.posing.presets import (
+from octo_motion.core.posing.puppet.joint_limits import bends
+from octo_motion.core.posing.puppet.material_fit import Bend, measure_bend, measure_shown
+from octo_motion.core.posing.puppet.materials import (
     MATERIALS,
     Material,
     elements_for,
     joint_loads,
     material_of,
 )
-from octo_motion.core.posing.world import World, WorldSettings
+from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats
 from tests.core.puppets import chain, octopus, posed
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.figure import Figure, Pose
 from octo_motion.core.posing.picking import Hit
+from octo_motion.core.posing.puppet.figure import Figure, Pose
 from octo_motion.core.posing.session import COARSEST, Sample, Session, Told
-from octo_motion.core.posing.world import WorldSettings
+from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.core.rotations import IDENTITY, angle_between, from_axis_angle
 from tests.core.puppets import chain, posed, soft
 

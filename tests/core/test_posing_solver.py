@@ -10,14 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.posing import kinematics, reference
-from octo_motion.core.posing.contacts import Contacts
-from octo_motion.core.posing.figure import Elements, Limits
-from octo_motion.core.posing.newton import Start
-from octo_motion.core.posing.obstacles import Box, Plane
-from octo_motion.core.posing.rows import Holds, Rows
-from octo_motion.core.posing.tree import Layout, Tree, plan
-from octo_motion.core.posing.world import World, WorldSettings
+from octo_motion.core.posing import reference
+from octo_motion.core.posing.puppet import kinematics
+from octo_motion.core.posing.puppet.figure import Elements, Limits
+from octo_motion.core.posing.solver.constraint_rows import Holds, Rows
+from octo_motion.core.posing.solver.contact_detection import Contacts
+from octo_motion.core.posing.solver.newton import Start
+from octo_motion.core.posing.solver.obstacles import Box, Plane
+from octo_motion.core.posing.solver.tree import Layout, Tree, plan
+from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import (
     conjugate,
     from_rotation_vector,

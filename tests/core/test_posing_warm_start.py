@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.coupling import Coupling, Grab
-from octo_motion.core.posing.figure import Figure, Limits
-from octo_motion.core.posing.newton import Start
-from octo_motion.core.posing.obstacles import Plane
-from octo_motion.core.posing.presets import elements_for
-from octo_motion.core.posing.world import World, WorldSettings
+from octo_motion.core.posing.puppet.figure import Figure, Limits
+from octo_motion.core.posing.puppet.materials import elements_for
+from octo_motion.core.posing.solver.hand_spring import Coupling, Grab
+from octo_motion.core.posing.solver.newton import Start
+from octo_motion.core.posing.solver.obstacles import Plane
+from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.puppets import chain, doll, octopus, posed, soft
 

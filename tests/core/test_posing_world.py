@@ -11,18 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.posing.coupling import Coupling
-from octo_motion.core.posing.figure import Figure, Pose
-from octo_motion.core.posing.obstacles import Box, Plane, Sphere
-from octo_motion.core.posing.presets import elements_for
-from octo_motion.core.posing.world import World, WorldSettings
-from octo_motion.core.rotations import (
-    Floats,
-    angle_between,
-    from_axis_angle,
-    multiply,
-    rotate,
-)
+from octo_motion.core.posing.puppet.figure import Figure, Pose
+from octo_motion.core.posing.puppet.materials import elements_for
+from octo_motion.core.posing.solver.hand_spring import Coupling
+from octo_motion.core.posing.solver.obstacles import Box, Plane, Sphere
+from octo_motion.core.posing.solver.world import World, WorldSettings
+from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, multiply, rotate
 from tests.core.puppets import chain, doll, free, octopus, posed, soft, torn, tree
 
 WEIGHT = (0.0, 0.0, -9.81)

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion import quality
-from octo_motion.core.locomotion.ground import Plane
+from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.rotations import from_axis_angle
 
 

@@ -6,22 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from octo_motion.core.easing import least_jerk
 from octo_motion.core.errors import RigError, SettingsError
-from octo_motion.core.locomotion import gait
-from octo_motion.core.locomotion.arm_frames import ArmFrames, arm_frames
-from octo_motion.core.locomotion.coil import profile_of
-from octo_motion.core.locomotion.curl import curled
-from octo_motion.core.locomotion.easing import least_jerk
-from octo_motion.core.locomotion.generator import GaitSettings, Generator
-from octo_motion.core.locomotion.grasp import Grasp, Mode, Places, Target, plan_grasp
-from octo_motion.core.locomotion.reach import Timeline, first_place, front_width
-from octo_motion.core.rotations import (
-    IDENTITY,
-    Floats,
-    angle_between,
-    from_axis_angle,
-    rotate,
-)
+from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.core.locomotion.gait.gait_poser import GaitSettings, Generator
+from octo_motion.core.locomotion.reaching.curl import curled
+from octo_motion.core.locomotion.reaching.grasp import Grasp, Mode, Places, Target, plan_grasp
+from octo_motion.core.locomotion.reaching.timeline import Timeline, first_place, front_width
+from octo_motion.core.locomotion.reaching.winding import profile_of
+from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, arm_frames
+from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle, rotate
 from tests.core import objects
 from tests.core.rigs import body_with_arms, posed_joints
 

@@ -9,12 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.body_line import body_line
-from octo_motion.core.locomotion.crawl import CrawlSettings, Holds, plan_crawl
-from octo_motion.core.locomotion.ground import Plane
-from octo_motion.core.locomotion.loops import route_in_place
-from octo_motion.core.locomotion.rhythm import Even, Tabled, at_rest, crawling_in_place, free
-from octo_motion.core.locomotion.travel import TravelSettings, bearings_of
+from octo_motion.core.locomotion.ground.body_height import body_line
+from octo_motion.core.locomotion.ground.contact_timing import (
+    Even,
+    Tabled,
+    at_rest,
+    crawling_in_place,
+    free,
+)
+from octo_motion.core.locomotion.ground.crawl_planner import CrawlSettings, Holds, plan_crawl
+from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.path.in_place import route_in_place
+from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import from_axis_angle
 from tests.core.test_crawl import journey
 

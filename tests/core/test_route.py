@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from octo_motion.core.errors import RouteError
-from octo_motion.core.locomotion.route import Route
+from octo_motion.core.locomotion.path.route import Route
 from octo_motion.core.rotations import Floats
 
 CONTROL_POINTS = [[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [3.0, 2.0, 1.0], [4.0, 0.0, 1.0]]

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion import gait
-from octo_motion.core.locomotion.arm_frames import arm_frames
-from octo_motion.core.locomotion.generator import GaitSettings, Generator
-from octo_motion.core.locomotion.separation import Capsules, measure
+from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure
+from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.core.locomotion.gait.gait_poser import GaitSettings, Generator
+from octo_motion.core.locomotion.rig.arm_frames import arm_frames
 from octo_motion.core.rotations import Floats
 from tests.core.rigs import body_with_arms
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.arm_shapes import bent, curve, drawn, opened, unit
-from octo_motion.core.locomotion.body_line import body_line
-from octo_motion.core.locomotion.foothold_places import easy_height
-from octo_motion.core.locomotion.limbs import StanceSettings
-from octo_motion.core.locomotion.travel import TravelSettings, bearings_of
+from octo_motion.core.locomotion.ground.arm_curves import bent, curve, drawn, opened, unit
+from octo_motion.core.locomotion.ground.body_height import body_line
+from octo_motion.core.locomotion.ground.foothold_reach import easy_height
+from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
+from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import Floats
 from tests.core.grounds import STRAIGHT, bumps, largest_turn, walker
 

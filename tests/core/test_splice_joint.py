@@ -15,7 +15,7 @@ from octo_motion.core.rotations import (
     rotate,
     shortest_arc,
 )
-from octo_motion.core.splicing.joint_rotation import SOFT, Limb, joint_turn, reach
+from octo_motion.core.splicing.transfer.limb_rotation import SOFT, Limb, joint_turn, reach
 
 seeds = st.integers(0, 2**31)
 

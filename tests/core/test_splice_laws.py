@@ -17,10 +17,11 @@ from octo_motion.core.rotations import (
     to_matrix,
 )
 from octo_motion.core.skeleton import Skeleton
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.joint_rotation import SOFT
-from octo_motion.core.splicing.landmarks import Landmarks
-from octo_motion.core.splicing.parts import (
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.timing import Timing
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.transfer.limb_rotation import SOFT
+from octo_motion.core.splicing.transfer.parts import (
     HEAD,
     LEFT_ARM,
     LEGS,
@@ -31,8 +32,7 @@ from octo_motion.core.splicing.parts import (
     chain,
     part_bones,
 )
-from octo_motion.core.splicing.splice import Reach, Splice, Splicer, build, spliced
-from octo_motion.core.splicing.timing import Timing
+from octo_motion.core.splicing.transfer.splice import Reach, Splice, Splicer, build, spliced
 from tests.core.rigs import skeleton_of
 from tests.core.splice_bodies import (
     LANDMARKS,

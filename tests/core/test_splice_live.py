@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from octo_motion.core.rotations import angle_between
-from octo_motion.core.splicing import live, splice
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.live import Live
-from octo_motion.core.splicing.parts import HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK, Part
-from octo_motion.core.splicing.splice import Splice, build
-from octo_motion.core.splicing.timing import After, Timing
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.timing import After, Timing
+from octo_motion.core.splicing.transfer import preview as live
+from octo_motion.core.splicing.transfer import splice
+from octo_motion.core.splicing.transfer.parts import HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK, Part
+from octo_motion.core.splicing.transfer.preview import Live
+from octo_motion.core.splicing.transfer.splice import Splice, build
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
 
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.rotations import Floats, from_rotation_vector, multiply, rotate
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.parts import HEAD, LEGS, PARTS, RIGHT_ARM, TRUNK, Part
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.timing import Timing
 from octo_motion.core.splicing.quality import (
     Seam,
     feet_at_rest,
@@ -22,8 +22,8 @@ from octo_motion.core.splicing.quality import (
     seams,
     turn_error,
 )
-from octo_motion.core.splicing.splice import Splice, spliced
-from octo_motion.core.splicing.timing import Timing
+from octo_motion.core.splicing.transfer.parts import HEAD, LEGS, PARTS, RIGHT_ARM, TRUNK, Part
+from octo_motion.core.splicing.transfer.splice import Splice, spliced
 from tests.bench.plain_copy import plain_copy
 from tests.core.splice_bodies import (
     LANDMARKS,

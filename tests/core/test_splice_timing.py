@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import ClipError
-from octo_motion.core.splicing.alignment import suggest_timings
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.timing import Timing, window
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.timing import Timing, window
+from octo_motion.core.splicing.transfer.timing_suggestions import suggest_timings
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion import quality
-from octo_motion.core.locomotion.footholds import Wish
-from octo_motion.core.locomotion.ground import normals
-from octo_motion.core.locomotion.limbs import StanceSettings
+from octo_motion.core.locomotion.ground.footholds import Wish
+from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
+from octo_motion.core.locomotion.ground.surface import normals
+from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.rotations import multiply, rotate
 from tests.core.grounds import FRAMES, GROUNDS, STRAIGHT, TURN, Walker, largest_turn, walker
 

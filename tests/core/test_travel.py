@@ -11,9 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion.route import Route
-from octo_motion.core.locomotion.stroke import phase_at_distance, stroke_distance, stroke_speed
-from octo_motion.core.locomotion.travel import (
+from octo_motion.core.locomotion.path.burst_glide import (
+    phase_at_distance,
+    stroke_distance,
+    stroke_speed,
+)
+from octo_motion.core.locomotion.path.route import Route
+from octo_motion.core.locomotion.path.travel import (
     Travel,
     TravelSettings,
     duration,
@@ -21,13 +25,7 @@ from octo_motion.core.locomotion.travel import (
     strides,
     unhurried,
 )
-from octo_motion.core.rotations import (
-    Floats,
-    angle_between,
-    from_axis_angle,
-    multiply,
-    rotate,
-)
+from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, multiply, rotate
 
 LEFT, FRONT, UP = np.array([1.0, 0, 0]), np.array([0, -1.0, 0]), np.array([0, 0, 1.0])
 CYCLE = 2.0 * np.pi

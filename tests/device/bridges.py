@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from octo_motion.core.posing.figure import Figure, Pose
-from octo_motion.device import messages as say
-from octo_motion.device.client import Client, State
+from octo_motion.core.posing.puppet.figure import Figure, Pose
+from octo_motion.device.ipc import messages as say
+from octo_motion.device.ipc.client import Client, State
 from tests.core.puppets import chain, posed, soft
 
 OPTIONS = ("--simulate", "--no-haply", "--no-hid")

@@ -14,8 +14,8 @@ from typing import Any
 
 from octo_motion.device.driver import Description, DeviceLostError, Dynamics, Kind, Sample
 from octo_motion.device.hid.system import Found
+from octo_motion.device.sources.websocket import accept_key, frame, masked
 from octo_motion.device.spatial import ZERO, Vector
-from octo_motion.device.websocket import accept_key, frame, masked
 
 SPACE_MOUSE = bytes.fromhex(
     # A space mouse with separate reports 1 and 2 of ±350, and 32 buttons in report 3.

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.core.posing.obstacles import Plane
+from octo_motion.core.posing.solver.obstacles import Plane
 from octo_motion.device import __main__ as program
-from octo_motion.device import messages as say
-from octo_motion.device import process
-from octo_motion.device.client import Client, State
+from octo_motion.device.ipc import messages as say
+from octo_motion.device.ipc import process
+from octo_motion.device.ipc.client import Client, State
 from tests.device.bridges import (
     FIGURE,
     OPTIONS,

@@ -14,12 +14,18 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.figure import Pose
-from octo_motion.device import channel as line
+from octo_motion.core.posing.puppet.figure import Pose
 from octo_motion.device.bridge_process import Bridge
 from octo_motion.device.calibration import NONE, Phase
-from octo_motion.device.channel import Channel, ChannelClosedError, Listener, connect, new_secret
-from octo_motion.device.messages import (
+from octo_motion.device.ipc import channel as line
+from octo_motion.device.ipc.channel import (
+    Channel,
+    ChannelClosedError,
+    Listener,
+    connect,
+    new_secret,
+)
+from octo_motion.device.ipc.messages import (
     HEADER,
     MAGIC,
     VERSION,

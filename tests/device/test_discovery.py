@@ -12,12 +12,12 @@ from dataclasses import replace
 import pytest
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.device import discovery as finding
-from octo_motion.device.discovery import Discovery, Sources
 from octo_motion.device.driver import Driver
-from octo_motion.device.haply import Haply
 from octo_motion.device.hid import system
 from octo_motion.device.hid.system import Found
+from octo_motion.device.sources import discovery as finding
+from octo_motion.device.sources.discovery import Discovery, Sources
+from octo_motion.device.sources.haply import Haply
 from tests.device.parts import FakeHandle, HaplyService, found
 
 NOTHING = Sources(hid=False, haply=False)

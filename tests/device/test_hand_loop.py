@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 import pytest
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.core.posing.world import WorldSettings
-from octo_motion.device import messages as say
+from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.device.calibration import NONE, Calibration
-from octo_motion.device.channel import Channel, ChannelClosedError, Listener, connect
 from octo_motion.device.driver import Description, Driver, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
+from octo_motion.device.ipc import messages as say
+from octo_motion.device.ipc.channel import Channel, ChannelClosedError, Listener, connect
 from octo_motion.device.simulation import Simulation
 from octo_motion.device.spatial import IDENTITY
 from tests.core.puppets import chain, posed, soft

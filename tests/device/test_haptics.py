@@ -18,7 +18,7 @@ from octo_motion.device.haptics.passivity import DAMPING, STORED, Observer
 from octo_motion.device.haptics.safety import FALL, RISE, Limits, Shaper, freshness
 from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.haptics.timing import Histogram
-from octo_motion.device.simulated_hand import Hand, rest
+from octo_motion.device.sources.simulated_hand import Hand, rest
 from octo_motion.device.spatial import (
     IDENTITY,
     ZERO,

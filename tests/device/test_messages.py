@@ -13,11 +13,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.posing.obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
-from octo_motion.device import messages as say
+from octo_motion.core.posing.solver.obstacles import (
+    Box,
+    Capsule,
+    Hull,
+    Mesh,
+    Obstacle,
+    Plane,
+    Sphere,
+)
 from octo_motion.device.calibration import Calibration, Phase
-from octo_motion.device.codec import MessageError
 from octo_motion.device.haptics.local_model import Pull
+from octo_motion.device.ipc import messages as say
+from octo_motion.device.ipc.codec import MessageError
 from tests.core.puppets import doll, posed, soft
 
 CORNERS = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]])

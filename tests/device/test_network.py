@@ -17,12 +17,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.device import haply, network
 from octo_motion.device.driver import DeviceLostError, Dynamics, Kind, Sample
-from octo_motion.device.haply import Haply
-from octo_motion.device.network import Features, Force, PacketError, Port, State, parse
+from octo_motion.device.sources import haply, network
+from octo_motion.device.sources.haply import Haply
+from octo_motion.device.sources.network import Features, Force, PacketError, Port, State, parse
+from octo_motion.device.sources.websocket import (
+    FrameReader,
+    WebSocket,
+    WebSocketError,
+    frame,
+    masked,
+)
 from octo_motion.device.spatial import IDENTITY
-from octo_motion.device.websocket import FrameReader, WebSocket, WebSocketError, frame, masked
 from tests.device.parts import HaplyService
 
 KEY = bytes(range(16))

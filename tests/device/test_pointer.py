@@ -9,17 +9,17 @@ import math
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.coupling import Coupling
-from octo_motion.core.posing.world import WorldSettings
+from octo_motion.core.posing.solver.hand_spring import Coupling
+from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.core.rotations import from_rotation_vector
 from octo_motion.device.calibration import Calibration
 from octo_motion.device.driver import DeviceLostError, Kind, Sample
 from octo_motion.device.haptics.local_model import Held, Pull
 from octo_motion.device.haptics.pointer import Pointer
-from octo_motion.device.messages import DeviceMessage, Settings, Workspace
-from octo_motion.device.simulated_hand import Hand, SimulatedHand
+from octo_motion.device.ipc.messages import DeviceMessage, Settings, Workspace
 from octo_motion.device.simulation import Hand as HandInWorld
 from octo_motion.device.simulation import Simulation
+from octo_motion.device.sources.simulated_hand import Hand, SimulatedHand
 from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector, length
 from tests.core.puppets import chain, posed, soft
 from tests.device.parts import FakeDriver

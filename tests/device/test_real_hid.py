@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from octo_motion.device import messages as say
-from octo_motion.device.channel import Channel, Listener, connect
-from octo_motion.device.client import Client, State
-from octo_motion.device.discovery import Discovery, Sources
 from octo_motion.device.driver import DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.local_model import Pull
 from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.hid import force_profile as profile
+from octo_motion.device.ipc import messages as say
+from octo_motion.device.ipc.channel import Channel, Listener, connect
+from octo_motion.device.ipc.client import Client, State
+from octo_motion.device.sources.discovery import Discovery, Sources
 from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector
 from tests.core.puppets import chain, posed, soft
 from tests.device import uhid

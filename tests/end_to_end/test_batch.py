@@ -15,8 +15,10 @@ from typing import Any
 import bpy
 import pytest
 
+from octo_motion.command_line import blender_command as registration
+from octo_motion.command_line import commands
+from octo_motion.command_line import job_runner as bake
 from octo_motion.core.errors import WriteError
-from octo_motion.ui.batch import bake, commands, registration
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 PROGRAM = "python -m octo_motion"
@@ -303,7 +305,7 @@ def test_unknown_shot_or_a_file_in_the_reports_place_runs_nothing(
 GRIEF = """
 import os, signal, sys, time
 if "--run-shot" in sys.orig_argv:
-    from octo_motion.ui.batch import stage
+    from octo_motion.command_line import shot_runner as stage
     save = stage._save
     def come_to_grief(place, *, compress):
         save(place, compress=compress)

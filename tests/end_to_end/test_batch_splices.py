@@ -16,11 +16,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.clips import read_clip
+from octo_motion.blender.animation.clips import read_clip
+from octo_motion.command_line import commands
 from octo_motion.core.rotations import angle_between
-from octo_motion.core.splicing.mapping import map_skeleton
-from octo_motion.core.splicing.parts import PARTS, part_bones
-from octo_motion.ui.batch import commands
+from octo_motion.core.splicing.humanoid.mapping import map_skeleton
+from octo_motion.core.splicing.transfer.parts import PARTS, part_bones
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 CLIPS = REPOSITORY / "docs" / "examples" / "clips"

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from octo_motion.blender.curves import add_route_curve
+from octo_motion.blender.scene.curves import add_route_curve
 from octo_motion.ui.plain import plain
 
 ROUTE = ((0.0, 0.0, 0.0), (0.0, -2.0, 0.0), (1.0, -3.0, 0.5), (3.0, -3.0, 0.5))

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.curves import read_route
+from octo_motion.blender.scene.curves import read_route
 
 POINTS = {"b0": (1, 2, 3), "b1": (2, 4, 3), "b2": (4, 4, 4), "b3": (5, 2, 4)}
 

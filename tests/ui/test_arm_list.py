@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from octo_motion.blender import versions
-from octo_motion.ui.locomotion.properties import locomotion_settings
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 
 BONES = 4
 

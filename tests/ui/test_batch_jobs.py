@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from octo_motion.command_line.fingerprint import fingerprint, version
+from octo_motion.command_line.job_file import Job, JobError, Known, load_gait_file, read_job
+from octo_motion.command_line.setting_values import Setting, check_settings, parse_assignments
+from octo_motion.command_line.shot_request import NewRoute, ShotEntry, frame_rate
+from octo_motion.command_line.vocabulary import known
 from octo_motion.core.errors import GaitError, SettingsError
-from octo_motion.core.locomotion import gait
-from octo_motion.core.locomotion.octopus_shape import OctopusShape
-from octo_motion.ui.batch.entry import NewRoute, ShotEntry, frame_rate
-from octo_motion.ui.batch.fingerprint import fingerprint, version
-from octo_motion.ui.batch.job import Job, JobError, Known, load_gait_file, read_job
-from octo_motion.ui.batch.known import known
-from octo_motion.ui.batch.setting_values import Setting, check_settings, parse_assignments
+from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.core.locomotion.octopus.shape import OctopusShape
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 

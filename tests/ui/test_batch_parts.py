@@ -15,13 +15,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError
-from octo_motion.core.locomotion.figures import Figure
-from octo_motion.ui.batch.blender_said import blender_said
-from octo_motion.ui.batch.command_line import parse
-from octo_motion.ui.batch.limits import LimitError, check_limits, parse_limits, quality, told
-from octo_motion.ui.batch.outputs import commit, remove_staged, staged, write_json
-from octo_motion.ui.batch.processes import (
+from octo_motion.command_line.command_line import parse
+from octo_motion.command_line.operator_errors import blender_said
+from octo_motion.command_line.outputs import commit, remove_staged, staged, write_json
+from octo_motion.command_line.processes import (
     Ended,
     Task,
     check_jobs,
@@ -30,7 +27,16 @@ from octo_motion.ui.batch.processes import (
     run_processes,
     stoppable,
 )
-from octo_motion.ui.batch.report import ShotRecord, Verdict, judge, read_report, write_report
+from octo_motion.command_line.quality_limits import (
+    LimitError,
+    check_limits,
+    parse_limits,
+    quality,
+    told,
+)
+from octo_motion.command_line.report import ShotRecord, Verdict, judge, read_report, write_report
+from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError
+from octo_motion.core.locomotion.metrics.report import Figure
 
 # --- What is skipped -----------------------------------------------------------------------------
 

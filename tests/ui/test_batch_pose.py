@@ -10,11 +10,11 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.ui.batch.commands import main
-from octo_motion.ui.batch.entry import ShotEntry
-from octo_motion.ui.batch.job import JobError, read_job
-from octo_motion.ui.batch.known import known
-from octo_motion.ui.batch.stage import perform
+from octo_motion.command_line.commands import main
+from octo_motion.command_line.job_file import JobError, read_job
+from octo_motion.command_line.shot_request import ShotEntry
+from octo_motion.command_line.shot_runner import perform
+from octo_motion.command_line.vocabulary import known
 
 STEPS = (
     {"do": "grab", "bone": "arm1.04.L", "at": 1.0},

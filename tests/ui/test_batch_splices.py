@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
+from octo_motion.command_line.job_file import Job, JobError, read_job
+from octo_motion.command_line.motion_files import check_motion, files_within
+from octo_motion.command_line.shot_request import NewSplice, ShotEntry
+from octo_motion.command_line.splice_entries import parse_splice, read_splices
+from octo_motion.command_line.splice_runner import import_base
+from octo_motion.command_line.vocabulary import check_file, known
 from octo_motion.core.errors import ClipError, SettingsError
-from octo_motion.ui.batch.entry import NewSplice, ShotEntry
-from octo_motion.ui.batch.job import Job, JobError, read_job
-from octo_motion.ui.batch.known import check_file, known
-from octo_motion.ui.batch.motion_files import check_motion, files_within
-from octo_motion.ui.batch.splice_job import parse_splice, read_splices
-from octo_motion.ui.batch.splice_stage import import_base
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 CLIPS = REPOSITORY / "docs" / "examples" / "clips"

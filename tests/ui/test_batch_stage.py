@@ -7,10 +7,10 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.command_line.shot_request import ShotEntry
+from octo_motion.command_line.shot_runner import perform
 from octo_motion.core.errors import RigError, SettingsError
-from octo_motion.ui.batch.entry import ShotEntry
-from octo_motion.ui.batch.stage import perform
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.ui.locomotion.generate_motion import prepare
 from tests.blender.test_ground import make_square
 from tests.ui.rig import click, give_route
 

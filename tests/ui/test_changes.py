@@ -7,9 +7,9 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.travel import plan_travel
-from octo_motion.ui.locomotion.properties import locomotion_settings
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.core.locomotion.path.travel import plan_travel
+from octo_motion.ui.locomotion.generate_motion import prepare
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh
 from tests.ui.rig import click
 from tests.ui.test_quality_report import measured_joints, played_joints

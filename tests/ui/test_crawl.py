@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion.shot import Shot
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.ui.locomotion.generate_motion import prepare
+from octo_motion.ui.locomotion.writing.write_motion import Shot
 from tests.ui.rig import click
 
 

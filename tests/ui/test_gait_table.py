@@ -9,11 +9,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender import presets
+from octo_motion.blender.files import presets
 from octo_motion.core.errors import GaitError
-from octo_motion.core.locomotion import gait
-from octo_motion.ui.locomotion.gait_properties import used
-from octo_motion.ui.locomotion.properties import locomotion_settings, read_gait, set_gait
+from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.ui.locomotion.settings.gait import used
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings, read_gait, set_gait
 from tests.ui.rig import click, make_octopus, scene_contents
 
 

@@ -10,12 +10,12 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.curves import read_route
+from octo_motion.blender.scene.curves import read_route
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.ui import at_work
-from octo_motion.ui.locomotion import shot as shot_module
-from octo_motion.ui.locomotion import workflow
-from octo_motion.ui.locomotion.generate import OCTO_MOTION_OT_generate_locomotion
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion.operators.generate import OCTO_MOTION_OT_generate_locomotion
+from octo_motion.ui.locomotion.writing import write_motion as shot_module
 from octo_motion.ui.modal_job import ModalJob
 from tests.ui.rig import (
     ROUTE,
@@ -892,7 +892,7 @@ def long_job(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     settings_of(octopus).tell_overlaps = False
     settings_of(octopus).frame_end = 120
     monkeypatch.setattr(shot_module, "_BONES_AT_ONCE", 24 * 6)
-    monkeypatch.setattr("octo_motion.ui.locomotion.generate.PATIENCE", 0.0)
+    monkeypatch.setattr("octo_motion.ui.locomotion.operators.generate.PATIENCE", 0.0)
     monkeypatch.setattr(ModalJob, "_turn", 0.0)
     operator, window = Operator(), Window()
     assert operator.invoke(window, Press("LEFTMOUSE")) == {"RUNNING_MODAL"}
@@ -958,7 +958,7 @@ def test_a_failure_in_the_middle_cleans_up(
     def fail(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr("octo_motion.core.locomotion.generator.Generator.shapes", fail)
+    monkeypatch.setattr("octo_motion.core.locomotion.gait.table.gait_poser.Generator.shapes", fail)
     with pytest.raises(ZeroDivisionError):
         operator.modal(window, Press("TIMER"))
     assert window.calls[-3:] == CLEAN

@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.curves import read_route
+from octo_motion.blender.scene.curves import read_route
 from octo_motion.core.rotations import rotate
-from octo_motion.ui.locomotion import workflow
-from octo_motion.ui.locomotion.arm_items import bones_of
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion.reading.arm_items import bones_of
 from tests.ui.rig import click, joints_in_world
 
 RIGS = (

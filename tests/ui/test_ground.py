@@ -8,15 +8,20 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.contacts import markers
+from octo_motion.blender.scene.contact_markers import markers
 from octo_motion.core.errors import GroundError
-from octo_motion.core.locomotion import quality
-from octo_motion.core.locomotion.ground import Plane
-from octo_motion.core.locomotion.travel import plan_travel
-from octo_motion.ui.locomotion import ground_properties
-from octo_motion.ui.locomotion.properties import locomotion_settings
-from octo_motion.ui.locomotion.wishes import Wanted, changed_by_hand, gathered, store
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.path.travel import plan_travel
+from octo_motion.ui.locomotion.generate_motion import prepare
+from octo_motion.ui.locomotion.settings import ground as ground_properties
+from octo_motion.ui.locomotion.settings.contact_overrides import (
+    Wanted,
+    changed_by_hand,
+    gathered,
+    store,
+)
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh, make_square
 from tests.ui.rig import click, generate, give_route, joints_in_world, keys
 

@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender import imports
-from octo_motion.blender.armature import read_skeleton
-from octo_motion.blender.imports import NOTE, import_clip
+from octo_motion.blender.rig.armature import read_skeleton
+from octo_motion.blender.scene import imports
+from octo_motion.blender.scene.imports import NOTE, import_clip
 from octo_motion.core.errors import ClipError
-from octo_motion.core.splicing.mapping import map_skeleton
+from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.ui.splicing import import_session
 from octo_motion.ui.splicing.import_clips import OCTO_MOTION_OT_import_clips
 from tests.ui.rig import click, joints_in_world, keys

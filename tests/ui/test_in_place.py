@@ -7,11 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.actions import is_edited
-from octo_motion.core.locomotion import quality
-from octo_motion.core.locomotion.gait import presets
-from octo_motion.core.locomotion.travel import plan_travel
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.blender.animation.actions import is_edited
+from octo_motion.core.locomotion.gait.table import presets
+from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.path.travel import plan_travel
+from octo_motion.ui.locomotion.generate_motion import prepare
 from tests.ui.rig import generate, joints_in_world, keys, make_octopus
 
 

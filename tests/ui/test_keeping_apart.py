@@ -7,10 +7,12 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import apart, live, workflow
-from octo_motion.ui.locomotion.apart import DEEP
-from octo_motion.ui.locomotion.properties import locomotion_settings
-from octo_motion.ui.locomotion.shot import Shot
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion.operators import live
+from octo_motion.ui.locomotion.reading import skin as apart
+from octo_motion.ui.locomotion.reading.skin import DEEP
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings
+from octo_motion.ui.locomotion.writing.write_motion import Shot
 from tests.bench.apart import add_bumps
 from tests.ui.rig import keys
 

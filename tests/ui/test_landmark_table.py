@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.core.splicing.landmarks import LANDMARKS, OPTIONAL
+from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS, OPTIONAL
 from octo_motion.ui.splicing import landmark_table
 from octo_motion.ui.splicing.landmark_properties import (
     PROPERTIES,

@@ -16,9 +16,11 @@ import numpy as np
 import pytest
 
 import octo_motion
-from octo_motion.blender import actions
-from octo_motion.blender.contacts import markers
-from octo_motion.ui.locomotion import live, panels, workflow
+from octo_motion.blender.animation import actions
+from octo_motion.blender.scene.contact_markers import markers
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion import panels
+from octo_motion.ui.locomotion.operators import live
 from tests.blender.test_ground import make_mesh, make_square
 from tests.ui.rig import click, generate, give_route, keys, make_octopus
 from tests.ui.test_panels import Layout

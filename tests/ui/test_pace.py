@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import workflow
-from octo_motion.ui.locomotion.shot import Shot
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion.generate_motion import prepare
+from octo_motion.ui.locomotion.writing.write_motion import Shot
 from tests.ui.rig import click, give_route, joints_in_world
 from tests.ui.test_quality_report import WAY, bumpy
 

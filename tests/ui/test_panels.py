@@ -14,7 +14,7 @@ import bpy
 import pytest
 
 from octo_motion.ui.locomotion import panels
-from octo_motion.ui.locomotion.properties import locomotion_settings
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from octo_motion.ui.panel_base import draw_sentence
 from tests.ui.rig import give_route, make_octopus
 

@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from octo_motion.blender import device_store
-from octo_motion.blender.device_store import load_calibrations
-from octo_motion.device import messages as say
+from octo_motion.blender.files import device_store
+from octo_motion.blender.files.device_store import load_calibrations
 from octo_motion.device.calibration import NONE, Calibration
-from octo_motion.device.client import Client, State
 from octo_motion.device.driver import Kind
+from octo_motion.device.ipc import messages as say
+from octo_motion.device.ipc.client import Client, State
 from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.controls import Outcome
 from octo_motion.ui.posing.device_hands import NOTHING_NEAR, DeviceHands, Room

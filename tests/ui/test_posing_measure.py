@@ -11,9 +11,9 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.figure_reading import MATERIAL, bone_materials
+from octo_motion.blender.rig.puppet_reading import MATERIAL, bone_materials
 from octo_motion.core.posing.picking import Hit
-from octo_motion.core.posing.presets import joint_loads
+from octo_motion.core.posing.puppet.materials import joint_loads
 from octo_motion.ui.posing.controls import MEASURING, Outcome, PoseControls
 from octo_motion.ui.posing.puppet_session import PuppetSession
 from tests.ui.test_posing import MOVE, PIXELS, TICK, VIEW, Event, over, tip

@@ -11,12 +11,12 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.figure_reading import MATERIAL, bone_materials, moved_bones
-from octo_motion.blender.obstacle_reading import read_obstacle
-from octo_motion.blender.puppet import Puppet
+from octo_motion.blender.rig.puppet import Puppet
+from octo_motion.blender.rig.puppet_reading import MATERIAL, bone_materials, moved_bones
+from octo_motion.blender.scene.obstacles import read_obstacle
 from octo_motion.core.errors import OctoMotionError, RigError
-from octo_motion.core.posing.figure import Pose
-from octo_motion.core.posing.obstacles import Box, Plane
+from octo_motion.core.posing.puppet.figure import Pose
+from octo_motion.core.posing.solver.obstacles import Box, Plane
 from octo_motion.core.rotations import angle_between, from_rotation_vector, multiply, rotate
 from octo_motion.ui.posing.puppet_session import PuppetSession
 

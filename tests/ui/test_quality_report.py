@@ -10,12 +10,12 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion import quality
-from octo_motion.core.locomotion.figures import KINDS, Figure, Measured, Poses
+from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, Poses
 from octo_motion.core.rotations import rotate
-from octo_motion.ui.locomotion import quality_report
-from octo_motion.ui.locomotion.shot import Shot
-from octo_motion.ui.locomotion.workflow import prepare
+from octo_motion.ui.locomotion.generate_motion import prepare
+from octo_motion.ui.locomotion.settings import quality as quality_report
+from octo_motion.ui.locomotion.writing.write_motion import Shot
 from tests.blender.test_ground import make_mesh
 from tests.ui.rig import click, generate, give_route, joints_in_world, make_octopus
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Vector
 
-from octo_motion.blender.actions import is_edited
+from octo_motion.blender.animation.actions import is_edited
 from tests.core import objects
 from tests.ui.rig import click, generate, give_route, joints_in_world, keys, make_octopus
 

@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender import actions
+from octo_motion.blender.animation import actions
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import angle_between, from_matrix
-from octo_motion.ui.locomotion import panels, workflow
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion import panels
 from tests.ui.rig import (
     click,
     generate,

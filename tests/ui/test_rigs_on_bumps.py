@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import workflow
-from octo_motion.ui.locomotion.arm_items import bones_of
+from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion.reading.arm_items import bones_of
 from tests.ui.rig import click
 from tests.ui.test_generate_on_rigs import opened
 

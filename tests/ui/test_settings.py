@@ -9,11 +9,14 @@ import bpy
 import pytest
 
 from octo_motion.core.errors import RigError
-from octo_motion.core.locomotion.generator import GaitSettings
-from octo_motion.core.locomotion.travel import TravelSettings
+from octo_motion.core.locomotion.gait.gait_poser import GaitSettings
+from octo_motion.core.locomotion.path.travel import TravelSettings
 from octo_motion.ui import registration
 from octo_motion.ui.job import Job
-from octo_motion.ui.locomotion.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from octo_motion.ui.locomotion.settings.properties import (
+    OCTO_MOTION_PG_locomotion,
+    locomotion_settings,
+)
 from octo_motion.ui.plain import plain
 from tests.ui.rig import give_route, make_octopus
 
@@ -128,8 +131,8 @@ def test_the_weight_curve_is_made_when_it_is_switched_on_and_kept_when_off() -> 
 
 
 def test_the_weight_curve_moves_the_arms_as_weights_do() -> None:
-    from octo_motion.ui.locomotion.gait_reading import gait_settings
-    from octo_motion.ui.locomotion.properties import read_gait
+    from octo_motion.ui.locomotion.reading.gait import gait_settings
+    from octo_motion.ui.locomotion.settings.properties import read_gait
 
     settings = locomotion_settings(make_octopus())
     settings.weight_root, settings.weight_tip = 0.9, 0.3

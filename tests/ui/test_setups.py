@@ -8,9 +8,9 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.core.locomotion import gait
-from octo_motion.ui.locomotion import setups
-from octo_motion.ui.locomotion.properties import locomotion_settings, read_gait
+from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.ui.locomotion.operators import setups
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings, read_gait
 from octo_motion.ui.plain import plain
 from tests.ui.rig import click, make_octopus
 

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import workflow
+from octo_motion.ui.locomotion import generate_motion as workflow
 from tests.ui.rig import click, generate, keys, make_octopus
 
 _THICK = 0.05

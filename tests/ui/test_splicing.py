@@ -11,12 +11,12 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.actions import MARK, is_edited
-from octo_motion.blender.clips import read_clip, write_clip
+from octo_motion.blender.animation.actions import MARK, is_edited
+from octo_motion.blender.animation.clips import read_clip, write_clip
 from octo_motion.core.errors import ClipError, OctoMotionError
 from octo_motion.core.rotations import angle_between, from_rotation_vector
-from octo_motion.core.splicing.clip import Clip
-from octo_motion.core.splicing.landmarks import LANDMARKS
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS
 from octo_motion.ui.splicing import splice_panels
 from octo_motion.ui.splicing.splice_drag import OCTO_MOTION_OT_splice_drag_timing
 from octo_motion.ui.splicing.stack import prepare
@@ -57,7 +57,7 @@ def make_humanoid(name: str, *, scale: float = 1.0, without: frozenset[str] = fr
 
 def give_motion(armature: Any, seed: int, frames: int = 41, name: str = "") -> Any:
     """A smooth motion of all bones."""
-    from octo_motion.blender.armature import read_skeleton, world_matrix
+    from octo_motion.blender.rig.armature import read_skeleton, world_matrix
 
     skeleton = read_skeleton(armature)
     random = np.random.default_rng(seed)

@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.actions import curves_of
+from octo_motion.blender.animation.actions import curves_of
 from octo_motion.core.rotations import rotate
-from octo_motion.ui.locomotion.properties import locomotion_settings
-from octo_motion.ui.locomotion.workflow import generate, prepare
+from octo_motion.ui.locomotion.generate_motion import generate, prepare
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.ui.rig import click, make_octopus
 from tests.ui.test_changes import HUMP, computed, steps
 from tests.ui.test_generate_on_rigs import opened

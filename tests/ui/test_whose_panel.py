@@ -7,8 +7,9 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.ui.locomotion import panels, setups
-from octo_motion.ui.locomotion.properties import locomotion_settings
+from octo_motion.ui.locomotion import panels
+from octo_motion.ui.locomotion.operators import setups
+from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from octo_motion.ui.panel_base import armature_in
 from octo_motion.ui.splicing.landmark_properties import PROPERTIES
 from tests.ui.rig import click, give_route, make_octopus

@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..rotations import Floats
-from .kinematics import skew
-from .problem import Problem
+from .puppet.kinematics import skew
+from .solver.problem import Problem
 
 
 @dataclass(eq=False)

@@ -22,12 +22,12 @@ from ..rotations import (
     multiply,
     to_rotation_vector,
 )
-from .coupling import Coupling, Grab
-from .figure import Elements, Figure, Pose
-from .figure_building import joints_of, turned_bodies
-from .obstacles import Obstacle
 from .picking import Hit
-from .world import World, WorldSettings, WorldState
+from .puppet.build import joints_of, turned_bodies
+from .puppet.figure import Elements, Figure, Pose
+from .solver.hand_spring import Coupling, Grab
+from .solver.obstacles import Obstacle
+from .solver.world import World, WorldSettings, WorldState
 
 COARSEST: Final = 4e-3
 """Seconds: longer steps would let a fast hand shake the puppet."""

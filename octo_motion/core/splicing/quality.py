@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from ..rotations import Floats, angle_between, conjugate, multiply, rotate
 from ..skeleton import Skeleton
-from .clip import Clip
-from .frames import BodyFrame, chest_frame, laid_over, pelvis_frame
-from .landmarks import Landmarks
-from .parts import landmark_bone
-from .posture import Posture, posture_of, sampled, sampled_world
-from .splice import Splice
-from .timing import Window, window
+from .clip.clip import Clip
+from .clip.posture import Posture, posture_of, sampled, sampled_world
+from .clip.timing import Window, window
+from .humanoid.landmarks import Landmarks
+from .transfer.body_frames import BodyFrame, chest_frame, laid_over, pelvis_frame
+from .transfer.parts import landmark_bone
+from .transfer.splice import Splice
 
 Bools = NDArray[np.bool_]
 

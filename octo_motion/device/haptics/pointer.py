@@ -10,7 +10,7 @@ from typing import Final
 from ..calibration import NONE, Calibration, Calibrator
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..hid.space_mouse import SpaceMouse
-from ..messages import HandMessage, Settings, Workspace
+from ..ipc.messages import HandMessage, Settings, Workspace
 from ..spatial import (
     IDENTITY,
     ZERO,

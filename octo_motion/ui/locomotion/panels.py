@@ -7,16 +7,15 @@ from typing import Any, Final, cast
 
 import bpy
 
-from ...blender.actions import key_counts
-from ...blender.weight_curve import NODE, curve_node
+from ...blender.animation.actions import key_counts
+from ...blender.files.weight_curve import NODE, curve_node
 from ..panel_base import ArmaturePanel, ItemRows, TabPanel, armature_in, draw_sentence
-from .add_octopus import OCTO_MOTION_OT_add_octopus
-from .add_route import OCTO_MOTION_OT_add_route
-from .arm_list import draw_arms
-from .change_list import draw_changes
-from .contacts import draw_ground, draw_rest
-from .gait_properties import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table, used
-from .gait_table import (
+from .operators.add_octopus import OCTO_MOTION_OT_add_octopus
+from .operators.add_route import OCTO_MOTION_OT_add_route
+from .operators.arms import draw_arms
+from .operators.changes import draw_changes
+from .operators.contacts import draw_ground, draw_rest
+from .operators.gait_table import (
     OCTO_MOTION_MT_gait,
     OCTO_MOTION_MT_gait_offset,
     OCTO_MOTION_OT_gait_curve_add,
@@ -26,11 +25,12 @@ from .gait_table import (
     OCTO_MOTION_OT_gait_load,
     OCTO_MOTION_OT_gait_offset_remove,
 )
-from .generate import OCTO_MOTION_OT_generate_locomotion
-from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from .quality_report import draw_figures, known_figures
-from .reach_list import draw_reaches
-from .setups import OCTO_MOTION_PT_setups
+from .operators.generate import OCTO_MOTION_OT_generate_locomotion
+from .operators.reaches import draw_reaches
+from .operators.setups import OCTO_MOTION_PT_setups
+from .settings.gait import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table, used
+from .settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .settings.quality import draw_figures, known_figures
 
 _SIDES: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
 

@@ -9,12 +9,12 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ...blender.armature import armature_data
-from ...blender.figure_reading import bone_materials, set_bone_material
+from ...blender.rig.armature import armature_data
+from ...blender.rig.puppet_reading import bone_materials, set_bone_material
 from ...core.errors import RigError
-from ...core.posing.figure import Figure
-from ...core.posing.measuring import Bend, Measured, measure_bend
-from ...core.posing.presets import Material, joint_loads, material_of
+from ...core.posing.puppet.figure import Figure
+from ...core.posing.puppet.material_fit import Bend, Measured, measure_bend
+from ...core.posing.puppet.materials import Material, joint_loads, material_of
 from .properties import posing_settings
 
 CUSTOM: Final = "CUSTOM"

@@ -12,17 +12,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...blender.device_store import load_calibrations, save_calibrations
+from ...blender.files.device_store import load_calibrations, save_calibrations
 from ...core.errors import SettingsError, WriteError
-from ...core.posing.figure import Pose
-from ...core.posing.obstacles import Obstacle
 from ...core.posing.picking import Hit
+from ...core.posing.puppet.figure import Pose
 from ...core.posing.session import MOST_STEPS_BACK
+from ...core.posing.solver.obstacles import Obstacle
 from ...core.rotations import Floats, from_matrix
 from ...device.calibration import NONE, Calibration
-from ...device.client import Client, State
 from ...device.driver import Kind
-from ...device.messages import (
+from ...device.ipc.client import Client, State
+from ...device.ipc.messages import (
     Button,
     Buzz,
     CalibrationMessage,
@@ -34,7 +34,7 @@ from ...device.messages import (
     Workspace,
     WorldMessage,
 )
-from ...device.messages import Settings as DeviceSettings
+from ...device.ipc.messages import Settings as DeviceSettings
 from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25

@@ -7,15 +7,10 @@ from typing import Any, Final
 
 import bpy
 
-from ...device.client import State
+from ...device.ipc.client import State
 from .device_calibrate import draw_calibration
 from .device_ndof import NAME, NdofHands
-from .device_pose import (
-    Hands,
-    OCTO_MOTION_OT_device_test,
-    OCTO_MOTION_OT_pose_device,
-    active_hands,
-)
+from .device_pose import Hands, OCTO_MOTION_OT_device_test, OCTO_MOTION_OT_pose_device, active_hands
 from .device_settings import device_settings
 from .panels import OCTO_MOTION_PT_posing, PosePanel
 

@@ -11,9 +11,9 @@ from bpy.props import IntProperty
 
 from ...core.errors import DeviceError, SettingsError
 from ...core.rotations import Floats
-from ...device.client import Client, State
 from ...device.driver import Kind
-from ...device.messages import Notice
+from ...device.ipc.client import Client, State
+from ...device.ipc.messages import Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room

@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
-from ...blender.actions import writable_armature
-from ...blender.armature import active_armature, selected_bones
-from ...blender.figure_reading import bone_materials, read_rig, set_bone_material
+from ...blender.animation.actions import writable_armature
+from ...blender.rig.armature import active_armature, selected_bones
+from ...blender.rig.puppet_reading import bone_materials, read_rig, set_bone_material
 from ...core.errors import RigError
-from ...core.posing.figure import Figure
-from ...core.posing.measuring import Bend
+from ...core.posing.puppet.figure import Figure
+from ...core.posing.puppet.material_fit import Bend
 from ..armature_operator import ArmatureOperator
 from .custom_material import coefficients, keep_material, measured_joint
 from .measuring_hand import BEARS

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from ...core.errors import RigError
-from ...core.posing.figure import Figure, Pose
-from ...core.posing.measuring import Bend, measure_shown
+from ...core.posing.puppet.figure import Figure, Pose
+from ...core.posing.puppet.material_fit import Bend, measure_shown
 from ...core.rotations import (
     IDENTITY,
     Floats,

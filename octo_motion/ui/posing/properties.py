@@ -9,10 +9,10 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 
-from ...blender.armature import armature_data
-from ...core.posing.bone_roles import SMALLEST
-from ..locomotion.gait_properties import OVERRIDE
-from ..locomotion.properties import make_overridable
+from ...blender.rig.armature import armature_data
+from ...core.posing.puppet.bone_roles import SMALLEST
+from ..locomotion.settings.gait import OVERRIDE
+from ..locomotion.settings.properties import make_overridable
 
 MATERIALS: Final = (
     ("CLAY", "Clay", "Gives way slowly and stays: as soft as it is pulled", 0),

@@ -15,21 +15,21 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ...blender.actions import writable_armature
-from ...blender.figure_reading import bone_materials, is_part_of, read_rig
-from ...blender.obstacle_reading import read_obstacle
-from ...blender.pose_keys import Keyed, PoseKeys
-from ...blender.puppet import Puppet
-from ...blender.shown_pose import PoseValues, pose_values, restore_pose
+from ...blender.animation.actions import writable_armature
+from ...blender.animation.pose_keys import Keyed, PoseKeys
+from ...blender.animation.preview_pose import PoseValues, pose_values, restore_pose
+from ...blender.rig.puppet import Puppet
+from ...blender.rig.puppet_reading import bone_materials, is_part_of, read_rig
+from ...blender.scene.obstacles import read_obstacle
 from ...core.errors import OctoMotionError, RigError, SettingsError
-from ...core.posing.blas_threads import OneThread
-from ...core.posing.figure import Figure, Pose
-from ...core.posing.figure_building import turned_bodies
-from ...core.posing.obstacles import Obstacle, Plane
 from ...core.posing.picking import Hit, capsules_in_world, pick
-from ...core.posing.presets import Material, elements_for, joint_loads
+from ...core.posing.puppet.build import turned_bodies
+from ...core.posing.puppet.figure import Figure, Pose
+from ...core.posing.puppet.materials import Material, elements_for, joint_loads
 from ...core.posing.session import TOUCHED, Sample, Session, Told, hand_for
-from ...core.posing.world import WorldSettings
+from ...core.posing.solver.blas_threads import OneThread
+from ...core.posing.solver.obstacles import Obstacle, Plane
+from ...core.posing.solver.world import WorldSettings
 from ...core.rotations import IDENTITY, Floats
 from .custom_material import (
     chosen_material,

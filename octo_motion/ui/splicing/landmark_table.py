@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ...blender.actions import writable_armature
-from ...blender.armature import active_armature, armature_data, read_skeleton
+from ...blender.animation.actions import writable_armature
+from ...blender.rig.armature import active_armature, armature_data, read_skeleton
 from ...core.errors import RigError
-from ...core.splicing.bone_names import mirrored
-from ...core.splicing.landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED
-from ...core.splicing.mapping import map_skeleton
+from ...core.splicing.humanoid.bone_names import mirrored
+from ...core.splicing.humanoid.landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED
+from ...core.splicing.humanoid.mapping import map_skeleton
 from ..armature_operator import ArmatureOperator
 from ..armature_preset import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in

@@ -8,8 +8,8 @@ from typing import Final, cast
 import bpy
 from bpy.props import PointerProperty
 
-from ...blender.armature import armature_data
-from ..locomotion.properties import make_overridable
+from ...blender.rig.armature import armature_data
+from ..locomotion.settings.properties import make_overridable
 from .landmark_properties import OCTO_MOTION_PG_landmarks
 from .splice_properties import SpliceStack
 

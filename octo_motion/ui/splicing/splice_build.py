@@ -8,8 +8,8 @@ from typing import Any, Final
 import bpy
 from bpy.props import IntProperty
 
-from ...core.splicing.alignment import Suggestion
-from ..locomotion.arm_items import assign
+from ...core.splicing.transfer.timing_suggestions import Suggestion
+from ..locomotion.reading.arm_items import assign
 from .splice_list import SpliceOperator, StackOperator
 from .stack import Stack, Summary, prepare, suggestions, write
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import bpy
 from bpy.props import FloatProperty
 
-from ...blender.actions import writable_armature
-from ...blender.armature import active_armature
+from ...blender.animation.actions import writable_armature
+from ...blender.rig.armature import active_armature
 from ...core.errors import ClipError, OctoMotionError
 from .. import at_work
 from .properties import splicing_settings

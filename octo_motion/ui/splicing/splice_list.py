@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ...blender.actions import writable_armature
-from ...blender.armature import active_armature
+from ...blender.animation.actions import writable_armature
+from ...blender.rig.armature import active_armature
 from ...core.errors import ClipError
 from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ..panel_base import ItemRows

@@ -15,18 +15,18 @@ from typing import Any, Final, cast
 import bpy
 import numpy as np
 
-from ...blender import actions
-from ...blender.armature import armature_data, read_skeleton
-from ...blender.clips import further_channels, read_clip, scaled_channels, write_clip
+from ...blender.animation import actions
+from ...blender.animation.clips import further_channels, read_clip, scaled_channels, write_clip
+from ...blender.rig.armature import armature_data, read_skeleton
 from ...core.errors import ClipError, WriteError
-from ...core.splicing.alignment import Suggestion, suggest_timings
-from ...core.splicing.carry import Side, carriers
-from ...core.splicing.clip import Clip
-from ...core.splicing.landmarks import LANDMARKS, OPTIONAL, Landmarks
-from ...core.splicing.mapping import map_skeleton
-from ...core.splicing.parts import PARTS, Part, chain, part_bones
-from ...core.splicing.splice import Reach, SeenFrom, Splice, build
-from ...core.splicing.timing import After, Timing, window
+from ...core.splicing.clip.clip import Clip
+from ...core.splicing.clip.timing import After, Timing, window
+from ...core.splicing.humanoid.landmarks import LANDMARKS, OPTIONAL, Landmarks
+from ...core.splicing.humanoid.mapping import map_skeleton
+from ...core.splicing.transfer.carry import Side, carriers
+from ...core.splicing.transfer.parts import PARTS, Part, chain, part_bones
+from ...core.splicing.transfer.splice import Reach, SeenFrom, Splice, build
+from ...core.splicing.transfer.timing_suggestions import Suggestion, suggest_timings
 from ..plain import plain
 from .landmark_properties import read_landmarks, write_landmarks
 from .properties import OCTO_MOTION_PG_splicing, splicing_settings

@@ -9,9 +9,9 @@ from typing import Final, Literal
 
 import bpy
 
-from ...blender.shown_pose import pose_values, restore_pose, show_pose
+from ...blender.animation.preview_pose import pose_values, restore_pose, show_pose
 from ...core.errors import OctoMotionError, WriteError
-from ...core.splicing.live import Live
+from ...core.splicing.transfer.preview import Live
 from .stack import Stack, local_object
 
 PER_PIXEL: Final = 0.1

@@ -1,0 +1,785 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arrays to actions: keys in bulk, and never a key lost that an artist has set.
+
+An action made here carries a mark: whose it is, and a fingerprint of its keys as written. As long
+as the fingerprint still fits and nothing else uses the action, it may be written anew in place.
+Any other action is left exactly as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from operator import itemgetter
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ...core.errors import RigError, WriteError
+from ...core.keyframes.reduction import BezierKeys
+from ...core.rotations import (
+    Floats,
+    conjugate,
+    continuous,
+    continuous_axis_angle,
+    continuous_euler,
+    from_euler,
+    from_matrix,
+    multiply,
+    normalized,
+    to_euler,
+)
+from ..rig.armature import armature_data
+
+MARK: Final = "octo_motion_generated"
+"""Custom property of an action made here: a group with the fields of ``_mark``."""
+
+_ENUMERATION: Final = np.uint8
+"""What Blender keeps a key's enumerations in: with another type it copies them one by one."""
+_MARK_VERSION: Final = 1
+"""Counts up when the fingerprint is taken otherwise: older actions then count as edited."""
+
+_OBJECT_GROUP: Final = "Object Transforms"
+"""The channel group in which Blender itself keeps an object's transform keys."""
+
+_HANDLE_SLACK: Final = 1e-3
+"""Share of a handle's length by which it may stray: each time that Blender aligns handles, it
+rounds them anew."""
+
+_LEAST_SPACING: Final = 0.01
+"""Blender takes keys that are no further apart, in frames, for one and the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One animated property: as many F-curves as it has components."""
+
+    data_path: str
+    values: Floats
+    """(frames, components)"""
+    group: str
+    keys: BezierKeys | None = None
+    """What is written in place of one linear key per frame."""
+
+
+def writable_armature(obj: bpy.types.Object) -> None:
+    """Make sure that an action can be given to this armature, and will be saved with the file.
+
+    Raises:
+        RigError: the object is no armature.
+        WriteError: it is linked, a library override that is not editable, or in NLA tweak mode.
+    """
+    armature_data(obj)
+    writable_object(obj)
+
+
+def writable_object(obj: bpy.types.Object) -> None:
+    """The same for any object.
+
+    Raises:
+        WriteError: it is linked, a library override that is not editable, or in NLA tweak mode.
+    """
+    # Python may assign an action to a linked object: it animates, and is gone when the file is
+    # opened again. Of a local object with linked armature data, and of an editable override, the
+    # action is saved.
+    if obj.library is not None:
+        problem = f"'{obj.name}' is linked from '{obj.library.name}' and is read-only here."
+        if all(scene.library is not None for scene in obj.users_scene):
+            raise WriteError(
+                problem,
+                "Link its collection into a scene of this file and make a library override "
+                "(Object > Library Override > Make).",
+            )
+        raise WriteError(problem, "Make a library override (Object > Library Override > Make).")
+    if obj.override_library is not None and obj.override_library.is_system_override:
+        raise WriteError(
+            f"'{obj.name}' is a library override that is not editable.",
+            "Make it editable: select it and choose Object > Library Override > Make.",
+        )
+    data = obj.animation_data
+    if data is not None and data.use_tweak_mode:
+        raise WriteError(
+            f"'{obj.name}' is in the tweak mode of the NLA editor.",
+            "Leave tweak mode there (Tab) and try again.",
+        )
+    if data is not None and data.is_property_readonly("action"):
+        raise WriteError(
+            f"The animation of '{obj.name}' is read-only.", "Choose an object that can be edited."
+        )
+
+
+def rotation_channels(
+    armature: bpy.types.Object, bones: Sequence[str], quaternions: Floats
+) -> list[Channel]:
+    """Bones' rotations, each in the rotation mode that its bone has; the mode stays as it is.
+
+    Each frame continues the one before: quaternions keep their sign, Euler angles and the angle
+    about an axis go on past the half turn instead of jumping.
+
+    Args:
+        armature: the armature object.
+        bones: names of its bones.
+        quaternions: (frames, bones, 4), rotations from rest, what Blender calls ``matrix_basis``.
+
+    Raises:
+        RigError: the armature has no such bone.
+    """
+    pose_bones = _pose_bones(armature, bones)
+    modes = [bone.rotation_mode for bone in pose_bones]
+    channels: dict[int, Channel] = {}
+    for mode in set(modes):
+        chosen = [number for number, each in enumerate(modes) if each == mode]
+        values = _in_rotation_mode(quaternions[:, chosen], mode)
+        for place, number in enumerate(chosen):
+            bone = pose_bones[number]
+            path = bone.path_from_id(_rotation_property(mode))
+            channels[number] = Channel(path, values[:, place], bone.name)
+    return [channels[number] for number in range(len(modes))]
+
+
+def location_channel(armature: bpy.types.Object, bone: str, locations: Floats) -> Channel:
+    """A bone's locations (frames, 3), in its rest frame.
+
+    Raises:
+        RigError: the armature has no such bone.
+    """
+    (pose_bone,) = _pose_bones(armature, [bone])
+    return Channel(pose_bone.path_from_id("location"), locations, pose_bone.name)
+
+
+def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
+    """An object's travel through the world, in its own channels; its scale stays as it is.
+
+    Parent, parent inverse, delta transforms and rotation mode are taken off. The parent is taken
+    as it stands at the current frame; if it moves, it carries the object along. A parent with
+    unequal scales shears what hangs on it: the rotation is then the nearest there is.
+
+    Args:
+        obj: the object.
+        locations: (frames, 3), world.
+        quaternions: (frames, 4), world.
+
+    Raises:
+        RigError: the parent's scale is zero in some direction.
+    """
+    frame, turn = parent_frame(obj), _parent_turn(obj)
+    own_locations = np.linalg.solve(frame[:3, :3], (locations - frame[:3, 3]).T).T
+    return own_channels(obj, own_locations, multiply(conjugate(turn), normalized(quaternions)))
+
+
+def own_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
+    """The same, of places (frames, 3) and orientations (frames, 4) before parents and constraints:
+    delta transforms and rotation mode are taken off.
+    """
+    mode = obj.rotation_mode
+    rotations = multiply(conjugate(delta_rotation(obj)), quaternions)
+    return [
+        Channel("location", locations - np.array(obj.delta_location), _OBJECT_GROUP),
+        Channel(_rotation_property(mode), _in_rotation_mode(rotations, mode), _OBJECT_GROUP),
+    ]
+
+
+def object_places(
+    obj: bpy.types.Object, locations: Floats, quaternions: Floats
+) -> tuple[Floats, Floats]:
+    """Inverse of :func:`object_channels`: where values of an object's channels put it.
+
+    Args:
+        obj: the object.
+        locations: (frames, 3), values of its location.
+        quaternions: (frames, 4), what the values of its rotation mean.
+
+    Returns:
+        Locations (frames, 3) and orientations (frames, 4) in the world.
+    """
+    frame, turn = parent_frame(obj), _parent_turn(obj)
+    places = (locations + np.array(obj.delta_location)) @ frame[:3, :3].T + frame[:3, 3]
+    return places, multiply(multiply(turn, delta_rotation(obj)), quaternions)
+
+
+def channel_unit(obj: bpy.types.Object) -> float:
+    """Metres in the world of one unit of an object's location channels.
+
+    The longest, where a parent scales unequally.
+    """
+    return float(np.linalg.norm(parent_frame(obj)[:3, :3], ord=2))
+
+
+def write_action(
+    obj: bpy.types.Object,
+    name: str,
+    frames: Floats,
+    channels: Sequence[Channel],
+    *,
+    previous: bpy.types.Action | None,
+    settings_note: str = "",
+    repeats: bool = False,
+    replaceable: bool = False,
+    automatic: bool = False,
+) -> bpy.types.Action:
+    """Give an object an action with these channels: their own keys, or one key per frame.
+
+    ``previous`` is written anew in place, and keeps its name, slot and users, if it was made here
+    for this object, nobody has edited it since, and no other object, NLA strip or constraint uses
+    it. Otherwise it is left alone and a new action is made. The action that the object had until
+    now is never changed; if nothing else uses it, a fake user saves it from being purged.
+
+    Args:
+        obj: the object to animate.
+        name: name of a new action.
+        frames: (frames,), ascending; fractions are kept.
+        channels: values at these frames.
+        previous: the action to write anew, or none.
+        settings_note: kept with the action, for whoever wants to know how it was made.
+        repeats: whether curves go on before their first key and after their last, over and over.
+        replaceable: whether :func:`may_replace` has just said yes of ``previous``.
+        automatic: whether keys on every frame have automatic handles, and lead straight on if not.
+
+    Returns:
+        The action, assigned to the object together with its slot.
+
+    Raises:
+        WriteError: the object is read-only, or in NLA tweak mode. Nothing has changed then.
+    """
+    times = _checked(frames, channels)
+    writable_object(obj)
+    data = obj.animation_data or obj.animation_data_create()
+    assert data is not None
+    assigned = data.action
+    if previous is not None and (replaceable or may_replace(previous, obj)):
+        action = previous
+    else:
+        action = _new_action(obj, name)
+    # Actions made here have one layer, one strip and one slot; with more, they count as edited.
+    (slot,), (layer,) = action.slots, action.layers
+    (strip,) = layer.strips
+    assert isinstance(strip, bpy.types.ActionKeyframeStrip)
+    channelbag = strip.channelbag(slot, ensure=True)
+    assert channelbag is not None
+    digests, handles = _write_curves(channelbag, times, channels, automatic=automatic)
+    _repeat(channelbag, repeats=repeats)
+    action.use_cyclic = repeats
+    action.use_frame_range = True
+    action.frame_start, action.frame_end = float(times[0]), float(times[-1])
+    data.action = action
+    data.action_slot = slot
+    if assigned is not None and assigned.library is None and assigned.users == 0:
+        assigned.use_fake_user = True
+    _mark(action, obj, settings_note, _fingerprint(action, digests), handles)
+    action[MARK]["keys"] = key_count(action)
+    action[MARK]["frames"] = len(times)
+    action[MARK]["curves"] = sum(channel.values.shape[1] for channel in channels)
+    return action
+
+
+def is_generated(action: bpy.types.Action) -> bool:
+    """Whether the action was made here, or is a copy of one that was."""
+    return MARK in action
+
+
+def is_edited(action: bpy.types.Action) -> bool:
+    """Whether the action is not, or no longer, what was generated.
+
+    Keys, handles, modifiers and further curves count, so do a muted or locked curve, markers and
+    the frame range. A name, a colour, a selection and a fake user do not.
+    """
+    mark = action.get(MARK)
+    if mark is None or mark.get("version") != _MARK_VERSION:
+        return True
+    return mark.get("fingerprint") != _fingerprint(action) or _handles_moved(action)
+
+
+def note_of(action: bpy.types.Action) -> str:
+    """How an action was made, as whoever wrote it has noted it; "" for any other."""
+    mark = action.get(MARK)
+    return str(mark.get("note", "")) if mark is not None else ""
+
+
+def key_counts(action: bpy.types.Action) -> tuple[int, int]:
+    """How many keys an action had when it was generated, and how many one per frame would be.
+
+    The same number twice where that is not known.
+    """
+    mark = action.get(MARK)
+    if mark is None or "curves" not in mark:
+        return key_count(action), key_count(action)
+    return int(mark["keys"]), int(mark["frames"]) * int(mark["curves"])
+
+
+def key_count(action: bpy.types.Action) -> int:
+    """Number of keys on all curves of an action."""
+    return sum(
+        len(curve.keyframe_points)
+        for channelbag in _channelbags(action)
+        for curve in channelbag.fcurves
+    )
+
+
+def may_replace(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+    """Whether this action is the object's alone, and all that is in it was generated."""
+    if action.library is not None or action.override_library is not None:
+        return False
+    if not is_generated(action) or action.asset_data is not None:
+        return False
+    if not _made_for(action, obj) or _used_elsewhere(action, obj):
+        return False
+    return not is_edited(action)
+
+
+def _made_for(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+    mark = action[MARK]
+    if mark.get("owner") == obj.name:
+        return True
+    # The mark of another: an action that was handed over, and still is the other's, or what an
+    # object has when it was renamed, appended, or duplicated together with its action.
+    data = obj.animation_data
+    if data is None or data.action != action:
+        return False
+    return mark.get("owner") not in bpy.data.objects or mark.get("name") != action.name
+
+
+def _used_elsewhere(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+    """Whether the action moves anything but this object, or this object by other ways too."""
+    for user in bpy.data.user_map(subset=[action])[action]:
+        data = getattr(user, "animation_data", None)
+        if data is not None:
+            if user != obj and action in (data.action, data.action_tweak_storage):
+                return True
+            strips = (strip for track in data.nla_tracks for strip in track.strips)
+            if any(strip.action == action for strip in flattened(strips)):
+                return True
+        if isinstance(user, bpy.types.Object) and action in _constraint_actions(user):
+            return True
+    return False
+
+
+def flattened(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.NlaStrip]:
+    """The strips, and those inside meta strips."""
+    for strip in strips:
+        yield strip
+        yield from flattened(strip.strips)
+
+
+def _constraint_actions(obj: bpy.types.Object) -> list[bpy.types.Action | None]:
+    bones = obj.pose.bones if obj.pose is not None else ()
+    return [
+        constraint.action
+        for owner in (obj, *bones)
+        for constraint in owner.constraints
+        if isinstance(constraint, bpy.types.ActionConstraint)
+    ]
+
+
+def _new_action(obj: bpy.types.Object, name: str) -> bpy.types.Action:
+    action = bpy.data.actions.new(name)
+    action.slots.new("OBJECT", obj.name)
+    action.layers.new("Layer").strips.new(type="KEYFRAME")
+    return action
+
+
+def _checked(frames: Floats, channels: Sequence[Channel]) -> np.ndarray:
+    """Frames in Blender's precision. A ValueError here is a fault of the caller's, not a user's."""
+    times = np.ascontiguousarray(frames, dtype=np.float32)
+    if times.ndim != 1 or len(times) == 0:
+        raise ValueError(f"frames must be one row of at least one frame, not {times.shape}")
+    if not np.isfinite(times).all() or (np.diff(times) <= _LEAST_SPACING).any():
+        raise ValueError(f"frames must ascend by more than {_LEAST_SPACING}")
+    for channel in channels:
+        if channel.values.ndim != 2 or len(channel.values) != len(times):
+            raise ValueError(f"{channel.data_path}: {channel.values.shape} for {len(times)} frames")
+        if not np.isfinite(channel.values).all():
+            raise ValueError(f"{channel.data_path} has values that are no numbers")
+    if len({channel.data_path for channel in channels}) != len(channels):
+        raise ValueError("two channels for one property")
+    return times
+
+
+def _write_curves(
+    channelbag: bpy.types.ActionChannelbag,
+    times: np.ndarray,
+    channels: Sequence[Channel],
+    *,
+    automatic: bool,
+) -> tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]:
+    """Make the curves what the channels say. Curves that are there already are filled anew, so
+    that their colours, selection and place in the editors stay. All keys of one that has a key on
+    each frame are of one kind, as nobody has edited them.
+
+    Returns:
+        The hash of each curve's keys, by its data path and index: to read them back takes longer
+        than to write them. The handles of those that have keys of their own.
+    """
+    digests: dict[tuple[str, int], bytes] = {}
+    handles: dict[tuple[str, int], np.ndarray] = {}
+    curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
+    # Everything goes through the same few buffers: memory stays modest, however many the bones.
+    points = np.empty((len(times), 2), dtype=np.float32)
+    points[:, 0] = times
+    flat = points.ravel()
+    # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
+    generated = _filled(len(times), "type", "GENERATED")
+    kinds = np.stack(
+        [_filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR"), generated]
+        + [_filled(len(times), "handle_left_type", "AUTO")] * automatic
+    )
+    for channel in channels:
+        for component in range(channel.values.shape[1]):
+            curve = curves.pop((channel.data_path, component), None)
+            if curve is None:
+                curve = channelbag.fcurves.new(channel.data_path, index=component)
+            keys = curve.keyframe_points
+            interpolation, handles_are = _kind_of(keys)
+            own_handles = interpolation == "BEZIER" and handles_are != "AUTO"
+            # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
+            regrouped = own_handles != (channel.keys is not None)
+            if curve.group is None or (regrouped and curve.group.name != channel.group):
+                group = channelbag.groups.get(channel.group)
+                curve.group = group or channelbag.groups.new(channel.group)
+            place = (channel.data_path, component)
+            if channel.keys is not None:
+                digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
+                continue
+            as_many = len(keys) == len(times)
+            alike = as_many and interpolation == ("BEZIER" if automatic else "LINEAR")
+            alike = alike and (handles_are == "AUTO" or not automatic)
+            if not as_many:
+                keys.clear()
+                keys.add(len(times))
+            points[:, 1] = channel.values[:, component]
+            keys.foreach_set("co", flat)
+            if not alike:
+                keys.foreach_set("interpolation", kinds[0])
+                keys.foreach_set("type", generated)
+                if automatic:
+                    keys.foreach_set("handle_left_type", kinds[2])
+                    keys.foreach_set("handle_right_type", kinds[2])
+            if automatic and curve.auto_smoothing != "NONE":
+                # Else handles depend on those of all other keys, and swing after a sudden turn.
+                curve.auto_smoothing = "NONE"
+            curve.update()
+            digests[place] = _keys_digest(points, kinds)
+    for curve in curves.values():
+        # Its group goes with the last of its curves.
+        channelbag.fcurves.remove(curve)
+    return digests, handles
+
+
+def _repeat(channelbag: bpy.types.ActionChannelbag, *, repeats: bool) -> None:
+    for curve in channelbag.fcurves:
+        for modifier in list(curve.modifiers):
+            curve.modifiers.remove(modifier)
+        if repeats:
+            curve.modifiers.new("CYCLES")
+
+
+def _write_bezier(
+    curve: bpy.types.FCurve, keys: BezierKeys, component: int
+) -> tuple[bytes, np.ndarray]:
+    """Fill a curve with Bézier keys; the hash of its keys, and its handles as Blender has them."""
+    points = curve.keyframe_points
+    if len(points) != len(keys):
+        points.clear()
+        points.add(len(keys))
+    coordinates = np.column_stack([keys.frames, keys.values[:, component]])
+    bezier = _filled(len(keys), "interpolation", "BEZIER")
+    generated = _filled(len(keys), "type", "GENERATED")
+    free = _filled(len(keys), "handle_left_type", "FREE")
+    kinds = np.where(keys.smooth, _filled(len(keys), "handle_left_type", "ALIGNED"), free)
+    points.foreach_set("co", coordinates.ravel())
+    points.foreach_set("interpolation", bezier)
+    points.foreach_set("type", generated)
+    points.foreach_set("handle_left_type", kinds)
+    points.foreach_set("handle_right_type", kinds)
+    points.foreach_set("handle_left", np.ascontiguousarray(keys.left[:, component]).ravel())
+    points.foreach_set("handle_right", np.ascontiguousarray(keys.right[:, component]).ravel())
+    curve.update()
+    return _keys_digest(coordinates, np.stack([bezier, generated])), _handles(curve)
+
+
+def _kind_of(keys: bpy.types.FCurveKeyframePoints) -> tuple[str, str]:
+    """Interpolation and left handle's type of a curve's first key, both "" where there is none."""
+    if not len(keys):
+        return "", ""
+    first = keys[0]
+    return first.interpolation, first.handle_left_type
+
+
+def _has_own_handles(curve: bpy.types.FCurve) -> bool:
+    """Whether its handles were set, rather than left to Blender, or to nobody."""
+    interpolation, handles_are = _kind_of(curve.keyframe_points)
+    return interpolation == "BEZIER" and handles_are != "AUTO"
+
+
+def _handles(curve: bpy.types.FCurve) -> np.ndarray:
+    """Left and right handles (keys, 4) of a curve."""
+    points = curve.keyframe_points
+    left, right = np.empty((2, len(points), 2), dtype=np.float32)
+    points.foreach_get("handle_left", left.ravel())
+    points.foreach_get("handle_right", right.ravel())
+    return np.column_stack([left, right])
+
+
+def _handles_moved(action: bpy.types.Action) -> bool:
+    """Whether a handle of Bézier keys is not, or no longer, where it was written.
+
+    The keys themselves must be known to be as they were.
+    """
+    written = np.frombuffer(action[MARK].get("handles", b""), dtype=np.float32).reshape(-1, 4)
+    if not len(written):
+        # Then it has no curve with handles of its own: its keys would be others.
+        return False
+    start = 0
+    for curve in _sorted_curves(action):
+        points = curve.keyframe_points
+        if not _has_own_handles(curve):
+            continue
+        now, then = _handles(curve), written[start : start + len(points)]
+        start += len(points)
+        if len(then) != len(now):
+            return True
+        keys = np.empty((len(points), 2), dtype=np.float32)
+        points.foreach_get("co", keys.ravel())
+        keys = np.tile(keys, (1, 2))
+        slack = _HANDLE_SLACK * np.abs(then - keys) + 8.0 * np.spacing(np.abs(keys))
+        if (np.abs(now - then) > slack).any():
+            return True
+    return start != len(written)
+
+
+def _filled(count: int, name: str, item: str) -> np.ndarray:
+    """A keyframe's enumeration value, as many times as there are keys."""
+    return np.full(count, _value(name, item), dtype=_ENUMERATION)
+
+
+@cache
+def _value(name: str, item: str) -> int:
+    """What Blender keeps a keyframe's enumeration as."""
+    definition = bpy.types.Keyframe.bl_rna.properties[name]
+    assert isinstance(definition, bpy.types.EnumProperty)
+    return definition.enum_items[item].value
+
+
+def _mark(
+    action: bpy.types.Action,
+    obj: bpy.types.Object,
+    settings_note: str,
+    fingerprint: str,
+    handles: Mapping[tuple[str, int], np.ndarray],
+) -> None:
+    action[MARK] = {
+        "owner": obj.name,
+        "name": action.name,
+        "version": _MARK_VERSION,
+        "fingerprint": fingerprint,
+        "note": settings_note,
+    }
+    if handles:
+        ordered = [handles[place] for place in sorted(handles)]
+        action[MARK]["handles"] = np.concatenate(ordered).tobytes()
+
+
+def _fingerprint(
+    action: bpy.types.Action, known: Mapping[tuple[str, int], bytes] | None = None
+) -> str:
+    """A hash of all in an action that an artist can have set on purpose.
+
+    Handles of linear keys are left out: they have no effect, and a key that is made Bézier changes
+    its interpolation. Of automatic ones their being so counts: one that is moved is so no more.
+    Others are compared, not hashed: Blender rounds aligned ones anew each time that a curve is
+    updated.
+
+    Args:
+        action: the action.
+        known: hashes of its curves' keys, where they have just been written.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+
+    def add(*values: object) -> None:
+        digest.update(repr(values).encode())
+
+    add(action.use_frame_range, action.frame_start, action.frame_end, action.use_cyclic)
+    add([(marker.name, marker.frame) for marker in action.pose_markers])
+    add([slot.handle for slot in action.slots])
+    add([len(layer.strips) for layer in action.layers])
+    buffer = np.empty((0, 2), dtype=np.float32)
+    for path, index, state, curve in _told(action):
+        keys = curve.keyframe_points
+        count = len(keys)
+        digest.update(f"({path!r}, {index}, {state}({count}, {len(curve.modifiers)})".encode())
+        if known is not None:
+            digest.update(known[path, index])
+            continue
+        if len(buffer) != count:
+            buffer = np.empty((count, 2), dtype=np.float32)
+        keys.foreach_get("co", buffer.ravel())
+        digest.update(_keys_digest(buffer, _kinds(keys)))
+    return digest.hexdigest()
+
+
+def _told(action: bpy.types.Action) -> list[tuple[str, int, str, bpy.types.FCurve]]:
+    """Path, component, state as text and curve of all curves, by path and component: an artist may
+    move channels up and down in the list.
+    """
+    found: list[tuple[str, int, str, bpy.types.FCurve]] = []
+    for channelbag in _channelbags(action):
+        curves = channelbag.fcurves
+        # What can be read of all at once is.
+        index, extrapolation = np.empty((2, len(curves)), dtype=np.int32)
+        mute, lock = np.empty((2, len(curves)), dtype=bool)
+        curves.foreach_get("array_index", index)
+        curves.foreach_get("extrapolation", extrapolation)
+        curves.foreach_get("mute", mute)
+        curves.foreach_get("lock", lock)
+        states = zip(extrapolation.tolist(), mute.tolist(), lock.tolist(), strict=True)
+        texts = [f"{_extrapolation(kind)!r}, {off}, {locked})" for kind, off, locked in states]
+        paths = [curve.data_path for curve in curves]
+        found.extend(zip(paths, index.tolist(), texts, curves, strict=True))
+    return sorted(found, key=itemgetter(0, 1))
+
+
+@cache
+def _extrapolation(number: int) -> str:
+    """Name of the way in which a curve goes on beyond its keys."""
+    definition = bpy.types.FCurve.bl_rna.properties["extrapolation"]
+    assert isinstance(definition, bpy.types.EnumProperty)
+    return next(each.identifier for each in definition.enum_items if each.value == number)
+
+
+def _kinds(keys: bpy.types.FCurveKeyframePoints) -> np.ndarray:
+    """What a curve's keys are, (rows, keys): interpolation, type, and of automatic handles that."""
+    kinds = np.empty((4, len(keys)), dtype=_ENUMERATION)
+    keys.foreach_get("interpolation", kinds[0])
+    keys.foreach_get("type", kinds[1])
+    if not len(keys) or kinds[0, 0] != _value("interpolation", "BEZIER"):
+        return kinds[:2]
+    keys.foreach_get("handle_left_type", kinds[2])
+    if kinds[2, 0] != _value("handle_left_type", "AUTO"):
+        return kinds[:2]
+    keys.foreach_get("handle_right_type", kinds[3])
+    if kinds[2].tobytes() != kinds[3].tobytes():
+        # As nothing was ever written.
+        kinds[2] = 255
+    return kinds[:3]
+
+
+def _keys_digest(points: np.ndarray, kinds: np.ndarray) -> bytes:
+    """Hash of a curve's keys.
+
+    Args:
+        points: (keys, 2) frames and values, single precision.
+        kinds: (rows, keys) what they are.
+    """
+    digest = hashlib.blake2b(points, digest_size=16)
+    digest.update(kinds)
+    return digest.digest()
+
+
+def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
+    """All F-curves of an action, whatever they move."""
+    for channelbag in _channelbags(action):
+        yield from channelbag.fcurves
+
+
+def _sorted_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
+    """All curves by path and component: an artist may move channels up and down in the list."""
+    return sorted(curves_of(action), key=lambda each: (each.data_path, each.array_index))
+
+
+def _channelbags(action: bpy.types.Action) -> Iterator[bpy.types.ActionChannelbag]:
+    for layer in action.layers:
+        for strip in layer.strips:
+            if isinstance(strip, bpy.types.ActionKeyframeStrip):
+                yield from channelbags_of(strip)
+
+
+def channelbags_of(strip: bpy.types.ActionKeyframeStrip) -> Iterator[bpy.types.ActionChannelbag]:
+    """Its channelbags, such that their curves' keys can be read quickly.
+
+    What is reached from one property to the next carries all that it was reached through, and so
+    does each of its keys while they are read: that takes four times as long as the reading.
+    """
+    for each in strip.channelbags:
+        slot = each.slot
+        yield (strip.channelbag(slot) if slot is not None else None) or each
+
+
+def _pose_bones(armature: bpy.types.Object, bones: Sequence[str]) -> list[bpy.types.PoseBone]:
+    armature_data(armature)
+    if armature.pose is None:
+        # An armature that was made a moment ago gets its pose with the next update.
+        bpy.context.view_layer.update()
+    if armature.pose is None:
+        raise RigError(
+            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+        )
+    found = armature.pose.bones
+    missing = [name for name in bones if name not in found]
+    if missing:
+        raise RigError(
+            f"'{armature.name}' has no bone '{missing[0]}' in its pose.",
+            "Leave edit mode, or detect the arms again.",
+        )
+    return [found[name] for name in bones]
+
+
+def rotation_path(owner: bpy.types.Object | bpy.types.PoseBone) -> str:
+    """Data path of the rotation of an object or of a bone, in the mode that it has."""
+    name = _rotation_property(owner.rotation_mode)
+    return owner.path_from_id(name) if isinstance(owner, bpy.types.PoseBone) else name
+
+
+def _rotation_property(mode: str) -> str:
+    if mode in ("QUATERNION", "AXIS_ANGLE"):
+        return f"rotation_{mode.lower()}"
+    return "rotation_euler"
+
+
+def _in_rotation_mode(quaternions: Floats, mode: str) -> Floats:
+    """Quaternions (frames, …, 4) as values of a rotation mode, continuous over the frames."""
+    if mode == "QUATERNION":
+        result = continuous(quaternions)
+        # Rest is (1, 0, 0, 0): start on its side.
+        return np.where(result[:1, ..., :1] < 0.0, -result, result)
+    if mode == "AXIS_ANGLE":
+        return continuous_axis_angle(quaternions)
+    return continuous_euler(to_euler(quaternions, mode), mode)
+
+
+def parent_frame(obj: bpy.types.Object) -> Floats:
+    """The frame (4, 4) in which the object's own channels stand, at the current frame."""
+    if obj.parent is None:
+        return np.eye(4)
+    # Whatever kind of parent it is (object, bone, vertex, path), Blender has taken it off in
+    # matrix_local. Constraints stand in both matrices and cancel. A path is known only to
+    # evaluated objects.
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    parent = evaluated.matrix_world @ evaluated.matrix_local.inverted_safe()
+    return np.array(parent @ obj.matrix_parent_inverse, dtype=np.float64)
+
+
+def _parent_turn(obj: bpy.types.Object) -> Floats:
+    """The rotation (4,) within the frame in which the object's own channels stand.
+
+    Raises:
+        RigError: the parent's scale is zero in some direction.
+    """
+    # The frame may scale, shear and mirror: its polar decomposition.
+    left, sizes, right = np.linalg.svd(parent_frame(obj)[:3, :3])
+    if sizes[-1] < 1e-6 * sizes[0]:
+        raise RigError(f"The parent of '{obj.name}' is flat or has no size.", "Repair its scale.")
+    turn = left @ right
+    # Blender takes a mirrored frame's axes the other way round: so reads its matrix_world.
+    return from_matrix(turn if np.linalg.det(turn) > 0.0 else -turn)
+
+
+def delta_rotation(obj: bpy.types.Object) -> Floats:
+    """An object's delta rotation, (4,), in its rotation mode."""
+    if obj.rotation_mode == "QUATERNION":
+        return normalized(obj.delta_rotation_quaternion)
+    if obj.rotation_mode == "AXIS_ANGLE":
+        # Blender has such a delta, but no way to see or set it.
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    return from_euler(obj.delta_rotation_euler, obj.rotation_mode)

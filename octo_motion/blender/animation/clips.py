@@ -1,0 +1,683 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Actions to clips and clips to actions: motion as arrays, exactly as Blender shows it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from typing import Any, Final
+
+import bpy
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.errors import ClipError
+from ...core.rotations import (
+    IDENTITY,
+    Floats,
+    from_axis_angle,
+    from_euler,
+    from_matrix,
+    multiply,
+    normalized,
+    to_matrix,
+)
+from ...core.skeleton import Skeleton
+from ...core.splicing.clip.clip import Clip
+from ...core.splicing.clip.scaled_pose import without_scale
+from ...core.splicing.clip.unpose import orientations_of, unposed
+from ...core.splicing.transfer.parts import beneath
+from ..rig.armature import armature_data, read_skeleton, world_matrix
+from .actions import (
+    Channel,
+    delta_rotation,
+    location_channel,
+    object_channels,
+    own_channels,
+    parent_frame,
+    rotation_channels,
+    writable_armature,
+    write_action,
+)
+from .fcurves import evaluate, is_shown, key_range
+from .scene_poses import assigned, shown_poses
+from .unkeyed import AT_REST, UnkeyedPose, keep_unkeyed_pose, rotation_channel, unkeyed_pose
+
+_LEAST_SCALING: Final = 1e-6
+"""Factors by which a bone's scale may be off one, and be taken for one."""
+
+_ROUNDING: Final = 1e-4
+"""Factors by which importers' scale keys are off one, or unequal, without meaning it."""
+
+_APART: Final = frozenset({"ALIGNED", "AVERAGE", "NONE"})
+"""Ways of a bone to inherit its parent's scale that leave its own axes straight."""
+
+_STILL: Final = 1e-7
+"""Of the skeleton's size: a location that is smaller is none."""
+
+_POSED: Final = frozenset({*AT_REST, "rotation_mode"})
+"""Properties of a bone that a clip is about, …"""
+
+_PLACED: Final = frozenset(
+    {"rotation_mode"}
+    | {f"{kind}{name}" for kind in ("", "delta_") for name in AT_REST if name != "scale"}
+)
+"""… and of an object; its size is not."""
+
+_Curves = dict[tuple[str, str], dict[int, bpy.types.FCurve]]
+"""F-curves by bone ("" is the object itself) and property, then by component."""
+
+
+def read_clip(
+    armature: bpy.types.Object,
+    action: bpy.types.Action | None = None,
+    slot: bpy.types.ActionSlot | None = None,
+    *,
+    visual: bool = False,
+    frames: ArrayLike | None = None,
+    rate: float | None = None,
+) -> Clip:
+    """The motion that an action gives an armature. Nothing in the file is changed.
+
+    What the action has no curve for keeps its value: where the object stands, and a bone's pose,
+    as far as nothing else moves it (glTF files pose bones that no action of theirs moves). But
+    what another action on the armature has left there is no part of this clip: such a bone is
+    at rest. Parents of the object are taken as they stand at the current frame. Scaled bones
+    move and turn those they carry; the clip keeps where they are, not how large. But bones that
+    carry no other, or stretch and have children that do not inherit their scale in full, keep it,
+    and their children are where they are without it.
+
+    Args:
+        armature: the armature object.
+        action: the action; the armature's own if none is given. With ``visual`` and none given
+            there need not be any: NLA tracks will do.
+        slot: the slot of the action; if none is given the one that the armature uses, or would.
+        visual: as the scene shows it, with NLA, constraints, drivers and moving parents. Plays
+            the scene, so takes longer.
+        frames: (frames,) ascending, subframes allowed; the whole frames between the slot's first
+            and last key, or of the action's manual frame range, if none is given.
+        rate: frames per second, the scene's if none is given.
+
+    Raises:
+        RigError: the object is no armature, or has no bones.
+        ClipError: there is no action, no slot for the armature, no curve for it, only one frame,
+            a key that is no number, or the armature is scaled unequally; with ``visual``, the
+            scene does not show it.
+    """
+    armature_data(armature)
+    skeleton = read_skeleton(armature)
+    data = armature.animation_data
+    if action is None and data is not None:
+        action = data.action
+        slot = slot or (data.action_slot if action is not None else None)
+    scene = bpy.context.scene
+    assert scene is not None
+    per_second = float(rate or scene.render.fps / scene.render.fps_base)
+    if action is None:
+        tracks = data is not None and any(track.strips for track in data.nla_tracks)
+        if not (visual and tracks):
+            raise ClipError(f"'{armature.name}' has no action.", "Give it one, or import a clip.")
+        times = _checked_frames(_track_range(armature) if frames is None else frames, frames)
+        return _shown_clip(armature, skeleton, armature.name, times, per_second)
+    slot = slot or _slot_for(armature, action)
+    curves = _curves_of(action, slot, skeleton)
+    if not curves:
+        raise ClipError(
+            f"Action '{action.name}' has no keys for the bones of '{armature.name}'.",
+            "Choose an action made for this armature.",
+        )
+    times = _checked_frames(_action_range(action, curves) if frames is None else frames, frames)
+    if visual:
+        with assigned(armature, action, slot):
+            return _shown_clip(armature, skeleton, action.name, times, per_second)
+    unkeyed = unkeyed_pose(armature)
+    rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
+    world, own = _object_motion(armature, curves, times)
+    if not all(np.isfinite(each).all() for each in (rotations, locations, world)):
+        raise ClipError(
+            f"Action '{action.name}' has keys that are no finite numbers.",
+            "Repair or delete them, or choose another action.",
+        )
+    _check_scale(armature, world)
+    return Clip(action.name, skeleton, times, per_second, rotations, locations, world, scales, own)
+
+
+def write_clip(
+    armature: bpy.types.Object,
+    clip: Clip,
+    *,
+    name: str = "",
+    note: str = "",
+    previous: bpy.types.Action | None = None,
+    besides: Sequence[Channel] = (),
+) -> bpy.types.Action:
+    """Give an armature a clip as a new action, with keys on all bones.
+
+    Each bone keeps its rotation mode, and turns the short way from frame to frame. The action
+    that the armature had is not changed. The object gets keys where the clip moves it.
+
+    Args:
+        armature: an armature with the clip's bones.
+        clip: the motion.
+        name: name of the new action, the clip's if empty.
+        note: what the clip was made from, kept with the action.
+        previous: an action written here before, to be written anew if nobody has edited it.
+        besides: what else the action moves, and what it moves otherwise than the clip; see
+            :func:`further_channels` and :func:`scaled_channels`.
+
+    Returns:
+        The action, assigned to the armature.
+
+    Raises:
+        RigError: the object is no armature, or lacks a bone.
+        WriteError: it is read-only, or in NLA tweak mode.
+    """
+    writable_armature(armature)
+    skeleton = clip.skeleton
+    channels = rotation_channels(armature, skeleton.names, clip.rotations)
+    channels += _location_channels(armature, clip)
+    assert armature.pose is not None
+    scales = np.ones(clip.locations.shape) if clip.scales is None else clip.scales
+    channels += [
+        Channel(bone.path_from_id("scale"), scales[:, number], bone.name)
+        for bone in armature.pose.bones
+        if (number := skeleton.index.get(bone.name)) is not None
+        and (bone.scale[:] != (1.0, 1.0, 1.0) or (scales[:, number] != 1.0).any())
+    ]
+    channels += _object_channels(armature, clip)
+    besides_paths = {each.data_path for each in besides}
+    channels = [each for each in channels if each.data_path not in besides_paths]
+    channels += besides
+    keep_unkeyed_pose(armature)
+    return write_action(
+        armature,
+        name or clip.name,
+        clip.frames,
+        channels,
+        previous=previous,
+        settings_note=note,
+    )
+
+
+def further_channels(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    frames: Floats,
+) -> list[Channel]:
+    """What an action moves that is no part of a clip: custom properties, influences of constraints,
+    the object's size and visibility.
+
+    Args:
+        armature: the armature object.
+        action: the action.
+        slot: its slot; if none is given the one that the armature uses, or would.
+        frames: (frames,)
+
+    Raises:
+        ClipError: there is no slot for the armature.
+    """
+    bones = armature_data(armature).bones
+    found: dict[str, dict[int, bpy.types.FCurve]] = defaultdict(dict)
+    for curve in _channelbag_curves(action, slot or _slot_for(armature, action)):
+        start, _, rest = curve.data_path.partition('pose.bones["')
+        name, _, channel = rest.rpartition('"].')
+        if start:
+            told = curve.data_path in _PLACED
+        else:
+            told = channel in _POSED and bpy.utils.unescape_identifier(name) in bones
+        if is_shown(curve) and not told:
+            found[curve.data_path][curve.array_index] = curve
+    channels: list[Channel] = []
+    for path, components in found.items():
+        try:
+            value: Any = armature.path_resolve(path)
+        except ValueError:
+            # Of a bone or a property that is gone.
+            continue
+        # What has no curve keeps its value. Curves know choices from a list by their numbers.
+        now: list[Any] = [0.0]
+        if not isinstance(value, str):
+            now = [value] if isinstance(value, (bool, int, float)) else list(value)
+        values = _values({("", ""): components}, "", "", now, frames)
+        if not np.isfinite(values).all():
+            continue
+        group = next(iter(components.values())).group
+        bone = path.removeprefix('pose.bones["').partition('"]')[0]
+        channels.append(Channel(path, values, group.name if group is not None else bone))
+    return channels
+
+
+def scaled_channels(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    frames: Floats,
+    changed: Collection[str],
+) -> tuple[list[Channel], list[str]]:
+    """Bones that are scaled and carry others, of which a clip has the places, not the size.
+
+    Where none of what they carry is changed, all of it can be as the action has it.
+
+    Args:
+        armature: the armature object.
+        action: the action that the clip was read from.
+        slot: its slot; if none is given the one that the armature uses, or would.
+        frames: (frames,)
+        changed: names of the bones that no longer move as the action says.
+
+    Returns:
+        Channels to write in place of the clip's, and names of the bones that lose their size.
+    """
+    skeleton = read_skeleton(armature)
+    curves = _curves_of(action, slot or _slot_for(armature, action), skeleton)
+    unkeyed = unkeyed_pose(armature)
+    modes = _rotation_modes(armature, skeleton)
+
+    def values(name: str, channel: str) -> Floats:
+        otherwise = unkeyed.get((name, channel), AT_REST[channel])
+        return _values(curves, name, channel, otherwise, frames)
+
+    off = np.array([np.abs(values(name, "scale") - 1.0).max() for name in skeleton.names])
+    scaled = off > _ROUNDING
+    channels: list[Channel] = []
+    lost: list[str] = []
+    done: set[int] = set()
+    for number in np.flatnonzero(scaled & ~_stretches_apart(armature, skeleton, scaled)).tolist():
+        if number in done:
+            continue
+        carried = beneath(skeleton, [number])
+        done.update(carried)
+        names = [skeleton.names[each] for each in carried]
+        if any(name in changed for name in names):
+            lost.append(skeleton.names[number])
+            continue
+        assert armature.pose is not None
+        channels += [
+            Channel(armature.pose.bones[name].path_from_id(channel), values(name, channel), name)
+            for name in names
+            for channel in ("location", rotation_channel(modes[name]), "scale")
+        ]
+    return channels, lost
+
+
+def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
+    """The object's own motion; none where it stands as it does now."""
+    moved, still = clip.own, np.array(armature.matrix_basis, dtype=np.float64)
+    if moved is None:
+        moved, still = clip.world, world_matrix(armature)
+    if np.abs(moved - still).max() <= _STILL * max(1.0, np.abs(still).max()):
+        return []
+    if clip.own is None:
+        turns = from_matrix(moved[:, :3, :3] / clip.scale)
+        return object_channels(armature, moved[:, :3, 3], turns)
+    signs = np.sign(np.array(armature.scale) * np.array(armature.delta_scale))
+    turns = from_matrix(
+        moved[:, :3, :3] / (np.linalg.norm(moved[:, :3, :3], axis=1) * signs)[:, None]
+    )
+    return own_channels(armature, moved[:, :3, 3], turns)
+
+
+def _location_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
+    """Locations of roots, and of all bones that are not, or would not stay, where rest has them."""
+    skeleton = clip.skeleton
+    size = np.ptp(skeleton.heads, axis=0).max() + skeleton.lengths.max()
+    assert armature.pose is not None
+    channels: list[Channel] = []
+    for number, name in enumerate(skeleton.names):
+        if skeleton.connected[number]:
+            continue
+        bone = armature.pose.bones[name]
+        values = clip.locations[:, number]
+        at_rest = bone.location[:] == (0.0, 0.0, 0.0) and np.abs(values).max() < _STILL * size
+        if at_rest and skeleton.parents[number] >= 0:
+            continue
+        if not bone.bone.use_local_location:
+            values = values @ _location_axes(skeleton, number).T
+        channels.append(location_channel(armature, name, values))
+    return channels
+
+
+def _shown_clip(
+    armature: bpy.types.Object, skeleton: Skeleton, name: str, times: Floats, rate: float
+) -> Clip:
+    _check_shown(armature)
+    matrices, world, own = shown_poses(armature, times)
+    _check_scale(armature, world)
+    orientations = from_matrix(orientations_of(matrices[..., :3, :3]))
+    rotations, locations = unposed(skeleton, orientations, matrices[..., :3, 3])
+    sizes = np.linalg.norm(matrices[..., :3, :3], axis=-2)
+    scaled = np.abs(sizes - 1.0).max(axis=(0, 2)) > _ROUNDING
+    # What constraints and drivers scale they will scale again.
+    alone = scaled & ~_beneath(skeleton, scaled) & ~np.array(skeleton.constrained)
+    alone &= np.array([not each for each in skeleton.children])
+    scales = np.where(alone[:, None], sizes, 1.0) if alone.any() else None
+    return Clip(name, skeleton, times, rate, rotations, locations, world, scales, own)
+
+
+def _check_shown(armature: bpy.types.Object) -> None:
+    """Blender would hand out the one pose that it has worked out last, at every frame."""
+    layer = bpy.context.view_layer
+    assert layer is not None
+    if armature.hide_viewport or not _is_within(armature, layer.layer_collection):
+        raise ClipError(
+            f"'{armature.name}' is not in the scene, or disabled in viewports: it cannot be read "
+            "as shown.",
+            "Enable it and its collection in the Outliner, or turn off As Shown.",
+        )
+    if armature_data(armature).pose_position == "REST":
+        raise ClipError(
+            f"'{armature.name}' is in its rest position: it cannot be read as shown.",
+            "Choose Pose Position in its armature properties, or turn off As Shown.",
+        )
+
+
+def _is_within(obj: bpy.types.Object, layer: bpy.types.LayerCollection) -> bool:
+    """Whether Blender works the object out because of this collection or one beneath it."""
+    collection = layer.collection
+    if collection.hide_viewport:
+        return False
+    own = not layer.exclude and obj in collection.objects.values()
+    return own or any(_is_within(obj, each) for each in layer.children)
+
+
+def _slot_for(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types.ActionSlot:
+    """The slot that Blender would give the armature, or the only one with its bones."""
+    data = armature.animation_data
+    slots = [slot for slot in action.slots if slot.target_id_type in ("OBJECT", "UNSPECIFIED")]
+    if data is not None and data.action == action and data.action_slot is not None:
+        return data.action_slot
+    for slot in slots:
+        if armature in slot.users():
+            return slot
+    wanted = [f"OB{armature.name}"]
+    if data is not None:
+        wanted.insert(0, data.last_slot_identifier)
+    fitting = [slot for slot in slots if _curves_of(action, slot, read_skeleton(armature))]
+    for identifier in wanted:
+        for slot in fitting:
+            if slot.identifier == identifier:
+                return slot
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
+        names = ", ".join(f"'{slot.name_display}'" for slot in fitting)
+        raise ClipError(
+            f"Action '{action.name}' has several slots that fit '{armature.name}': {names}.",
+            "Assign the action to the armature and choose its slot in the Action editor.",
+        )
+    if any(_channelbag_curves(action, slot) for slot in action.slots):
+        raise ClipError(
+            f"Action '{action.name}' has no slot for '{armature.name}'.",
+            "Choose an action made for this armature.",
+        )
+    raise ClipError(f"Action '{action.name}' is empty.", "Choose an action that has keys.")
+
+
+def _channelbag_curves(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot
+) -> list[bpy.types.FCurve]:
+    found: list[bpy.types.FCurve] = []
+    for layer in action.layers:
+        for strip in layer.strips:
+            if isinstance(strip, bpy.types.ActionKeyframeStrip):
+                channelbag = strip.channelbag(slot)
+                if channelbag is not None:
+                    found.extend(channelbag.fcurves)
+    return found
+
+
+def _curves_of(action: bpy.types.Action, slot: bpy.types.ActionSlot, skeleton: Skeleton) -> _Curves:
+    """The curves that move the armature or its bones; none at all if no bone is among them."""
+    curves: _Curves = defaultdict(dict)
+    bones = False
+    for curve in _channelbag_curves(action, slot):
+        if not is_shown(curve):
+            continue
+        start, _, rest = curve.data_path.partition('pose.bones["')
+        name, _, channel = rest.rpartition('"].')
+        if start:
+            name, channel = "", curve.data_path
+        else:
+            name = bpy.utils.unescape_identifier(name)
+            if name not in skeleton.index:
+                continue
+        if channel.removeprefix("delta_") in AT_REST:
+            curves[name, channel][curve.array_index] = curve
+            bones = bones or bool(name)
+    return curves if bones else {}
+
+
+def _action_range(action: bpy.types.Action, curves: _Curves) -> Floats:
+    """The whole frames within the keys (or the artist's own range), at least the two ends."""
+    if action.use_frame_range:
+        start, end = action.frame_start, action.frame_end
+    else:
+        ranges = [
+            key_range(curve)
+            for components in curves.values()
+            for curve in components.values()
+            if len(curve.keyframe_points) or len(curve.sampled_points)
+        ]
+        if not ranges:
+            raise ClipError(
+                f"Action '{action.name}' has no keys, so no beginning and no end.",
+                "Give it a manual frame range.",
+            )
+        start, end = min(each[0] for each in ranges), max(each[1] for each in ranges)
+    if end - start < 0.5:
+        raise ClipError(
+            f"Action '{action.name}' has only one frame: it is a pose, not a motion.",
+            "Choose an action with keys at two frames or more.",
+        )
+    return _whole_frames(start, end)
+
+
+def _whole_frames(start: float, end: float) -> Floats:
+    # Frames are single precision in Blender, and importers miss whole ones by a little.
+    first, last = np.ceil(start - 1e-3), np.floor(end + 1e-3)
+    return np.arange(first, last + 1.0) if last > first else np.array([start, end])
+
+
+def _track_range(armature: bpy.types.Object) -> Floats:
+    data = armature.animation_data
+    assert data is not None
+    strips = [strip for track in data.nla_tracks for strip in track.strips if not strip.mute]
+    if not strips:
+        raise ClipError(f"All NLA strips of '{armature.name}' are muted.", "Unmute one.")
+    return _whole_frames(
+        min(strip.frame_start for strip in strips), max(strip.frame_end for strip in strips)
+    )
+
+
+def _checked_frames(times: ArrayLike, given: ArrayLike | None) -> Floats:
+    """A ValueError is a fault of the caller's, not a user's."""
+    checked = np.asarray(times, dtype=np.float64)
+    if checked.ndim != 1 or len(checked) == 0 or not (np.diff(checked) > 0.0).all():
+        raise ValueError(f"frames must be one ascending row, not {given}")
+    return checked
+
+
+def _values(
+    curves: _Curves, owner: str, channel: str, otherwise: Sequence[float], times: Floats
+) -> Floats:
+    """(frames, components) of one property."""
+    result = np.tile(np.array(otherwise, dtype=np.float64), (len(times), 1))
+    for component, curve in curves.get((owner, channel), {}).items():
+        if component < result.shape[1]:
+            result[:, component] = evaluate(curve, times)
+    return result
+
+
+def _bone_motion(
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    curves: _Curves,
+    unkeyed: UnkeyedPose,
+    times: Floats,
+) -> tuple[Floats, Floats, Floats | None]:
+    """Rotations (frames, bones, 4), locations and, if there are any, scales (frames, bones, 3)."""
+    shape = (len(times), len(skeleton))
+    rotations = np.broadcast_to(IDENTITY, (*shape, 4)).copy()
+    locations = np.zeros((*shape, 3))
+    scales = np.ones((*shape, 3))
+    bones = armature_data(armature).bones
+    modes = _rotation_modes(armature, skeleton)
+    present = {*curves, *unkeyed}
+
+    def values(name: str, channel: str) -> Floats:
+        otherwise = unkeyed.get((name, channel), AT_REST[channel])
+        return _values(curves, name, channel, otherwise, times)
+
+    for number, name in enumerate(skeleton.names):
+        if (name, "location") in present and not skeleton.connected[number]:
+            moved = values(name, "location")
+            if not bones[name].use_local_location:
+                moved = moved @ _location_axes(skeleton, number)
+            locations[:, number] = moved
+        if (name, "scale") in present:
+            scales[:, number] = values(name, "scale")
+    for mode in set(modes.values()):
+        channel = rotation_channel(mode)
+        chosen = [
+            name for name in skeleton.names if modes[name] == mode and (name, channel) in present
+        ]
+        if chosen:
+            numbers = [skeleton.index[name] for name in chosen]
+            turned = np.stack([values(name, channel) for name in chosen], axis=1)
+            rotations[:, numbers] = _as_quaternions(turned, mode)
+    off = np.abs(scales - 1.0).max(axis=(0, 2))
+    stretching = (off > _ROUNDING) & _stretches_apart(armature, skeleton, off > _ROUNDING)
+    kept = None
+    if stretching.any():
+        kept = np.where(stretching[:, None], scales, 1.0)
+        off = np.where(stretching, 0.0, off)
+    _check_inheritance(armature, skeleton, off > _ROUNDING)
+    if (off > _LEAST_SCALING).any():
+        scales = np.where(stretching[:, None], 1.0, scales)
+        return *without_scale(skeleton, rotations, locations, scales), kept
+    return rotations, locations, kept
+
+
+def _stretches_apart(
+    armature: bpy.types.Object, skeleton: Skeleton, scaled: np.ndarray
+) -> np.ndarray:
+    """Whether each bone's children all keep their own axes when it is scaled; at the end of a
+    chain, whether the bone itself does, or has nothing scaled above it.
+    """
+    bones = armature_data(armature).bones
+    inside = _beneath(skeleton, scaled)
+    apart = [
+        bones[name].inherit_scale in _APART or not (inside[number] or skeleton.children[number])
+        for number, name in enumerate(skeleton.names)
+    ]
+    return np.array(
+        [
+            all(apart[child] for child in children or (number,))
+            for number, children in enumerate(skeleton.children)
+        ]
+    )
+
+
+def _beneath(skeleton: Skeleton, chosen: np.ndarray) -> np.ndarray:
+    """Which bones hang on one of these, (bones,)."""
+    inside = np.zeros(len(skeleton), dtype=bool)
+    for number, parent in enumerate(skeleton.parents):
+        inside[number] = parent >= 0 and (chosen[parent] or inside[parent])
+    return inside
+
+
+def _location_axes(skeleton: Skeleton, bone: int) -> Floats:
+    """A bone's own axes (3, 3), as columns, seen along those in which its location is given when
+    it is not local: its parent's, or the armature's.
+    """
+    axes = skeleton.rest_matrices[bone, :3, :3]
+    parent = skeleton.parents[bone]
+    return axes if parent < 0 else skeleton.rest_matrices[parent, :3, :3].T @ axes
+
+
+def _check_inheritance(armature: bpy.types.Object, skeleton: Skeleton, scaled: np.ndarray) -> None:
+    bones = armature_data(armature).bones
+    beneath = scaled.copy()
+    for number, parent in enumerate(skeleton.parents):
+        if parent < 0 or not beneath[parent]:
+            continue
+        bone = bones[number]
+        if bone.inherit_scale != "FULL" or not bone.use_inherit_rotation:
+            raise ClipError(
+                f"'{armature.name}' scales bones above '{bone.name}', which does not inherit it.",
+                "Turn on As Shown: the motion is then read as the scene shows it.",
+            )
+        beneath[number] = True
+
+
+def _rotation_modes(armature: bpy.types.Object, skeleton: Skeleton) -> dict[str, str]:
+    if armature.pose is None:
+        bpy.context.view_layer.update()
+    if armature.pose is None:
+        raise ClipError(
+            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+        )
+    pose = {bone.name: bone.rotation_mode for bone in armature.pose.bones}
+    return {name: pose.get(name, "QUATERNION") for name in skeleton.names}
+
+
+def _as_quaternions(values: Floats, mode: str) -> Floats:
+    """Values (…, components) of a rotation mode as unit quaternions (…, 4)."""
+    if mode == "QUATERNION":
+        return _unit(values)
+    if mode == "AXIS_ANGLE":
+        return _unit(from_axis_angle(normalized(values[..., 1:]), values[..., 0]))
+    return from_euler(values, mode)
+
+
+def _unit(quaternions: Floats) -> Floats:
+    """Of length one; one of no length is no rotation, as in Blender."""
+    unit = normalized(quaternions)
+    return np.where(np.any(unit, axis=-1, keepdims=True), unit, IDENTITY)
+
+
+def _object_motion(
+    armature: bpy.types.Object, curves: _Curves, times: Floats
+) -> tuple[Floats, Floats]:
+    """World matrices (frames, 4, 4) of the armature object, and what its own channels make."""
+    if not any(not name for name, _ in curves):
+        shape = (len(times), 4, 4)
+        basis = np.array(armature.matrix_basis, dtype=np.float64)
+        world = np.broadcast_to(world_matrix(armature), shape)
+        return world.copy(), np.broadcast_to(basis, shape).copy()
+
+    def values(channel: str) -> Floats:
+        return _values(curves, "", channel, tuple(getattr(armature, channel)), times)
+
+    mode = armature.rotation_mode
+    channel = rotation_channel(mode)
+    rotations = _as_quaternions(values(channel), mode)
+    delta = f"delta_{channel}"
+    if ("", delta) in curves and mode != "AXIS_ANGLE":
+        rotations = multiply(_as_quaternions(values(delta), mode), rotations)
+    else:
+        rotations = multiply(delta_rotation(armature), rotations)
+    own = np.zeros((len(times), 4, 4))
+    scales = values("scale") * values("delta_scale")
+    own[:, :3, :3] = to_matrix(rotations) * scales[:, None, :]
+    own[:, :3, 3] = values("location") + values("delta_location")
+    own[:, 3, 3] = 1.0
+    return parent_frame(armature) @ own, own
+
+
+def _check_scale(armature: bpy.types.Object, world: Floats) -> None:
+    sizes = np.linalg.norm(world[:, :3, :3], axis=1)
+    mean = sizes.mean()
+    if mean == 0.0 or not np.isfinite(world).all():
+        raise ClipError(f"'{armature.name}' has no size.", "Repair the object's scale.")
+    if (np.linalg.det(world[:, :3, :3]) < 0.0).any():
+        raise ClipError(
+            f"'{armature.name}' is mirrored by a negative scale.",
+            "Apply its scale (Object > Apply > Scale).",
+        )
+    if np.abs(sizes / mean - 1.0).max() > _ROUNDING:
+        raise ClipError(
+            f"The scale of '{armature.name}' is not the same in all directions and at all frames.",
+            "Give it one scale: apply it (Object > Apply > Scale), and remove its scale keys.",
+        )

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The user's own gaits: JSON files in the folder that Blender keeps for the extension."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final
+
+from ...core.errors import GaitError
+from ...core.locomotion.gait import table as gait
+from ...core.locomotion.gait.table import GaitTable
+from .user_files import own_folder, unwritable, write_whole
+
+SUFFIX: Final = ".json"
+LONGEST_NAME: Final = 60
+
+# What some file system refuses, and the escape itself.
+_UNSAFE: Final = re.compile(r'[\x00-\x1f<>:"/\\|?*%\x7f]|^[. ]|[. ]$')
+_ESCAPE: Final = re.compile("%([0-9a-f]{2})")
+_DEVICES: Final = re.compile(r"(?i)^(con|prn|aux|nul|com\d|lpt\d)(?=$|\.)")
+
+
+def user_folder(*, create: bool = False) -> Path:
+    """Where the user's gaits are; of the extension its own folder, else the scripts' presets.
+
+    Raises:
+        WriteError: it is to be made and cannot be.
+    """
+    return own_folder("gaits", create=create)
+
+
+def gait_names() -> list[str]:
+    """Names of all gaits: those that come with the extension, then the user's."""
+    return [*gait.presets(), *user_gait_names()]
+
+
+def has_gait(name: str) -> bool:
+    """Whether there is a gait of that name; quick enough to be asked while a panel is drawn."""
+    return name in gait.presets() or (bool(name) and _path_of(name).is_file())
+
+
+def user_gait_names() -> list[str]:
+    """Names of the user's own gaits, sorted."""
+    built_in = gait.presets()
+    names = (_name_of(path) for path in user_folder().glob(f"*{SUFFIX}"))
+    return sorted((name for name in names if name not in built_in), key=str.casefold)
+
+
+def load_gait(name: str) -> GaitTable:
+    """A gait by name, with that name.
+
+    Raises:
+        GaitError: there is none, or its file is damaged.
+    """
+    built_in = gait.presets()
+    if not name:
+        raise GaitError("No gait is chosen.", f"Choose one of {', '.join(gait_names())}.")
+    if name in built_in:
+        return built_in[name]
+    path = _path_of(name)
+    if not name or not path.is_file():
+        raise GaitError(f"There is no gait '{name}'.", f"Choose one of {', '.join(gait_names())}.")
+    return gait.renamed(read_gait(path), name)
+
+
+def save_gait(table: GaitTable, *, overwrite: bool = False) -> Path:
+    """Keep a table as one of the user's gaits, under its own name.
+
+    Raises:
+        GaitError: the name is empty, too long, that of a gait of the extension, or taken.
+        WriteError: the file cannot be written.
+    """
+    name = table.name
+    if not name.strip():
+        raise GaitError("The gait has no name.", "Give it one.")
+    if len(name) > LONGEST_NAME:
+        raise GaitError(f"The gait's name has {len(name)} letters.", f"Use {LONGEST_NAME} at most.")
+    if name in gait.presets():
+        raise GaitError(f"The gait '{name}' comes with Octo Motion.", "Choose another name.")
+    path = _path_of(name)
+    if path.exists() and not overwrite:
+        raise GaitError(f"There is a gait '{name}' already.", "Choose another name, or overwrite.")
+    user_folder(create=True)
+    write_gait(table, path)
+    return path
+
+
+def remove_gait(name: str) -> None:
+    """Delete one of the user's gaits.
+
+    Raises:
+        GaitError: there is none of that name, or it comes with the extension.
+        WriteError: the file cannot be deleted.
+    """
+    if name in gait.presets():
+        raise GaitError(f"The gait '{name}' comes with Octo Motion.", "It cannot be removed.")
+    path = _path_of(name)
+    if not name or not path.is_file():
+        raise GaitError(f"There is no saved gait '{name}'.", "Choose one that you have saved.")
+    try:
+        path.unlink()
+    except OSError as error:
+        raise unwritable(f"'{path}'", error) from error
+
+
+def read_gait(path: Path) -> GaitTable:
+    """The gait in a file.
+
+    Raises:
+        GaitError: it cannot be read, or is no gait.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = (isinstance(error, OSError) and error.strerror) or "it is not text"
+        raise GaitError(
+            f"'{path.name}' cannot be read: {reason}.", "Choose a gait file."
+        ) from error
+    return gait.from_json(text, f"'{path.name}'")
+
+
+def write_gait(table: GaitTable, path: Path) -> None:
+    """Write a gait to a file, whole or not at all.
+
+    Raises:
+        WriteError: it cannot be written.
+    """
+    write_whole(path, gait.to_json(table))
+
+
+def _path_of(name: str) -> Path:
+    """The file of a gait's name: any name has one, and no two names share one."""
+    safe = _UNSAFE.sub(lambda found: f"%{ord(found.group()):02x}", name)
+    safe = _DEVICES.sub(lambda found: f"%{ord(found.group()[0]):02x}{found.group()[1:]}", safe)
+    return user_folder() / f"{safe}{SUFFIX}"
+
+
+def _name_of(path: Path) -> str:
+    return _ESCAPE.sub(lambda found: chr(int(found.group(1), 16)), path.stem)

@@ -1,0 +1,423 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An armature as a puppet: which bones are bodies, how thick, how heavy, how far they turn."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import bpy
+import numpy as np
+
+from ...core.errors import RigError, WriteError
+from ...core.posing.puppet.bone_roles import (
+    BODY,
+    FOLLOW,
+    SMALLEST,
+    RigFacts,
+    Roles,
+    diagonal,
+    find_roles,
+)
+from ...core.posing.puppet.build import DENSITY, FREE, SIZE, JointLimits, PosedBones, build_figure
+from ...core.posing.puppet.figure import Figure, Pose
+from ...core.posing.puppet.materials import Material
+from ...core.rotations import Floats, from_matrix
+from ...core.skeleton import Skeleton
+from .armature import armature_data, read_skeleton
+
+MARK: Final = "octo_motion_puppet"
+"""Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
+
+MATERIAL: Final = "octo_motion_material"
+"""Custom property of a bone: what its joint alone is made of, four numbers of ``Material``."""
+_NEVER: Final = -1.0
+"""In place of what a joint bears that never yields: files of other programs know no infinity."""
+
+MOST_LIMBS: Final = 300
+"""More cannot be moved at a speed at which one could pose them."""
+
+_TOLERANT: Final = frozenset({"LIMIT_ROTATION", "LIMIT_LOCATION", "LIMIT_SCALE", "MAINTAIN_VOLUME"})
+"""Constraints under which a bone still turns as its keys say."""
+_ANGLE_LIMIT: Final = 2.0 * np.pi - 1e-4
+_MOST_VERTICES: Final = 6000
+"""Of each mesh that are looked at: more make no better radius."""
+_LEAST_WEIGHT: Final = 0.35
+"""A vertex counts for the bone that has at least this share of it, and the most."""
+_EVEN: Final = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """An armature taken for a puppet."""
+
+    skeleton: Skeleton
+    roles: Roles
+    figure: Figure
+    pose: Pose
+    unit: float
+    """Puppet metres of one metre in the world: every puppet is simulated at the same size."""
+
+    def body(self, bone: str, armature: str) -> int:
+        """The body of a bone, or the one that a helper bone follows.
+
+        Raises:
+            RigError: the armature has no such bone, or it follows nothing.
+        """
+        number = self.skeleton.index.get(bone)
+        if number is None:
+            raise RigError(f"'{armature}' has no bone '{bone}'.", "Check its name.")
+        body = self.roles.follows[number]
+        if body < 0:
+            raise RigError(
+                f"The bone '{bone}' is no limb of the puppet.", "Choose one that it carries."
+            )
+        return body
+
+
+def read_rig(
+    armature: bpy.types.Object, *, density: float = DENSITY, smallest: float = SMALLEST
+) -> Rig:
+    """Make a figure of an armature as it stands now. Nothing in the file is changed.
+
+    Args:
+        armature: the armature object.
+        density: kg/m³.
+        smallest: share of the figure's size below which bones only follow.
+
+    Raises:
+        RigError: it is no armature, has no bones, no size, an uneven scale, or nothing to pose; or
+            it is shown at rest.
+    """
+    skeleton = read_skeleton(armature)
+    if armature.pose is None or len(armature.pose.bones) != len(skeleton):
+        bpy.context.view_layer.update()
+    if armature.pose is None:
+        raise RigError(
+            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+        )
+    if armature_data(armature).pose_position == "REST":
+        raise RigError(
+            f"'{armature.name}' is shown at rest, whatever its pose is.",
+            "Set its data to Pose Position (Properties > Data > Skeleton).",
+        )
+    scale = even_scale(armature)
+    posed = posed_bones(armature, scale)
+    skin = _read_skin(armature, skeleton)
+    facts = RigFacts(
+        moved=moved_bones(armature),
+        weights=skin.weights,
+        marks=bone_marks(armature),
+        locked=_locked_bones(armature),
+        smallest=smallest,
+    )
+    roles = find_roles(skeleton, facts, armature.name)
+    if len(roles.bodies) > MOST_LIMBS:
+        raise RigError(
+            f"'{armature.name}' has {len(roles.bodies)} limbs, more than {MOST_LIMBS}.",
+            "Raise Smallest Bone, or mark bones that are to follow.",
+        )
+    bodies = list(roles.bodies)
+    unit = SIZE / (diagonal(skeleton.heads[bodies], skeleton.tails[bodies]) * scale)
+    figure, pose = build_figure(
+        skeleton,
+        roles,
+        _scaled(posed, unit),
+        skin={bone: points * unit for bone, points in skin.points.items()},
+        limits=joint_limits(armature),
+        density=density,
+    )
+    return Rig(skeleton, roles, figure, pose, unit)
+
+
+def _scaled(posed: PosedBones, unit: float) -> PosedBones:
+    return replace(posed, heads=posed.heads * unit, lengths=posed.lengths * unit)
+
+
+def even_scale(armature: bpy.types.Object) -> float:
+    """The scale of an object, which must be the same in all directions.
+
+    Raises:
+        RigError: it is not, or zero, or negative, or sheared.
+    """
+    matrix = np.array(armature.matrix_world, dtype=np.float64)[:3, :3]
+    sizes = np.linalg.norm(matrix, axis=0)
+    name = f"'{armature.name}'"
+    if not np.isfinite(matrix).all() or sizes.min() <= 1e-9 * max(1.0, sizes.max()):
+        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
+    if sizes.max() - sizes.min() > _EVEN * sizes.max():
+        shown = ", ".join(f"{size:.3g}" for size in sizes)
+        raise RigError(
+            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
+        )
+    axes = matrix / sizes
+    if np.abs(axes.T @ axes - np.eye(3)).max() > _EVEN:
+        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
+    if np.linalg.det(axes) < 0.0:
+        raise RigError(
+            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
+        )
+    return float(sizes.mean())
+
+
+def posed_bones(armature: bpy.types.Object, scale: float) -> PosedBones:
+    """All bones as they are shown now, in the world.
+
+    Raises:
+        RigError: a bone is nowhere.
+    """
+    shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert shown.pose is not None
+    count = len(shown.pose.bones)
+    buffer = np.empty(16 * count, dtype=np.float32)
+    shown.pose.bones.foreach_get("matrix", buffer)
+    # Blender hands over matrices column by column.
+    matrices = buffer.reshape(count, 4, 4).transpose(0, 2, 1).astype(np.float64)
+    if not np.isfinite(matrices).all():
+        raise RigError(
+            f"'{armature.name}' has bones posed at undefined positions.",
+            "Clear their transforms (Pose > Clear Transform > All).",
+        )
+    world = np.array(shown.matrix_world, dtype=np.float64)
+    turned = world[:3, :3] @ matrices[:, :3, :3]
+    sizes = np.linalg.norm(turned, axis=1)
+    rest_lengths = np.array([bone.length for bone in armature_data(armature).bones])
+    return PosedBones(
+        heads=matrices[:, :3, 3] @ world[:3, :3].T + world[:3, 3],
+        rotations=from_matrix(_nearest_rotations(turned)),
+        lengths=rest_lengths * sizes[:, 1],
+        turn=from_matrix(world[:3, :3] / scale),
+    )
+
+
+def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
+    """Names of the bones that something else than their own rotation turns."""
+    if armature.pose is None:
+        return frozenset()
+    found = {
+        bone.name
+        for bone in armature.pose.bones
+        if any(each.type not in _TOLERANT and _acts(each) for each in bone.constraints)
+    }
+    for bone in armature.pose.bones:
+        for constraint in bone.constraints:
+            if constraint.type in {"IK", "SPLINE_IK"} and _acts(constraint):
+                count = getattr(constraint, "chain_count", 0)
+                chain = [bone, *bone.parent_recursive]
+                found.update(each.name for each in chain[: count or len(chain)])
+    if armature.animation_data is not None:
+        for curve in armature.animation_data.drivers:
+            start, _, rest = curve.data_path.partition('pose.bones["')
+            name, _, channel = rest.partition('"].')
+            if not start and channel.startswith("rotation_") and not curve.mute:
+                found.add(bpy.utils.unescape_identifier(name))
+    return frozenset(found)
+
+
+def _acts(constraint: bpy.types.Constraint) -> bool:
+    return not constraint.mute and constraint.influence > 0.0
+
+
+def bone_marks(armature: bpy.types.Object) -> dict[str, str]:
+    """What the artist has decided of bones: "BODY" or "FOLLOW"."""
+    return {
+        bone.name: str(bone[MARK])
+        for bone in armature_data(armature).bones
+        if bone.get(MARK) in (BODY, FOLLOW)
+    }
+
+
+def mark_bones(armature: bpy.types.Object, names: list[str], mark: str) -> None:
+    """Decide for bones: "BODY", "FOLLOW", or "" to let the extension tell."""
+    bones = armature_data(armature).bones
+    for name in names:
+        if mark:
+            bones[name][MARK] = mark
+        elif MARK in bones[name]:
+            del bones[name][MARK]
+
+
+def bone_materials(armature: bpy.types.Object) -> dict[str, Material]:
+    """Materials of single bones, as they were measured; what is damaged counts for nothing."""
+    found: dict[str, Material] = {}
+    for bone in armature_data(armature).bones:
+        values: Any = bone.get(MATERIAL)
+        if values is None:
+            continue
+        try:
+            bears, springs, settles, gives = (float(each) for each in values)
+        except (TypeError, ValueError):
+            continue
+        known = not np.isnan((bears, springs)).any() and np.isfinite((settles, gives)).all()
+        if known and min(springs, settles) > 0.0 and gives >= 0.0 and bears != 0.0:
+            found[bone.name] = Material(
+                bears if bears > 0.0 else float(np.inf), springs, settles, gives
+            )
+    return found
+
+
+def set_bone_material(armature: bpy.types.Object, name: str, material: Material | None) -> None:
+    """Let a bone's joint be of a material of its own, or of the figure's again with None.
+
+    Raises:
+        WriteError: the bones are linked.
+    """
+    data = armature_data(armature)
+    if not data.is_editable:
+        raise WriteError(
+            f"The bones of '{armature.name}' are linked and read-only.",
+            "Let the whole figure have the material, or measure in the linked file.",
+        )
+    bone = data.bones[name]
+    if material is None:
+        if MATERIAL in bone:
+            del bone[MATERIAL]
+        return
+    bears = material.bears if np.isfinite(material.bears) else _NEVER
+    bone[MATERIAL] = [bears, material.springs, material.settles, material.gives]
+
+
+def joint_limits(armature: bpy.types.Object) -> dict[str, JointLimits]:
+    """Limits of bones, from Limit Rotation constraints and limits of inverse kinematics.
+
+    About axes that are locked, bones stay as they are. A range that a constraint gives goes before
+    that of inverse kinematics about the same axis.
+    """
+    assert armature.pose is not None
+    found: dict[str, JointLimits] = {}
+    for bone in armature.pose.bones:
+        ranges = _ik_limits(bone) | _limit_constraint(bone)
+        x, y, z = np.array(bone.lock_rotation).tolist()
+        if ranges or x or y or z:
+            found[bone.name] = JointLimits(
+                ranges.get("x", FREE), ranges.get("y", FREE), ranges.get("z", FREE), (x, y, z)
+            )
+    return found
+
+
+def _limit_constraint(bone: bpy.types.PoseBone) -> dict[str, tuple[float, float]]:
+    for constraint in bone.constraints:
+        limit: Any = constraint
+        if limit.type != "LIMIT_ROTATION" or limit.mute or limit.influence < 1.0:
+            continue
+        # Other spaces limit something else than the joint.
+        if limit.owner_space == "LOCAL":
+            return {
+                axis: (getattr(limit, f"min_{axis}"), getattr(limit, f"max_{axis}"))
+                for axis in "xyz"
+                if getattr(limit, f"use_limit_{axis}")
+                and getattr(limit, f"max_{axis}") - getattr(limit, f"min_{axis}") < _ANGLE_LIMIT
+            }
+    return {}
+
+
+def _ik_limits(bone: bpy.types.PoseBone) -> dict[str, tuple[float, float]]:
+    own: Any = bone
+    ranges = {
+        axis: (getattr(own, f"ik_min_{axis}"), getattr(own, f"ik_max_{axis}"))
+        for axis in "xyz"
+        if getattr(own, f"use_ik_limit_{axis}")
+    }
+    return ranges | {axis: (0.0, 0.0) for axis in "xyz" if getattr(own, f"lock_ik_{axis}")}
+
+
+def _locked_bones(armature: bpy.types.Object) -> frozenset[str]:
+    assert armature.pose is not None
+    return frozenset(bone.name for bone in armature.pose.bones if all(np.array(bone.lock_rotation)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Skin:
+    """The meshes that an armature deforms."""
+
+    points: Mapping[int, Floats]
+    """(points, 3), world, as the skin is shown now, by the bone that moves them most."""
+    weights: Mapping[str, float]
+    """Summed over the skin, by bone."""
+
+
+def _read_skin(armature: bpy.types.Object, skeleton: Skeleton) -> _Skin:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    points: dict[int, list[Floats]] = defaultdict(list)
+    sums = np.zeros(len(skeleton))
+    for item in bpy.data.objects:
+        if item.type != "MESH" or not item.users_scene:
+            continue
+        shown = item.evaluated_get(depsgraph)
+        if not isinstance(shown.data, bpy.types.Mesh) or not len(shown.data.vertices):
+            continue
+        carrier = _carrying_bone(item, armature)
+        if carrier is not None:
+            place = _vertices(shown)
+            step = -(-len(place) // _MOST_VERTICES)
+            points[skeleton.index[carrier]].append(place[::step])
+            sums[skeleton.index[carrier]] += len(place)
+        elif item.find_armature() == armature:
+            bone_of_group = [skeleton.index.get(group.name, -1) for group in item.vertex_groups]
+            owners = _owners(shown.data, bone_of_group, sums)
+            place = _vertices(shown)
+            for bone in {each for each in owners.values() if each >= 0}:
+                points[bone].append(place[[n for n, each in owners.items() if each == bone]])
+    return _Skin(
+        points={bone: np.concatenate(parts) for bone, parts in points.items()},
+        weights={skeleton.names[bone]: float(sums[bone]) for bone in np.flatnonzero(sums > 1e-3)},
+    )
+
+
+def is_part_of(item: bpy.types.Object, armature: bpy.types.Object) -> bool:
+    """Whether an object goes along with an armature: as its skin, or hung on it."""
+    above: bpy.types.Object | None = item
+    while above is not None:
+        if above == armature or above.find_armature() == armature:
+            return True
+        above = above.parent
+    return False
+
+
+def _carrying_bone(item: bpy.types.Object, armature: bpy.types.Object) -> str | None:
+    """The bone on which a stiff part hangs, itself or by its parents."""
+    each: bpy.types.Object | None = item
+    while each is not None:
+        if each.parent == armature:
+            known = each.parent_type == "BONE" and each.parent_bone in armature_data(armature).bones
+            return each.parent_bone if known else None
+        each = each.parent
+    return None
+
+
+def _vertices(shown: bpy.types.Object) -> Floats:
+    """Positions (vertices, 3) of an evaluated mesh object in the world."""
+    mesh = shown.data
+    assert isinstance(mesh, bpy.types.Mesh)
+    place = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", place)
+    matrix = np.array(shown.matrix_world, dtype=np.float64)
+    return place.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _owners(mesh: bpy.types.Mesh, bone_of_group: list[int], sums: Floats) -> dict[int, int]:
+    """The bone that moves each looked-at vertex most; adds all weights to the bones' sums."""
+    step = -(-len(mesh.vertices) // _MOST_VERTICES)
+    owners: dict[int, int] = {}
+    for number in range(0, len(mesh.vertices), step):
+        best, most, total = -1, 0.0, 0.0
+        for each in mesh.vertices[number].groups:
+            bone = bone_of_group[each.group] if each.group < len(bone_of_group) else -1
+            if bone >= 0:
+                sums[bone] += each.weight * step
+                total += each.weight
+                if each.weight > most:
+                    best, most = bone, each.weight
+        if most >= _LEAST_WEIGHT * total:
+            owners[number] = best
+    return owners
+
+
+def _nearest_rotations(matrices: Floats) -> Floats:
+    """The rotations in matrices that may scale and shear: their polar decompositions."""
+    left, _, right = np.linalg.svd(matrices)
+    flipped = np.linalg.det(left @ right) < 0.0
+    left[flipped, :, -1] *= -1.0
+    return left @ right

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects that the artist has marked as solid, as obstacles for a puppet."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import bmesh
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...core.errors import RigError
+from ...core.posing.solver.obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
+from ...core.rotations import Floats, from_matrix
+
+MOST_TRIANGLES: Final = 50_000
+"""More would keep a session from running in real time."""
+
+
+def read_obstacle(item: bpy.types.Object, kind: str, unit: float) -> Obstacle:
+    """One object as an obstacle, as it is shown now.
+
+    A box, a ball and a capsule are fitted to the object's own bounds, and turn and scale with it;
+    a plane lies at its origin and is solid below its local Z axis.
+
+    Args:
+        item: the object.
+        kind: "PLANE", "BOX", "SPHERE", "CAPSULE", "HULL" or "MESH".
+        unit: puppet metres of one metre in the world.
+
+    Raises:
+        RigError: the object has no size, no surface, or too much of it, or is nowhere.
+    """
+    shown = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    world = np.array(shown.matrix_world, dtype=np.float64)
+    sizes = np.linalg.norm(world[:3, :3], axis=0)
+    if not np.isfinite(world).all() or sizes.min() <= 0.0:
+        raise RigError(f"The obstacle '{item.name}' has no size.", "Repair its scale.")
+    axes = world[:3, :3] / sizes
+    # Of what is mirrored, another axis than a plane's is turned round.
+    axes[:, 0] *= np.sign(np.linalg.det(axes)) or 1.0
+    turn = from_matrix(axes)
+    if kind == "PLANE":
+        return Plane(position=world[:3, 3] * unit, orientation=turn)
+    if kind in ("HULL", "MESH"):
+        corners = _triangles(shown, convex=kind == "HULL") * unit
+        return Hull(corners=corners) if kind == "HULL" else Mesh(corners=corners)
+    low, high = _bounds(shown)
+    half = np.maximum(0.5 * (high - low) * sizes * unit, 1e-6)
+    middle = world[:3, :3] @ (0.5 * (low + high)) + world[:3, 3]
+    if kind == "BOX":
+        return Box(position=middle * unit, orientation=turn, half=half)
+    if kind == "SPHERE":
+        return Sphere(position=middle * unit, orientation=turn, radius=float(half.max()))
+    along = int(np.argmax(half))
+    radius = float(np.delete(half, along).max())
+    reach = np.zeros(3)
+    reach[along] = max(half[along] - radius, 1e-6)
+    ends = np.stack([-reach, reach])
+    return Capsule(position=middle * unit, orientation=turn, ends=ends, radius=radius)
+
+
+def _bounds(shown: bpy.types.Object) -> tuple[Floats, Floats]:
+    """Lower and upper corner (3,) of an object in its own space."""
+    corners = np.array([Vector(corner) for corner in shown.bound_box], dtype=np.float64)
+    _check_corners(shown, corners)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if not (high > low).any():
+        # Empties and the like show how large they are in their own way.
+        size = float(getattr(shown, "empty_display_size", 0.0))
+        if size <= 0.0:
+            raise RigError(f"The obstacle '{shown.name}' has no size.", "Repair its scale.")
+        return np.full(3, -size), np.full(3, size)
+    return low, high
+
+
+def _check_corners(shown: bpy.types.Object, places: np.ndarray) -> None:
+    if not np.isfinite(places).all():
+        raise RigError(
+            f"The obstacle '{shown.name}' has corners at undefined positions.", "Repair its mesh."
+        )
+
+
+def _triangles(shown: bpy.types.Object, *, convex: bool) -> Floats:
+    """Triangles (triangles, 3, 3) of a surface in the world, or of the hull about it."""
+    try:
+        mesh = shown.to_mesh()
+    except RuntimeError:
+        mesh = None
+    if mesh is None or not len(mesh.polygons):
+        raise RigError(
+            f"The obstacle '{shown.name}' has no faces.", "Choose another shape for it: a box."
+        )
+    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", places)
+    _check_corners(shown, places)
+    editable = bmesh.new()
+    try:
+        editable.from_mesh(mesh)
+        editable.transform(shown.matrix_world)
+        if convex:
+            # What is inside the hull, and what of the surface is no part of it, goes.
+            hull = bmesh.ops.convex_hull(
+                editable, input=list(editable.verts), use_existing_faces=False
+            )
+            outer = {each for each in hull["geom"] if isinstance(each, bmesh.types.BMFace)}
+            spare = [face for face in editable.faces if face not in outer]
+            bmesh.ops.delete(editable, geom=[*spare], context="FACES_ONLY")
+        found = np.array(
+            [[loop.vert.co[:] for loop in loops] for loops in editable.calc_loop_triangles()],
+            dtype=np.float64,
+        )
+    finally:
+        editable.free()
+        shown.to_mesh_clear()
+    if len(found) > MOST_TRIANGLES:
+        raise RigError(
+            f"The obstacle '{shown.name}' has {len(found)} triangles, more than {MOST_TRIANGLES}.",
+            "Mark a simpler object in its place, or choose another shape for it.",
+        )
+    return found

@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splices of one shot in this Blender: import clips, fill the list, build."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import bpy
+
+from ..blender.animation import actions
+from ..blender.animation.cycles import lasting
+from ..blender.scene.imports import NOTE, ImportedClip, import_clip
+from ..core.errors import ClipError, OctoMotionError
+from ..ui.splicing.properties import splicing_settings
+from ..ui.splicing.splice_properties import PARTS
+from ..ui.splicing.stack import Reader, prepare, write
+from .motion_files import check_motion, files_within
+from .setting_values import Value, unknown
+from .shot_request import HIGHEST_FPS, NewSplice, SpliceWork, frame_rate
+
+_FIRST_FRAME: Final = 1
+
+_BROADCAST: Final = 1.001
+"""What whole rates are divided by for television."""
+
+_SPARE_EASE: Final = 0.25
+"""Of a clip's length, as in the panel: longer easing would leave little of a short clip."""
+
+
+@dataclass(frozen=True)
+class SpliceSummary:
+    """What was spliced, for people and for reports."""
+
+    message: str
+    frames: int
+    frame_start: int
+    frame_end: int
+    warnings: tuple[str, ...]
+
+
+@dataclass
+class Clips:
+    """Motion files in this Blender, each imported once."""
+
+    warnings: list[str] = field(default_factory=list)
+    """What was repaired, or was odd."""
+    read: list[Path] = field(default_factory=list)
+    """Further files that belong to those that were named."""
+    _imported: dict[Path, ImportedClip] = field(default_factory=dict)
+
+    def armature(self, path: Path) -> bpy.types.Object:
+        """The armature of a file.
+
+        Raises:
+            OctoMotionError: the file cannot be used, or has several.
+        """
+        first, *others = self._clip(path).armatures
+        if others:
+            raise ClipError(
+                f"'{path.name}' has {1 + len(others)} armatures.",
+                "Import it into a .blend file and name the armature there.",
+            )
+        return bpy.data.objects[first]
+
+    def action(self, path: Path, name: str) -> bpy.types.Action:
+        """An action of a file by its name, its only one if that is empty.
+
+        Raises:
+            OctoMotionError: there is none of that name, or there are several.
+        """
+        clip = self._clip(path)
+        short = {each.removeprefix(f"{path.stem} "): each for each in clip.actions}
+        if name:
+            found = short.get(name) or (name if name in clip.actions else "")
+            if not found:
+                raise ClipError(f"'{path.name}': {unknown('action', name, short)}")
+            return bpy.data.actions[found]
+        if len(short) > 1:
+            raise ClipError(
+                f"'{path.name}' has {len(short)} actions.", f"Name one: {', '.join(short)}."
+            )
+        return bpy.data.actions[clip.actions[0]]
+
+    def _clip(self, path: Path) -> ImportedClip:
+        if path not in self._imported:
+            check_motion(path)
+            try:
+                clip = import_clip(path, bpy.context, _FIRST_FRAME)
+            except OctoMotionError as error:
+                raise type(error)(f"'{path.name}': {error.problem}", error.remedy) from error
+            self._imported[path] = clip
+            self.warnings += [f"'{clip.file}': {note}" for note in clip.notes]
+            self.read += files_within(path)
+        return self._imported[path]
+
+
+def import_base(path: Path, fps: float | None) -> tuple[bpy.types.Object, Clips]:
+    """A motion file as the only thing in the file, in a scene of its own frame rate.
+
+    Raises:
+        OctoMotionError: the file cannot be used.
+    """
+    clips = _alone(path, fps)
+    armature = clips.armature(path)
+    if fps is None:
+        action: Any = bpy.data.actions[0]
+        own = min(max(_rounded(float(action[NOTE]["rate"])), 1.0), float(HIGHEST_FPS))
+        scene = armature.users_scene[0]
+        if abs(own - scene.render.fps / scene.render.fps_base) > 1e-6:
+            # Only now the rate is known, by which the keys are to be placed.
+            clips = _alone(path, own)
+            armature = clips.armature(path)
+    return armature, clips
+
+
+def _alone(path: Path, fps: float | None) -> Clips:
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    scene = bpy.context.scene
+    assert scene is not None
+    if fps is not None:
+        scene.render.fps, scene.render.fps_base = frame_rate(fps)
+    clips = Clips()
+    clips.armature(path)
+    return clips
+
+
+def _rounded(rate: float) -> float:
+    """Files round the time of a frame: 0.033333 s are 30 frames per second, 0.041708 s are 23.976,
+    as in broadcasting.
+    """
+    usual = (float(round(rate)), round(_BROADCAST * rate) / _BROADCAST)
+    nearest = min(usual, key=lambda each: abs(rate - each))
+    return nearest if abs(rate - nearest) < 1e-3 * rate else rate
+
+
+def has_splices(armature: bpy.types.Object) -> bool:
+    """Whether an armature's list of splices has any."""
+    return bool(len(_stack(armature).splices))
+
+
+def splice(
+    armature: bpy.types.Object,
+    work: SpliceWork,
+    settings: Mapping[str, Value],
+    clips: Clips,
+    base_file: Path | None,
+) -> SpliceSummary:
+    """Fill the list of an armature as it is asked for, and build.
+
+    Args:
+        armature: what gets the result; the context has its scene.
+        work: what to splice.
+        settings: of the armature's splicing, by name.
+        clips: files that have been imported.
+        base_file: the motion file that the armature was imported from, if it was.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    actions.writable_armature(armature)
+    stack = _stack(armature)
+    if work.splices is None and not has_splices(armature):
+        raise ClipError(
+            f"'{armature.name}' has no splices in its list.",
+            "Say what to splice, a part and a motion file at least.",
+        )
+    if work.base or base_file is not None:
+        stack.base = _base(work.base, clips, base_file)
+        stack.base_slot = ""
+    _set(stack, settings)
+    if work.frames is not None or work.splices is not None:
+        _choose_base(armature, stack)
+    if work.frames is not None and stack.base is not None:
+        stack.base = lasting(stack.base, work.frames)
+    if work.splices is not None:
+        _clear(stack)
+        for number, each in enumerate(work.splices, 1):
+            try:
+                _add(armature, each, clips, base_file)
+            except OctoMotionError as error:
+                raise type(error)(f"Splice {number}: {error.problem}", error.remedy) from error
+    prepared = prepare(armature)
+    made = write(prepared, prepared.compute())
+    first, last = (round(each) for each in bpy.data.actions[made.action].frame_range)
+    warnings = (*clips.warnings, *made.warnings)
+    return SpliceSummary(made.message, made.frames, first, last, warnings)
+
+
+def _stack(armature: bpy.types.Object) -> Any:
+    return splicing_settings(armature)
+
+
+def _choose_base(armature: bpy.types.Object, stack: Any) -> None:
+    """Take the armature's own action as the base, where none is set."""
+    data = armature.animation_data
+    if stack.base is None and data is not None and data.action is not None:
+        stack.base = data.action
+        stack.base_slot = data.action_slot.identifier if data.action_slot else ""
+
+
+def _base(name: str, clips: Clips, base_file: Path | None) -> bpy.types.Action:
+    if base_file is not None:
+        return clips.action(base_file, name)
+    return _action(name)
+
+
+def _action(name: str) -> bpy.types.Action:
+    found = [each for each in bpy.data.actions if each.name == name]
+    local = [each for each in found if each.library is None]
+    if not found:
+        raise ClipError(unknown("action", name, sorted(each.name for each in bpy.data.actions)))
+    return (local or found)[0]
+
+
+def _clear(stack: Any) -> None:
+    stack.splices.clear()
+    if len(stack.splices):
+        raise ClipError(
+            "The list of splices is in a linked file and cannot be replaced.",
+            "Leave splices out to build it as it is.",
+        )
+    stack.active_splice = 0
+
+
+def _add(
+    armature: bpy.types.Object, asked: NewSplice, clips: Clips, base_file: Path | None
+) -> None:
+    """Add a splice with what the panel's button gives it, and what is asked for."""
+    source, action = _source(armature, asked, clips, base_file)
+    landmarks, values = dict[str, Value](), dict[str, Value]()
+    for name, value in asked.settings.items():
+        group, _, landmark = name.rpartition("landmarks.")
+        (values if group or landmark == name else landmarks)[landmark] = value
+    _set(_stack(source).landmarks, landmarks)
+    reader, stack = Reader(), _stack(armature)
+    slot, visual = str(values.get("slot", "")), bool(values.get("visual", False))
+    begins = float(reader.base(armature).clip.frames[0])
+    frames = reader.source(source, action, slot, visual=visual).clip.frames
+    item = stack.splices.add()
+    item.source, item.action = source, action
+    item.base_start, item.splice_start = begins, float(frames[0])
+    ease = min(item.ease_in, _SPARE_EASE * float(frames[-1] - frames[0]))
+    item.ease_in = item.ease_out = round(ease)
+    _set(item, values)
+    item.name = item.name or _name(item, stack.splices)
+
+
+def _name(item: Any, items: Any) -> str:
+    """What the panel would call a splice, other than all others are called."""
+    parts = {identifier: title for identifier, title, *_ in PARTS}
+    name = f"{item.bone or parts[item.part]}: {item.action.name}"
+    taken = {each.name for each in items}
+    numbered = (f"{name}.{number:03}" for number in range(1, len(taken) + 1))
+    return next(each for each in (name, *numbered) if each not in taken)
+
+
+def _source(
+    armature: bpy.types.Object, asked: NewSplice, clips: Clips, base_file: Path | None
+) -> tuple[bpy.types.Object, bpy.types.Action]:
+    """The armature of a splice and its action."""
+    if asked.clip is not None and asked.clip != base_file:
+        return clips.armature(asked.clip), clips.action(asked.clip, asked.action)
+    if asked.source:
+        source = _armature(asked.source)
+        return source, _action(asked.action) if asked.action else _own_action(source, armature)
+    if base_file is not None and (asked.clip is not None or asked.action):
+        return armature, clips.action(base_file, asked.action)
+    if not asked.action:
+        raise ClipError(
+            "It is not said what is spliced.",
+            "Give a motion file (clip), or the name of an armature (source) or of an action.",
+        )
+    return armature, _action(asked.action)
+
+
+def _armature(name: str) -> bpy.types.Object:
+    found = [each for each in bpy.data.objects if each.type == "ARMATURE"]
+    named = [each for each in found if each.name == name]
+    if not named:
+        raise ClipError(unknown("armature", name, sorted(each.name for each in found)))
+    return named[0]
+
+
+def _own_action(source: bpy.types.Object, armature: bpy.types.Object) -> bpy.types.Action:
+    data = source.animation_data
+    if data is None or data.action is None:
+        raise ClipError(f"The source '{source.name}' has no action.", "Name the action.")
+    if source == armature:
+        raise ClipError(f"'{source.name}' is both base and source.", "Name the source's action.")
+    return data.action
+
+
+def _set(group: Any, values: Mapping[str, Value]) -> None:
+    for name, value in values.items():
+        *groups, last = name.split(".")
+        owner = group
+        for each in groups:
+            owner = getattr(owner, each)
+        setattr(owner, last, value)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Few Bézier keys in place of one key per frame, within bounds that hold at every frame.
+
+What an animator edits is a key: a frame at which all channels of a bone, or of a whole limb, have
+a key. Between two keys every channel is a cubic whose handles stand at thirds of the time:
+Blender's curve is then a cubic in time itself, and its values depend on those of keys and handles
+linearly.
+
+First the frames are chosen (:mod:`.key_frames`), for bounds somewhat wider than those that are
+asked for. Then all keys of a limb are fitted together (:mod:`.key_fit`: :mod:`.key_curves` against
+:mod:`.key_model`), handles are brought into line, and keys are added where bounds are still broken
+(:mod:`.key_search`), between frames, too (:mod:`.key_halves`). Keys on every frame have handles of
+their own (:mod:`.key_dense`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..errors import SettingsError
+from ..rotations import Floats
+from .dense import dense_keys
+from .key_times import Choice
+from .search import Search
+from .subframes import looked_at
+from .tracks import LOCATION, SCALE, BezierKeys, Booleans, Chain, Limb, Track, chain_to_tip
+
+__all__ = [
+    "LOCATION",
+    "SCALE",
+    "BezierKeys",
+    "Chain",
+    "Limb",
+    "Track",
+    "chain_to_tip",
+    "check_bounds",
+    "reduce_keys",
+    "reducing",
+]
+
+_SLACK: Final = 1.15
+"""Bounds within which key frames are chosen: what fitting makes up for afterwards."""
+_LEVERAGE: Final = 2.5
+"""Distances of the tip, as shares of the chain's length, that a bone may be turned away when key
+frames are chosen: what others make up for …"""
+_HELD_LEVERAGE: Final = 4.2
+"""… and the same of joints that rest."""
+_CHOOSING: Final = 0.2
+"""Share of the work that it takes to choose key frames."""
+
+
+def check_bounds(angle: float, distance: float) -> None:
+    """Make sure that there is something to reduce within.
+
+    Raises:
+        SettingsError: a bound is not above zero.
+    """
+    if not (angle > 0.0 and distance > 0.0):
+        raise SettingsError(
+            "Without any tolerance, no key can be left out.",
+            "Choose an angle and a distance above zero, or keys on every frame.",
+        )
+
+
+def reduce_keys(
+    frames: Floats,
+    limbs: Sequence[Limb],
+    *,
+    every: int = 1,
+    all_of_them: bool = False,
+    loops: bool = False,
+) -> list[list[BezierKeys]]:
+    """As few keys as keep each limb within its bounds at every frame.
+
+    Args:
+        frames: (frames,) ascending, as Blender keeps them.
+        limbs: any number.
+        every: at every how many of the frames there may be a key, from the first to the last one;
+            those in between are moments at which the bounds hold too.
+        all_of_them: whether there is a key wherever there may be one, of the motion's own values.
+        loops: whether the motion goes on from its last frame to its first.
+
+    Returns:
+        The keys of each limb's tracks.
+
+    Raises:
+        SettingsError: a bound is not above zero.
+    """
+    steps = reducing(frames, limbs, every=every, all_of_them=all_of_them, loops=loops)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as finished:
+            return finished.value
+
+
+def reducing(
+    frames: Floats,
+    limbs: Sequence[Limb],
+    *,
+    every: int = 1,
+    all_of_them: bool = False,
+    loops: bool = False,
+) -> Generator[float, None, list[list[BezierKeys]]]:
+    """The same in steps, yielding the share that is done: 0…1. May be dropped between any two."""
+    for limb in limbs:
+        check_bounds(limb.angle, float(np.min(limb.distance)))
+    times = np.asarray(frames, dtype=np.float32).astype(np.float64)
+    if len(times) == 1:
+        return [[_alone(times, track) for track in limb.tracks] for limb in limbs]
+    if all_of_them:
+        return (yield from _dense(times, limbs, every, loops=loops))
+    plans = [_Plan.of(limb, len(times)) for limb in limbs]
+    for share in _choose(times, plans, every):
+        yield _CHOOSING * share
+    result: list[list[BezierKeys]] = []
+    done, whole = 0, max(sum(len(limb.tracks) for limb in limbs), 1)
+    for plan in plans:
+        fine = looked_at(times, plan.limb, every)
+        search = Search(fine, fine.marked(plan.keyed), fine.marked(plan.corners), loops=loops)
+        own, steps = len(plan.limb.tracks), search.found()
+        while True:
+            try:
+                share = next(steps)
+            except StopIteration as finished:
+                result.append(finished.value)
+                break
+            yield _CHOOSING + (1.0 - _CHOOSING) * (done + own * share) / whole
+        done += own
+    return result
+
+
+def _dense(
+    times: Floats, limbs: Sequence[Limb], every: int, *, loops: bool
+) -> Generator[float, None, list[list[BezierKeys]]]:
+    """A key wherever there may be one, of the motion's own values."""
+    result: list[list[BezierKeys]] = []
+    for limb in limbs:
+        yield len(result) / len(limbs)
+        result.append(dense_keys(times, limb, every, loops=loops))
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """A limb, and its key frames."""
+
+    limb: Limb
+    keyed: Booleans
+    """(columns, frames)"""
+    corners: Booleans
+    """(tracks, frames)"""
+
+    @classmethod
+    def of(cls, limb: Limb, frames: int) -> _Plan:
+        columns = limb.column_numbers()
+        return cls(
+            limb,
+            np.zeros((max(columns, default=-1) + 1, frames), dtype=bool),
+            np.ones((len(columns), frames), dtype=bool),
+        )
+
+    def column(self, number: int) -> tuple[list[int], Limb]:
+        """Tracks with the same key frames, and a limb of them alone, with wider bounds.
+
+        Where there is a chain, distances are not looked at yet: what moves its tip is fitted
+        together. Scales are bounded like locations, by a share of what they are of.
+        """
+        limb, angle = self.limb, self.limb.angle
+        tracks = [place for place, each in enumerate(limb.column_numbers()) if each == number]
+        distance = float(np.min(limb.distance))
+        if limb.chain is not None:
+            # Bones that are further off would move the tip by more than others can make up for.
+            length = np.linalg.norm(limb.chain.steps, axis=1).sum()
+            distance = _LEVERAGE * float(np.mean(limb.distance))
+            if limb.room is not None and np.any(held := np.isfinite(limb.room)):
+                distance = min(distance, _HELD_LEVERAGE * float(np.mean(limb.room[held])))
+            distance = angle = min(angle, distance / length)
+        unit = distance / angle
+        kept = [limb.tracks[place] for place in tracks]
+        kept = [
+            Track(unit * each.values, LOCATION) if each.kind == SCALE else each for each in kept
+        ]
+        return tracks, Limb(kept, _SLACK * angle, _SLACK * distance, limb.lever)
+
+
+def _choose(times: Floats, plans: Sequence[_Plan], every: int) -> Generator[float, None, None]:
+    """Fill in the key frames of all plans; columns that are alike are worked on together."""
+    alike: dict[object, list[tuple[int, int]]] = {}
+    for place, plan in enumerate(plans):
+        for number in range(len(plan.keyed)):
+            tracks, limb = plan.column(number)
+            form = tuple((track.kind, track.values.shape[1]) for track in limb.tracks)
+            alike.setdefault(form, []).append((place, number))
+    done, whole = 0, max(sum(len(plan.keyed) for plan in plans), 1)
+    for columns in alike.values():
+        found = [plans[place].column(number) for place, number in columns]
+        choice = Choice(times, [limb for _, limb in found], every)
+        for share in choice.fewest():
+            yield (done + len(columns) * share) / whole
+        done += len(columns)
+        for row, ((place, number), (tracks, _)) in enumerate(zip(columns, found, strict=True)):
+            plans[place].keyed[number] = choice.keyed[row]
+            plans[place].corners[tracks] = choice.corners[row].T
+
+
+def _alone(times: Floats, track: Track) -> BezierKeys:
+    """The only key of a single frame."""
+    values = track.values[:1]
+    point = np.stack(np.broadcast_arrays(times[:, None], values), axis=-1).astype(np.float32)
+    return BezierKeys(
+        frames=times.astype(np.float32),
+        values=values.astype(np.float32),
+        left=point - np.array((1.0, 0.0), dtype=np.float32),
+        right=point + np.array((1.0, 0.0), dtype=np.float32),
+        smooth=np.zeros(1, dtype=bool),
+    )

@@ -1,0 +1,425 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms that would pass through each other or the body, moved aside over all frames at once.
+
+Where capsules come too near to each other, the joints round them are asked to move apart: those
+that are free to. What lies on the ground stays, and the other goes over it or round it. What is
+asked is spread over the frames before and after, so that arms make room in time. Then segments
+turn, as little and as evenly as it takes, and an arm that holds on is drawn back to where it does.
+A few rounds of that, each beginning where the one before has ended. Arms that are still in each
+other after these could not be parted, and move as if nobody had asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Final, Protocol
+
+import numpy as np
+
+from ...batched import dot
+from ...easing import smooth_step
+from ...rotations import Floats
+from ...temporal_filter import blurred, covered, reach, widened
+from ..ground.arm_curves import drawn
+from .capsule_overlap import Capsules
+from .chain_solver import joints_of, turned_towards
+from .overlap_contacts import Crowd, Touches, Touching, aside
+
+_ROUNDS: Final = 8
+_BOLDLY: Final = 1.3
+"""How much further arms are asked to go than they have to: they never get all the way."""
+_DONE: Final = 0.08
+"""Share of the thinner radius: arms that overlap no deeper have made way."""
+_AROUND: Final = 4
+"""Reaches of the means, before and after arms touch, within which others may have to make way."""
+_BRIEF: Final = 0.34
+"""How much shorter than the rest the means are over which an arm becomes free when it lets go."""
+_BORDER: Final = 1.6
+"""Segments from where an arm lies over which it is less and less free to move."""
+_STEADY: Final = 0.7
+"""Share by which an arm that holds on makes less way."""
+_PINNED: Final = 30.0
+"""How much more the place where an arm holds on counts than that it makes way."""
+_STEPS: Final = 4
+"""Newton's steps that draw an arm back to where it holds on."""
+_TORN: Final = 2e-5
+"""Arm lengths by which an arm may miss that place; one that misses it more is left as it was."""
+_HOPELESS: Final = (0.5, 1.0)
+"""Depths, as shares of the thinner radius, between which arms are left in each other."""
+_MOSTLY: Final = 0.5
+"""Share of all frames from which on two capsules that overlap belong together."""
+_SWIFT: Final = 1.2
+"""How much faster than anything before an arm may turn to make way …"""
+_UNSEEN: Final = 0.4
+"""… or radians from one frame to the next, if that is more: a walk has as much."""
+_SUNK: Final = 2e-3
+"""Arm lengths that an arm may be pushed below where it was above the ground."""
+_REPEATS: Final = 3
+"""How often arms that could not make way well are looked for."""
+_LITTLE: Final = 0.02
+"""Share of a mean radius by which it begins gently to matter what is asked."""
+_TINY: Final = 1e-12
+
+
+class Floor(Protocol):
+    """What arms must not be pushed into."""
+
+    def clearance(self, frames: np.ndarray, points: Floats) -> Floats:
+        """Height (items, joints) of points (items, joints, 3) above it at frames (items,)."""
+        ...
+
+
+def parted(
+    crowd: Crowd,
+    still: Sequence[Capsules],
+    *,
+    floor: Floor | None,
+    width: int,
+    cyclic: bool = False,
+) -> Floats | None:
+    """Joints (frames, arms, joints, 3) of arms that have made way; none if nobody has to.
+
+    The result at a frame hangs on the frames within some reach of it, and on no state: the same
+    motion gives the same result.
+
+    Args:
+        crowd: the arms.
+        still: parts of the body, one frame each.
+        floor: what is below, or nothing.
+        width: of the means over frames that make it smooth (``over_time.blurred``).
+        cyclic: whether the last frame is the first again.
+    """
+    every = np.arange(len(crowd.joints))
+    if not len(every):
+        return None
+    touching = Touching(crowd, still)
+    touches = touching.now()
+    chosen = touches.depth > _DONE
+    pairs, counts = np.unique(touches.pair[chosen], return_counts=True)
+    # What overlaps nearly all the while is the creature's own form, and not in anybody's way.
+    own_form = pairs[counts > _MOSTLY * len(every)]
+    deep = np.zeros(len(every))
+    deep[touches.frame[chosen & ~np.isin(touches.pair, own_form)]] = 1.0
+    if not deep.any():
+        return None
+    # Who makes way may be in the way of others then, but not for ever.
+    around = widened(deep, _AROUND * reach(width), cyclic=cyclic) > 0.0
+    touching.look_at(around, own_form)
+    return _Parting(crowd, touching, np.flatnonzero(around), floor, width, cyclic=cyclic).run()
+
+
+class _Parting:
+    """One crowd, as it makes way."""
+
+    def __init__(
+        self,
+        crowd: Crowd,
+        touching: Touching,
+        around: np.ndarray,
+        floor: Floor | None,
+        width: int,
+        *,
+        cyclic: bool,
+    ) -> None:
+        self._crowd, self._touching, self._floor = crowd, touching, floor
+        self._around = around
+        self._width, self._cyclic = width, cyclic
+        self._joints = crowd.joints.copy()
+        steps = np.diff(crowd.joints, axis=2)
+        self._lengths = _length(steps)
+        self._before = steps / np.maximum(self._lengths, _TINY)[..., None]
+        self._directions = self._before.copy()
+        self._length = float(self._lengths.sum(axis=2).mean())
+        self._scale = float(crowd.radii.mean())
+        lies = crowd.lying.any(axis=2)
+        self._held = np.where(lies, 1.0, self._covered(lies.astype(np.float64), brief=True))
+        self._anchor = _anchors(crowd.lying)
+        self._free, self._loose = (
+            self._in_time(each, crowd.kept[..., None]) for each in _freedom(crowd.lying)
+        )
+        self._allowed, self._room = self._clearance()
+
+    def run(self) -> Floats:
+        """Joints (frames, arms, joints, 3) after all rounds."""
+        for _ in range(_ROUNDS):
+            touches = self._touching.at(self._joints)
+            sunk = self._room.min() < -1e-4 * self._length
+            if np.max(touches.depth, initial=0.0) <= _DONE and not sunk:
+                break
+            wanted = self._spread(self._wanted(touches))
+            chosen = np.nonzero(_differ(wanted, 0.0))
+            if len(chosen[0]):
+                self._move(chosen, wanted[chosen])
+        given_up = np.zeros(self._held.shape)
+        for _ in range(_REPEATS):
+            more = np.maximum(given_up, self._hopeless(self._touching.at(self._joints)))
+            if np.array_equal(more, given_up):
+                break
+            given_up = more
+            self._give_up(np.minimum(self._covered(given_up), 1.0))
+        return self._joints
+
+    # --- What is known before anything moves ---
+
+    def _covered(self, values: Floats, *, brief: bool = False) -> Floats:
+        width = max(1, int(_BRIEF * self._width)) if brief else self._width
+        return covered(values, width, cyclic=self._cyclic)
+
+    def _in_time(self, free: Floats, kept: np.ndarray) -> Floats:
+        """Freedom (frames, arms, …) that comes and goes smoothly, and is nowhere more."""
+        bound = self._covered(np.where(kept, 1.0, 1.0 - free), brief=True)
+        return np.where((free > 0.0) & ~kept, 1.0 - np.minimum(bound, 1.0), 0.0)
+
+    def _clearance(self) -> tuple[Floats, Floats]:
+        """How high above the floor joints (frames, arms, joints) have to stay, and are above that.
+
+        Not lower than they are, or than their skin is thick.
+        """
+        shape = self._crowd.joints.shape[:3]
+        allowed, room = np.full(shape, -np.inf), np.full(shape, np.inf)
+        if self._floor is not None:
+            frames = self._around
+            points = self._crowd.joints[frames].reshape(-1, shape[2], 3)
+            height = self._floor.clearance(np.repeat(frames, shape[1]), points)
+            height = height.reshape(len(frames), *shape[1:])
+            allowed[frames] = np.minimum(height, self._crowd.radii)
+            room[frames] = height - allowed[frames]
+        return allowed, room
+
+    # --- One round ---
+
+    def _wanted(self, touches: Touches) -> Floats:
+        """By how much joints (frames, arms, joints, 3) would have to move at their own frame."""
+        shape = self._joints.shape
+        way, far = aside(touches)
+        chosen = np.flatnonzero(far > 1e-6 * touches.thin)
+        way, far, touches = way[:, chosen], far[chosen], touches.part(chosen)
+        ways = way, -way
+        can = [self._can(touches, which, ways[which]) for which in (0, 1)]
+        whole = can[0] + can[1] + _LITTLE
+        places, weights, pushes = [], [], []
+        for which in (0, 1):
+            own = touches.arms[which] < shape[1]
+            arm, share = touches.arms[which][own], touches.shares[which][own]
+            push = ((_BOLDLY * far * can[which] / whole) * ways[which])[:, own]
+            first = touches.frame[own] * shape[1] + arm
+            first = first * shape[2] + touches.segments[which][own]
+            for joint, part in ((0, 1.0 - share), (1, share)):
+                places.append(first + joint)
+                weights.append(far[own] * part)
+                pushes.append(weights[-1] * push)
+        place, weight = np.concatenate(places), np.concatenate(weights)
+        size = int(np.prod(shape[:3]))
+        whole = np.bincount(place, weight, size) + _LITTLE * self._scale
+        wanted = np.empty((size, 3))
+        for axis, each in enumerate(np.concatenate(pushes, axis=1)):
+            wanted[:, axis] = np.bincount(place, each, size) / whole
+        wanted = wanted.reshape(shape)
+        slack = 1e-9 * self._length
+        if self._room.min() < -slack:
+            where = np.nonzero(self._room < -slack)
+            sunk, soft = -self._room[where] - slack, _LITTLE * self._scale
+            sunk = np.where(sunk > soft, sunk, sunk * sunk / soft)
+            wanted[where] += sunk[:, None] * self._crowd.up[where[0]]
+        return wanted
+
+    def _can(self, touches: Touches, which: int, way: Floats) -> Floats:
+        """How far (touches,) the one or the other can make way, 0…1."""
+        arm = touches.arms[which]
+        own = arm < self._joints.shape[1]
+        frame, arm = touches.frame, np.where(own, arm, 0)
+        segment, share = np.where(own, touches.segments[which], 0), touches.shares[which]
+        can = (1.0 - share) * self._loose[frame, arm, segment]
+        can += share * self._loose[frame, arm, segment + 1]
+        can *= 1.0 - _STEADY * self._held[frame, arm]
+        # What is on the ground already is not pushed down.
+        room = np.minimum(self._room[frame, arm, segment], self._room[frame, arm, segment + 1])
+        radius = np.maximum(self._crowd.radii[arm, segment], _TINY)
+        down = np.maximum(-dot(way, self._crowd.up[frame].T), 0.0)
+        return own * can * (1.0 - down * (1.0 - smooth_step(room / (2.0 * radius))))
+
+    def _spread(self, wanted: Floats) -> Floats:
+        """The same, begun in time and ended late: as far as is asked, and smoothly."""
+        result = np.zeros(wanted.shape)
+        flat, spread = wanted.reshape(len(wanted), -1, 3), result.reshape(len(wanted), -1, 3)
+        asked = (wanted.reshape(len(wanted), -1) != 0.0).any(axis=0)
+        asked = np.flatnonzero(asked.reshape(-1, 3).any(axis=1))
+        size = _length(flat[:, asked])
+        some = size.max(axis=0, initial=0.0) > 1e-6 * self._scale
+        columns, size = asked[some], size[:, some]
+        if not len(columns):
+            return result
+        mean = blurred(flat[:, columns], self._width, cyclic=self._cyclic)
+        length = _length(mean)
+        # Where it is asked to go now one way and now the other, it stays between them.
+        mean_size = blurred(size, self._width, cyclic=self._cyclic)
+        agreed = smooth_step(2.0 * length / np.maximum(mean_size, _TINY))
+        whole = self._covered(size) * agreed
+        whole[whole < 1e-5 * self._scale] = 0.0
+        whole *= self._loose.reshape(len(wanted), -1)[:, columns]
+        spread[:, columns] = (whole / np.maximum(length, _TINY))[..., None] * mean
+        return result
+
+    def _move(self, chosen: tuple[np.ndarray, ...], wanted: Floats) -> None:
+        """Turn the segments of some arms at some frames.
+
+        Args:
+            chosen: frames and arms (items,).
+            wanted: (items, joints, 3) by how much their joints are to move.
+        """
+        lengths, free = self._lengths[chosen], self._free[chosen]
+        size = _length(wanted[:, 1:])
+        joints = np.arange(1, lengths.shape[1] + 1)
+        pinned = self._held[chosen][:, None] * (joints == self._anchor[chosen][:, None])
+        weights = size / (size + 0.1 * self._scale) * (1.0 - pinned) + _PINNED * pinned
+        directions = turned_towards(
+            self._directions[chosen],
+            lengths,
+            free=free,
+            goals=wanted[:, 1:] * (1.0 - pinned)[..., None],
+            weights=weights,
+        )
+        self._put(chosen, self._drawn_back(chosen, directions))
+
+    def _drawn_back(self, chosen: tuple[np.ndarray, ...], directions: Floats) -> Floats:
+        """Directions (items, segments, 3) of arms that hold on where they did.
+
+        Just before and after, they are drawn there in part, so that letting go is no jump.
+        """
+        some = np.flatnonzero(self._held[chosen] > 0.0)
+        if not len(some):
+            return directions
+        items = chosen[0][some], chosen[1][some]
+        held, anchor, lengths = (
+            self._held[items][:, None],
+            self._anchor[items],
+            self._lengths[items],
+        )
+        roots, rows = self._joints[items][:, 0], np.arange(len(some))
+        moved = joints_of(roots, directions[some], lengths)[rows, anchor]
+        goal = moved + held * (self._crowd.joints[items][rows, anchor] - moved)
+        inside = np.arange(lengths.shape[1]) < anchor[:, None]
+        back = drawn(
+            np.ascontiguousarray(np.moveaxis(directions[some], 0, -1)),
+            np.ascontiguousarray(lengths.T),
+            free=np.ascontiguousarray(self._free[items].T),
+            chosen=np.ascontiguousarray(inside.T.astype(np.float64)),
+            roots=np.ascontiguousarray(roots.T),
+            goal=np.ascontiguousarray(goal.T),
+            steps=_STEPS,
+        )
+        back = np.moveaxis(back, -1, 0)
+        missed = _length(joints_of(roots, back, lengths)[rows, anchor] - goal)
+        torn = np.clip(missed / (_TORN * self._length) - 1.0, 0.0, 1.0)[:, None, None]
+        back = np.where(torn > 0.0, back + torn * (self._before[items] - back), back)
+        result = directions.copy()
+        result[some] = _unit(back)
+        return result
+
+    def _put(self, chosen: tuple[np.ndarray, ...], directions: Floats) -> None:
+        self._directions[chosen] = directions
+        joints = joints_of(self._joints[chosen][:, 0], directions, self._lengths[chosen])
+        self._joints[chosen] = joints
+        if self._floor is not None:
+            self._room[chosen] = self._floor.clearance(chosen[0], joints) - self._allowed[chosen]
+
+    def _hopeless(self, touches: Touches) -> Floats:
+        """Which arms (frames, arms) could not make way, or not without a jump, 0…1."""
+        frames, arms = self._held.shape
+        worst = np.zeros((frames, arms + int(touches.arms[1].max(initial=0)) + 1))
+        for which in (0, 1):
+            np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
+        low, high = _HOPELESS
+        result = smooth_step((worst[:, :arms] - low) / (high - low))
+        changed = self._changed()
+        most = max(_SWIFT * float(self._turns_before.max(initial=0.0)), _UNSEEN)
+        swift = self._turns_before > most
+        # Between two frames of which neither has changed it turns as it did.
+        anew = np.nonzero(changed[:-1] | changed[1:])
+        ends = self._directions[:-1][anew], self._directions[1:][anew]
+        swift[anew] = _turns(*ends) > most
+        result[1:][swift] = result[:-1][swift] = 1.0
+        result[self._room.min(axis=2) < -_SUNK * self._length] = 1.0
+        return np.where(changed | (result < 1.0), result, 0.0)
+
+    def _changed(self) -> np.ndarray:
+        """Which arms (frames, arms) have made way."""
+        return _differ(self._directions, self._before)
+
+    @cached_property
+    def _turns_before(self) -> Floats:
+        """How far (frames − 1, arms) they turned before anything was moved."""
+        return _turns(self._before[:-1], self._before[1:])
+
+    def _give_up(self, share: Floats) -> None:
+        """Let arms (frames, arms) move as they did before, by some share."""
+        chosen = np.nonzero((share > 1e-9) & self._changed())
+        back = share[chosen][:, None, None]
+        before, after = self._before[chosen], self._directions[chosen]
+        mixed = _unit(after + back * (before - after))
+        mixed = np.where(back >= 1.0 - 1e-9, before, self._drawn_back(chosen, mixed))
+        self._put(chosen, mixed)
+
+
+def _turns(first: Floats, second: Floats) -> Floats:
+    """How far (…) a segment turns at most against the one before it, radians.
+
+    Args:
+        first: (…, segments, 3) directions at a frame.
+        second: (…, segments, 3) at the next.
+    """
+    one, other = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
+    # The one before, turned the shortest way to where it is a frame later, takes the next along.
+    (sx, sy, sz), (ex, ey, ez), (x, y, z) = one[..., :-1], other[..., :-1], one[..., 1:]
+    ax, ay, az = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
+    beyond = 1.0 / np.maximum(1.0 + sx * ex + sy * ey + sz * ez, 1e-6)
+    cx, cy, cz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+    taken = (
+        x + cx + (ay * cz - az * cy) * beyond,
+        y + cy + (az * cx - ax * cz) * beyond,
+        z + cz + (ax * cy - ay * cx) * beyond,
+    )
+    left = [end - start for end, start in zip(other[..., 1:], taken, strict=True)]
+    squares = left[0] * left[0] + left[1] * left[1] + left[2] * left[2]
+    own = _length(second[..., 0, :] - first[..., 0, :])
+    return np.maximum(own, np.sqrt(squares.max(axis=-1, initial=0.0)))
+
+
+def _anchors(lying: np.ndarray) -> np.ndarray:
+    """The first joint (frames, arms) that lies; of an arm that does not, the nearest in time."""
+    lies = lying.any(axis=2)
+    count, frames = len(lies), np.arange(len(lies))[:, None]
+    last = np.maximum.accumulate(np.where(lies, frames, -count), axis=0)
+    coming = np.minimum.accumulate(np.where(lies, frames, 2 * count)[::-1], axis=0)[::-1]
+    closest = np.where(frames - last <= coming - frames, last, coming)
+    return np.take_along_axis(lying.argmax(axis=2), np.clip(closest, 0, count - 1), axis=0)
+
+
+def _freedom(lying: np.ndarray) -> tuple[Floats, Floats]:
+    """How far segments (frames, arms, segments) and joints may move, 0…1."""
+    numbers = np.arange(lying.shape[2])
+    far = 10 * len(numbers)
+    # Joints to the nearest one that lies, towards the tip and towards the root.
+    onward = np.where(lying, numbers, far)[..., ::-1]
+    onward = np.minimum.accumulate(onward, axis=2)[..., ::-1] - numbers
+    back = numbers - np.maximum.accumulate(np.where(lying, numbers, -far), axis=2)
+    segments = smooth_step(np.minimum(onward[..., :-1], back[..., 1:]) / _BORDER)
+    # The root is the body's.
+    return segments, smooth_step(np.minimum(np.minimum(onward, back), numbers) / _BORDER)
+
+
+def _differ(one: Floats, other: Floats | float) -> np.ndarray:
+    """Where (frames, arms) any of (frames, arms, …) is not the same."""
+    # One axis is much quicker gone through than two.
+    return (one != other).reshape(*one.shape[:2], -1).any(axis=2)
+
+
+def _length(vectors: Floats) -> Floats:
+    """Lengths (…) of vectors (…, 3)."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return np.sqrt(x * x + y * y + z * z)
+
+
+def _unit(vectors: Floats) -> Floats:
+    return vectors / np.maximum(_length(vectors), _TINY)[..., None]

@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms that would dip into the ground between two frames, raised at these.
+
+On every frame an arm is off the ground. From one to the next keys lead each bone on by itself, and
+where a fast arm turns far in one frame, the way between two poses is not the arm's own: it may
+lead through a bump. The frames round such a moment are posed again, with the arm higher by as much
+as it was too low.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from ...batched import turned
+from ...rotations import Floats, rotate
+from ...temporal_filter import covered
+from ..ground.surface import Ground
+from ..metrics.report import Poses, automatic
+from ..rig.arm_batches import ArmsTogether, alike
+from ..rig.arm_frames import ArmFrames
+
+_TOLERATED: Final = 0.002
+"""Arm lengths that a joint may be below the ground half way between frames …"""
+_SPARE: Final = 0.003
+"""… and by which one that was deeper is raised above it."""
+_ROUNDS: Final = 4
+_BETTER: Final = 0.9
+"""Share of a dip that may be left after a round for another to be worth its while."""
+_ASTRAY: Final = 0.125
+"""By how much an arm is astray half way between frames at most, in arm lengths: for straight keys,
+and with the whole arm as a lever, an eighth of what each of its bones' quaternions bends by, twice
+as that is half an angle, and half as there are two such frames."""
+_WIDTH: Final = 1
+"""Frames of the means by which arms rise and sink again: smoothly, within six frames."""
+_JERK: Final = np.radians(5.0)
+"""How much farther a bone of an arm that is raised may turn within a frame."""
+_MOST: Final = 0.25
+"""Arm lengths that an arm is raised at most: what needs more is no matter of frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArmsOverGround:
+    """The arms of a body over time, and what they are above of."""
+
+    arms: Sequence[ArmFrames]
+    ground: Ground
+    scale: float
+    """Metres of the armature's unit."""
+    cyclic: bool = False
+    """Whether the last frame is the first again, and the motion repeats."""
+
+    @cached_property
+    def bones(self) -> list[slice]:
+        """Which bones of all arms' are those of each."""
+        ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)]).tolist()
+        return [slice(start, end) for start, end in pairwise(ends)]
+
+    def joints(self, poses: Poses) -> list[Floats]:
+        """Joints of each arm (moments, joints, 3), world."""
+        found = []
+        for arm, own in zip(self.arms, self.bones, strict=True):
+            rotations = np.ascontiguousarray(poses.rotations[:, own])
+            joints = self.scale * arm.joints(arm.from_bones(rotations), poses.strains[:, own])
+            found.append(poses.locations[:, None] + rotate(poses.orientations[:, None], joints))
+        return found
+
+    @cached_property
+    def _alike(self) -> list[tuple[list[int], ArmsTogether]]:
+        """The arms by how many bones they have."""
+        return alike(self.arms)
+
+    def clear(self, joints: Sequence[Floats], arms: Sequence[int] | None = None) -> Floats:
+        """Arm lengths (frames, arms) that each arm's lowest joint is above the ground.
+
+        Args:
+            joints: of each arm (frames, joints, 3), world.
+            arms: which are looked at, none for all.
+        """
+        found = []
+        for number in range(len(self.arms)) if arms is None else arms:
+            own, length = joints[number][:, 1:], self.arms[number].length
+            height = own[..., 2] - self.ground.height(own)
+            found.append(height.min(axis=1) / (length * self.scale))
+        return np.stack(found, axis=1)
+
+    def dips(self, poses: Poses, clear: Floats, arms: Sequence[int] | None = None) -> Floats:
+        """Arm lengths (frames − 1, arms) that each one's lowest joint is below the ground half way
+        between frames; 0 where it cannot be.
+
+        Args:
+            poses: at the frames.
+            clear: (frames, all arms) arm lengths that they are above the ground there.
+            arms: which are looked at, none for all.
+        """
+        frames, count = poses.rotations.shape[:2]
+        found = np.zeros((frames - 1, len(self.arms)))
+        for numbers, together in self._alike:
+            wanted = [place for place, each in enumerate(numbers) if arms is None or each in arms]
+            if not wanted:
+                continue
+            own, place = [numbers[each] for each in wanted], np.array(wanted)
+            bones = np.concatenate([np.arange(count)[self.bones[each]] for each in own])
+            rotations = poses.rotations[:, bones]
+            astray = _bends(rotations).reshape(frames, len(own), -1).sum(axis=2)
+            least = np.minimum(clear[:-1, own], clear[1:, own])
+            # Half way between which frames, and which arm.
+            moment, arm = np.nonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + _TOLERATED)
+            if not len(moment):
+                continue
+            half = automatic(
+                Poses(rotations, poses.strains[:, bones], poses.locations, poses.orientations),
+                cyclic=self.cyclic,
+            )
+            shape = frames - 1, len(own), len(together.lengths)
+            turns = half.rotations.reshape(*shape, 4)[moment, arm]
+            strains = half.strains.reshape(shape)[moment, arm]
+            which = place[arm]
+            there = together.orientations(np.moveaxis(turns, 0, 2), which)
+            joints = self.scale * together.joints(there, which, strains.T)[1:]
+            world = turned(np.ascontiguousarray(half.orientations[moment].T), joints)
+            world += half.locations[moment].T
+            below = self.ground.height(np.moveaxis(world, 1, -1)) - world[:, 2]
+            lengths = np.array([self.arms[each].length for each in own])[arm]
+            found[moment, np.array(own)[arm]] = below.max(axis=0) / (lengths * self.scale)
+        return found if arms is None else found[:, list(arms)]
+
+
+def _bends(values: Floats) -> Floats:
+    """Second differences of quaternions (frames, bones, 4), how long they are (frames, bones)."""
+    last = [2 * values[:1] - values[1:2], values, 2 * values[-1:] - values[-2:-1]]
+    around = np.concatenate(last)
+    second = around[2:] - 2.0 * values + around[:-2]
+    w, x, y, z = np.moveaxis(second, -1, 0)
+    return np.sqrt(w * w + x * x + y * y + z * z)
+
+
+def raised_between(
+    course: ArmsOverGround,
+    poses: Poses,
+    joints: Sequence[Floats],
+    again: Callable[[np.ndarray, Floats], tuple[Poses, Sequence[Floats]]],
+) -> Poses:
+    """The same motion, without arms that dip into the ground between frames.
+
+    Args:
+        course: arms and ground.
+        poses: of all frames; they are left as they are.
+        joints: of each arm (frames, joints, 3) then, world.
+        again: poses of some frames (n,), with arms (n, arms) so many arm lengths higher, and the
+            joints of each arm; of arms that are nowhere higher it need say nothing.
+    """
+    if len(poses.rotations) < 2:
+        return poses
+    clear = course.clear(joints)
+    lift = np.zeros(clear.shape)
+    tried = [(poses, course.dips(poses, clear))]
+    for _ in range(_ROUNDS):
+        last, deep = tried[-1]
+        # What dips no less for having been raised is not raised any further.
+        before = tried[-2][1] if len(tried) > 1 else np.zeros_like(deep)
+        worth = (deep > _TOLERATED) & ((before <= _TOLERATED) | (deep < _BETTER * before))
+        asked = _at_frames(np.where(worth, deep + _SPARE, 0.0), cyclic=course.cyclic)
+        more = covered(asked, _WIDTH, cyclic=course.cyclic)
+        chosen = np.flatnonzero(np.any(more > 0.0, axis=1))
+        if not len(chosen):
+            break
+        lift = np.minimum(lift + more, _MOST)
+        fresh, places = again(chosen, lift[chosen])
+        arms = np.flatnonzero(np.any(lift[chosen] > 0.0, axis=0)).tolist()
+        rotations, strains, deep = last.rotations.copy(), last.strains.copy(), deep.copy()
+        for bones in (course.bones[arm] for arm in arms):
+            rotations[chosen, bones] = fresh.rotations[:, bones]
+            strains[chosen, bones] = fresh.strains[:, bones]
+        clear[np.ix_(chosen, arms)] = course.clear(places, arms)
+        higher = Poses(rotations, strains, poses.locations, poses.orientations)
+        deep[:, arms] = course.dips(higher, clear, arms)
+        tried.append((higher, deep))
+    return _best(course, tried, lift > 0.0)
+
+
+def _best(
+    course: ArmsOverGround, tried: Sequence[tuple[Poses, Floats]], raised: np.ndarray
+) -> Poses:
+    """Of several ways to raise arms, wherever one was raised, the one with the least dip.
+
+    A higher arm may dip the more, where it has to come down from there in a frame. And one that
+    folds may jerk when it is raised: better it dips than that.
+
+    Args:
+        course: the arms.
+        tried: poses, and what :meth:`ArmsOverGround.dips` says of them.
+        raised: (frames, arms) where these are not the same.
+    """
+    if len(tried) == 1:
+        return tried[0][0]
+    rotations, strains = tried[0][0].rotations.copy(), tried[0][0].strains.copy()
+    for number, bones in enumerate(course.bones):
+        for first, end in _runs(raised[:, number]):
+            moments = slice(max(first - 1, 0), end)
+            depths = [deep[moments, number].max(initial=0.0) for _, deep in tried]
+            turns = [
+                _largest_turn(poses.rotations[max(first - 1, 0) : end + 1, bones])
+                for poses, _ in tried
+            ]
+            jerky = np.array(turns) > turns[0] + _JERK
+            badness = np.where(jerky, np.inf, np.maximum(depths, _TOLERATED))
+            poses, _ = tried[int(np.argmin(badness))]
+            rotations[first:end, bones] = poses.rotations[first:end, bones]
+            strains[first:end, bones] = poses.strains[first:end, bones]
+    whole = tried[0][0]
+    return Poses(rotations, strains, whole.locations, whole.orientations)
+
+
+def _largest_turn(rotations: Floats) -> float:
+    """Radians that a bone turns at most from one of the frames (frames, bones, 4) to the next."""
+    cosines = np.abs(np.einsum("fbi,fbi->fb", rotations[1:], rotations[:-1]))
+    return float(2.0 * np.arccos(np.minimum(cosines.min(initial=1.0), 1.0)))
+
+
+def _at_frames(halfway: Floats, *, cyclic: bool) -> Floats:
+    """The greater (frames, …) of values half way (frames − 1, …) before and after each frame."""
+    none = np.zeros((1, *halfway.shape[1:]))
+    before, after = (halfway[-1:], halfway[:1]) if cyclic else (none, none)
+    return np.maximum(np.concatenate([before, halfway]), np.concatenate([halfway, after]))
+
+
+def _runs(where: np.ndarray) -> list[tuple[int, int]]:
+    """Starts and ends of frames (frames,) in a row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]])))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]

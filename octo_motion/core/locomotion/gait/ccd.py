@@ -1,0 +1,431 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weighted cyclic coordinate descent of an arm's three groups, in batch [Octopus, §3.1.4].
+
+An arm is handled as the directions of its segments in the arm's own frame (x outward, z up). The
+batch is all frames of all arms that are built alike. It is the last axis here, unlike elsewhere:
+vectors are (3, batch) and directions (segments, 3, batch), so that each component is one run of
+memory, which is what makes the solver fast.
+
+The result depends on nothing but the angles of its own frame. So each frame must start afresh,
+and must not pop where a target crosses the line of the group before it. The usual start, a
+straight continuation, bends there to one side in one frame and to the other in the next. Ours is
+the shape that the gait asks for: it bends at each link as far as the table says, which changes
+with time as smoothly as the table, and it sways a little across that bend, so that a group which
+goes from one side to the other passes round the straight line and not through it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...batched import running, smallest_arc, turned
+from ...rotations import Floats
+
+SWEEPS: Final = 4
+SOFTENINGS: Final = 4
+_SPREADS: Final = 2
+"""How often bends are spread before the groups are closed again."""
+
+# Stretching a group to its full length is the singular point of any inverse kinematics: its bend
+# grows like the square root of what is left. Rounding the corner off costs half of this at most,
+# in group lengths.
+_ROUNDING: Final = 1.5e-4
+# A joint turns the less, the shorter its lever: of a lever of √0.05 of the group, half. So the
+# last joints do not curl, and an arm of many bones takes the shape of one of few.
+_SHORT_LEVER: Final = 0.05
+_JOINTS_OF_A_WEIGHT: Final = 4
+# Where a gait bends a group much more than this, the group does not need to sway.
+_SLIGHT: Final = np.radians(8.0)
+# Square of the tangent of half the largest bend, 170°, of a group that folds up.
+_MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
+_NEWTON_STEPS: Final = 6
+_NEWTON_STEPS_BETWEEN: Final = 2
+# Arm lengths within which a joint comes to rest on a floor.
+_FLOOR_ROUNDING: Final = 0.1
+_SHORT: Final = 1e-9
+_OPPOSITE: Final = 1e-4
+"""Where a group has to be turned with more care: a chord of hardly any length, of the unit that
+lengths are in, and one plus the cosine of what is nearly half a turn."""
+_TINY: Final = 1e-12
+_PAIR: Final = 2
+"""Segments of a group that has one bend alone."""
+_HARDLY: Final = 0.1
+"""Share of the sway with which such a group changes sides where it is straight."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """What arms of one build have in common, lengths in any unit."""
+
+    lengths: Floats
+    """(segments,) root to tip."""
+    sizes: tuple[int, int, int]
+    """Segments in each group."""
+    weights: Floats
+    """(segments,) weight a of the joint at each segment's root, in (0, 1] [Octopus, eq. 3.7]."""
+    pairs_as_asked: bool = False
+    """Whether a group of two segments bends to the side that its own link turns to, and its one
+    bend is not softened. The more its link turns, the shorter a group gets: so that bend comes
+    from nothing and goes to nothing where it changes sides. Where the links before and after have
+    a say in it, a bend of many degrees changes sides from one frame to the next."""
+
+    @property
+    def groups(self) -> tuple[slice, ...]:
+        """The segments of each group."""
+        ends = np.cumsum(self.sizes)
+        return tuple(
+            slice(int(end) - size, int(end)) for end, size in zip(ends, self.sizes, strict=True)
+        )
+
+    @property
+    def pairs(self) -> tuple[slice, ...]:
+        """The groups whose one bend is as asked for."""
+        each = zip(self.groups, self.sizes, strict=True)
+        return tuple(group for group, size in each if size == _PAIR and self.pairs_as_asked)
+
+
+def solve(
+    chain: Chain,
+    shape: Floats,
+    links: Floats,
+    targets: Floats,
+    *,
+    softness: float = 0.8,
+    give: float = 0.0,
+    floor: Floats | None = None,
+) -> Floats:
+    """Directions (segments, 3, batch) of arms whose groups end at their targets.
+
+    Args:
+        chain: the arms' build.
+        shape: (segments, 3, batch) the shape to start from, each group seen from its own link
+            (see ``asked_shape``).
+        links: (links, 4, batch) orientations of the links.
+        targets: (links + 1, 3, batch) pseudo-targets Q₀ … Q₃; those out of reach are pointed at.
+        softness: 0 leaves the bends as they are; towards 1 they are spread over neighbours.
+        give: group lengths by which a group may reach beyond its target as it straightens.
+        floor: (batch,) height that joints between the groups' ends keep above, as far as the
+            targets let them.
+    """
+    directions = np.empty_like(shape)
+    root = np.zeros_like(targets[0])
+    for group, segments in enumerate(chain.groups):
+        lengths, goal = chain.lengths[segments], targets[group + 1] - root
+        own = aimed(turned(links[group], shape[segments]), lengths, goal)
+        for _ in range(SWEEPS if len(own) > 1 else 0):
+            own = swept(own, lengths, chain.weights[segments], goal)
+        directions[segments] = closed(own, lengths, goal, give=give)
+        root = root + chord(directions[segments], lengths)
+    rounds = SOFTENINGS if softness > 0.0 or floor is not None else 0
+    for number in range(1, rounds + 1):
+        before = directions
+        for _ in range(_SPREADS):
+            directions = softened(directions, softness)
+        for segments in chain.pairs:
+            directions[segments] = before[segments]
+        if floor is not None:
+            directions = lifted(directions, chain.lengths, floor)
+        # Only the last closing has to be exact.
+        steps = _NEWTON_STEPS if number == rounds else _NEWTON_STEPS_BETWEEN
+        root = np.zeros_like(root)
+        for group, segments in enumerate(chain.groups):
+            lengths, goal = chain.lengths[segments], targets[group + 1] - root
+            directions[segments] = closed(directions[segments], lengths, goal, steps, give=give)
+            root = root + chord(directions[segments], lengths)
+    return directions
+
+
+def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
+    """The shape that the gait asks for, (segments, 3, batch), each group seen from its link.
+
+    Along each group the direction turns from halfway back to the link before to halfway on to
+    the link after, about the link's own direction in the mean; a parabola is the simplest that
+    does. The first group leaves the body the way that the arm does.
+
+    Args:
+        chain: the arms' build.
+        angles: (links, 2, batch) head and pitch of each link.
+        sway: (2, batch) head and pitch of the bend that is added at the root of the first group
+            where it is nearly straight; it changes sides along each group.
+    """
+    # The first group leaves the body straight, and nothing pulls at the last one's end: there it
+    # goes on as it came.
+    before = -0.5 * angles * np.array([2.0, 1.0, 1.0])[:, None, None]
+    after = 0.5 * angles[[1, 2, 2]]
+    asked = np.sum(before**2 + after**2, axis=1, keepdims=True)
+    swaying = sway * (_SLIGHT**2 / (_SLIGHT**2 + asked))
+    # Where groups before give, those after them are still bent while their links are straight.
+    gives = False
+    shape = np.zeros((len(chain.lengths), 3, angles.shape[-1]))
+    shape[:, 0] = 1.0
+    for group, segments in enumerate(chain.groups):
+        lengths = chain.lengths[segments]
+        if len(lengths) == 1:
+            continue
+        leading, aside = after[group], (-1.0) ** group * swaying[group]
+        if segments in chain.pairs:
+            leading = np.zeros_like(leading)
+            aside = aside if gives else _HARDLY * aside
+        gives = True
+        reach = np.cumsum(lengths)
+        along = ((reach - 0.5 * lengths) / reach[-1])[:, None, None]
+        turn = (
+            before[group] * (1.0 - 4.0 * along + 3.0 * along**2)
+            + leading * (3.0 * along**2 - 2.0 * along)
+            + aside * (1.0 - 2.0 * along)
+        )
+        # Cosines and sines by the tangent of half of the angle, which is quicker.
+        half = np.tan(0.5 * turn)
+        share = 2.0 / (1.0 + half * half)
+        half *= share
+        share -= 1.0
+        shape[segments, 0] = share[:, 0] * share[:, 1]
+        shape[segments, 1] = share[:, 0] * half[:, 1]
+        shape[segments, 2] = half[:, 0]
+    return shape
+
+
+def chord(directions: Floats, lengths: Floats) -> Floats:
+    """Vector (3, batch) from a group's root to its end."""
+    # Not by way of BLAS, whose threads wait for each other longer than they work.
+    return np.einsum("s,scb->cb", lengths, directions)
+
+
+def aimed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
+    """A group turned as a whole about its root, its end towards the goal (3, batch)."""
+    end = chord(directions, lengths)
+    sizes = _size(end), _size(goal)
+    if min(float(each.min(initial=1.0)) for each in sizes) < _SHORT:
+        return turned(smallest_arc(end, goal), directions)
+    ends = np.stack([end / sizes[0], goal / sizes[1]])
+    facing = 1.0 + np.einsum("cb,cb->b", ends[0], ends[1])
+    if float(facing.min(initial=1.0)) < _OPPOSITE:
+        return turned(smallest_arc(end, goal), directions)
+    # Two reflections make the turn from one to the other: in the first, in what lies half way.
+    shares = np.einsum("xcb,scb->xsb", ends, directions)
+    half = (shares[0] + shares[1]) / facing
+    shares[1] = 2.0 * shares[0] - half
+    shares[0] = -half
+    result = np.einsum("xsb,xcb->scb", shares, ends)
+    result += directions
+    return result
+
+
+def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) -> Floats:
+    """One sweep of weighted CCD over a group, tip to root [Octopus, eq. 3.3, 3.7].
+
+    At each joint everything beyond it turns about ``(P_e − P_j) × (Q − P_j)`` by ``a_j ξ_j``.
+    The joints nearer to the root have not moved yet when a joint turns, and those beyond move as
+    one piece; so it is enough to carry along the vector from the joint to the end, and to apply
+    to each segment all turns from the root up to its own joint.
+
+    Weights count for groups of four joints, as in the source; where more joints share the bend,
+    each takes the less of it.
+    """
+    count = len(directions)
+    steps = lengths[:, None, None] * directions
+    whole = float(np.sum(lengths))
+    scale = min(1.0, _JOINTS_OF_A_WEIGHT / count)
+    to_goal = goal - chord(directions, lengths)
+    turns: list[tuple[Floats, Floats]] = []
+    end = np.zeros_like(goal)
+    for joint in range(count - 1, -1, -1):
+        end += steps[joint]
+        to_goal += steps[joint]
+        turns.append(_partial_turn(end, to_goal, weights[joint] * scale, whole))
+    result = np.empty_like(directions)
+    # A turn is 1 + p ⊗ q, p and q two vectors each in the plane that it turns.
+    planes, change = turns.pop()
+    carried = np.einsum("xib,xjb->ijb", planes, change)
+    for axis in range(3):
+        carried[axis, axis] += 1.0
+    result[0] = np.einsum("ijb,jb->ib", carried, directions[0])
+    for joint in range(1, count):
+        planes, change = turns.pop()
+        carried += np.einsum("xib,xjb->ijb", np.einsum("ijb,xjb->xib", carried, planes), change)
+        result[joint] = np.einsum("ijb,jb->ib", carried, directions[joint])
+    return result
+
+
+def closed(
+    directions: Floats,
+    lengths: Floats,
+    goal: Floats,
+    steps: int = _NEWTON_STEPS,
+    *,
+    give: float = 0.0,
+) -> Floats:
+    """A group bent as much as it takes for its end to be at the goal, in the shape it has.
+
+    The bends are the angles between the segments and the chord. The tangents of half of them are
+    all scaled by one factor, so that the chord is as long as the goal is far; then the group is
+    turned about its root.
+
+    The bend goes with the square root of what the chord is short of the group. So a goal that
+    comes and goes at an even speed straightens the group with a snap. With s what the chord is
+    short of, in group lengths, s² / (s + give) in its place makes the bend go with s itself where
+    that is little.
+    """
+    whole = float(np.sum(lengths))
+    if len(lengths) > 1:
+        slack = 1.0 - _size(goal) / whole
+        slack = 0.5 * (slack + np.sqrt(slack * slack + _ROUNDING**2))
+        # Far out of reach it is nothing at all, and would be divided by nothing.
+        slack = np.maximum(slack, _TINY)
+        slack *= slack / (slack + give)
+        directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0), steps)
+    return aimed(directions, lengths, goal)
+
+
+def overreach(chords: Floats, whole: Floats, give: float) -> Floats:
+    """How far beyond goals so far away groups of these lengths reach (see :func:`closed`)."""
+    slack = np.clip(1.0 - chords / whole, _TINY, 1.0)
+    return whole * slack * give / (slack + give)
+
+
+def softened(directions: Floats, amount: float) -> Floats:
+    """Directions drawn towards the mean of their neighbours, across the borders of groups too.
+
+    Before the first segment stands the way in which the arm leaves the body, x.
+    """
+    if amount < _TINY:
+        return directions
+    # In quarters of the amount: it is made of unit length in the end.
+    mean = (4.0 / amount - 2.0) * directions
+    mean[1:] += directions[:-1]
+    mean[:-1] += directions[1:]
+    mean[0, 0] += 1.0
+    mean[-1] += directions[-1]
+    return _made_unit(mean)
+
+
+def raised(heights: Floats, floor: Floats) -> Floats:
+    """Heights (…, batch) that are never below the floor (batch,), with a smooth passage.
+
+    Differences never grow: what is within reach of each other stays so.
+    """
+    above = heights - floor
+    return floor + 0.5 * (above + np.sqrt(above * above + _FLOOR_ROUNDING**2))
+
+
+def lifted(directions: Floats, lengths: Floats, floor: Floats) -> Floats:
+    """An arm whose joints below a floor are raised to it; lengths are kept, ends may move."""
+    above = running(lengths[:, None] * directions[:, 2])
+    above -= floor
+    lift = 0.5 * (np.sqrt(above * above + _FLOOR_ROUNDING**2) - above)
+    lift[1:] -= lift[:-1].copy()
+    result = directions.copy()
+    result[:, 2] += lift / lengths[:, None]
+    return _made_unit(result)
+
+
+def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> Floats:
+    """A group whose bends are scaled so that its chord is as long as wanted (batch,).
+
+    With k = tan²(θ/2) of a segment's bend θ, and q the square of the factor, the segment gets the
+    bend of cosine ``(1 − q k) / (1 + q k)``: the chord is a rational function of q, and its
+    square is nearly linear where bends are slight. Newton's method finds q.
+    """
+    count, _, batch = directions.shape
+    whole = float(np.sum(lengths))
+    axis = chord(directions, lengths)
+    found = _size(axis)
+    axis /= np.maximum(found, _TINY)
+    along = np.einsum("scb,cb->sb", directions, axis)
+    rest = np.maximum(1.0 + along, 1e-9)
+    tangent = np.maximum(1.0 - along, 0.0) / rest
+    limit = _MOST_FOLDED / np.maximum(np.max(tangent, axis=0), _TINY)
+    square = _squared_arc(wanted / whole) / np.maximum(_squared_arc(found / whole), _TINY)
+    square = np.minimum(square, limit)
+    # Of each segment what is across the axis, and half of what makes its length along it.
+    parts = np.empty((count, 4, batch))
+    across = parts[:, :3]
+    np.multiply(along[:, None], axis, out=across)
+    np.subtract(directions, across, out=across)
+    np.multiply(rest, 0.5, out=parts[:, 3])
+    factor = 2.0 / rest
+    weighted = lengths[:, None] * factor
+    shares = np.empty((2, count, batch))
+    goal = wanted * wanted
+    for _ in range(steps):
+        share = square * tangent
+        share += 1.0
+        np.reciprocal(share, out=share)
+        np.multiply(weighted, share, out=shares[0])
+        share *= tangent
+        np.multiply(shares[0], share, out=shares[1])
+        # Sums over the segments, and less their slopes against q. Along the axis the chord is
+        # Σ l (2 share − 1), across it the square root of q times Σ l share across.
+        sums = np.einsum("wsb,scb->wcb", shares, parts)
+        outer = sums[0, :3]
+        inner = 2.0 * sums[0, 3] - whole
+        spread, fading = np.einsum("wcb,cb->wb", sums[:, :3], outer)
+        excess = inner * inner + square * spread - goal
+        slope = spread - 2.0 * (2.0 * inner * sums[1, 3] + square * fading)
+        step = square - excess / np.minimum(slope, -_TINY)
+        np.minimum(step, 4.0 * square, out=step)
+        np.maximum(step, 0.25 * square, out=step)
+        square = np.minimum(step, limit, out=step)
+    share = 1.0 / (1.0 + square * tangent)
+    result = across * (factor * np.sqrt(square) * share)[:, None]
+    result += (2.0 * share - 1.0)[:, None] * axis
+    return result
+
+
+def _squared_arc(ratio: Floats) -> Floats:
+    """About the square of half the angle of a circle's arc, from the ratio of chord to arc."""
+    missing = 1.0 - ratio
+    return missing * (6.0 + (np.pi**2 - 6.0) * missing)
+
+
+def _partial_turn(
+    end: Floats, to_goal: Floats, share: float, whole: float
+) -> tuple[Floats, Floats]:
+    """A share of the smallest turn from one vector (3, batch) to another; the first is turned.
+
+    Where the turn has no definite axis it fades out: near half a turn, and where the vectors are
+    short against the ``whole`` group.
+
+    Returns:
+        Two unit vectors that span the plane which is turned, (2, 3, batch), and the two whose
+        products with these make the turn, less one.
+    """
+    plane = np.empty((2, *end.shape))
+    size = _size(end)
+    np.divide(end, np.maximum(size, _TINY), out=plane[0])
+    cosine = np.einsum("cb,cb->b", plane[0], to_goal)
+    np.multiply(plane[0], cosine, out=plane[1])
+    np.subtract(to_goal, plane[1], out=plane[1])
+    square = np.einsum("cb,cb->b", plane[1], plane[1])
+    sine = np.sqrt(square)
+    plane[1] /= np.maximum(sine, _TINY)
+    angle = np.arctan2(sine, cosine)
+    lever = size * np.sqrt(square + cosine * cosine)
+    half = np.minimum(4.0 - angle * (4.0 / np.pi), 1.0)
+    half *= angle
+    half *= (0.5 * share) * lever / (lever + _SHORT_LEVER * whole * whole)
+    # By the tangent of half of it, which is quicker than its sine.
+    tangent = np.tan(half)
+    turn = 2.0 * tangent / (1.0 + tangent * tangent)
+    lost = turn * tangent
+    np.multiply(plane[0], size * (1.0 - lost), out=end)
+    end += (size * turn) * plane[1]
+    change = plane * -lost
+    change[0] -= turn * plane[1]
+    change[1] += turn * plane[0]
+    return plane, change
+
+
+def _size(vectors: Floats) -> Floats:
+    """Lengths (batch,) of vectors (3, batch)."""
+    return np.sqrt(np.einsum("cb,cb->b", vectors, vectors))
+
+
+def _made_unit(vectors: Floats) -> Floats:
+    """Vectors (segments, 3, batch), which are changed to unit length in place."""
+    size = np.sqrt(np.einsum("scb,scb->sb", vectors, vectors))
+    vectors *= (1.0 / np.maximum(size, _TINY))[:, None]
+    return vectors

@@ -1,0 +1,579 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a gait to bone rotations: what moves the arms of one body.
+
+A frame's result depends on that frame's phase and turn alone, never on other frames. Everything
+is solved in each arm's own frame, x outward and z up as the body has them, with the length of the
+arm for unit; so neither rest pose nor bone roll nor scale of the rig matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Final
+
+import numpy as np
+
+from ...batched import running, turned
+from ...content_cache import Remembered, key_of
+from ...errors import RigError, SettingsError
+from ...rotations import Floats, from_axis_angle, from_matrix, less_whole_turns, multiply, rotate
+from ...skeleton import Skeleton
+from ..rig.arm_chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
+from ..rig.bone_rotations import ArmRest, arm_rest, bone_rotations
+from .ccd import Chain, asked_shape, overreach, raised, solve
+from .joint_groups import GROUPS, group_lengths, split_groups
+from .pseudo_targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
+from .swim_spread import opened
+from .table import GaitCurve, GaitTable, evaluate, variation
+
+MOST_STEADY: Final = 0.25
+"""Cycles over which movement may be evened out: more, and it is no longer there."""
+
+_UP: Final = np.array([0.0, 0.0, 1.0])
+_SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
+_CHUNK: Final = 4096
+"""Arms solved at a time, counted over frames: what stays within a processor's cache."""
+_FEW: Final = 100
+"""Shapes that are kept: of a few arms at a few frames, which cost as much to start as many."""
+_CYCLE_SAMPLES: Final = 96
+"""Phases at which a cycle is looked at as a whole."""
+_STANDING: Final = 0.3
+"""Share of a cycle in which an arm would reach deeper than the floor."""
+_LEAST_DEPTH: Final = 0.1
+"""Arm lengths: a gait that reaches less deep moves its arms level, and stands on nothing."""
+_ROOM: Final = 0.1
+"""Arm lengths beside the way of a swimming body at which its arms trail, at least."""
+_TRAILING: Final = 0.75
+"""Share of its length that the first group of an arm that trails spans: such a group is bent."""
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One arm as the generator is given it."""
+
+    name: str
+    bones: tuple[str, ...]
+    """Root to tip, at least three."""
+    side: Side
+    pair: int
+    phase: float = 0.0
+    """Radians that it is ahead of what the gait says."""
+    flip: bool = False
+    """Whether "towards the front" and the sense of bank are mirrored."""
+
+    @property
+    def handedness(self) -> float:
+        """+1 where "towards the front" is anticlockwise seen from above (right side), else −1."""
+        return (-1.0 if self.side == "LEFT" else 1.0) * (-1.0 if self.flip else 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class GaitSettings:
+    """How the arms move. Angles in radians."""
+
+    gait: GaitTable
+    contraction: float = 1.0
+    """Factor on the contraction of the links; 1 as in the source, 0 none."""
+    weights: tuple[float, ...] = (0.4,)
+    """Weights a of the joints, at even steps from the arm's root to its tip, each in (0, 1]."""
+    softness: float = 0.8
+    """0 leaves bends where CCD puts them; towards 1 they are spread over neighbouring joints."""
+    give: float = 0.0
+    """Group lengths by which an arm may reach beyond its targets as it straightens, so that it does
+    so gently; 0 meets them, as the source does, with a snap."""
+    sway: float = np.radians(10.0)
+    """Bend across the gait's own that each group starts with, so that no group passes through a
+    straight line."""
+    phase_spread: float = 1.0
+    """Factor on the gait's phase offsets; 0 moves all arms together."""
+    variation: tuple[float, float] = (0.0, 0.0)
+    """Limits j, k of the random additions to head and pitch [Octopus, §3.4]."""
+    seed: int = 0
+    period: int = 0
+    """Cycles after which the random additions come again, 0 for never."""
+    turning: float = 0.5
+    """Share of the turn that lies ahead which the arms take on as pitch [Octopus, §3.5]."""
+    steady: float = 0.0
+    """Cycles before and after each moment over which movement is evened out in time; 0 leaves the
+    table's corners, as the source does."""
+    heading: float = 0.0
+    """WALK: radians anticlockwise from the way that the body goes to its front: arms take their
+    phases from the gait by where they are seen from that way."""
+    stand: bool = False
+    """WALK: whether targets that lie deeper than most are raised to a floor where most are, so
+    that many arms stand on the ground together, and not the tip of one. The source's walk, whose
+    targets are the table's alone, knows no ground."""
+    lean: float = 0.0
+    """SWIM: how far from the body's +Z towards its back the way lies that its arms trail behind;
+    see ``TravelSettings``. Radians."""
+
+    def __post_init__(self) -> None:
+        numbers = (
+            *(self.contraction, self.softness, self.give, self.sway, self.phase_spread),
+            *(self.turning, self.steady, self.heading, self.lean),
+            *(*self.weights, *self.variation),
+        )
+        if not np.all(np.isfinite(numbers)):
+            raise SettingsError("A setting of the gait is not a number.", "Set it anew.")
+        if not self.weights or min(self.weights) <= 0.0 or max(self.weights) > 1.0:
+            raise SettingsError(
+                "A joint's weight is not between 0 and 1.", "Give weights above 0, 1 at most."
+            )
+        if self.variation[0] > self.variation[1]:
+            raise SettingsError(
+                "The variation's minimum is greater than its maximum.", "Exchange the two."
+            )
+        if self.contraction < 0.0:
+            raise SettingsError(
+                f"The contraction is {self.contraction:g}.", "Give 0 (none) or more."
+            )
+        if not 0.0 <= self.softness <= 1.0:
+            raise SettingsError(f"The softness is {self.softness:g}.", "Give a value from 0 to 1.")
+        if not 0.0 <= self.give <= 1.0:
+            raise SettingsError(f"The give is {self.give:g}.", "Give a value from 0 to 1.")
+        if not 0.0 <= self.steady <= MOST_STEADY:
+            raise SettingsError(
+                f"Steady is {self.steady:g} cycles.", f"Give a value from 0 to {MOST_STEADY:g}."
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPoses:
+    """Arms at some frames."""
+
+    rotations: Floats
+    """(frames, bones, 4) unit quaternions in each bone's rest frame (Blender's matrix_basis)."""
+    misses: Floats
+    """(frames, arms, groups) distance of each group's end from its target, in arm lengths, less
+    what the setting ``give`` lets it and those before it reach beyond."""
+
+
+@dataclass(frozen=True, eq=False)
+class Build:
+    """Arms whose segments have the same proportions, solved together."""
+
+    arms: tuple[int, ...]
+    chain: Chain
+    widths: Floats
+    """(links,) rest lengths H_g, in arm lengths."""
+
+
+class Generator:
+    """Moves the arms of one body.
+
+    Raises:
+        RigError: there are no arms, arms share bones, or a bone does not exist.
+    """
+
+    def __init__(
+        self, skeleton: Skeleton, arms: Sequence[Arm], body: BodyFrame, settings: GaitSettings
+    ) -> None:
+        if not arms:
+            raise RigError("The list of arms is empty.", "Detect the arms, or add one.")
+        self._arms = tuple(arms)
+        gait = settings.gait.for_pairs(max(arm.pair for arm in self._arms))
+        self._settings = settings = replace(settings, gait=gait)
+        _check_disjoint(self._arms)
+        for arm in self._arms:
+            chain_of(skeleton, arm.bones)
+        joints = [body.to_body(joint_positions(skeleton, arm.bones)) for arm in self._arms]
+        segments = [np.linalg.norm(np.diff(each, axis=0), axis=1) for each in joints]
+        self._lengths = np.array([float(each.sum()) for each in segments])
+        self._roots = np.array([each[0] for each in joints])
+        # From an arm's own frame to the body's: azimuth counts from the front, −Y.
+        bones = [arm.bones for arm in self._arms]
+        lean = 0.0 if gait.on_ground else settings.lean
+        find = partial(opened, lean=lean) if lean else arm_azimuths
+        azimuths = find(skeleton, bones, body)
+        # The same to a body whose +Z is the way that it swims along.
+        self._round = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
+        self._outward = self._round
+        if lean:
+            self._outward = multiply(from_axis_angle(_SIDEWAYS, -lean), self._round)
+        # From an arm's own frame to armature space.
+        self._to_armature = multiply(from_matrix(body.rotation), self._outward)
+        self._rests = [
+            replace(arm_rest(skeleton, arm.bones), outward=outward)
+            for arm, outward in zip(self._arms, self.opens_to, strict=True)
+        ]
+        self._hands = np.array([arm.handedness for arm in self._arms])
+        self._pairs = tuple(arm.pair for arm in self._arms)
+        spread = [gait.offset(arm.side, arm.pair, max(self._pairs)) for arm in self._arms]
+        if gait.on_ground and settings.heading != 0.0:
+            spread = [spread[other] for other in _instead(azimuths, settings.heading)]
+        self._offsets = settings.phase_spread * np.array(spread) + [arm.phase for arm in arms]
+        sway = np.array([_across(gait.curve(pair)) for pair in self._pairs])
+        sway[:, PITCH] *= self._hands
+        self._sway = settings.sway * sway
+        self._builds = self._group(segments)
+        self._floor = -np.inf
+        self._few: Remembered[tuple[Floats, Floats]] = Remembered()
+        if settings.stand and gait.on_ground:
+            floor = float(np.quantile(self._whole_cycle()[0], _STANDING))
+            if floor < -_LEAST_DEPTH * self.arm_length:
+                self._floor = floor
+
+    @property
+    def bones(self) -> tuple[str, ...]:
+        """Names of the bones that are turned, in the order of ``ArmPoses.rotations``."""
+        return tuple(bone for arm in self._arms for bone in arm.bones)
+
+    @property
+    def arm_length(self) -> float:
+        """Mean length of the arms, in the armature's units: what strides are counted in."""
+        return float(self._lengths.mean())
+
+    @cached_property
+    def clearance(self) -> float:
+        """Height of the body's centre over the lowest joint of a whole cycle, armature units.
+
+        It is the gait's own, whatever variation and turning add: the same for every shot.
+        """
+        return -float(self._cycle[0].min())
+
+    @cached_property
+    def _cycle(self) -> tuple[Floats, dict[int, Floats]]:
+        return self._whole_cycle()
+
+    def _whole_cycle(self) -> tuple[Floats, dict[int, Floats]]:
+        """Heights (phases, arms) over the body's centre of each arm's lowest joint, and shapes.
+
+        At phases of the arms' own: arms that are built alike and have one curve go through the
+        same heights, whichever side they are on, so one of them is looked at. The shapes
+        (segments, 3) are those of each arm half way through its hold.
+        """
+        gait = self._settings.gait
+        phases = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
+        phases = np.append(phases, gait.power_phase)
+        heights = self._roots[:, 2] / self._lengths
+        depths = np.empty((_CYCLE_SAMPLES, len(self._arms)))
+        middles: dict[int, Floats] = {}
+        for build in self._builds:
+            alike: dict[tuple[int, float], list[int]] = {}
+            for arm in build.arms:
+                curve = self._pairs[arm] if self._pairs[arm] in gait.curves else 0
+                alike.setdefault((curve, round(float(heights[arm]), 6)), []).append(arm)
+            chosen = [arms[0] for arms in alike.values()]
+            part = Build(tuple(chosen), build.chain, build.widths)
+            own = np.repeat(phases[:, None], len(chosen), axis=1)
+            pairs = tuple(self._pairs[arm] for arm in chosen)
+            angles = evaluate(gait, own, pairs, steady=self._settings.steady)
+            angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
+            # Not from what is kept: that does not know the floor.
+            directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
+            # Up is the same for the arm's frame and the body's.
+            climbs = running(build.chain.lengths[:, None, None] * directions[:, 2])
+            lowest = np.minimum(climbs.min(axis=0), 0.0)
+            for place, arms in enumerate(alike.values()):
+                low = lowest[:_CYCLE_SAMPLES, place, None]
+                depths[:, arms] = self._roots[arms, 2] + self._lengths[arms] * low
+                for arm in arms:
+                    middles[arm] = directions[:, :, -1, place].copy()
+                    # The other side is its mirror image.
+                    middles[arm][:, 1] *= self._hands[arm] * self._hands[arms[0]]
+        return depths, middles
+
+    def middle_shapes(self, arms: Sequence[int]) -> Floats:
+        """Directions (segments, 3, arms) half way through the hold, of arms that are built alike.
+
+        In the arms' frames, as the gait alone has them.
+        """
+        return np.stack([self._cycle[1][arm] for arm in arms], axis=-1)
+
+    def arm_phases(self, phase: Floats) -> Floats:
+        """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
+        return phase[:, None] + self._offsets
+
+    def pose(self, phase: Floats, turn: Floats) -> ArmPoses:
+        """The arms at some frames.
+
+        Args:
+            phase: (frames,) of the body's gait, radians.
+            turn: (frames, 2) turn that lies ahead, in the body's XY plane (``Travel.turn``).
+        """
+        angles, steering = self.asked(phase, turn)
+        step = max(1, _CHUNK // len(self._arms))
+        parts = [
+            self._pose(angles[start : start + step], steering[start : start + step])
+            for start in range(0, len(angles), step)
+        ]
+        if not parts:
+            parts = [self._pose(angles, steering)]
+        return ArmPoses(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+    def asked(self, phase: Floats, turn: Floats) -> tuple[Floats, Floats]:
+        """What the gait asks of the arms at some frames; arguments as of :meth:`pose`.
+
+        Returns:
+            Angles (frames, arms, links, 3), turns anticlockwise for every arm, and by how much the
+            arms steer (frames, arms), radians.
+        """
+        return self.asked_at(self.arm_phases(np.asarray(phase, dtype=np.float64)), turn)
+
+    def asked_at(
+        self, phases: Floats, turn: Floats, period: Sequence[int] | None = None
+    ) -> tuple[Floats, Floats]:
+        """The same for phases (frames, arms) of the arms themselves.
+
+        Args:
+            phases: radians.
+            turn: as of :meth:`pose`.
+            period: each arm's cycles after which random additions come again, if that is not the
+                same for all.
+        """
+        settings = self._settings
+        steady = settings.steady
+        angles = evaluate(settings.gait, phases, self._pairs, steady=steady) + variation(
+            settings.gait,
+            phases,
+            self._pairs,
+            settings.variation,
+            settings.seed,
+            period=settings.period if period is None else period,
+            steady=steady,
+        )
+        if not settings.gait.on_ground:
+            angles = self._beside(angles)
+        # Towards the goal: by the part of the turn that lies across the arm.
+        across = rotate(self._round, np.array([0.0, 1.0, 0.0]))[:, :2]
+        steering = settings.turning * np.asarray(turn, dtype=np.float64) @ across.T
+        return self._mirrored(angles), steering
+
+    def _beside(self, angles: Floats) -> Floats:
+        """Angles (frames, arms, links, 3) with which no arm trails in the line of all others.
+
+        Arms that spring from one point would all come to lie in it as they close. They turn in
+        less far with their first links, and what is left with their second ones: so they trail
+        side by side.
+        """
+        off = self._asides > 0.0
+        if not np.any(off):
+            return angles
+        result = angles.copy()
+        head, aside = angles[:, off, 0, HEAD], self._asides[off]
+        # All of it where an arm trails in the line of the others, little before.
+        closed = head / (0.5 * np.pi)
+        short = -aside * closed * np.abs(closed)
+        result[:, off, 0, HEAD] += short
+        result[:, off, 1, HEAD] -= short
+        return result
+
+    @cached_property
+    def _asides(self) -> Floats:
+        """By how far the first link of each arm (arms,) has to point beside the way, radians."""
+        result = np.zeros(len(self._arms))
+        if len(self._arms) < 2:
+            return result
+        out = rotate(self._outward, np.array([1.0, 0.0, 0.0]))
+        roots = np.sum(self._roots * out, axis=-1) / self._lengths
+        for build in self._builds:
+            columns = list(build.arms)
+            short = np.maximum(_ROOM - roots[columns], 0.0) / (_TRAILING * build.widths[0])
+            result[columns] = np.arcsin(np.minimum(short, 1.0))
+        return result
+
+    @property
+    def arms(self) -> tuple[Arm, ...]:
+        """The arms as they were given."""
+        return self._arms
+
+    @property
+    def builds(self) -> tuple[Build, ...]:
+        """The arms, by how they are built."""
+        return self._builds
+
+    @property
+    def settings(self) -> GaitSettings:
+        """How the arms move."""
+        return self._settings
+
+    @property
+    def offsets(self) -> Floats:
+        """(arms,) radians that each arm's phase is ahead of the body's."""
+        return self._offsets
+
+    @property
+    def roots(self) -> Floats:
+        """(arms, 3) P₀ in the body's frame, armature units."""
+        return self._roots
+
+    @property
+    def lengths(self) -> Floats:
+        """(arms,) armature units."""
+        return self._lengths
+
+    @property
+    def outward(self) -> Floats:
+        """(arms, 4) from an arm's own frame, x outward and z up, to the body's."""
+        return self._outward
+
+    @property
+    def opens_to(self) -> Floats:
+        """(arms, 3) unit: where each arm leads out of the body, armature space."""
+        return rotate(self._to_armature, np.array([1.0, 0.0, 0.0]))
+
+    @property
+    def rests(self) -> tuple[ArmRest, ...]:
+        """Each arm at rest."""
+        return tuple(self._rests)
+
+    def _mirrored(self, angles: Floats) -> Floats:
+        """The same angles (frames, arms, links, 3), but with turns anticlockwise for every arm."""
+        hands = np.ones((len(self._arms), 1, 3))
+        hands[..., [PITCH, BANK]] = self._hands[:, None, None]
+        return angles * hands
+
+    def _pose(self, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        """Rotations and misses from angles (frames, arms, links, 3) and steering (frames, arms)."""
+        frames = len(angles)
+        ends = np.cumsum([0] + [len(arm.bones) for arm in self._arms])
+        rotations = np.empty((frames, ends[-1], 4))
+        misses = np.empty((frames, len(self._arms), GROUPS))
+        for build in self._builds:
+            columns = list(build.arms)
+            own = angles[:, columns]
+            directions, misses[:, columns] = self.shapes(build, own, steering[:, columns])
+            count, size = len(directions), frames * len(columns)
+            to_armature = np.tile(self._to_armature[columns].T, (1, frames))
+            in_armature = turned(to_armature, directions.reshape(count, 3, size))
+            posed = bone_rotations(
+                [self._rests[arm] for arm in columns],
+                in_armature.reshape(directions.shape),
+                twist(build, own),
+            )
+            for place, arm in enumerate(columns):
+                rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
+        return rotations, misses
+
+    def shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        """Directions (segments, 3, frames, arms) in the arms' frames; misses (frames, arms, 3).
+
+        Args:
+            build: which arms.
+            angles: (frames, arms, links, 3) of these, from :meth:`asked`.
+            steering: (frames, arms) of these.
+        """
+        if angles.shape[0] * angles.shape[1] > _FEW:
+            return self._shapes(build, angles, steering)
+        # What is asked again and again, about a gait as such.
+        key = key_of(build.arms, angles, steering)
+        return self._few.get(key, lambda: self._shapes(build, angles, steering))
+
+    def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        frames, arms = angles.shape[:2]
+        batch = frames * arms
+        width = build.widths * (1.0 + contraction(angles, self._settings.contraction)) ** (
+            # A group of a single bone cannot shorten.
+            np.array(build.chain.sizes) > 1
+        )
+        steered = angles.copy()
+        steered[..., 0, PITCH] += steering
+        links = link_rotations(steered)
+        targets = _batch_last(pseudo_targets(links, width), batch)
+        floor = None
+        # Two targets raised to one height come nearer to each other, which a single bone cannot.
+        if np.isfinite(self._floor) and min(build.chain.sizes) > 1:
+            columns = list(build.arms)
+            own = (self._floor - self._roots[columns, 2]) / self._lengths[columns]
+            floor = np.tile(own, frames)
+            targets[1:, 2] = raised(targets[1:, 2], floor)
+        sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
+        shape = asked_shape(build.chain, _batch_last(steered[..., [HEAD, PITCH]], batch), sway.T)
+        directions = solve(
+            build.chain,
+            shape,
+            _batch_last(links, batch),
+            targets,
+            softness=self._settings.softness,
+            give=self._settings.give,
+            floor=floor,
+        )
+        joints = running(build.chain.lengths[:, None, None] * directions)
+        ends = joints[np.cumsum(build.chain.sizes) - 1]
+        missed = np.linalg.norm(ends - targets[1:], axis=1)
+        if self._settings.give > 0.0:
+            roots = np.concatenate([np.zeros_like(ends[:1]), ends[:-1]])
+            chords = np.linalg.norm(targets[1:] - roots, axis=1)
+            beyond = overreach(chords, build.widths[:, None], self._settings.give)
+            # A group of a single bone begins where the one before has ended, and ends as far off.
+            missed = np.maximum(missed - beyond.cumsum(axis=0), 0.0)
+        return (
+            directions.reshape(len(directions), 3, frames, arms),
+            np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1),
+        )
+
+    def _group(self, segments: Sequence[Floats]) -> tuple[Build, ...]:
+        """Arms that are built alike, so that one solution in batch serves them."""
+        alike: dict[tuple[float, ...], list[int]] = {}
+        for arm, lengths in enumerate(segments):
+            shares = lengths / self._lengths[arm]
+            # Bones' lengths are single precision.
+            alike.setdefault(tuple(np.round(shares, 6).tolist()), []).append(arm)
+        builds = []
+        weights = self._settings.weights
+        for arms in alike.values():
+            shares = segments[arms[0]] / self._lengths[arms[0]]
+            sizes = split_groups(shares)
+            along = np.cumsum(shares) - shares
+            sampled = np.interp(along, np.linspace(0.0, 1.0, len(weights)), weights)
+            afloat = not self._settings.gait.on_ground
+            chain = Chain(shares, sizes, sampled, pairs_as_asked=afloat)
+            builds.append(Build(tuple(arms), chain, group_lengths(shares, sizes)))
+        return tuple(builds)
+
+
+def twist(build: Build, angles: Floats) -> Floats:
+    """Radians (segments, frames, arms) by which each bone is twisted against the one before.
+
+    Args:
+        build: which arms.
+        angles: (frames, arms, links, 3) of these; bank is spread evenly over its group.
+    """
+    sizes = build.chain.sizes
+    shares = np.moveaxis(angles[..., BANK], -1, 0) / np.array(sizes)[:, None, None]
+    return np.repeat(shares, sizes, axis=0)
+
+
+def _batch_last(values: Floats, batch: int) -> Floats:
+    """From (frames, arms, rows, components) to what the solver takes: (rows, components, batch)."""
+    rows = values.reshape(batch, *values.shape[2:])
+    return np.ascontiguousarray(np.moveaxis(rows, 0, -1))
+
+
+def _check_disjoint(arms: Sequence[Arm]) -> None:
+    owner: dict[str, str] = {}
+    for arm in arms:
+        for bone in arm.bones:
+            if bone in owner:
+                raise RigError(
+                    f"Bone '{bone}' is in two arms, '{owner[bone]}' and '{arm.name}'.",
+                    "Remove one of the two from the list.",
+                )
+            owner[bone] = arm.name
+
+
+def _instead(azimuths: Floats, heading: float) -> list[int]:
+    """For each arm the one that stands where it does, seen from the way that the body goes.
+
+    Of a body that goes sideways other arms are in front. In their own order neighbours that go
+    across the way would step on each other.
+
+    Args:
+        azimuths: (arms,) radians from the front, anticlockwise.
+        heading: radians from the way to the front, anticlockwise.
+    """
+    apart = azimuths + heading - azimuths[:, None]
+    nearest = np.abs(less_whole_turns(apart))
+    # Of two that are as near always the same one, whatever the rounding.
+    return np.argmin(np.round(nearest, 3), axis=0).tolist()
+
+
+def _across(curve: GaitCurve) -> Floats:
+    """Head and pitch (2,) of a unit bend across the one that a curve's angles mostly make."""
+    samples = curve.angles[..., [HEAD, PITCH]].reshape(-1, 2)
+    # Principal axes; of a table of zeros, whose axes are arbitrary, the sideways one.
+    _, axes = np.linalg.eigh(samples.T @ samples + np.diag([1e-12, 0.0]))
+    least = axes[:, 0]
+    return least if least[PITCH] > 0.0 or (least[PITCH] == 0.0 and least[HEAD] > 0.0) else -least

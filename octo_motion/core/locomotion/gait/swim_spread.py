@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the arms of a swimming body stand round its way when that is not the body's up.
+
+A body whose mantle lies flat behind it swims as it lies: its way leads out at its back, and its
+arms open across that and close before its face. Arms that stand round their way, as a squid's do,
+stay where they are. Most bodies that lie carry theirs in a fan to the front and the sides, like
+the fingers of a hand on a table: opened across the way all of it would lie in one plane, and
+arms on each other. They open all round instead, in the order in which they lie, those in the
+middle of the fan above: their undersides face the inside of the bell, as they do on any octopus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ...easing import smooth_step
+from ...rotations import Floats, from_axis_angle, less_whole_turns, to_matrix
+from ...skeleton import Skeleton
+from ..rig.arm_chains import BodyFrame, arm_azimuths
+
+_OPEN: Final = np.radians(45.0)
+"""Lean from which on arms have opened all the way."""
+_WIDEST: Final = np.radians(140.0)
+"""Arms that leave no gap as wide as this stand all round."""
+_SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
+
+
+def opened(
+    skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFrame, lean: float
+) -> Floats:
+    """Where each arm opens to (arms,), seen along the way: radians from the front, left positive.
+
+    Args:
+        skeleton: the rig.
+        arms: bone names, root to tip.
+        body: which way the body faces.
+        lean: radians from the body's +Z towards its back to its way.
+    """
+    fan = arm_azimuths(skeleton, arms, body)
+    turned = body.rotation @ to_matrix(from_axis_angle(_SIDEWAYS, -lean))
+    found = arm_azimuths(skeleton, arms, replace(body, rotation=turned))
+    if _gap(found) >= _WIDEST:
+        order = np.argsort(fan, kind="stable")
+        apart = 2.0 * np.pi / (len(fan) + 1)
+        found[order] = (np.arange(len(fan)) - 0.5 * (len(fan) - 1)) * apart
+    return fan + smooth_step(lean / _OPEN) * less_whole_turns(found - fan)
+
+
+def _gap(azimuths: Floats) -> float:
+    """The widest between neighbours, radians."""
+    around = np.sort(less_whole_turns(azimuths))
+    return float(np.max(np.diff(around, append=around[0] + 2.0 * np.pi)))

@@ -1,0 +1,450 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gait tables as data: three angles for each of three links over one cycle [Octopus, §3.3].
+
+The angles have the source's names. **Head** (ヘッド角) turns a link up and down about its lateral
+axis, positive raises. **Pitch** (ピッチ角) turns it left and right about its vertical axis,
+positive towards the front of the body, mirrored on the left and the right. **Bank** (バンク角)
+twists the arm about the link; it moves no target.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from ...errors import GaitError
+from ...rotations import Floats
+
+ANGLES: Final = ("head", "pitch", "bank")
+LINKS: Final = 3
+SIDES: Final = ("LEFT", "CENTER", "RIGHT")
+CYCLE: Final = 2.0 * np.pi
+FORMAT: Final = "octo_motion.gait"
+FORMAT_VERSION: Final = 1
+
+Manner = Literal["WALK", "CRAWL", "SWIM"]
+MANNERS: Final[tuple[Manner, ...]] = ("WALK", "CRAWL", "SWIM")
+
+
+@dataclass(frozen=True)
+class GaitCurve:
+    """The angles of one arm over one cycle, linear between knots."""
+
+    phases: Floats
+    """(knots,) radians, ascending from 0 to 2π."""
+    angles: Floats
+    """(knots, links, angles) radians, in the order of ``ANGLES``; the last equals the first."""
+    free: bool = False
+    """Whether the arm never holds on to the ground, and all its cycle is a swing."""
+
+    def evaluate(self, phase: Floats) -> Floats:
+        """Angles (…, links, angles) at phases (…) in radians, of any cycle."""
+        knot, share = self.locate(phase)
+        share = share[..., None, None]
+        return (1.0 - share) * self.angles[knot] + share * self.angles[knot + 1]
+
+    def locate(self, phase: Floats) -> tuple[np.ndarray, Floats]:
+        """The knot before each phase, and the share of the way to the next."""
+        inside = np.mod(phase, CYCLE)
+        knot = np.clip(np.searchsorted(self.phases, inside, "right") - 1, 0, len(self.phases) - 2)
+        start, end = self.phases[knot], self.phases[knot + 1]
+        return knot, (inside - start) / (end - start)
+
+    def rounding(self, phase: Floats, steady: float) -> Floats:
+        """What rounds corners off at phases (…): evens out what is linear between knots over time.
+
+        The mean of a straight line over a window is the line itself. So the weighted mean over so
+        many cycles before and after, with weights that fall off evenly to nothing, differs from
+        what has corners by one such part for each corner: h (1 − |t| / h)³ / 6 of its change of
+        slope, at a time t away within a window of h.
+
+        Args:
+            phase: radians.
+            steady: cycles, half at most.
+
+        Returns:
+            (…, knots − 1) radians, for the change of slope at each knot but the last, which is
+            the first again.
+        """
+        within = steady * CYCLE
+        away = phase[..., None] - self.phases[:-1]
+        away -= CYCLE * np.rint(away / CYCLE)
+        return within / 6.0 * np.maximum(1.0 - np.abs(away) / within, 0.0) ** 3
+
+
+@dataclass(frozen=True)
+class GaitTable:
+    """A gait: one curve for all arms, others for single pairs, and how phases are spread."""
+
+    name: str
+    manner: Manner
+    """Whether the body walks (upright, all arms in step), crawls (upright, each arm in its own
+    time) or swims (mantle ahead)."""
+    curves: dict[int, GaitCurve]
+    """By arm pair, 1 in front; 0 serves every pair that has none of its own."""
+    spread_pairs: float = 0.0
+    """Cycles by which a pair after the last would be ahead of the first."""
+    spread_sides: float = 0.0
+    """Cycles by which the right side is ahead of the left."""
+    offsets: dict[tuple[int, str], float] = field(default_factory=dict)
+    """Radians by which single arms, by pair and side, are ahead; they replace the spread."""
+    stride: float = 1.0
+    """Distance travelled in one cycle, in arm lengths: what the gait looks right with."""
+    power_phase: float = 0.0
+    """Phase at the middle of the power stroke, radians."""
+    description: str = ""
+    notes: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def on_ground(self) -> bool:
+        """Whether the body goes over the ground, upright."""
+        return self.manner != "SWIM"
+
+    def curve(self, pair: int) -> GaitCurve:
+        """The curve for one pair of arms."""
+        return self.curves.get(pair, self.curves[0])
+
+    def for_pairs(self, pairs: int) -> GaitTable:
+        """The table for a body of so many pairs of arms.
+
+        Pairs count from the front. Where a gait lets some arms hold no ground, those of its last
+        pair are the ones that do, and so are the rear arms of a body that has fewer: else nothing
+        would carry it.
+        """
+        if not any(curve.free for curve in self.curves.values()):
+            return self
+        known = [*self.curves, *(pair for pair, _ in self.offsets)]
+        beyond = max(known) - pairs
+        if beyond <= 0:
+            return self
+        curves = {pair - beyond: curve for pair, curve in self.curves.items() if pair > beyond}
+        offsets = {
+            (pair - beyond, side): offset
+            for (pair, side), offset in self.offsets.items()
+            if pair > beyond
+        }
+        return replace(self, curves={0: self.curves[0], **curves}, offsets=offsets)
+
+    def offset(self, side: str, pair: int, pairs: int) -> float:
+        """Radians that an arm is ahead of the body's phase, for a body of so many pairs.
+
+        The source leaves the offsets open. Ours are a wave that runs over the pairs from back to
+        front while the sides alternate: with the preset of one cycle over the pairs and half a
+        cycle between the sides, eight arms fill the cycle two by two, each with its diagonal.
+        """
+        if (pair, side) in self.offsets:
+            return self.offsets[pair, side]
+        side_share = {"LEFT": 0.0, "CENTER": 0.5, "RIGHT": 1.0}[side]
+        return CYCLE * (
+            self.spread_pairs * (pair - 1) / max(pairs, 1) + self.spread_sides * side_share
+        )
+
+
+def evaluate(
+    table: GaitTable, phases: Floats, pairs: tuple[int, ...], *, steady: float = 0.0
+) -> Floats:
+    """Angles of all arms.
+
+    Args:
+        table: the gait.
+        phases: (frames, arms) radians, each arm's own offset included.
+        pairs: pair of each arm.
+        steady: cycles before and after each moment over which it is evened out
+            (:meth:`GaitCurve.rounding`).
+
+    Returns:
+        (frames, arms, links, angles) radians.
+    """
+    result = np.empty((*phases.shape, LINKS, len(ANGLES)))
+    for pair, columns in _columns_by_curve(table, pairs).items():
+        curve, own = table.curve(pair), phases[:, columns]
+        result[:, columns] = curve.evaluate(own)
+        if steady > 0.0:
+            slopes = np.diff(curve.angles, axis=0) / np.diff(curve.phases)[:, None, None]
+            corners = slopes - np.roll(slopes, 1, axis=0)
+            rounding = curve.rounding(own, steady)
+            result[:, columns] += np.einsum("fak,klc->falc", rounding, corners)
+    return result
+
+
+def variation(
+    table: GaitTable,
+    phases: Floats,
+    pairs: tuple[int, ...],
+    limits: tuple[float, float],
+    seed: int,
+    *,
+    period: int | Sequence[int] = 0,
+    steady: float = 0.0,
+) -> Floats:
+    """Random additions to the angles: R(j, k) of [Octopus, §3.4].
+
+    One number is drawn for each arm, link, cycle and knot (and for head and pitch apart), uniform
+    in [j, k), and interpolated as the table itself is; the last knot of a cycle is the first of
+    the next, so that the motion stays continuous. Numbers depend on seed, cycle and arm alone,
+    never on which frames are asked for. Bank stays as it is.
+
+    Args:
+        table: the gait, for its knots.
+        phases: (frames, arms) radians.
+        pairs: pair of each arm.
+        limits: j and k, radians.
+        seed: any whole number ≥ 0.
+        period: cycles after which the numbers come again, 0 for never; or each arm's own.
+        steady: as of :func:`evaluate`.
+
+    Returns:
+        (frames, arms, links, angles) radians.
+    """
+    low, high = limits
+    result = np.zeros((*phases.shape, LINKS, len(ANGLES)))
+    if phases.size == 0 or (low == 0.0 and high == 0.0):
+        return result
+    cycles = np.floor_divide(phases, CYCLE).astype(np.int64)
+    rounds = np.broadcast_to(np.asarray(period, dtype=np.int64), phases.shape[1:])
+    first, last = int(cycles.min()) - 1, int(cycles.max()) + 2
+    every = np.arange(first, last + 1)[:, None]
+    # (cycles, arms) numbers of the cycles whose draws count.
+    drawn = np.where(rounds > 0, every % np.maximum(rounds, 1), every)
+    kept = {int(each) for each in np.unique(drawn)}
+    for pair, columns in _columns_by_curve(table, pairs).items():
+        curve, own = table.curve(pair), phases[:, columns]
+        knots = len(curve.phases) - 1
+        draws = {each: _draw_cycle(seed, each, columns, knots) for each in kept}
+        values = np.array(
+            [
+                [draws[number][place] for place, number in enumerate(numbers)]
+                for numbers in drawn[:, columns].tolist()
+            ]
+        )
+        # One cycle after the other, (knots, arms, links, 2).
+        values = np.moveaxis(low + (high - low) * values, 2, 1).reshape(-1, len(columns), LINKS, 2)
+        knot, share = curve.locate(own)
+        place = (cycles[:, columns] - first) * knots + knot
+        arms = np.arange(len(columns))
+        share = share[..., None, None]
+        result[:, columns, :, :2] = (1.0 - share) * values[place, arms]
+        result[:, columns, :, :2] += share * values[place + 1, arms]
+        if steady > 0.0:
+            apart = np.tile(np.diff(curve.phases), len(every))[:-1, None, None, None]
+            slopes = np.diff(values, axis=0) / apart
+            corners = np.zeros_like(values)
+            corners[1:-1] = np.diff(slopes, axis=0)
+            rounding = curve.rounding(own, steady)
+            for number in range(knots):
+                nearest = np.rint((own - curve.phases[number]) / CYCLE).astype(np.int64) - first
+                corner = corners[nearest * knots + number, arms]
+                result[:, columns, :, :2] += rounding[..., number, None, None] * corner
+    return result
+
+
+def _draw_cycle(seed: int, cycle: int, arms: np.ndarray, knots: int) -> Floats:
+    """(arms, knots, links, 2) uniform in [0, 1). Each arm has a stream of its own."""
+    # SeedSequence takes no negative numbers; a phase offset can reach back before cycle 0.
+    words = [seed, abs(cycle), int(cycle < 0)]
+    streams = [np.random.default_rng([*words, arm]) for arm in arms.tolist()]
+    return np.stack([stream.random((knots, LINKS, 2)) for stream in streams])
+
+
+def _columns_by_curve(table: GaitTable, pairs: tuple[int, ...]) -> dict[int, np.ndarray]:
+    """Arms grouped by the curve that they use."""
+    keys = np.array([pair if pair in table.curves else 0 for pair in pairs])
+    return {int(key): np.flatnonzero(keys == key) for key in np.unique(keys)}
+
+
+def curve_from_degrees(phases: list[float], **angles: list[list[float]]) -> GaitCurve:
+    """A curve from degrees, each angle as one list of knot values for each link.
+
+    Args:
+        phases: of the knots.
+        angles: by their names; those that are not given stay at zero.
+
+    Raises:
+        ValueError: phases are no row of numbers, or an angle has not one for each link and knot.
+    """
+    knots = np.asarray(phases, dtype=np.float64)
+    if knots.ndim != 1:
+        raise ValueError("its phases are no row of numbers")
+    table = np.zeros((len(knots), LINKS, len(ANGLES)))
+    for name, links in angles.items():
+        values = np.asarray(links, dtype=np.float64)
+        # One number would do for all links and knots, a row for one of the two: nobody means it.
+        if values.shape != (LINKS, len(knots)):
+            raise ValueError(f"{name} has not one number for each link and phase")
+        table[:, :, ANGLES.index(name)] = values.T
+    return GaitCurve(np.radians(knots), np.radians(table))
+
+
+def check(table: GaitTable) -> GaitTable:
+    """The table, if it can be used.
+
+    Raises:
+        GaitError: numbers that are not finite, knots that do not ascend from 0 to 2π, a last
+            value that differs from the first, a table that serves not every pair.
+    """
+    where = f"Gait '{table.name}'"
+    if 0 not in table.curves:
+        raise GaitError(f"{where} has no curve for all arms.", "Give it a curve for pair 0.")
+    scalars = (
+        *(table.spread_pairs, table.spread_sides, table.stride, table.power_phase),
+        *table.offsets.values(),
+    )
+    if not np.isfinite(scalars).all():
+        raise GaitError(f"{where} has a number that is not finite.", "Correct it.")
+    if table.stride <= 0.0:
+        raise GaitError(f"{where} has a stride of {table.stride:g}.", "It must be above zero.")
+    for pair, curve in table.curves.items():
+        place = f"{where}, pair {pair}" if pair else where
+        if not (np.isfinite(curve.phases).all() and np.isfinite(curve.angles).all()):
+            raise GaitError(f"{place} has a number that is not finite.", "Correct it.")
+        if curve.angles.shape != (len(curve.phases), LINKS, len(ANGLES)):
+            raise GaitError(
+                f"{place} does not have three angles of three links at every knot.",
+                "Complete it.",
+            )
+        if len(curve.phases) < 2 or abs(curve.phases[0]) > 1e-9:
+            raise GaitError(f"{place} does not start at phase 0.", "Add a knot there.")
+        if abs(curve.phases[-1] - CYCLE) > 1e-9:
+            raise GaitError(f"{place} does not end at phase 360°.", "Add a knot there.")
+        if np.any(np.diff(curve.phases) <= 0.0):
+            raise GaitError(f"{place} has knots that do not ascend.", "Sort them by phase.")
+        if np.max(np.abs(curve.angles[0] - curve.angles[-1])) > 1e-9:
+            raise GaitError(
+                f"{place} ends at other angles than it starts with.",
+                "Make the values at 0° and 360° equal.",
+            )
+    return table
+
+
+def to_json(table: GaitTable) -> str:
+    """The table as a text that people can edit: degrees, one list for each angle and link."""
+    curves = {}
+    for pair, curve in sorted(table.curves.items()):
+        degrees = np.degrees(curve.angles)
+        curves["all" if pair == 0 else str(pair)] = {
+            "phase": _rounded(np.degrees(curve.phases)),
+            **{
+                name: [_rounded(degrees[:, link, number]) for link in range(LINKS)]
+                for number, name in enumerate(ANGLES)
+                if np.any(degrees[:, :, number])
+            },
+            **({"free": True} if curve.free else {}),
+        }
+    content = {
+        "format": FORMAT,
+        "version": FORMAT_VERSION,
+        "name": table.name,
+        "description": table.description,
+        "manner": table.manner.lower(),
+        "spread": {"pairs": table.spread_pairs, "sides": table.spread_sides},
+        "offsets": {
+            f"{pair} {side.lower()}": _rounded(np.degrees([offset]))[0]
+            for (pair, side), offset in sorted(table.offsets.items())
+        },
+        "stride": table.stride,
+        "power_phase": _rounded(np.degrees([table.power_phase]))[0],
+        "pairs": curves,
+        "notes": table.notes,
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+
+
+def _rounded(values: Any) -> list[float]:
+    # Twelve digits: exact to 1e-14 rad, without the noise of the conversion to degrees.
+    return [float(f"{value:.12g}") for value in values]
+
+
+def from_json(text: str, source: str = "The gait file") -> GaitTable:
+    """The table in a text made by ``to_json`` or by hand.
+
+    Args:
+        text: JSON.
+        source: what error messages call it, such as the file's name.
+
+    Raises:
+        GaitError: no JSON, not a gait, from a newer version, or damaged (see ``check``).
+    """
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise GaitError(
+            f"{source} is not JSON (line {error.lineno}: {error.msg}).", "Choose a gait file."
+        ) from error
+    except (ValueError, RecursionError) as error:
+        # A number of thousands of digits, or brackets in brackets without end.
+        raise GaitError(f"{source} is not JSON ({error}).", "Choose a gait file.") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise GaitError(f"{source} is not a gait of Octo Motion.", "Choose a gait file.")
+    if content.get("version") != FORMAT_VERSION:
+        raise GaitError(
+            f"{source} has format version {content.get('version')!r}, not {FORMAT_VERSION}.",
+            "Update Octo Motion, or save the gait anew.",
+        )
+    try:
+        manner = str(content["manner"]).upper()
+        known: dict[str, Manner] = {each: each for each in MANNERS}
+        curves = {
+            0 if key == "all" else int(key): replace(
+                curve_from_degrees(
+                    each["phase"], **{name: each[name] for name in ANGLES if name in each}
+                ),
+                free=bool(each.get("free", False)),
+            )
+            for key, each in content["pairs"].items()
+        }
+        spread = content.get("spread", {})
+        table = GaitTable(
+            name=str(content["name"]),
+            manner=known.get(manner, "WALK"),
+            curves=curves,
+            spread_pairs=float(spread.get("pairs", 0.0)),
+            spread_sides=float(spread.get("sides", 0.0)),
+            offsets={
+                _arm_of(key): float(np.radians(float(value)))
+                for key, value in content.get("offsets", {}).items()
+            },
+            stride=float(content.get("stride", 1.0)),
+            power_phase=float(np.radians(float(content.get("power_phase", 0.0)))),
+            description=str(content.get("description", "")),
+            notes={str(key): str(value) for key, value in content.get("notes", {}).items()},
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise GaitError(
+            f"{source} is damaged ({type(error).__name__}: {error}).", "Save the gait anew."
+        ) from error
+    if manner not in MANNERS:
+        raise GaitError(f"{source} has the manner {manner!r}.", "It must be walk, crawl or swim.")
+    return check(table)
+
+
+def _arm_of(key: str) -> tuple[int, str]:
+    """Pair and side from a text such as "1 left"."""
+    pair, side = key.upper().split()
+    if side not in SIDES:
+        raise ValueError(f"no side is called {side!r}")
+    return int(pair), side
+
+
+def presets() -> dict[str, GaitTable]:
+    """The gaits that come with the extension, by name."""
+    return dict(_shipped())
+
+
+@cache
+def _shipped() -> dict[str, GaitTable]:
+    tables = (
+        from_json(path.read_text(encoding="utf-8"), path.name)
+        for path in sorted((Path(__file__).parent / "presets").glob("*.json"))
+    )
+    return {table.name: table for table in tables}
+
+
+def renamed(table: GaitTable, name: str) -> GaitTable:
+    """The same table under another name."""
+    return replace(table, name=name)

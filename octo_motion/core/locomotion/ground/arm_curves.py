@@ -1,0 +1,426 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes of arms as a whole: along a curve, between two others, off the ground, onto a goal.
+
+A shape is the directions of an arm's segments, (segments, 3, batch), unit vectors; the batch comes
+last, as in ``columns``. Every function is smooth in what it is given, so that what it makes of a
+motion that is continuous is continuous.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ...batched import dot, running, smallest_arc, turned
+from ...rotations import Floats
+from .surface import Ground
+
+_WEAK: Final = 0.02
+"""Least lever that joints are raised with, in squares of the first segment's length."""
+_SHORTEST: Final = 0.2
+_LONGEST: Final = 4.0
+"""Handles of a curve, in its lengths."""
+_OPEN: Final = 0.36
+"""Share of the angle between a circle's arc and its chord that there is at a curve's ends at least.
+"""
+_OPENING: Final = 0.06
+"""Radians over which that comes."""
+_NO_CORNER: Final = 0.05
+_HALVINGS: Final = 7
+"""Steps in which they are found."""
+_BACKWARDS: Final = 1e-4
+"""Least of one and the cosine of an angle whose half has a tangent."""
+_BENDINGS: Final = 6
+"""Newton's steps in which it is found how much more a curve is bent."""
+_BOLD: Final = 0.6
+"""Radians that a segment turns at a step of Newton's at most."""
+_FIRM: Final = 1e-4
+"""What keeps the steps finite where an arm is straight, as a share of its own stiffness."""
+_MANY: Final = 0.5
+"""Share of a batch from which on all of it is raised, rather than those that are too low."""
+_TINY: Final = 1e-12
+
+
+def opened(
+    ways: tuple[Floats, Floats], chord: Floats, upward: Floats, ratio: Floats
+) -> tuple[Floats, Floats]:
+    """Ways in which a curve leaves and arrives, far enough from its chord for how long it is.
+
+    A cubic between ends that are in line with its chord can only be longer than that by doubling
+    back on itself, at a point where it turns over at once. The ends of a circle's arc as long would
+    be √(6 (1 − ratio)) from its chord, nearly; a share of that is needed, and what is lacking is
+    added to both, upwards.
+
+    Args:
+        ways: (3, batch) unit vectors both, at its start and at its end.
+        chord: (3, batch) from start to end.
+        upward: (3, batch) unit: which way it is to rise.
+        ratio: (batch,) of the chord to its length.
+    """
+    along = unit(chord)
+    up = unit(upward - dot(upward, along) * along)
+    apart = 0.5 * (_between(ways[0], along) + _between(ways[1], along))
+    lack = _OPEN * np.sqrt(6.0 * np.maximum(1.0 - ratio, 0.0)) - apart
+    near = np.maximum(lack + _OPENING, 0.0)
+    lack = np.where(lack > _OPENING, lack, near * near / (4.0 * _OPENING))
+    return _tipped(ways[0], along, up, lack), _tipped(ways[1], along, up, -lack)
+
+
+def _between(ways: Floats, along: Floats) -> Floats:
+    """Angles (batch,) between unit vectors (3, batch), without a corner where there is none."""
+    cosine = dot(ways, along)
+    across = ways - cosine * along
+    return np.arctan2(np.sqrt(dot(across, across) + _NO_CORNER**2), cosine)
+
+
+def _tipped(ways: Floats, along: Floats, up: Floats, angle: Floats) -> Floats:
+    """Vectors (3, batch) turned by angles (batch,) from one direction to another across it."""
+    ahead, rise = dot(ways, along), dot(ways, up)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turned_ahead, turned_rise = cosine * ahead - sine * rise, sine * ahead + cosine * rise
+    return ways + (turned_ahead - ahead) * along + (turned_rise - rise) * up
+
+
+def curve(
+    *,
+    leaving: Floats,
+    arriving: Floats,
+    chord: Floats,
+    size: Floats,
+    middles: Floats,
+    parts: Floats,
+) -> Floats:
+    """Directions (segments, 3, batch) along a cubic that is about as long as it should be.
+
+    Args:
+        leaving: (3, batch) unit, at its start.
+        arriving: (3, batch) unit, at its end.
+        chord: (3, batch) from start to end.
+        size: (batch,) how long it should be.
+        middles: (segments, 1, batch) where on it the segments' middles are, 0…1.
+        parts: (segments, batch) how much of each segment is on it.
+    """
+    t, ways = middles[:, 0], np.stack([chord, leaving, arriving])
+    # All of it lies in the space of three vectors: how much of each, and their products.
+    amounts = np.stack(
+        [
+            6.0 * t * (1.0 - t),
+            size * (1.0 - 4.0 * t + 3.0 * t * t),
+            size * (3.0 * t * t - 2.0 * t),
+        ]
+    )
+    (cc, cl, ca), (_, ll, la), (_, _, aa) = np.einsum("xcb,ycb->xyb", ways, ways)
+    along, out, back = amounts
+    level = along * along * cc
+    slope = 2.0 * along * (out * cl + back * ca)
+    bend = out * (out * ll + 2.0 * back * la) + back * back * aa
+    share = parts / np.maximum(np.sum(parts, axis=0), _TINY)
+    wanted = np.sqrt(cc) / size
+
+    def excess(handle: Floats) -> Floats:
+        square = (bend * handle + slope) * handle + level
+        weights = share / np.sqrt(np.maximum(square, _TINY * _TINY))
+        along, out, back = np.einsum("sb,xsb->xb", weights, amounts)
+        out, back = handle * out, handle * back
+        square = along * (along * cc + 2.0 * (out * cl + back * ca))
+        square += out * (out * ll + 2.0 * back * la) + back * back * aa
+        return np.sqrt(np.maximum(square, 0.0)) - wanted
+
+    # The longer the handles, the more of its length the curve spends on its way round.
+    low, high = np.full(size.shape, _SHORTEST), np.full(size.shape, _LONGEST)
+    for _ in range(_HALVINGS):
+        middle = np.sqrt(low * high)
+        short = excess(middle) < 0.0
+        low, high = np.where(short, low, middle), np.where(short, middle, high)
+    # Between the two, in proportion: so the curve does not change by steps.
+    above, below = np.maximum(excess(low), 0.0), np.maximum(-excess(high), 0.0)
+    handle = low + (high - low) * above / np.maximum(above + below, _TINY)
+    amounts[1:] *= handle
+    return unit(np.einsum("xsb,xcb->scb", amounts, ways))
+
+
+def bent(directions: Floats, parts: Floats, chord: Floats, share: Floats) -> Floats:
+    """Directions bent so much more that they lead along a chord no farther than a share of it.
+
+    The tangents of half of the angles to the chord are all scaled by one factor: an arch stays an
+    arch, however little of its length is left between its ends.
+
+    Args:
+        directions: (segments, 3, batch) unit.
+        parts: (segments, batch) how much of each segment counts.
+        chord: (3, batch)
+        share: (batch,) of how far they have led, 0…1.
+    """
+    along = unit(chord)
+    cosines = np.einsum("scb,cb->sb", directions, along)
+    across = directions - cosines[:, None] * along
+    squares = (1.0 - cosines) / np.maximum(1.0 + cosines, _BACKWARDS)
+    wanted = share * np.sum(parts * cosines, axis=0)
+    # The logarithm of the factor's square, for which the way led falls evenly.
+    factor = np.zeros(share.shape)
+    for _ in range(_BENDINGS):
+        bends = np.exp(factor) * squares
+        far = np.sum(parts * (1.0 - bends) / (1.0 + bends), axis=0)
+        slope = np.sum(parts * bends / (1.0 + bends) ** 2, axis=0)
+        factor = factor + np.clip(0.5 * (far - wanted) / np.maximum(slope, _TINY), -1.0, 1.0)
+    bends = np.exp(factor) * squares
+    ahead = (1.0 - bends) / (1.0 + bends)
+    size = np.sqrt(np.maximum(1.0 - ahead * ahead, 0.0))
+    return ahead[:, None] * along + size[:, None] * unit(across)
+
+
+def blended(outward: Floats, start: Floats, end: Floats, share: Floats) -> Floats:
+    """Shapes (segments, 3, batch) between two others, by the angles at their joints.
+
+    Directions themselves would have no middle where they are opposite. What an arm's shape
+    consists of are its bends, from each segment to the next, seen along the arm without twist:
+    two numbers at each joint, and these are far from a half turn.
+
+    Args:
+        outward: (3, batch) unit: what the first segment's direction is told from.
+        start: (segments, 3, batch) unit.
+        end: (segments, 3, batch) unit.
+        share: (batch,) 0 at the start, 1 at the end.
+    """
+    between = np.flatnonzero((share > 0.0) & (share < 1.0))
+    result = np.where(share < 1.0, start, end)
+    if len(between) == 0:
+        return result
+    first = np.broadcast_to(np.array([[1.0], [0.0], [0.0]]), (3, len(between)))
+    rest = smallest_arc(first, outward[:, between])
+    share = share[between]
+    # Frames along the two and along what is between them, carried from segment to segment
+    # without twist.
+    frames = np.empty((3, *np.eye(3).shape, len(between)))
+    frames[:] = [turned(rest, axis[:, None]) for axis in np.eye(3)]
+    for number in range(len(start)):
+        ways = np.stack([start[number][:, between], end[number][:, between]])
+        seen = np.einsum("xicb,xcb->xib", frames[:2], ways)
+        bends = _bends(seen)
+        own = _bent(bends[0] + share * (bends[1] - bends[0]))
+        way = np.einsum("icb,ib->cb", frames[2], own)
+        _carry(frames, np.concatenate([ways, way[None]]), np.concatenate([seen, own[None]]))
+        result[number][:, between] = way
+    return result
+
+
+def _bends(seen: Floats) -> Floats:
+    """Which way, y and z, and how far (…, 2, batch) unit vectors (…, 3, batch) are bent from x."""
+    x, y, z = seen[..., 0, :], seen[..., 1, :], seen[..., 2, :]
+    across = np.sqrt(y * y + z * z)
+    factor = np.where(across > 1e-9, np.arctan2(across, x) / np.maximum(across, 1e-9), 1.0)
+    return seen[..., 1:, :] * factor[..., None, :]
+
+
+def _bent(bend: Floats) -> Floats:
+    """Inverse of :func:`_bends`: unit vectors (3, batch)."""
+    angle = np.sqrt(bend[0] * bend[0] + bend[1] * bend[1])
+    # By the tangent of half of it, which is quicker than cosine and sine.
+    tangent = np.tan(0.5 * angle)
+    share = 2.0 / (1.0 + tangent * tangent)
+    result = np.empty((3, len(angle)))
+    result[0] = share - 1.0
+    result[1:] = bend * (share * tangent / np.maximum(angle, _TINY))
+    return result
+
+
+def _carry(frames: Floats, ways: Floats, seen: Floats) -> None:
+    """Turn frames (…, axes, 3, batch) in place as little as it takes for x to point another way.
+
+    Args:
+        frames: unit vectors x, y, z.
+        ways: (…, 3, batch) unit vectors.
+        seen: (…, 3, batch) the same as they are seen from the frames.
+    """
+    lost = seen[..., 1:, :] / np.maximum(1.0 + seen[..., :1, :], _TINY)
+    frames[..., 1:, :, :] -= lost[..., None, :] * (frames[..., :1, :, :] + ways[..., None, :, :])
+    frames[..., 0, :, :] = ways
+
+
+def evened(directions: Floats, share: Floats) -> Floats:
+    """Directions (segments, 3, batch) between those before and after, by a share (segments, batch).
+
+    Sharp bends spread over neighbouring joints; the first and the last segment stay.
+    """
+    result = directions.copy()
+    mean = 0.5 * (directions[2:] + directions[:-2])
+    mean -= directions[1:-1]
+    mean *= share[1:-1, None]
+    result[1:-1] += mean
+    return unit(result)
+
+
+def raised(
+    directions: Floats,
+    lengths: Floats,
+    *,
+    free: Floats,
+    roots: Floats,
+    needed: Floats,
+    loose: Floats,
+    ground: Ground,
+    rounds: int,
+    soft: Floats,
+) -> Floats:
+    """Directions (segments, 3, batch) of arms whose joints are not too near to the ground.
+
+    The lowest joints are raised by turning the segments before them as little as it takes. A
+    segment that stands upright has no lever on the height, and is left alone.
+
+    Args:
+        directions: (segments, 3, batch) unit.
+        lengths: (segments, batch)
+        free: (segments, batch) how far each is free to turn, 0…1.
+        roots: (3, batch) world.
+        needed: (segments + 1, batch) how high above the ground each joint should be.
+        loose: (segments + 1, batch) how far each is to be raised, 0…1.
+        ground: what they should be above of.
+        rounds: how often the lowest of them are raised.
+        soft: (…, batch) how much above what is needed they begin to be raised.
+    """
+    least = (1e-4 * np.max(np.broadcast_to(soft, needed.shape), axis=0)) ** 2
+    gentle, loosened = 0.25 / soft, free * lengths
+    weak = _WEAK * lengths[0] ** 2
+    joints = np.empty((len(lengths) + 1, *roots.shape))
+    result = directions
+    for number in range(rounds):
+        joints[0] = roots
+        np.multiply(lengths[:, None], result, out=joints[1:])
+        running(joints)
+        below = ground.height(np.moveaxis(joints, 1, -1)) - joints[:, 2]
+        below += needed
+        near = np.maximum(below + soft, 0.0)
+        below = np.where(below > soft, below, near * near * gentle)
+        below *= loose
+        if number == 0:
+            low = np.flatnonzero(below.any(axis=0))
+            if len(low) < _MANY * len(below[0]):
+                # Those that are high enough stay as they are, in all rounds.
+                result = directions.copy()
+                result[..., low] = raised(
+                    directions[..., low],
+                    lengths[:, low],
+                    free=free[:, low],
+                    roots=roots[:, low],
+                    needed=needed[:, low],
+                    loose=loose[:, low],
+                    ground=ground,
+                    rounds=rounds if len(low) else 0,
+                    soft=soft[..., low],
+                )
+                return result
+            result = directions.copy()
+        weights = below * below
+        weights *= 1.0 / (np.sum(weights, axis=0) + least)
+        wanted = np.einsum("sb,sb->b", weights, below)
+        # Share of the weights beyond each segment: what is raised by turning it.
+        carried = running(weights[:0:-1].copy())[::-1]
+        z = result[:, 2]
+        level = 1.0 - z * z
+        turn = loosened * carried
+        carried = carried * lengths
+        carried *= level
+        turn *= wanted / (np.einsum("sb,sb->b", turn, carried) + weak)
+        _turn_up(result, turn, level)
+    return result
+
+
+def _turn_up(directions: Floats, turn: Floats, level: Floats) -> None:
+    """Turn directions (segments, 3, batch) in place towards z.
+
+    Args:
+        directions: unit.
+        turn: (segments, batch) how much of z is added to each; changed in place.
+        level: (segments, batch) square of what is level of each direction.
+    """
+    square = turn * turn
+    square *= level
+    less = 1.0 / (1.0 + np.max(square, axis=0) / _BOLD**2)
+    turn *= np.sqrt(less)
+    square *= less
+    square += 1.0
+    # Only what of z is across a direction turns it.
+    size = np.reciprocal(np.sqrt(square, out=square), out=square)
+    left = turn * directions[:, 2]
+    np.subtract(1.0, left, out=left)
+    left *= size
+    directions *= left[:, None]
+    turn *= size
+    directions[:, 2] += turn
+
+
+def drawn(
+    directions: Floats,
+    lengths: Floats,
+    *,
+    free: Floats,
+    chosen: Floats,
+    roots: Floats,
+    goal: Floats,
+    steps: int,
+) -> Floats:
+    """Directions turned as little as it takes for the arm to end at the goal, by Newton's method.
+
+    The sum of squares of the turns, each divided by its segment's freedom, is smallest: three
+    equations for the multiplier λ, one for each coordinate of the end.
+
+    Args:
+        directions: (segments, 3, batch) unit.
+        lengths: (segments, batch)
+        free: (segments, batch) how far each is free to turn, 0…1.
+        chosen: (segments, batch) 1 for the segments up to the end that is drawn, else 0.
+        roots: (3, batch) world.
+        goal: (3, batch) world.
+        steps: of Newton's method.
+    """
+    reach = chosen * lengths
+    turning = reach * free
+    stiffness = turning * lengths
+    base = (1.0 + _FIRM) * (np.sum(stiffness, axis=0) + _TINY * np.sum(lengths, axis=0) ** 2)
+    squared, way = turning * turning, goal - roots
+    result = directions.copy()
+    weighted = np.empty_like(result)
+    for _ in range(steps):
+        left = way - np.einsum("sb,scb->cb", reach, result)
+        np.multiply(stiffness[:, None], result, out=weighted)
+        xx, xy, xz, yy, yz, zz = (
+            np.einsum("sb,sb->b", weighted[:, one], result[:, other])
+            for one, other in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+        )
+        pull = _solved((base - xx, -xy, -xz, base - yy, -yz, base - zz), left)
+        # Only what of it is across a segment turns that.
+        along = np.einsum("scb,cb->sb", result, pull)
+        square = along * along
+        np.subtract(np.einsum("cb,cb->b", pull, pull), square, out=square)
+        np.maximum(square, 0.0, out=square)
+        square *= squared
+        less = 1.0 / (1.0 + np.max(square, axis=0) / _BOLD**2)
+        turn = turning * np.sqrt(less)
+        square *= less
+        square += 1.0
+        size = np.reciprocal(np.sqrt(square, out=square), out=square)
+        along *= turn
+        np.subtract(1.0, along, out=along)
+        along *= size
+        result *= along[:, None]
+        turn *= size
+        result += np.multiply(turn[:, None], pull, out=weighted)
+    return result
+
+
+def _solved(matrix: tuple[Floats, ...], right: Floats) -> Floats:
+    """Solutions (3, batch) of symmetric equations xx, xy, xz, yy, yz, zz."""
+    xx, xy, xz, yy, yz, zz = matrix
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    determinant = xx * a + xy * b + xz * c
+    d, e, f = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+    x, y, z = right
+    return np.stack([a * x + b * y + c * z, b * x + d * y + e * z, c * x + e * y + f * z]) * (
+        1.0 / np.maximum(determinant, _TINY * xx**3)
+    )
+
+
+def unit(vectors: Floats) -> Floats:
+    """Vectors (…, 3, batch) at unit length."""
+    return vectors * (1.0 / np.maximum(np.sqrt(dot(vectors, vectors)), _TINY))[..., None, :]

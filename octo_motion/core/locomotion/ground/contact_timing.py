@@ -1,0 +1,512 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When each arm is where in its cycle, as a function of how far the body has come.
+
+A gait with a rhythm has the same cycle for all arms, a stride long, each arm ahead by its own
+offset. A crawl has none: each arm's cycle begins and ends with its own holds. Both are functions
+of the distance travelled alone, so that any frame can be computed without those before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...rotations import Floats, multiply, normalized, rotate
+from ..gait.table import CYCLE
+from .body_height import BodyLine
+from .crawl_planner import CrawlSettings, Holds, Journey, plan_crawl
+
+_PER_REACH: Final = 32
+"""Samples of a journey to the length of an arm."""
+_SPARE: Final = 6.0
+"""Reaches of crawl besides the loop that is cut from it, at least."""
+_CUTS: Final = 24
+"""Places where it might be cut."""
+_LOOPS: Final = 3
+"""How often a loop comes again, in its table, before its start and after its end."""
+_FINE: Final = 16
+"""Steps of the table of distances between two knots of an arm's cycle."""
+_STARTS: Final = (-0.1, 0.3)
+"""Where in its hold an arm may be as the body gets going, from the hold's middle, in holds: all of
+it lies down, and little of it is peeled off yet …"""
+_STOPS: Final = (-0.15, 0.15)
+"""… and as the body comes to rest."""
+_AT_ONCE: Final = 0.4
+"""Cycles since the middle of its last hold up to which an arm swings as the body gets going; one
+that would be further lies on the ground already. As the body comes to rest it is the other way."""
+_HASTE: Final = 2.0
+"""How much worse it is on a short way that an arm hurries than that it is late."""
+
+
+class Rhythm(Protocol):
+    """Phases of the arms along the way."""
+
+    @property
+    def rounds(self) -> Sequence[int] | None:
+        """Each arm's cycles in a loop, where these are not the same for all."""
+        ...
+
+    def phases(self, distance: Floats) -> Floats:
+        """Each arm's own phase (frames, arms) at distances (frames,), unwrapped, radians."""
+        ...
+
+    def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
+        """Distances (arms, …) at which some arms have come through so many cycles (arms, …)."""
+        ...
+
+    def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """Where arms are to take hold in cycles whose numbers are (cycles,), seen from above.
+
+        Returns:
+            Radians (arms, cycles) anticlockwise from an arm's own direction, and metres (arms,
+            cycles) from its root half way through the hold, nan for where it holds on with ease.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Even:
+    """One cycle per stride."""
+
+    stride: float
+    """Metres."""
+    offsets: Floats
+    """(arms,) radians that each arm is ahead of the body."""
+    rounds: Sequence[int] | None = None
+
+    def phases(self, distance: Floats) -> Floats:
+        """(frames, arms)."""
+        return CYCLE * distance[:, None] / self.stride + self.offsets
+
+    def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
+        """(arms, …)."""
+        ahead = self.offsets[list(arms)] / CYCLE
+        return self.stride * (cycles - ahead.reshape(-1, *[1] * (cycles.ndim - 1)))
+
+    def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """(arms, cycles) both: none."""
+        shape = len(arms), len(cycles)
+        return np.zeros(shape), np.full(shape, np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Tabled:
+    """Each arm by a table of its own."""
+
+    tables: Sequence[Table]
+    middle: float
+    """Phase of the gait, radians, half way through a hold."""
+    rounds: Sequence[int] | None = None
+    """Each arm's cycles in a loop, if it is one."""
+
+    def phases(self, distance: Floats) -> Floats:
+        """(frames, arms)."""
+        columns = [CYCLE * table.cycles(distance) for table in self.tables]
+        return np.stack(columns, axis=1) + self.middle
+
+    def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
+        """(arms, …)."""
+        since = cycles - self.middle / CYCLE
+        return np.stack(
+            [self.tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
+        )
+
+    def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """(arms, cycles) both."""
+        found = np.stack([self.tables[arm].aims_in(cycles) for arm in arms])
+        return found[..., 0], found[..., 1]
+
+
+def free(holds: Holds, arms: int, *, middle: float, duty: float) -> Tabled:
+    """The rhythm of arms whose cycles begin and end with their own holds.
+
+    Args:
+        holds: of all arms.
+        arms: how many there are.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes in the gait.
+    """
+    return Tabled([_table(holds, arm, duty) for arm in range(arms)], middle)
+
+
+def at_rest(
+    rhythm: Even | Tabled,
+    length: float,
+    *,
+    start: bool,
+    end: bool,
+    middle: float,
+    duty: float,
+) -> Tabled:
+    """The same rhythm of a body that starts from a standstill, comes to one, or both.
+
+    An arm that would hang in the air then swings in time, or not yet, or no more: whichever is
+    nearer. In between, and for all others, nothing changes.
+
+    Args:
+        rhythm: of the body that goes on before and after its route.
+        length: metres of the route.
+        start: whether the body stands at the start.
+        end: whether it stands at the end.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes.
+    """
+    if isinstance(rhythm, Even):
+        ends = (rhythm.phases(np.array([0.0, length])) - middle) / CYCLE
+        tables: Sequence[Table] = [
+            _even_table(first, last, rhythm.stride, duty) for first, last in ends.T.tolist()
+        ]
+    else:
+        tables = rhythm.tables
+    rested = [_rested(table, length, duty, start=start, end=end) for table in tables]
+    return Tabled(rested, middle)
+
+
+def crawling(
+    line: BodyLine,
+    roots: Floats,
+    outward: Floats,
+    settings: CrawlSettings,
+    *,
+    reach: float,
+    middle: float,
+    duty: float,
+    stands: tuple[bool, bool] = (False, False),
+) -> Tabled:
+    """The rhythm of a body that crawls.
+
+    Args:
+        line: its way.
+        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
+        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
+        settings: how it crawls.
+        reach: metres that its arms are long.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes in the gait.
+        stands: whether it stands at the start of its way, and at the end, with all arms down.
+    """
+    length = line.route.length
+    distance = _samples(length, reach)
+    way = line.at(distance)
+    journey = _journey(distance, way, roots, outward, reach=reach, stands=stands)
+    return free(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
+
+
+def crawling_in_place(
+    line: BodyLine,
+    roots: Floats,
+    outward: Floats,
+    settings: CrawlSettings,
+    *,
+    reach: float,
+    middle: float,
+    duty: float,
+) -> Tabled:
+    """The rhythm of a body that crawls straight on, and is after its route's length as before.
+
+    Each arm's holds are cut from a longer crawl, as many as fill the loop best, and stretched or
+    shrunk to its length; the place where they are cut is the one where most arms hold on.
+
+    Args:
+        line: a straight way on level ground.
+        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
+        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
+        settings: how it crawls.
+        reach: metres that its arms are long.
+        middle: phase of the gait half way through a hold, radians.
+        duty: share of a cycle that a hold takes in the gait.
+    """
+    loop = line.route.length
+    # As much as four holds and pauses, however long these may be: there is one more to cut at.
+    pause = max(settings.pause[1], settings.search[1]) + settings.far - settings.near
+    whole = loop + max(_SPARE, 4.0 * pause) * reach
+    distance = _samples(whole, reach)
+    (start, end), (turned, _) = line.at(np.array([0.0, loop]))
+    centres = start + distance[:, None] / loop * (end - start)
+    way = centres, np.tile(turned, (len(distance), 1))
+    journey = _journey(distance, way, roots, outward, reach=reach)
+    holds = plan_crawl(journey, settings)
+    cuts = [
+        [_cut(holds, arm, loop, start) for arm in range(len(roots))]
+        for start in np.linspace(0.25, 0.5, _CUTS) * (whole - loop)
+    ]
+    best = max(cuts, key=lambda arms: _support(arms, loop))
+    tables = [_looped(*holds, loop, duty) for holds in best]
+    return Tabled(tables, middle, rounds=[len(start) for start, _, _ in best])
+
+
+def _samples(length: float, reach: float) -> Floats:
+    """Distances along a way at which its journey is looked at."""
+    return np.linspace(0.0, length, max(2, int(np.ceil(length / reach * _PER_REACH)) + 1))
+
+
+def _journey(
+    distance: Floats,
+    way: tuple[Floats, Floats],
+    roots: Floats,
+    outward: Floats,
+    *,
+    reach: float,
+    stands: tuple[bool, bool] = (False, False),
+) -> Journey:
+    """What a crawl is planned from.
+
+    Args:
+        distance: (samples,) along the way.
+        way: the body's centres (samples, 3) and orientations (samples, 4) there.
+        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
+        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
+        reach: metres that its arms are long.
+        stands: whether it stands at the start, and at the end.
+    """
+    centres, rotations = way
+    directions = rotate(multiply(rotations[:, None], outward), np.array([1.0, 0.0, 0.0]))
+    places = centres[:, None] + rotate(rotations[:, None], roots)
+    return Journey(
+        distance=distance,
+        roots=places[..., :2],
+        outward=normalized(directions[..., :2]),
+        ahead=normalized(np.gradient(centres[:, :2], axis=0)),
+        length=reach,
+        stands=stands,
+    )
+
+
+def _cut(holds: Holds, arm: int, loop: float, start: float) -> tuple[Floats, Floats, Floats]:
+    """Starts, ends and aims of an arm's holds in a loop that is cut at a distance."""
+    own = np.flatnonzero(holds.arm == arm)
+    own = own[np.searchsorted(holds.start[own], start) :]
+    begins, ends = holds.start[own], holds.end[own]
+    lasts = begins[1:] - begins[0]
+    many = int(np.argmin(np.abs(np.log(lasts / loop)))) + 1
+    factor = loop / lasts[many - 1]
+    first = begins[0] - start
+    return (
+        first + factor * (begins[:many] - begins[0]),
+        first + factor * (ends[:many] - begins[0]),
+        _aims(holds, own[:many]),
+    )
+
+
+def _aims(holds: Holds, chosen: NDArray[Any]) -> Floats:
+    """Angles and distances of some holds (…, 2)."""
+    return np.stack([holds.turn[chosen], holds.away[chosen]], axis=-1)
+
+
+def _support(arms: Sequence[tuple[Floats, Floats, Floats]], loop: float) -> tuple[int, int]:
+    """How many arms hold on in a loop at least, and in all."""
+    at = np.linspace(0.0, loop, 96, endpoint=False)
+    holding = np.zeros(len(at), dtype=np.int64)
+    for start, end, _ in arms:
+        since = np.mod(at[:, None] - start, loop)
+        holding += np.any(since < end - start, axis=1)
+    return int(holding.min()), int(holding.sum())
+
+
+def _looped(start: Floats, end: Floats, aims: Floats, loop: float, duty: float) -> Table:
+    """The table of an arm whose holds come again after a loop."""
+    many = len(start)
+    turns = np.arange(-_LOOPS, _LOOPS + 2)
+    at = (loop * turns[:, None, None] + np.stack([start, end], axis=1)).ravel()
+    number = many * turns[:, None] + np.arange(many, dtype=np.float64)
+    values = (number[..., None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
+    return Table(at, values, _monotone(at, values), aims=aims, repeats=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """How far one arm is in its cycles: a rising curve through knots, straight on beyond them."""
+
+    at: Floats
+    """(knots,) distances"""
+    values: Floats
+    """(knots,) cycles from the middle of hold 0"""
+    slopes: Floats
+    """(knots,)"""
+    starts: bool = False
+    """Whether there is nothing before its first knot: the body stands …"""
+    stops: bool = False
+    """… and nothing after its last one."""
+    aims: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    """(holds, 2) where the arm is to take hold, as of :meth:`Rhythm.aims`, from hold 0 on …"""
+    repeats: bool = False
+    """… and whether it does so again after that."""
+
+    def aims_in(self, cycles: NDArray[np.int64]) -> Floats:
+        """Of holds by their number (cycles, 2)."""
+        many = len(self.aims)
+        if self.repeats:
+            return self.aims[np.mod(cycles, many)]
+        known = np.concatenate([self.aims, [[0.0, np.nan]]])
+        return known[np.where((cycles >= 0) & (cycles < many), cycles, many)]
+
+    def cycles(self, distance: Floats) -> Floats:
+        """At distances (…,)."""
+        low = self.at[0] if self.starts else -np.inf
+        distance = np.clip(distance, low, self.at[-1] if self.stops else np.inf)
+        knot = np.clip(np.searchsorted(self.at, distance, "right") - 1, 0, len(self.at) - 2)
+        start, width = self.at[knot], self.at[knot + 1] - self.at[knot]
+        t = (distance - start) / width
+        rise = self.values[knot + 1] - self.values[knot]
+        first, last = width * self.slopes[knot], width * self.slopes[knot + 1]
+        bend = first + last - 2.0 * rise
+        inside = self.values[knot] + t * (first + t * (rise - first - bend + t * bend))
+        before = self.values[0] + (distance - self.at[0]) * self.slopes[0]
+        after = self.values[-1] + (distance - self.at[-1]) * self.slopes[-1]
+        return np.where(t < 0.0, before, np.where(t > 1.0, after, inside))
+
+    @cached_property
+    def _steps(self) -> tuple[Floats, Floats]:
+        """Distances (steps,) close to each other, and cycles there."""
+        number = np.arange((len(self.at) - 1) * _FINE + 1) / _FINE
+        fine = np.interp(number, np.arange(len(self.at)), self.at)
+        return fine, self.cycles(fine)
+
+    def slopes_at(self, distance: Floats) -> Floats:
+        """Cycles per metre at distances (…,)."""
+        knot = np.clip(np.searchsorted(self.at, distance, "right") - 1, 0, len(self.at) - 2)
+        start, width = self.at[knot], self.at[knot + 1] - self.at[knot]
+        t = np.clip((distance - start) / width, 0.0, 1.0)
+        secant = (self.values[knot + 1] - self.values[knot]) / width
+        first, last = self.slopes[knot], self.slopes[knot + 1]
+        bend = first + last - 2.0 * secant
+        return first + t * (2.0 * (secant - first - bend) + 3.0 * t * bend)
+
+    def distances(self, cycles: Floats) -> Floats:
+        """At cycles (…,)."""
+        low = self.values[0] if self.starts else -np.inf
+        cycles = np.clip(cycles, low, self.values[-1] if self.stops else np.inf)
+        fine, values = self._steps
+        inside = np.interp(cycles, values, fine)
+        steep = np.maximum(self.slopes[[0, -1]], 1e-12)
+        before = self.at[0] + (cycles - self.values[0]) / steep[0]
+        after = self.at[-1] + (cycles - self.values[-1]) / steep[1]
+        low, high = cycles < self.values[0], cycles > self.values[-1]
+        return np.where(low, before, np.where(high, after, inside))
+
+
+def _even_table(first: float, last: float, stride: float, duty: float) -> Table:
+    """The table of an arm that has the same cycle all the way, its knots where holds begin and end.
+
+    Two knots would do for it. But what is changed next to one of them changes all that lies between
+    the two.
+
+    Args:
+        first: cycles from the middle of hold 0 where the route begins …
+        last: … and where it ends.
+        stride: metres in a cycle.
+        duty: share of a cycle that a hold takes.
+    """
+    holds = np.arange(np.floor(first) - 1.0, np.ceil(last) + 2.0)
+    values = (holds[:, None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
+    return Table(stride * (values - first), values, np.full(len(values), 1.0 / stride))
+
+
+def _table(holds: Holds, arm: int, duty: float) -> Table:
+    own: NDArray[np.bool_] = holds.arm == arm
+    start, end = holds.start[own], holds.end[own]
+    number = np.arange(len(start), dtype=np.float64)
+    at = np.stack([start, end], axis=1).ravel()
+    values: Floats = np.stack([number - 0.5 * duty, number + 0.5 * duty], axis=1).ravel()
+    if not len(start):
+        at, values = np.array([0.0, 1.0]), np.array([-0.5, -0.4])
+    # A cycle more at either end, as long as those that are there are in the mean.
+    whole = (at[-1] - at[0]) / max(values[-1] - values[0], 0.5)
+    swing = 1.0 - duty
+    at = np.concatenate(
+        [at[0] - whole * np.array([1.0, swing]), at, at[-1] + whole * np.array([swing, 1.0])]
+    )
+    values = np.concatenate(
+        [values[0] - np.array([1.0, swing]), values, values[-1] + np.array([swing, 1.0])]
+    )
+    return Table(at, values, _monotone(at, values), aims=_aims(holds, own))
+
+
+def _rested(table: Table, length: float, duty: float, *, start: bool, end: bool) -> Table:
+    """The table of an arm that lies on the ground where the body stands."""
+    first, low = _going(table, duty) if start else (0.0, -np.inf)
+    last, high = _stopping(table, length, duty) if end else (0.0, np.inf)
+    if low < high:
+        # A knot that is there already, but for its last digits, is not to be there twice.
+        same = 1e-9 * (table.at[-1] - table.at[0])
+        own = table.at[(table.at > low + same) & (table.at < high - same)]
+        at = np.unique([*[0.0, low] * start, *own, *[high, length] * end])
+    else:
+        at = np.array([0.0, length])
+    values, slopes = table.cycles(at), table.slopes_at(at)
+    if start:
+        values[0] = first
+    if end:
+        values[-1] = last
+    if not low < high:
+        # Hardly a step on so short a way: none at all if it were a hasty one.
+        own = np.ptp(table.cycles(at))
+        last = min(max(first, last), last + 1.0, key=lambda each: abs(each - first - own))
+        values[-1] = first if last - first > _HASTE * own else last
+    secants = np.diff(values) / np.diff(at)
+    if start and low > 0.0:
+        slopes[0] = secants[0]
+    if end and high < length:
+        slopes[-1] = secants[-1]
+    # No curve between two knots falls that is at most three times as steep as their chord.
+    slopes[1:] = np.minimum(slopes[1:], 3.0 * secants)
+    slopes[:-1] = np.minimum(slopes[:-1], 3.0 * secants)
+    return replace(table, at=at, values=values, slopes=slopes, starts=start, stops=end)
+
+
+def _going(table: Table, duty: float) -> tuple[float, float]:
+    """Where in its cycles an arm is at the start, and the distance at which it is as it would be.
+
+    It either swings at once, and then lands as it would, or later, and then lets go as it would.
+    """
+    own = float(table.cycles(np.zeros(1))[0])
+    first, middle = _nearest(own, _STARTS, duty, _AT_ONCE)
+    if first == own:
+        return own, 0.0
+    joint = middle + 1.0 - 0.5 * duty if own > first else middle + 0.5 * duty
+    return first, float(table.distances(np.array([joint]))[0])
+
+
+def _stopping(table: Table, length: float, duty: float) -> tuple[float, float]:
+    """Where in its cycles an arm is at the end, and the distance up to which it is as it would be.
+
+    It either takes no more step, or takes its last one in time.
+    """
+    own = float(table.cycles(np.array([length]))[0])
+    last, middle = _nearest(own, _STOPS, duty, 1.0 - _AT_ONCE)
+    if last == own:
+        return own, length
+    joint = middle - 0.5 * duty if own > last else middle - 1.0 + 0.5 * duty
+    return last, float(table.distances(np.array([joint]))[0])
+
+
+def _nearest(
+    cycles: float, around: tuple[float, float], duty: float, late: float
+) -> tuple[float, float]:
+    """Cycles nearby at which an arm lies on the ground, and the middle of that hold.
+
+    Args:
+        cycles: where the arm would be.
+        around: between which places in a hold it lies.
+        duty: share of a cycle that a hold takes.
+        late: cycles from a hold's middle from which on it is the next one's.
+    """
+    middle = np.floor(cycles - late) + 1.0
+    low, high = duty * np.array(around)
+    return float(np.clip(cycles, middle + low, middle + high)), float(middle)
+
+
+def _monotone(at: Floats, values: Floats) -> Floats:
+    """Slopes at the knots with which a piecewise cubic neither jumps nor turns back."""
+    width, rise = np.diff(at), np.diff(values)
+    secant = rise / width
+    slopes = np.empty_like(at)
+    slopes[0], slopes[-1] = secant[0], secant[-1]
+    first, last = 2.0 * width[1:] + width[:-1], width[1:] + 2.0 * width[:-1]
+    slopes[1:-1] = (first + last) / (first / secant[:-1] + last / secant[1:])
+    return slopes

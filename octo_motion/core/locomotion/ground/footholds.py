@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where and when arms hold on to the ground.
+
+An arm holds on once in each cycle of its gait. A foothold belongs to an arm and the number of its
+cycle and hangs on nothing else: not on frames, nor on footholds before it. It is laid where the
+gait wants it as the body passes, half way through the hold, and near enough for the arm to keep
+it while the body moves on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from ...rotations import Floats, rotate, rotate_in_plane
+from ..gait.table import CYCLE
+from ..path.course import Line
+from .contact_curve import laid
+from .contact_timing import Rhythm
+from .foothold_reach import PEELING, Passing, hold_times, peeled_to, spots
+from .foothold_relaxation import settled
+from .stance_settings import Limbs, StanceSettings
+from .surface import Ground, normals
+
+UNROLLING: Final = 0.3
+"""Share of a hold in which the arm lies down, from where it first touches to its tip."""
+_CURL: Final = np.radians(50.0)
+"""Range of the angle by which the part that lies down is bent to one side, from step to step."""
+_EARLIEST: Final = 0.46
+"""Cycles before and after its middle that a hold may reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wish:
+    """What an artist wants of one foothold."""
+
+    arm: int
+    cycle: int
+    removed: bool = False
+    shift: float = 0.0
+    """Cycles by which it is later, −0.3…0.3: beyond that a hold would leave its cycle."""
+    position: Floats | None = None
+    """(3,) where the arm is to touch, world."""
+    heading: float | None = None
+    """Which way it then lies, radians about world Z from +X."""
+
+
+@dataclass(frozen=True, eq=False)
+class Footholds:
+    """The footholds of arms that are built alike, by arm and cycle."""
+
+    first: int
+    """Number of the first cycle that is here."""
+    touching: int
+    """The joint c that touches first."""
+    on: Floats
+    """(arms, cycles) when the hold begins, in cycles from the middle that the gait gives it."""
+    off: Floats
+    """(arms, cycles) when it ends."""
+    middle: Floats
+    """(arms, cycles) halfway between unrolled and peeling."""
+    present: np.ndarray
+    """(arms, cycles) whether there is one at all."""
+    joints: Floats
+    """(arms, cycles, segments + 1 − c, 3) world: joints c … n as they lie on the ground."""
+    normals: Floats
+    """(arms, cycles, segments + 1 − c, 3) which way up the ground is there."""
+    skins: Floats
+    """(arms, cycles, segments + 1 − c) metres from each of these joints to the skin below it."""
+    headings: Floats
+    """(arms, cycles) radians about world Z from +X."""
+    curls: Floats
+    """(arms, cycles) radians by which they are bent to one side on the way to the tip."""
+    peeled_to: Floats
+    """(arms, cycles) metres along the arm up to which it is peeled off as the hold ends."""
+    roots_on: Floats
+    """(arms, cycles, 3) where the arm's root is as the hold begins, world …"""
+    roots_off: Floats
+    """(arms, cycles, 3) … and as it ends."""
+    short: Floats
+    """(arms, cycles) metres that it is out of reach."""
+
+    def unrolled(self) -> Floats:
+        """(arms, cycles) when all of it lies down."""
+        return self.on + UNROLLING * (self.off - self.on)
+
+    def peeled(self) -> Floats:
+        """(arms, cycles) when it begins to be peeled off."""
+        return self.off - PEELING * (self.off - self.on)
+
+
+def cycles_at(phases: Floats, middle: float) -> tuple[np.ndarray, Floats]:
+    """The cycle (…) that arms' phases (…) belong to, and cycles (…) from its hold's middle.
+
+    From half way through one swing to half way through the next it is one cycle.
+    """
+    turns = (phases - middle) / CYCLE
+    number = np.floor(turns + 0.5)
+    return number.astype(np.int64), turns - number
+
+
+def lay(
+    limbs: Limbs,
+    line: Line,
+    ground: Ground,
+    settings: StanceSettings,
+    rhythm: Rhythm,
+    *,
+    middle: float,
+    cycles: tuple[int, int],
+    wishes: Sequence[Wish] = (),
+    seed: int = 0,
+    alike: bool = False,
+) -> Footholds:
+    """Lay all footholds of some arms.
+
+    Args:
+        limbs: the arms.
+        line: the body's way.
+        ground: what it walks on.
+        settings: how arms hold on.
+        rhythm: when they do.
+        middle: phase of the gait, radians, half way through the hold.
+        cycles: the first and the last that are wanted.
+        wishes: the artist's; of arms by their number in the body.
+        seed: of the small differences from step to step.
+        alike: whether there are none, so that each cycle is like the one before.
+    """
+    first, last = cycles
+    shape = len(limbs.arms), last - first + 1
+    numbers = np.arange(first, last + 1)
+    wanted = _wanted(limbs, shape, first, wishes)
+    shift = wanted.shift
+
+    # Cycles of each arm at the middles that the gait gives to its holds.
+    given: Floats = np.broadcast_to(middle / CYCLE + numbers.astype(np.float64), shape)
+
+    def roots_at(since: Floats) -> tuple[Floats, Floats]:
+        """World positions of the arms' roots, and the body's orientations, at such times."""
+        centres, rotations = line.at(rhythm.distances(limbs.arms, given + since))
+        return centres + rotate(rotations, limbs.roots[:, None]), rotations
+
+    roots, rotations = roots_at(shift)
+    asked, away = rhythm.aims(limbs.arms, numbers)
+    aim, lie = (rotate_in_plane(each, asked) for each in _ahead(limbs, rotations))
+    joint = limbs.touching(settings.planted)
+    sizes = np.stack([limbs.reach[-1], limbs.reach[-1] - limbs.reach[joint]], axis=-1)
+    aside, farther = settled(ground, roots, aim, lie, away, sizes=sizes)
+    aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
+    away = away + farther
+    # One after the other, for the first will do for nearly all.
+    passings = (
+        Passing(roots, [roots_at(shift + each)[0] for each in times])
+        for times in hold_times(settings)
+    )
+    found = spots(limbs, ground, settings, passings, aim=aim, away=away)
+    spot = roots.copy()
+    spot[..., :2] += found.distance[..., None] * aim
+    side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if alike else numbers, seed)
+    heading = np.where(wanted.turned, wanted.headings, np.arctan2(lie[..., 1], lie[..., 0]))
+    curl: Floats = np.broadcast_to(_CURL * (side - 0.5), shape)
+    round_about = limbs.radii[joint:].T[:, None]
+    skins = np.broadcast_to(round_about, (*shape, round_about.shape[-1]))
+    spot = np.where(wanted.moved[..., None], wanted.places, spot)
+    joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
+    on = np.maximum(shift - found.half, -_EARLIEST)
+    off = np.minimum(shift + found.half, _EARLIEST)
+    # Shifted holds are told from the middle that the gait gives them.
+    roots_on, roots_off = roots_at(on)[0], roots_at(off)[0]
+    return Footholds(
+        first=first,
+        touching=joint,
+        on=on,
+        off=off,
+        middle=0.5 * ((on + UNROLLING * (off - on)) + (off - PEELING * (off - on))),
+        present=wanted.present,
+        joints=joints,
+        normals=normals(ground, joints),
+        skins=skins,
+        headings=heading,
+        curls=curl,
+        peeled_to=peeled_to(limbs, joint, joints, roots_off),
+        roots_on=roots_on,
+        roots_off=roots_off,
+        short=found.short,
+    )
+
+
+def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) -> Footholds:
+    """The same footholds of arms that lie otherwise.
+
+    Args:
+        footholds: of these arms.
+        limbs: the arms.
+        ground: what they lie on.
+        skins: (arms, cycles, segments + 1 − c) metres from each joint to the skin below it.
+    """
+    joint, spot = footholds.touching, footholds.joints[:, :, 0]
+    turns = {"heading": footholds.headings, "curl": footholds.curls}
+    joints = laid(limbs, ground, joint, skins=skins, spot=spot, **turns)
+    return replace(
+        footholds,
+        joints=joints,
+        normals=normals(ground, joints),
+        skins=skins,
+        peeled_to=peeled_to(limbs, joint, joints, footholds.roots_off),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """Wishes by arm and cycle, (arms, cycles)."""
+
+    present: np.ndarray
+    shift: Floats
+    moved: np.ndarray
+    places: Floats
+    turned: np.ndarray
+    headings: Floats
+
+
+def _wanted(limbs: Limbs, shape: tuple[int, int], first: int, wishes: Sequence[Wish]) -> _Wanted:
+    present, moved, turned = np.ones(shape, dtype=bool), *np.zeros((2, *shape), dtype=bool)
+    places, (shift, headings) = np.zeros((*shape, 3)), np.zeros((2, *shape))
+    if limbs.free is not None:
+        present[limbs.free] = False
+    for wish in wishes:
+        if wish.arm not in limbs.arms or not 0 <= wish.cycle - first < shape[1]:
+            continue
+        at = limbs.arms.index(wish.arm), wish.cycle - first
+        present[at], shift[at] = present[at] and not wish.removed, wish.shift
+        if wish.position is not None:
+            moved[at], places[at] = True, wish.position
+        if wish.heading is not None:
+            turned[at], headings[at] = True, wish.heading
+    return _Wanted(present, shift, moved, places, turned, headings)
+
+
+def _ahead(limbs: Limbs, rotations: Floats) -> tuple[Floats, Floats]:
+    """Which way arms point, and lie, seen from above: unit vectors (arms, cycles, 2) both."""
+    ahead = np.zeros((len(limbs.arms), 2, 3))
+    ahead[..., 0], ahead[..., 1] = np.cos(limbs.aims), np.sin(limbs.aims)
+    ahead = rotate(limbs.outward[:, None], ahead)
+    ahead = rotate(rotations[:, :, None], ahead[:, None])[..., :2]
+    ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
+    return ahead[:, :, 0], ahead[:, :, 1]
+
+
+def _hash(arms: np.ndarray, cycles: np.ndarray, seed: int) -> Floats:
+    """Numbers (arms, cycles) from 0 to 1 that hang on arm, cycle and seed alone."""
+    mixed = np.sin(12.9898 * (arms + 1.0) + 78.233 * (cycles + 0.5) + 37.719 * (seed + 1.0))
+    return np.mod(43758.5453 * mixed, 1.0)

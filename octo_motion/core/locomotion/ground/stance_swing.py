@@ -1,0 +1,576 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms that hold on to the ground while the body moves on, and swing to the next foothold.
+
+An arm at a time is one smooth curve: from the body to where it touches, along the ground, and up
+again where it is not unrolled yet. In the middle of a swing it is the gait's own shape; between
+the two it is a blend. Its segments are then turned, as little as it takes, until the arm meets its
+foothold: those that lie on the ground not at all. All of it is a function of the frame's own
+phase and place; there is no frame before it.
+
+Vectors are (…, 3, batch), as in ``columns``; the batch is frames × arms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from ...batched import dot
+from ...easing import least_jerk, smooth_step
+from ...rotations import Floats
+from .arm_curves import bent, blended, curve, drawn, evened, opened, raised, unit
+from .foothold_reach import PEELING
+from .footholds import UNROLLING, Footholds
+from .stance_settings import Limbs, StanceSettings
+from .surface import Ground
+
+_STEPS: Final = (4, 3, 3, 4)
+"""Newton's steps each time that an arm is drawn to its foothold, after it was raised."""
+_EVENED: Final = 0.3
+"""Share of the mean of its neighbours that a segment takes on each time before it is raised."""
+_KEPT: Final = 0.3
+"""Share of the gait's own shape in an arm that holds on."""
+_RAISED: Final = np.radians(12.0)
+"""How far an arm that holds on leaves the body upwards of outward."""
+_RAISES: Final = 6
+_RAISES_BETWEEN: Final = 2
+"""How often the lowest joints of an arm are raised, in the air and before it is drawn down."""
+_FALLING: Final = 0.2
+"""Share of downward in the way that a slack arm comes to the ground."""
+_KNEE: Final = 2.8
+"""Fewer segments than as many of equal length are as good as two with one joint between them: it
+must point up, or it is in the way, and would snap from one side to the other."""
+_STRAIGHT: Final = 0.999
+"""Cosine of what is left of the knee's bend where the foothold is as far as it reaches."""
+_ARCHED: Final = np.radians(15.0)
+_ARCHING: Final = 0.5
+"""How much more where it is slack, and over what share of its length that comes."""
+_BUNCHED: Final = 0.7
+"""Share of its length between body and foothold below which its curve is bent all over: a cubic
+that is as long doubles back on itself at its top, and turns over at once."""
+_BUNCHING: Final = 0.05
+"""Over what share of its length that comes."""
+_CURLED: Final = np.radians(85.0)
+"""How far the tip stands up before it is unrolled."""
+_FOLDED: Final = np.radians(110.0)
+"""How far the first bone of it is bent back at most from the one before: further on, which way it
+has turned on itself is not definite."""
+_BORDER: Final = 1.6
+"""Segments before the ground over which an arm is less and less free to turn."""
+_EASY: Final = 0.88
+"""Share of its length between body and foothold from which on an arm stretches."""
+_CROWDED: Final = 0.7
+"""The same below which it shortens …"""
+_SHORTER: Final = 0.5
+"""… by this share of the most stretch at most."""
+_NEARLY: Final = 0.97
+_REST: Final = 0.025
+"""Share of its length from which on an arm no longer reaches out all the way, and what is left."""
+_GENTLE: Final = 0.05
+"""Strain over which stretching begins."""
+_GOING: Final = 0.12
+"""Cycles within which an arm in the air comes to go along with its body."""
+_SOFT: Final = 0.25
+"""Share of the height that it needs within which a joint begins to be raised."""
+_OVER: Final = 0.03
+"""Arm lengths that joints which do not lie keep between their skin and the ground: between two of
+them the skin is lower, where the ground is bent upwards or the arm sideways."""
+_AT_ONCE: Final = 40.0
+"""How much faster than its hold an arm loses its stiffness against the ground: so it does not pass
+through it …"""
+_LETTING_GO: Final = 3.0
+"""… and how much faster it comes to keep its distance from it, where it has lain: without a jerk.
+"""
+_STARTING: Final = 10.0
+"""Hold that it has lost, of the cube of the share of its way from the ground: as least jerk begins.
+"""
+_ROLLED: Final = 0.6
+"""Share of that way within which it may come to have rolled to any side."""
+_UNHELD: Final = 0.2
+"""Share of its hold that an arm in the air has lost when all its movement is evened out."""
+_EARLIER: Final = 0.2
+"""Share of its way to the ground before its end from which on an arm unrolls."""
+_TINY: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Arms at moments: frames × arms."""
+
+    limbs: Limbs
+    arms: np.ndarray
+    """(batch,) place of each one's arm among the limbs."""
+    roots: Floats
+    """(3, batch) P₀, world."""
+    outward: Floats
+    """(3, batch) unit: straight out of the body, world."""
+    upward: Floats
+    """(3, batch) unit: the body's up, world."""
+    lift: Floats
+    """(batch,) metres that joints which do not lie are to be higher than they need be."""
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """(segments, batch) metres at rest."""
+        return self.limbs.lengths[:, self.arms]
+
+    @cached_property
+    def reach(self) -> Floats:
+        """(segments + 1, batch) metres along the arm to each joint, at rest."""
+        return self.limbs.reach[:, self.arms]
+
+    @cached_property
+    def radii(self) -> Floats:
+        """(segments + 1, batch) metres from each joint to the skin below it."""
+        return self.limbs.radii[:, self.arms]
+
+    def part(self, chosen: np.ndarray) -> Batch:
+        """Some of them."""
+        return Batch(
+            self.limbs,
+            self.arms[chosen],
+            self.roots[:, chosen],
+            self.outward[:, chosen],
+            self.upward[:, chosen],
+            self.lift[chosen],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """How a batch of arms holds on at its times."""
+
+    weight: Floats
+    """(batch,) 1 holds on, 0 free in the middle of a swing."""
+    lies_from: Floats
+    """(batch,) metres along the arm from which on it lies on the ground …"""
+    lies_to: Floats
+    """(batch,) … and up to which."""
+    by_tip: np.ndarray
+    """(batch,) whether it is the tip that the ground holds, or the joint that touches first."""
+    joints: Floats
+    """(segments + 1 − c, 3, batch) the joints as they lie, world."""
+    carried: Floats
+    """(3, batch) metres by which they have gone along with the body since, or still will."""
+    normals: Floats
+    """(segments + 1 − c, 3, batch) which way up the ground is there."""
+    skins: Floats
+    """(segments + 1 − c, batch) metres from each of these joints to the skin below it."""
+    touching: int
+    """c"""
+
+    def part(self, chosen: np.ndarray) -> Hold:
+        """Some of the batch."""
+        return Hold(
+            self.weight[chosen],
+            self.lies_from[chosen],
+            self.lies_to[chosen],
+            self.by_tip[chosen],
+            self.joints[..., chosen],
+            self.carried[:, chosen],
+            self.normals[..., chosen],
+            self.skins[:, chosen],
+            self.touching,
+        )
+
+    def upwards(self, segments: int) -> Floats:
+        """Which way is up for each segment (segments, 3, batch): what lies, lies on its ground."""
+        lying = unit(self.normals[1:] + self.normals[:-1])
+        free = np.broadcast_to(self.normals[:1], (self.touching, *self.normals.shape[1:]))
+        return np.concatenate([free, lying])[:segments]
+
+
+@dataclass(frozen=True, eq=False)
+class Stood:
+    """A batch of arms on the ground."""
+
+    directions: Floats
+    """(segments, 3, batch) unit, world."""
+    strains: Floats
+    """(segments, batch) by how much each is longer than at rest, as a share."""
+    joints: Floats
+    """(segments + 1, 3, batch) world."""
+    misses: Floats
+    """(batch,) metres between an arm that holds on and its foothold."""
+    lying: np.ndarray
+    """(segments + 1, batch) which joints rest on the ground and must not move."""
+
+
+def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) -> Hold:
+    """The footholds of a batch, and how far each is laid down or peeled off.
+
+    Args:
+        batch: the arms.
+        footholds: of their limbs.
+        cycles: (batch,) number of each one's cycle.
+        since: (batch,) cycles since the middle of the hold that the gait gives it.
+    """
+    roots = batch.roots
+    at = batch.arms, cycles - footholds.first
+    on, off = footholds.on[at], footholds.off[at]
+    touching, whole = batch.reach[footholds.touching], batch.reach[-1]
+    earlier = _EARLIER * (on + 0.5)
+    down = smooth_step((since - on + earlier) / (UNROLLING * (off - on) + earlier))
+    gone = smooth_step((since - footholds.peeled()[at]) / (PEELING * (off - on)))
+    landing = least_jerk((since + 0.5) / (on + 0.5))
+    leaving = least_jerk((0.5 - since) / (0.5 - off))
+    weight = np.where(since < on, landing, np.where(since > off, leaving, 1.0))
+    joints = np.moveaxis(footholds.joints[at], 0, -1)
+    # An arm in the air goes along with the body, and does so gently at first.
+    before, after = np.maximum(on - since, 0.0), np.maximum(since - off, 0.0)
+    moved = np.where(
+        since < on, roots - footholds.roots_on[at].T, roots - footholds.roots_off[at].T
+    )
+    carried = moved * least_jerk((before + after) / _GOING)
+    return Hold(
+        weight=weight * footholds.present[at],
+        lies_from=touching + gone * (footholds.peeled_to[at] - touching),
+        lies_to=touching + down * (whole - touching),
+        by_tip=since > footholds.middle[at],
+        joints=np.ascontiguousarray(joints),
+        carried=carried,
+        normals=np.ascontiguousarray(np.moveaxis(footholds.normals[at], 0, -1)),
+        skins=np.ascontiguousarray(footholds.skins[at].T),
+        touching=footholds.touching,
+    )
+
+
+def pulled(
+    batch: Batch, shapes: Floats, held: Hold, ground: Ground, settings: StanceSettings
+) -> tuple[Floats, Floats]:
+    """Strains (segments, batch) and directions (segments, 3, batch) of arms.
+
+    Arms with their gait's shapes, brought to their footholds; in the air they may be in the ground.
+
+    Args:
+        batch: the arms.
+        shapes: (segments, 3, batch) the gait's directions, world.
+        held: how each one holds on.
+        ground: what it must not pass through.
+        settings: how arms hold on.
+    """
+    strains, standing = _held(batch, shapes, held, ground, settings)
+    return strains, blended(batch.outward, standing, shapes, 1.0 - held.weight)
+
+
+def unheld(held: Hold) -> Floats:
+    """How far the movement of arms (batch,) is to be evened out over time: 0 while they hold on."""
+    return np.minimum((1.0 - held.weight) / _UNHELD, 1.0)
+
+
+def stand(
+    batch: Batch,
+    pose: tuple[Floats, Floats],
+    held: Hold,
+    ground: Ground,
+    settings: StanceSettings,
+) -> Stood:
+    """Arms that are in the air brought off the ground.
+
+    Args:
+        batch: the arms.
+        pose: strains and directions, as :func:`pulled` returns them.
+        held: how each one holds on.
+        ground: what it must not pass through.
+        settings: how arms hold on.
+    """
+    (strains, directions), weight, reach = pose, held.weight, batch.reach
+    lengths = batch.lengths * (1.0 + strains)
+    swinging = np.flatnonzero(weight < 1.0)
+    if len(swinging):
+        part, own = batch.part(swinging), held.part(swinging)
+        away = 1.0 - own.weight
+        let_go, at_once = smooth_step(_LETTING_GO * away), smooth_step(_AT_ONCE * away)
+        free = _freedom(part, own)
+        whole = part.reach[-1]
+        # What has lain is as high as its skin is thick, and no higher yet.
+        rising = (settings.lift * away**2 + _OVER * let_go) * whole + part.lift
+        # In the air an arm may roll: any side of it may come to be below.
+        rolled = smooth_step(np.cbrt(away / _STARTING) / _ROLLED)
+        near = part.radii.copy()
+        near[own.touching :] = own.skins + rolled * (near[own.touching :] - own.skins)
+        near[own.touching :] += own.weight * _crested(own, ground)
+        most = np.max(part.radii, axis=0) + rising
+        soft = _SOFT * (part.radii + let_go * (most - part.radii)) + _TINY
+        directions = directions.copy()
+        directions[..., swinging] = raised(
+            directions[..., swinging],
+            lengths[:, swinging],
+            free=free + (1.0 - free) * at_once,
+            roots=part.roots,
+            needed=near + rising - (1.0 - let_go) * soft,
+            loose=at_once * _out(part.reach),
+            ground=ground,
+            rounds=_RAISES,
+            soft=soft,
+        )
+    joints = np.concatenate([batch.roots[None], lengths[:, None] * directions]).cumsum(axis=0)
+    goal = np.where(held.by_tip, held.joints[-1], held.joints[0])
+    missed = np.where(held.by_tip, joints[-1], joints[held.touching]) - goal
+    slack = 1e-9 * reach[-1]
+    lying = (reach >= held.lies_from - slack) & (reach <= held.lies_to + slack) & (weight >= 1.0)
+    return Stood(directions, strains, joints, np.sqrt(dot(missed, missed)) * (weight >= 1.0), lying)
+
+
+def _crested(held: Hold, ground: Ground) -> Floats:
+    """Metres (segments + 1 − c, batch) that joints lie higher than their skin is thick.
+
+    Over a crest bones that are straight would cut into it: an arm that lays itself down there, or
+    has just let go, stays above it as one that lies.
+    """
+    above = held.joints[:, 2] - ground.height(np.moveaxis(held.joints, 1, -1))
+    return np.maximum(above - held.skins, 0.0)
+
+
+def _held(
+    batch: Batch, shapes: Floats, held: Hold, ground: Ground, settings: StanceSettings
+) -> tuple[Floats, Floats]:
+    """Strains (segments, batch) and directions (segments, 3, batch) of arms that hold on.
+
+    Arms that do not, for the moment, are posed as they held on last, or will next; of those that
+    never do it is the gait's shape.
+    """
+    strains, directions = np.zeros(shapes[:, 0].shape), shapes.copy()
+    chosen = np.flatnonzero(held.weight > 0.0)
+    if len(chosen) == 0:
+        return strains, directions
+    batch, held, shapes = batch.part(chosen), held.part(chosen), shapes[..., chosen]
+    free, loose = _freedom(batch, held), _loose(batch, held)
+    strain, guess, chord = _asked(batch, held, settings)
+    strain = strain * free
+    lengths = batch.lengths * (1.0 + strain)
+    # What is out of reach is pointed at: at full stretch no solver has a definite answer.
+    ratio = np.sqrt(dot(chord, chord)) / (held.lies_from + np.sum(batch.lengths * strain, axis=0))
+    over = np.maximum(ratio - _NEARLY, 0.0)
+    short = (over - _REST * np.tanh(over / _REST)) / np.maximum(ratio, _TINY)
+    goal = held.carried + np.where(held.by_tip, held.joints[-1], held.joints[0]) - short * chord
+    # Some of the gait stays, but for what lies or unrolls.
+    kept = np.where(_kneed(batch, held), 0.0, _KEPT)
+    own = unit(guess + (kept * free)[:, None] * (shapes - guess))
+    before = np.arange(len(lengths))[:, None] < held.touching
+    to_goal = (before | held.by_tip).astype(np.float64)
+
+    for number, steps in enumerate(_STEPS):
+        # The last time it only has to meet its goal.
+        softer = evened(own, _EVENED * free) if number < len(_STEPS) - 1 else own
+        own = raised(
+            softer,
+            lengths,
+            free=free,
+            roots=batch.roots,
+            needed=batch.radii + (_OVER * batch.reach[-1] + batch.lift),
+            loose=loose,
+            ground=ground,
+            rounds=_RAISES_BETWEEN,
+            soft=_SOFT * np.max(batch.radii, axis=0) + _TINY,
+        )
+        own = drawn(
+            own,
+            lengths,
+            free=free,
+            chosen=to_goal,
+            roots=batch.roots,
+            goal=goal,
+            steps=steps,
+        )
+    # What is beyond the joint that is held can be raised without letting go; where it comes to
+    # lie it needs no raising, or it would stay up until the last moment and then drop.
+    beyond = (1.0 - to_goal) * smooth_step((batch.reach[1:] - held.lies_to) / batch.lengths)
+    skins = np.concatenate([batch.radii[: held.touching], held.skins])
+    soft = _SOFT * skins + _TINY
+    own = raised(
+        own,
+        lengths,
+        free=beyond,
+        roots=batch.roots,
+        needed=skins - soft,
+        loose=loose,
+        ground=ground,
+        rounds=_RAISES_BETWEEN,
+        soft=soft,
+    )
+    strains[:, chosen], directions[..., chosen] = strain * held.weight, own
+    return strains, directions
+
+
+def _kneed(batch: Batch, held: Hold) -> np.ndarray:
+    """Which arms (batch,) have one joint that counts before they touch."""
+    free = batch.limbs.lengths[: held.touching]
+    alone = np.sum(free, axis=0) ** 2 < _KNEE * np.sum(free * free, axis=0)
+    return alone[batch.arms] & (held.touching > 1)
+
+
+def _knee(batch: Batch, held: Hold, chord: Floats, longer: Floats) -> Floats:
+    """Directions (segments, 3, batch) of arms with a single knee, as two sides of a triangle.
+
+    It stands over the way to the ground, up and out: whichever way the body goes, its plane turns
+    no faster than that way does.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        chord: (3, batch) from each one's root to where it meets the ground.
+        longer: (batch,) factor by which it is stretched.
+    """
+    reach = batch.reach
+    inner = reach[1 : held.touching]
+    knee = 1 + np.argmin(np.abs(inner - 0.5 * reach[held.touching]), axis=0)
+    upper = longer * np.take_along_axis(reach, knee[None], axis=0)[0]
+    lower = longer * held.lies_from - upper
+    away = np.maximum(np.sqrt(dot(chord, chord)), _TINY)
+    along = chord / away
+    side = batch.outward + batch.upward
+    side = unit(side - dot(side, along) * along)
+    cosine = (upper * upper + away * away - lower * lower) / (2.0 * upper * away)
+    cosine = np.clip(cosine, -_STRAIGHT, _STRAIGHT)
+    thigh = cosine * along + np.sqrt(1.0 - cosine * cosine) * side
+    shin = unit(chord - upper * thigh)
+    before = np.arange(len(batch.lengths))[:, None, None] < knee
+    return np.where(before, thigh, shin)
+
+
+def _freedom(batch: Batch, held: Hold) -> Floats:
+    """How far each segment (segments, batch) is free to turn: 0 where it lies on the ground."""
+    return smooth_step((held.lies_from - batch.reach[:-1]) / (_BORDER * batch.lengths))
+
+
+def _loose(batch: Batch, held: Hold) -> Floats:
+    """How far each joint (segments + 1, batch) may be raised: 0 where it lies, and at the root."""
+    reach, width = batch.reach, batch.reach[1]
+    before = smooth_step((held.lies_from - reach) / width)
+    after = smooth_step((reach - held.lies_to) / width)
+    return np.maximum(before, np.where(held.by_tip, 0.0, after)) * _out(reach)
+
+
+def _out(reach: Floats) -> Floats:
+    """0 at the root, which the body carries, 1 a little further out."""
+    return smooth_step(reach / (0.15 * reach[-1]))
+
+
+def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, Floats, Floats]:
+    """Strains (1, batch) and directions (segments, 3, batch) of arms that hold on.
+
+    And the way (3, batch) from each one's root to where it meets the ground.
+    """
+    first = held.touching
+    lying = np.diff(held.joints, axis=0)
+    lying /= batch.lengths[first:, None]
+    place, arriving = _met(batch, held, lying)
+    chord = place - batch.roots
+    ratio = np.sqrt(dot(chord, chord)) / held.lies_from
+    strain = np.zeros((1, ratio.shape[-1]))
+    if batch.limbs.may_stretch and settings.stretch > 0.0:
+        strain[0] = _strained(ratio, settings.stretch)
+    directions = _arch(batch, held, chord, arriving, strain[0])
+    if np.any(kneed := _kneed(batch, held)):
+        directions = np.where(kneed, _knee(batch, held, chord, 1.0 + strain[0]), directions)
+    through = np.clip((held.lies_from - batch.reach[first:-1]) / batch.lengths[first:], 0.0, 1.0)
+    directions[first:] = through[:, None] * directions[first:] + (1.0 - through[:, None]) * lying
+    rolled = _rolled(batch, held, lying, directions[first - 1])
+    directions[first:] = np.where(held.by_tip, directions[first:], rolled)
+    return strain, unit(directions), chord
+
+
+def _met(batch: Batch, held: Hold, lying: Floats) -> tuple[Floats, Floats]:
+    """Where arms meet the ground, and which way they run into it, (3, batch) both.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        lying: (segments − c, 3, batch) unit vectors along the segments that lie.
+    """
+    lengths, reach, first, last = batch.lengths, batch.reach, held.touching, len(lying) - 1
+    # Directions at the joints that lie.
+    at_joints = np.concatenate([lying[:1], 0.5 * (lying[1:] + lying[:-1]), lying[-1:]])
+    place = held.carried.copy()
+    arriving = np.zeros_like(batch.roots)
+    for number in range(len(lying)):
+        low, high = reach[first + number], reach[first + number + 1]
+        share = np.clip((held.lies_from - low) / (high - low), 0.0, 1.0)
+        inside = (held.lies_from >= low) & ((held.lies_from < high) | (number == last))
+        place += inside * (held.joints[number] + share * lying[number] * lengths[first + number])
+        arriving += inside * (
+            at_joints[number] + share * (at_joints[number + 1] - at_joints[number])
+        )
+    return place, unit(arriving)
+
+
+def _strained(ratio: Floats, stretch: float) -> Floats:
+    """Strains (batch,) of arms that may stretch, and shorten where they are crowded.
+
+    Args:
+        ratio: (batch,) of the way from body to ground to the length of arm between the two.
+        stretch: the most that bones get longer by, as a share.
+    """
+    taut = np.maximum(ratio / _EASY - 1.0, 0.0)
+    taut = taut * taut / (taut + _GENTLE)
+    slack = np.maximum(1.0 - ratio / _CROWDED, 0.0)
+    slack = slack * slack / (slack + _GENTLE)
+    shortest = _SHORTER * stretch
+    return stretch * np.tanh(taut / stretch) - shortest * np.tanh(slack / shortest)
+
+
+def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Floats) -> Floats:
+    """Directions (segments, 3, batch) of arms that are one curve from the body to the ground.
+
+    A cubic that leaves and arrives as the arm does, and is as long. The slacker the arm, the more
+    it rises.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        chord: (3, batch) from each one's root to where it meets the ground.
+        arriving: (3, batch) unit: which way it runs into it there.
+        strain: (batch,) by how much it is longer than at rest, as a share.
+    """
+    lengths, reach = batch.lengths, batch.reach
+    ratio = np.sqrt(dot(chord, chord)) / held.lies_from
+    slack = smooth_step((_EASY - ratio) / _ARCHING)
+    rising = _RAISED + _ARCHED * slack
+    # Slack, it comes down rather than back from under the body.
+    falling = _FALLING * slack
+    arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
+    leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
+    leaving, arriving = opened((leaving, arriving), chord, batch.upward, ratio / (1.0 + strain))
+    size = held.lies_from * (1.0 + strain)
+    middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
+    parts = np.clip(held.lies_from - reach[:-1], 0.0, lengths)
+    tight = ratio / (1.0 + strain)
+    over = 0.5 * (tight - _BUNCHED)
+    least = _BUNCHED + over + np.sqrt(over * over + _BUNCHING**2)
+    directions = curve(
+        leaving=leaving,
+        arriving=arriving,
+        chord=chord,
+        size=size * tight / least,
+        middles=middles,
+        parts=parts,
+    )
+    return bent(directions, parts, chord, tight / least)
+
+
+def _rolled(batch: Batch, held: Hold, lying: Floats, before: Floats) -> Floats:
+    """Directions (segments − c, 3, batch) of what is not unrolled yet: it stands up.
+
+    Args:
+        batch: the arms.
+        held: how each holds on.
+        lying: (segments − c, 3, batch) unit: how it will lie.
+        before: (3, batch) unit: the direction of the segment before.
+    """
+    first, reach = held.touching, batch.reach
+    span = reach[-1] - reach[first]
+    # The more, the further out.
+    beyond = np.maximum(reach[first + 1 :] - held.lies_to, 0.0) / span
+    angle = _CURLED * beyond * np.sqrt(beyond)
+    # It folds back no further than what comes before it leaves room for.
+    bend = np.arccos(np.clip(dot(before, lying[0]), -1.0, 1.0))
+    room = np.maximum(_FOLDED - bend, _TINY) / np.maximum(angle[0], _TINY)
+    angle = (angle * room * np.tanh(1.0 / room))[:, None]
+    up = np.zeros_like(lying)
+    up[:, 2] = 1.0
+    up = unit(up - dot(up, lying)[:, None] * lying)
+    return np.cos(angle) * lying + np.sin(angle) * up

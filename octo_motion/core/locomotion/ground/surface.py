@@ -1,0 +1,434 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a creature walks on: a plane, or heights over a regular grid in the world's XY plane.
+
+However many faces a ground has, it is sampled once; after that every question is a look-up in a
+table, for all frames, arms and joints at once. Heights between the samples are bilinear.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from ...content_cache import Remembered, key_of
+from ...errors import GroundError
+from ...rotations import Floats
+
+_EDGE: Final = 1e-6
+"""Share of a face by which it reaches beyond its edges, so that none falls between two."""
+_AT_ONCE: Final = 2_000_000
+"""Pairs of faces and samples that are looked at together."""
+_SIDE: Final = 16
+"""Samples along a side of a face that is small."""
+_BLOCK: Final = 16
+"""Samples: a ground's border lies at multiples of as many from the world's origin."""
+_MOST_SAMPLES: Final = 4_000_000
+"""Samples of a ground; a longer route is sampled more coarsely."""
+
+
+_ONE: Final = 1e-4
+"""Share of a sample's width within which faces are at one height."""
+
+_single_known: Final[Remembered[HeightField | None]] = Remembered(3)
+_extents: Final[Remembered[tuple[Floats, Floats]]] = Remembered(3)
+
+
+class Ground(Protocol):
+    """A surface over the world's XY plane."""
+
+    def height(self, points: Floats) -> Floats:
+        """World Z (…,) of the ground at points (…, 2 or 3); Z of the points is not looked at."""
+        ...
+
+    def slope(self, points: Floats) -> Floats:
+        """Rise per metre along X and Y (…, 2)."""
+        ...
+
+
+def normals(ground: Ground, points: Floats) -> Floats:
+    """Unit normals (…, 3) of the ground, upwards."""
+    slope = ground.slope(points)
+    upward = np.concatenate([-slope, np.ones((*slope.shape[:-1], 1))], axis=-1)
+    return upward / np.sqrt(np.sum(upward * upward, axis=-1, keepdims=True))
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A level or sloping plane."""
+
+    z: float
+    """Height over the world's origin."""
+    rise: tuple[float, float] = (0.0, 0.0)
+    """Metres per metre along X and Y."""
+
+    def height(self, points: Floats) -> Floats:
+        """World Z (…,)."""
+        if self.rise == (0.0, 0.0):
+            return np.full(points.shape[:-1], self.z)
+        return self.z + points[..., 0] * self.rise[0] + points[..., 1] * self.rise[1]
+
+    def slope(self, points: Floats) -> Floats:
+        """Rise (…, 2)."""
+        return np.broadcast_to(np.array(self.rise), (*points.shape[:-1], 2))
+
+
+@dataclass(frozen=True, eq=False)
+class HeightField:
+    """Heights over a regular grid; beyond its border the ground goes on level."""
+
+    origin: tuple[float, float]
+    """World X and Y of the first sample."""
+    spacing: float
+    """Metres between samples."""
+    heights: Floats
+    """(nx, ny) world Z, at least 2 × 2."""
+
+    def height(self, points: Floats) -> Floats:
+        """World Z (…,)."""
+        ny = self.heights.shape[1]
+        x, column = self._place(points, 0)
+        y, row = self._place(points, 1)
+        # The first of the four samples round each point.
+        column *= ny
+        column += row
+        flat = self.heights.ravel()
+        low, high = _along(flat, column, y), _along(flat[ny:], column, y)
+        high -= low
+        high *= x
+        high += low
+        return high
+
+    def slope(self, points: Floats) -> Floats:
+        """Rise (…, 2), taken over a sample's width to either side, so that it does not jump."""
+        at = points[..., :2]
+        step = self.spacing * np.eye(2)
+        across = [self.height(at + each) - self.height(at - each) for each in step]
+        return np.stack(across, axis=-1) * (0.5 / self.spacing)
+
+    def _place(self, points: Floats, axis: int) -> tuple[Floats, np.ndarray]:
+        """How far points are beyond the sample before them along an axis, and its number."""
+        place = np.array(points[..., axis], dtype=np.float64)
+        place -= self.origin[axis]
+        place *= 1.0 / self.spacing
+        np.maximum(place, 0.0, out=place)
+        # There is a sample after it.
+        np.minimum(place, math.nextafter(self.heights.shape[axis] - 1.0, 0.0), out=place)
+        number = place.astype(np.intp)
+        place -= number
+        return place, number
+
+
+def _along(heights: Floats, first: np.ndarray, share: Floats) -> Floats:
+    """Heights by a share of the way from a sample to the next."""
+    low, rise = heights.take(first), heights[1:].take(first)
+    rise -= low
+    rise *= share
+    rise += low
+    return rise
+
+
+def sampled(
+    triangles: Floats,
+    path: Floats,
+    needed: np.ndarray,
+    *,
+    reach: float,
+    spacing: float,
+    headroom: float,
+    content: bytes | None = None,
+) -> HeightField:
+    """The ground that faces make along a path.
+
+    Of several surfaces one above the other, the highest counts that is not further than the
+    headroom above the path: what a creature walks on, not the roof above it. Where the samples lie
+    does not depend on the path: another path over the same place finds the same ground.
+
+    Args:
+        triangles: (faces, 3, 3) corners, world.
+        path: (n, 3) points along the route and beyond its ends, near each other.
+        needed: (n,) under which of them there must be ground.
+        reach: metres to all sides of the path that are sampled.
+        spacing: metres between samples.
+        headroom: metres.
+        content: a key of the faces' content, where it is known, so that they need not be looked at
+            again for another path.
+
+    Raises:
+        GroundError: there are no faces, or none under some point of the path.
+    """
+    if len(triangles) == 0:
+        raise GroundError("The ground has no faces.", "Choose a mesh that has faces.")
+    low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
+    spacing = max(spacing, float(np.sqrt(np.prod(high - low) / _MOST_SAMPLES)))
+    block = _BLOCK * spacing
+    low, high = block * np.floor(low / block), block * np.ceil(high / block)
+    shape = tuple(int(each) + 1 for each in np.rint((high - low) / spacing))
+    grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
+    if content is None:
+        content = key_of(triangles)
+    key = key_of(content, grid.origin, spacing, shape)
+    lowest, highest = _extents.get(key, lambda: _extent(triangles, grid))
+    single = _single_known.get(key, lambda: _single(grid, lowest, highest))
+    if single is not None:
+        # There is nothing to choose between.
+        heights = highest
+    else:
+        coarse = _near_path(grid, path, reach)
+        heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
+    inside = np.flatnonzero(needed)
+    bare = ~np.isfinite(heights[_nearest(grid, path[inside])])
+    if np.any(bare):
+        share = float(np.flatnonzero(bare)[0]) / max(len(inside) - 1, 1)
+        raise GroundError(
+            f"The route leaves the ground after {100.0 * share:.0f} % of its length.",
+            "Move the route, or make the ground larger.",
+        )
+    return single or HeightField(grid.origin, spacing, _filled(heights))
+
+
+def along_path(path: Floats, *, reach: float, spacing: float, softness: float) -> Ground:
+    """The ground that a route itself describes: as high as the route where that is nearest.
+
+    Args:
+        path: (n, 3) points along the route, near each other.
+        reach: metres to all sides of the path that are needed.
+        spacing: metres between samples.
+        softness: metres over which the heights of neighbouring stretches pass into each other.
+    """
+    if np.ptp(path[:, 2]) <= 1e-6 * max(reach, 1e-9):
+        return Plane(float(path[:, 2].mean()))
+    low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
+    spacing = max(spacing, float(np.sqrt(np.prod(high - low) * len(path) / _MOST_SAMPLES / 4.0)))
+    x, y = (
+        np.arange(np.ceil((end - start) / spacing) + 2) * spacing + start
+        for start, end in zip(low, high, strict=True)
+    )
+    heights = np.empty((len(x), len(y)))
+    for column, place in enumerate(x):
+        apart = (place - path[:, 0]) ** 2 + (y[:, None] - path[:, 1]) ** 2
+        weight = np.exp((apart.min(axis=1, keepdims=True) - apart) * (0.5 / softness**2))
+        heights[column] = weight @ path[:, 2] / weight.sum(axis=1)
+    return HeightField((float(low[0]), float(low[1])), spacing, heights)
+
+
+def passes_over_itself(path: Floats, apart: float, above: float) -> bool:
+    """Whether some point of a path (n, 3) lies nearly over another, and well above it."""
+    step = max(1, len(path) // 400)
+    some = path[::step]
+    level = np.linalg.norm(some[:, None, :2] - some[None, :, :2], axis=-1)
+    rise = np.abs(some[:, None, 2] - some[None, :, 2])
+    return bool(np.any((level < apart) & (rise > above)))
+
+
+def _near_path(grid: HeightField, path: Floats, reach: float) -> Callable[[Floats], Floats]:
+    """A function that spreads a value of each point of the path over the samples nearest to it."""
+    factor = max(1, int(0.25 * reach / grid.spacing))
+    nx, ny = (-(-each // factor) for each in grid.heights.shape)
+    width = factor * grid.spacing
+    x = grid.origin[0] + width * (np.arange(nx) + 0.5)
+    y = grid.origin[1] + width * (np.arange(ny) + 0.5)
+    nearest = np.empty((nx, ny), dtype=np.int64)
+    for column, place in enumerate(x):
+        apart = (place - path[:, 0]) ** 2 + (y[:, None] - path[:, 1]) ** 2
+        nearest[column] = apart.argmin(axis=1)
+
+    def spread(values: Floats) -> Floats:
+        fine = np.repeat(np.repeat(values[nearest], factor, axis=0), factor, axis=1)
+        return fine[: grid.heights.shape[0], : grid.heights.shape[1]]
+
+    return spread
+
+
+def _nearest(grid: HeightField, points: Floats) -> tuple[np.ndarray, np.ndarray]:
+    place = np.rint((points[:, :2] - grid.origin) / grid.spacing).astype(np.int64)
+    return place[:, 0], place[:, 1]
+
+
+def _extent(triangles: Floats, grid: HeightField) -> tuple[Floats, Floats]:
+    """Lowest and highest of all faces at each sample (nx, ny); +∞ and −∞ where there is none."""
+    lowest, highest = np.full(grid.heights.size, np.inf), np.full(grid.heights.size, -np.inf)
+    for place, z in _hits(triangles, grid):
+        np.minimum.at(lowest, place, z)
+        np.maximum.at(highest, place, z)
+    return lowest.reshape(grid.heights.shape), highest.reshape(grid.heights.shape)
+
+
+def _single(grid: HeightField, lowest: Floats, highest: Floats) -> HeightField | None:
+    """The ground, if no two faces are above each other; arguments as :func:`_extent` returns."""
+    there = np.isfinite(highest)
+    # Where two faces meet, both are there.
+    if np.max(highest[there] - lowest[there], initial=0.0) > _ONE * grid.spacing:
+        return None
+    return HeightField(grid.origin, grid.spacing, _filled(np.where(there, highest, np.nan)))
+
+
+def _beneath(
+    triangles: Floats, grid: HeightField, ceiling: Floats, lowest: Floats, highest: Floats
+) -> Floats:
+    """Heights (nx, ny) of the faces at the samples; NaN where there is none.
+
+    The highest below the ceiling; where there is none, the lowest above it.
+    """
+    heights = np.where(highest <= ceiling, highest, np.where(lowest > ceiling, lowest, np.nan))
+    heights[~np.isfinite(heights)] = np.nan
+    between = (lowest <= ceiling) & (highest > ceiling)
+    if np.any(between):
+        # Only where faces are on both sides does it matter which ones there are.
+        below, limit = np.full(heights.size, -np.inf), ceiling.ravel()
+        for place, z in _hits(triangles, grid):
+            low = z <= limit[place]
+            np.maximum.at(below, place[low], z[low])
+        heights[between] = below.reshape(heights.shape)[between]
+    return heights
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Faces as they lie over a grid, each (faces,)."""
+
+    first: np.ndarray
+    """Number of the first sample that may lie on it."""
+    columns: np.ndarray
+    """How many may, along X …"""
+    rows: np.ndarray
+    """… and along Y."""
+    second: tuple[Floats, Floats, Floats]
+    """How near the first sample is to the second corner, 1 at the corner and 0 on the side across,
+    and how much nearer the next one along X and along Y is."""
+    third: tuple[Floats, Floats, Floats]
+    """The same of the third corner."""
+    heights: tuple[Floats, Floats, Floats]
+    """World Z of the first corner, and of the others above it."""
+
+    def part(self, chosen: np.ndarray) -> _Faces:
+        """Some of the faces."""
+        (s, sx, sy), (t, tx, ty), (z, z1, z2) = self.second, self.third, self.heights
+        return _Faces(
+            self.first[chosen],
+            self.columns[chosen],
+            self.rows[chosen],
+            (s[chosen], sx[chosen], sy[chosen]),
+            (t[chosen], tx[chosen], ty[chosen]),
+            (z[chosen], z1[chosen], z2[chosen]),
+        )
+
+
+def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Floats]]:
+    """Numbers of samples and heights there, of faces that lie over or under them, in blocks."""
+    faces, width = _over(triangles, grid), grid.heights.shape[1]
+    longest = np.maximum(faces.columns, faces.rows)
+    size, done = 1, 0
+    while done < _SIDE:
+        # Faces of about one size together: sample after sample of all of them at once.
+        size = min(2 * size, _SIDE)
+        alike = np.flatnonzero((longest > done) & (longest <= size))
+        many = _AT_ONCE // (size * size)
+        for start in range(0, len(alike), many):
+            part = faces.part(alike[start : start + many])
+            for column, row in np.ndindex(size, size):
+                over = (column < part.columns) & (row < part.rows)
+                second, third = _nearness(part, slice(None), column, row)
+                hit = np.flatnonzero(over & _inside(second, third))
+                height = _height(part, hit, second[hit], third[hit])
+                yield part.first[hit] + (column * width + row), height
+        done = size
+    large = np.flatnonzero(longest > _SIDE)
+    counts = faces.columns[large] * faces.rows[large]
+    # In blocks of about so many samples; one huge face is a block of its own.
+    block = np.cumsum(counts) // _AT_ONCE
+    for number in np.unique(block):
+        chosen, many = large[block == number], counts[block == number]
+        face = np.repeat(chosen, many)
+        within = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
+        column, row = np.divmod(within, faces.rows[face])
+        second, third = _nearness(faces, face, column, row)
+        hit = np.flatnonzero(_inside(second, third))
+        face, place = face[hit], column[hit] * width + row[hit]
+        yield faces.first[face] + place, _height(faces, face, second[hit], third[hit])
+
+
+def _over(triangles: Floats, grid: HeightField) -> _Faces:
+    """The faces that may lie over some sample of a grid; none with a corner that is nowhere."""
+    known = np.isfinite(triangles).all(axis=(1, 2))
+    if not known.all():
+        triangles = triangles[known]
+    (x0, x1, x2), (y0, y1, y2) = (
+        [(triangles[:, corner, axis] - grid.origin[axis]) / grid.spacing for corner in range(3)]
+        for axis in range(2)
+    )
+    area = (x1 - x0) * (y2 - y0) - (y1 - y0) * (x2 - x0)
+    over, sides = np.abs(area) > 1e-12, []
+    for one, two, three, count in zip(
+        (x0, y0), (x1, y1), (x2, y2), grid.heights.shape, strict=True
+    ):
+        low = np.minimum(np.minimum(one, two), three)
+        high = np.maximum(np.maximum(one, two), three)
+        first = np.maximum(np.ceil(low - _EDGE), 0.0)
+        sides.append((first, np.minimum(np.floor(high + _EDGE), count - 1.0) - first + 1.0))
+        over &= sides[-1][1] > 0.0
+    kept = np.flatnonzero(over)
+    x0, x1, x2, y0, y1, y2, area = (each[kept] for each in (x0, x1, x2, y0, y1, y2, area))
+    (column, columns), (row, rows) = ((first[kept], count[kept]) for first, count in sides)
+    across = (y2 - y0) / area, (x0 - x2) / area, (y0 - y1) / area, (x1 - x0) / area
+    x, y = column - x0, row - y0
+    z0, z1, z2 = (triangles[kept, corner, 2] for corner in range(3))
+    return _Faces(
+        (column * grid.heights.shape[1] + row).astype(np.int64),
+        columns.astype(np.int64),
+        rows.astype(np.int64),
+        (x * across[0] + y * across[1], across[0], across[1]),
+        (x * across[2] + y * across[3], across[2], across[3]),
+        (z0, z1 - z0, z2 - z0),
+    )
+
+
+def _nearness(
+    faces: _Faces,
+    chosen: np.ndarray | slice,
+    column: np.ndarray | int,
+    row: np.ndarray | int,
+) -> tuple[Floats, Floats]:
+    """How near samples, so many after the first of chosen faces, are to their other corners."""
+    (s, sx, sy), (t, tx, ty) = faces.second, faces.third
+    return (
+        s[chosen] + column * sx[chosen] + row * sy[chosen],
+        t[chosen] + column * tx[chosen] + row * ty[chosen],
+    )
+
+
+def _inside(second: Floats, third: Floats) -> np.ndarray:
+    """Whether samples lie on their faces."""
+    return (np.minimum(second, third) >= -_EDGE) & (second + third <= 1.0 + _EDGE)
+
+
+def _height(faces: _Faces, chosen: np.ndarray, second: Floats, third: Floats) -> Floats:
+    """Heights of chosen faces at samples that are so near to their other corners."""
+    first, rise, other = faces.heights
+    return first[chosen] + (second * rise[chosen] + third * other[chosen])
+
+
+def _filled(heights: Floats) -> Floats:
+    """Heights whose gaps go on level from their borders, ring by ring."""
+    padded = np.pad(heights, 1, constant_values=np.nan)
+    width = padded.shape[1]
+    flat = padded.ravel()
+    gap = np.isnan(flat)
+    border = np.ones(padded.shape, dtype=bool)
+    border[1:-1, 1:-1] = False
+    gap &= ~border.ravel()
+    steps = np.array([width, -width, 1, -1])
+    known = np.flatnonzero(~np.isnan(flat))
+    # Only what lies next to a ring that was filled can be filled next.
+    while len(known):
+        beside = (known[:, None] + steps).ravel()
+        ring = np.unique(beside[gap[beside]])
+        around = flat[ring[:, None] + steps]
+        there = ~np.isnan(around)
+        flat[ring] = np.where(there, around, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
+        gap[ring] = False
+        known = ring
+    return padded[1:-1, 1:-1].copy()

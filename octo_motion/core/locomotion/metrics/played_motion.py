@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion that few keys play, on frames and half way between them, to be measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ....blender.animation import actions
+from ....blender.animation.stretching import strains_of
+from ...keyframes.playback import rotations_of, values_at
+from ...rotations import Floats
+from ...skeleton import Skeleton
+from ..rig.placement import carried_by_root_bone
+from .report import Measured, Poses, between
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Whose keys they are."""
+
+    armature: bpy.types.Object
+    skeleton: Skeleton
+    arms: Sequence[Sequence[str]]
+    """Bones of each arm, root to tip."""
+    travels: bool
+    """Whether anything takes it along; in place it is measured as if something did."""
+    root_bone: str
+    """"" where the object travels."""
+    world: Floats
+    """(4, 4) of the object, of uniform scale, where a bone travels."""
+
+
+def as_keyed(measured: Measured, rig: Rig, channels: Sequence[actions.Channel]) -> Measured:
+    """What is measured of a motion, of what its keys play in place of what was computed.
+
+    Whether arms overlap, and how far they are from their targets, stays as it was computed.
+
+    Args:
+        measured: the motion as it was computed.
+        rig: whose keys they are.
+        channels: all that the motion has, those that have few keys and those that have one on
+            each frame.
+    """
+    frames = measured.frames
+    halves = 0.5 * (frames[:-1] + frames[1:])
+    by_path = {channel.data_path: channel for channel in channels}
+    poses = _poses(measured.poses, rig, by_path, frames, frames)
+    computed = measured.poses
+    halfway = Poses(
+        between(computed.rotations, turns=True),
+        between(computed.strains),
+        between(computed.locations),
+        between(computed.orientations, turns=True),
+    )
+    return replace(measured, poses=poses, halfway=_poses(halfway, rig, by_path, frames, halves))
+
+
+def _poses(
+    computed: Poses,
+    rig: Rig,
+    channels: Mapping[str, actions.Channel],
+    frames: Floats,
+    times: Floats,
+) -> Poses:
+    """What channels play at some times; what they do not move is as it was computed."""
+
+    def played(path: str) -> Floats | None:
+        channel = channels.get(path)
+        if channel is None:
+            return None
+        if channel.keys is not None:
+            return values_at(channel.keys, times)
+        columns = [np.interp(times, frames, column) for column in channel.values.T]
+        return np.stack(columns, axis=-1)
+
+    assert rig.armature.pose is not None
+    bones = [name for arm in rig.arms for name in arm]
+    rotations = computed.rotations.copy()
+    alongs: dict[str, Floats] = {}
+    for place, name in enumerate(bones):
+        bone = rig.armature.pose.bones[name]
+        turned = played(actions.rotation_path(bone))
+        if turned is not None:
+            rotations[:, place] = rotations_of(turned, bone.rotation_mode)
+        scaled = played(bone.path_from_id("scale"))
+        if scaled is not None:
+            alongs[name] = scaled[:, 1]
+    strains = strains_of(rig.armature, rig.arms, alongs, len(times))
+    if not rig.travels:
+        return Poses(rotations, strains, computed.locations, computed.orientations)
+    carrier = rig.armature.pose.bones[rig.root_bone] if rig.root_bone else rig.armature
+    moved = played(carrier.path_from_id("location") if rig.root_bone else "location")
+    turned = played(actions.rotation_path(carrier))
+    if moved is None or turned is None:
+        return Poses(rotations, strains, computed.locations, computed.orientations)
+    turns = rotations_of(turned, carrier.rotation_mode)
+    if rig.root_bone:
+        places = carried_by_root_bone(rig.skeleton, rig.root_bone, rig.world, moved, turns)
+    else:
+        places = actions.object_places(rig.armature, moved, turns)
+    return Poses(rotations, strains, *places)

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Few keys in place of one per frame: what belongs together, and how far it may be off."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import bpy
+import numpy as np
+
+from ....blender.animation import actions
+from ....blender.animation.stretching import hands_on
+from ...keyframes.playback import values_at
+from ...keyframes.reduction import (
+    LOCATION,
+    SCALE,
+    BezierKeys,
+    Chain,
+    Limb,
+    Track,
+    chain_to_tip,
+    reduce_keys,
+    reducing,
+)
+from ...keyframes.residuals import Errors
+from ...rotations import Floats
+from ...skeleton import Skeleton
+from ..gait.gait_poser import Arm
+
+MANTLE_GROUP: Final = "Mantle"
+
+_TRAVEL_SHARE: Final = 0.25
+"""Of the distance that a tip may be off, what travel may take at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerances:
+    """How far the motion may be off at any frame."""
+
+    angle: float
+    """Radians, of each bone against its parent."""
+    distance: float
+    """Of each arm's tip, in the armature's units."""
+    by_bone: bool = True
+    """Whether each bone has key frames of its own, rather than each arm."""
+    held: float = np.inf
+    """Of joints that rest on the ground, in the armature's units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What moves."""
+
+    armature: bpy.types.Object
+    scale: float
+    """Metres of the armature's unit."""
+    skeleton: Skeleton
+    arms: Sequence[Arm]
+    mantle: Sequence[str]
+    """Bones."""
+    travel_bone: str
+    """"" where the object travels."""
+
+    def modes(self, bones: Sequence[str]) -> list[str]:
+        """Rotation modes of bones."""
+        assert self.armature.pose is not None
+        return [self.armature.pose.bones[name].rotation_mode for name in bones]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """All channels of one shot, by what an animator moves as one."""
+
+    travel: Sequence[actions.Channel]
+    """A location and a rotation, of the object or of a bone; none in place."""
+    arms: Sequence[actions.Channel]
+    """Rotations of the arms' bones, one arm after the other."""
+    mantle: Sequence[actions.Channel]
+    stretch: Sequence[actions.Channel] = ()
+    """Scales of the arms' bones that stretch."""
+    lying: Sequence[np.ndarray] = ()
+    """For each arm (moments, joints) which rest on the ground, none where nothing does."""
+
+    def all(self) -> list[actions.Channel]:
+        """Every channel, as one key per frame."""
+        return [*self.travel, *self.arms, *self.mantle, *self.stretch]
+
+
+def reduced(
+    frames: Floats,
+    body: Body,
+    motion: Motion,
+    tolerances: Tolerances,
+    *,
+    every: int = 1,
+    dense: bool = False,
+    loops: bool = False,
+) -> Generator[float, None, list[actions.Channel]]:
+    """The channels with few keys, grouped by arm, in steps that yield the share that is done.
+
+    Args:
+        frames: (moments,) at which the channels have their values.
+        body: its arms and mantle are those of the channels, in their order.
+        motion: the channels.
+        tolerances: how far they may be off.
+        every: at every how many of these moments there is a frame, from the first to the last.
+        dense: whether there is a key on every frame all the same.
+        loops: whether the motion goes on from its last frame to its first.
+
+    Raises:
+        SettingsError: without tolerance, no key can be left out.
+    """
+    parts: list[Sequence[actions.Channel]] = []
+    limbs: list[Limb] = []
+    found: list[list[BezierKeys]] = []
+    distance: float | Floats = tolerances.distance
+    carried: float | Floats = 0.0
+    if motion.travel:
+        travel, unit = _travel(body, motion, tolerances)
+        found += reduce_keys(frames, [travel], every=every, all_of_them=dense, loops=loops)
+        parts.append(motion.travel)
+        # What it does not take is left to the arms, frame by frame.
+        played = [values_at(keys, frames) for keys in found[0]]
+        carried = Errors(travel).measure(played)[1] * travel.distance / unit
+        distance = distance - carried
+    rest = iter(motion.arms)
+    for number, arm in enumerate(body.arms):
+        turned = [next(rest) for _ in arm.bones]
+        stretched = [each for each in motion.stretch if each.group in arm.bones]
+        tracks = _tracks(turned, body.modes(arm.bones))
+        tracks += [Track(each.values, SCALE) for each in stretched]
+        parts.append([replace(each, group=arm.name) for each in (*turned, *stretched)])
+        chain = _chain(body, arm, [each.group for each in stretched])
+        lying = motion.lying[number] if motion.lying else None
+        limbs.append(
+            Limb(
+                tracks=tracks,
+                angle=tolerances.angle,
+                distance=distance,
+                chain=chain,
+                columns=range(len(tracks)) if tolerances.by_bone else None,
+                room=None if lying is None else _room(chain, lying, tolerances.held - carried),
+            )
+        )
+    if body.mantle:
+        parts.append([replace(each, group=MANTLE_GROUP) for each in motion.mantle])
+        tracks = _tracks(motion.mantle, body.modes(body.mantle))
+        columns = range(len(tracks)) if tolerances.by_bone else None
+        limbs.append(Limb(tracks, tolerances.angle, tolerances.distance, columns=columns))
+    found += yield from reducing(frames, limbs, every=every, all_of_them=dense, loops=loops)
+    return [
+        replace(channel, values=channel.values[::every], keys=keys)
+        for part, each in zip(parts, found, strict=True)
+        for channel, keys in zip(part, each, strict=True)
+    ]
+
+
+def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> Chain:
+    """An arm's chain, of which some bones stretch: their tracks come after those of all turns."""
+    chain = chain_to_tip(body.skeleton, arm.bones)
+    if not stretched:
+        return chain
+    tracks = {name: len(arm.bones) + place for place, name in enumerate(stretched)}
+    return replace(
+        chain,
+        scaled=tuple(tracks.get(name, -1) for name in arm.bones),
+        handed=tuple(hands_on(body.armature, arm.bones)),
+    )
+
+
+def _room(chain: Chain, lying: np.ndarray, held: float | Floats) -> Floats:
+    """How far the ends of the bones of an arm may be off (moments, bones), as its joints rest."""
+    (turned,) = np.nonzero(np.array(chain.turned) >= 0)
+    result = np.full((len(lying), len(chain.turned)), np.inf)
+    # What rides along between two bones of the arm belongs to the first of them.
+    ends = [*(turned[1:] - 1), len(chain.turned) - 1]
+    result[:, ends] = np.where(lying[:, 1:], np.reshape(held, (-1, 1)), np.inf)
+    return result
+
+
+def _length(skeleton: Skeleton, arm: Arm) -> float:
+    return float(np.linalg.norm(chain_to_tip(skeleton, arm.bones).steps, axis=1).sum())
+
+
+def _tracks(channels: Sequence[actions.Channel], kinds: Sequence[str]) -> list[Track]:
+    return [Track(channel.values, kind) for channel, kind in zip(channels, kinds, strict=True)]
+
+
+def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> tuple[Limb, float]:
+    """The body's travel, whose turns carry the tips of the arms; the armature's unit in its own."""
+    if body.travel_bone:
+        (mode,) = body.modes([body.travel_bone])
+        pivot = body.skeleton.heads[body.skeleton.index[body.travel_bone]]
+        unit = 1.0
+    else:
+        mode = body.armature.rotation_mode
+        pivot = np.zeros(3)
+        # The armature's unit, as the object's location has it.
+        unit = body.scale / actions.channel_unit(body.armature)
+    held = tolerances.held if motion.lying else np.inf
+    limb = Limb(
+        tracks=_tracks(motion.travel, [LOCATION, mode]),
+        angle=tolerances.angle,
+        distance=_TRAVEL_SHARE * min(tolerances.distance, held) * unit,
+        lever=max(_reach(body.skeleton, arm, pivot) for arm in body.arms) * unit,
+    )
+    return limb, unit
+
+
+def _reach(skeleton: Skeleton, arm: Arm, pivot: Floats) -> float:
+    """How far from a point an arm can reach."""
+    root = skeleton.heads[skeleton.index[arm.bones[0]]]
+    return float(np.linalg.norm(root - pivot)) + _length(skeleton, arm)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the body is along a route on which it goes first one way and then another.
+
+Each way of moving has its own place for the body at a distance along the route: over the ground,
+upright; or through the water, mantle first. Where one becomes the other the body goes over, its
+place in a straight line and its bearing by the shortest turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...easing import least_jerk
+from ...rotations import Floats
+from ..gait.table import CYCLE
+from .burst_glide import stroke_distance
+from .gait_changes import Change, between, sense_of
+from .heading import Bearings
+from .route import Route
+from .travel import Travel, TravelSettings, travel_at, walked_at
+
+
+class Line(Protocol):
+    """A body's places along its route, also before and after it."""
+
+    @property
+    def route(self) -> Route:
+        """Where to."""
+        ...
+
+    @property
+    def settings(self) -> TravelSettings:
+        """How; its stride is that of the gait."""
+        ...
+
+    def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
+        """World positions (…, 3) and orientations (…, 4) of the body at distances (…,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class SwumLine:
+    """A swimming body, which starts with a stroke."""
+
+    route: Route
+    settings: TravelSettings
+    bearings: Bearings
+    start: float
+    """Metres along the route at which it is in the middle of a stroke."""
+    height: float = 0.0
+    """Metres above the route."""
+    floor: Line | None = None
+    """Where it would walk, none if there is no ground."""
+    room: float = 0.0
+    """Metres above that, below which it does not come …"""
+    softness: float = 0.0
+    """… and within which it comes near to that."""
+
+    def phase(self, distance: Floats) -> Floats:
+        """Phase of the gait (…,), radians."""
+        return self.settings.stroke_phase + CYCLE * (distance - self.start) / self.settings.stride
+
+    def travel(self, distance: Floats) -> Travel:
+        """The body at distances (n,), where it shoots ahead of them and falls behind."""
+        settings = self.settings
+        phase = self.phase(distance)
+        here = stroke_distance(phase, settings.burst, settings.stroke_phase) - phase
+        middle = np.array(settings.stroke_phase)
+        there = stroke_distance(middle, settings.burst, settings.stroke_phase) - middle
+        along = distance + settings.stride / CYCLE * (here - there)
+        return travel_at(self.route, settings, self.bearings, along, phase)
+
+    def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
+        """World positions (…, 3) and orientations (…, 4)."""
+        wanted = np.asarray(distance, dtype=np.float64)
+        travel = self.travel(wanted.reshape(-1))
+        positions = travel.positions + np.array([0.0, 0.0, self.height])
+        if self.floor is not None:
+            over = positions[:, 2] - self.floor.at(travel.distance)[0][:, 2] - self.room
+            # The greater of 0 and what it is over, without a corner.
+            higher = 0.5 * (np.sqrt(over * over + self.softness * self.softness) - over)
+            positions[:, 2] += higher
+        return positions.reshape(*wanted.shape, 3), travel.rotations.reshape(*wanted.shape, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class WalkedLine:
+    """A walking body that holds no ground."""
+
+    route: Route
+    settings: TravelSettings
+    bearings: Bearings
+    height: float
+    """Metres above the route."""
+
+    def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
+        """World positions (…, 3) and orientations (…, 4)."""
+        wanted = np.asarray(distance, dtype=np.float64)
+        flat = wanted.reshape(-1)
+        positions, rotations = walked_at(self.route, self.settings, self.bearings, flat)
+        positions = positions + np.array([0.0, 0.0, self.height])
+        return positions.reshape(*wanted.shape, 3), rotations.reshape(*wanted.shape, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """The body's places along the whole route."""
+
+    lines: Sequence[Line]
+    """One for each way."""
+    changes: Sequence[Change]
+
+    @cached_property
+    def _senses(self) -> list[Floats]:
+        """Which way round the body turns at each change, as it does half way."""
+        found, way = [], 0
+        for change in self.changes:
+            middle = np.array([change.middle])
+            (_, before), (_, after) = (self.lines[each].at(middle) for each in (way, change.way))
+            found.append(sense_of(before, after)[0])
+            way = change.way
+        return found
+
+    def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
+        """World positions (…, 3) and orientations (…, 4) of the body at distances (…,)."""
+        wanted = np.asarray(distance, dtype=np.float64)
+        flat = wanted.reshape(-1)
+        positions, rotations = self.lines[0].at(flat)
+        for number, change in enumerate(self.changes):
+            over = least_jerk((flat - change.start) / (change.end - change.start))
+            later = over > 0.0
+            if not np.any(later):
+                continue
+            place, bearing = self.lines[change.way].at(flat[later])
+            share = over[later]
+            positions[later] += share[:, None] * (place - positions[later])
+            rotations[later] = between(rotations[later], bearing, share, self._senses[number])
+        return positions.reshape(*wanted.shape, 3), rotations.reshape(*wanted.shape, 4)
+
+    def line(self, way: int) -> CourseLine:
+        """The course as the walker of one way needs it."""
+        return CourseLine(self, self.lines[way].route, self.lines[way].settings)
+
+
+@dataclass(frozen=True, eq=False)
+class CourseLine:
+    """The places of the whole course, with the stride of one of its ways."""
+
+    course: Course
+    route: Route
+    settings: TravelSettings
+
+    def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
+        """World positions (…, 3) and orientations (…, 4) of the body at distances (…,)."""
+        return self.course.at(distance)

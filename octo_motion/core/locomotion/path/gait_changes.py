@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From one way of moving to another along the route: walk, crawl and swim.
+
+Body and arms do not change together. The body goes over from one way to the other along a stretch
+of the route. An arm goes over while it holds on to nothing: from when it lets go of its last
+foothold of the one way until it takes its first of the other. So nothing slips, and a body that
+swims away is still pushed off by the arms that let go last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...easing import least_jerk
+from ...errors import SettingsError
+from ...rotations import (
+    Floats,
+    conjugate,
+    continuous,
+    from_rotation_vector,
+    multiply,
+    to_rotation_vector,
+)
+
+_HELD: Final = 0.3
+"""Share of a change, from either end, in which arms may still hold on, or hold on again: in between
+the body turns too far for an arm to follow."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Where one way of moving becomes another. Metres along the route."""
+
+    start: float
+    end: float
+    way: int
+    """Number of the way from here on; 0 is the one that the route begins with."""
+
+    @property
+    def middle(self) -> float:
+        """Halfway."""
+        return 0.5 * (self.start + self.end)
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """When each arm goes over at one change, and the footholds that it does without."""
+
+    start: Floats
+    """(arms,) metres along the route."""
+    end: Floats
+    """(arms,)"""
+    dropped_before: tuple[NDArray[np.bool_], ...]
+    """For each arm, which holds of the way before are left out."""
+    dropped_after: tuple[NDArray[np.bool_], ...]
+    """For each arm, which holds of the way after."""
+
+
+def check_changes(changes: Sequence[Change], length: float) -> tuple[Change, ...]:
+    """The changes in the order of the route.
+
+    Raises:
+        SettingsError: one is not on the route, or two overlap.
+    """
+    ordered = tuple(sorted(changes, key=lambda each: each.middle))
+    for each in ordered:
+        if not (np.isfinite(each.start) and np.isfinite(each.end) and each.end > each.start):
+            raise SettingsError("A change of gait has no length.", "Give it one above 0.")
+        if each.middle < 0.0 or each.middle > length:
+            raise SettingsError(
+                "A change of gait is not on the route.", "Give it a place from 0 to 1."
+            )
+    for before, after in pairwise(ordered):
+        if after.start < before.end - 1e-9:
+            raise SettingsError(
+                "Two changes of gait overlap.", "Move them apart, or make them shorter."
+            )
+    return ordered
+
+
+def changes_by_height(
+    distance: Floats, height: Floats, *, take_off: float, length: float
+) -> tuple[Change, ...]:
+    """Way 1 wherever the route is higher over the ground than so much, way 0 elsewhere.
+
+    Args:
+        distance: (samples,) metres along the route, ascending.
+        height: (samples,) metres over the ground.
+        take_off: metres.
+        length: metres that each change is long. Shorter stretches of either way are left out.
+    """
+    above = height > take_off
+    borders = np.flatnonzero(above[1:] != above[:-1])
+    found: list[Change] = [Change(-length, 0.0, 1)] if above[0] else []
+    for border in borders:
+        rise = height[border + 1] - height[border]
+        share = (take_off - height[border]) / rise
+        middle = distance[border] + share * (distance[border + 1] - distance[border])
+        way = int(above[border + 1])
+        if found and middle - found[-1].middle < 1.5 * length:
+            # There and back within one change: neither is worth its while.
+            found.pop()
+            continue
+        found.append(Change(float(middle - 0.5 * length), float(middle + 0.5 * length), way))
+    return tuple(found)
+
+
+def way_weights(changes: Sequence[Change], ways: int, distance: Floats) -> Floats:
+    """How far the body goes each way (…, ways) at distances (…,); they sum to 1."""
+    weights = np.zeros((*distance.shape, ways))
+    weights[..., 0] = 1.0
+    for change in changes:
+        over = least_jerk((distance - change.start) / (change.end - change.start))
+        weights *= (1.0 - over)[..., None]
+        weights[..., change.way] += over
+    return weights
+
+
+def windows(
+    change: Change,
+    before: Sequence[tuple[Floats, Floats]],
+    after: Sequence[tuple[Floats, Floats]],
+) -> Windows:
+    """When each arm goes over from one way to the other.
+
+    Args:
+        change: where.
+        before: for each arm, where its holds (holds,) of the way before begin and end, ascending.
+        after: the same of the way after.
+    """
+    held = _HELD * (change.end - change.start)
+    starts, ends = np.empty(len(before)), np.empty(len(before))
+    first_drops, last_drops = [], []
+    for arm, ((on, off), (next_on, next_off)) in enumerate(zip(before, after, strict=True)):
+        dropped = (0.5 * (on + off) > change.middle) | (off > change.start + held)
+        kept = off[~dropped]
+        start = max(change.start, float(kept.max()) if len(kept) else change.start)
+        late = (0.5 * (next_on + next_off) < change.middle) | (next_on < change.end - held)
+        coming = next_on[~late]
+        end = min(change.end, float(coming.min()) if len(coming) else change.end)
+        starts[arm], ends[arm] = start, end
+        first_drops.append(dropped)
+        last_drops.append(late)
+    return Windows(starts, ends, tuple(first_drops), tuple(last_drops))
+
+
+def slowing(way: Floats, within: float) -> Floats:
+    """A way (…,) from 0 on that comes to a stop: at full speed at 0, still from ``within`` on."""
+    inside = np.clip(way, 0.0, within)
+    return inside - 0.5 * inside * inside / within
+
+
+def between(first: Floats, second: Floats, share: Floats, sense: Floats | None = None) -> Floats:
+    """Rotations (…, 4) a share (…,) of the way from one to the other.
+
+    Args:
+        first: (…, 4)
+        second: (…, 4)
+        share: (…,) 0…1
+        sense: (…, 3) which way round to turn, where it matters, as a rotation vector; none for
+            the shortest. A walker that swims off turns about: half a turn, which is as short the
+            one way as the other, and must not be taken now this way and now that.
+    """
+    turn = to_rotation_vector(multiply(conjugate(first), second))
+    if sense is not None:
+        angle = np.linalg.norm(turn, axis=-1, keepdims=True)
+        against = (np.sum(turn * sense, axis=-1, keepdims=True) < 0.0) & (angle > 0.5 * np.pi)
+        turn = np.where(against, turn * (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-12)), turn)
+    return multiply(first, from_rotation_vector(share[..., None] * turn))
+
+
+def sense_of(first: Floats, second: Floats) -> Floats:
+    """The shortest turn (…, 3) from one rotation (…, 4) to the other, as a rotation vector."""
+    return to_rotation_vector(multiply(conjugate(first), second))
+
+
+def blended(first: Floats, second: Floats, share: Floats) -> Floats:
+    """Motions (frames, …, 4) a share (frames, …) of the way from one to the other.
+
+    Half way each bone turns the shortest way, and before and after the same way round, however
+    far apart the two motions come: no bone turns now this way and now that.
+    """
+    turn = continuous(multiply(conjugate(first), second))
+    nearest = np.argmin(np.abs(share - 0.5), axis=0)
+    middle = np.take_along_axis(turn[..., 0], nearest[None], axis=0)
+    turn = np.where((middle < 0.0)[..., None], -turn, turn)
+    sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, turn[..., :1])
+    # Beyond half a turn the cosine is negative: the angle goes on to a whole one.
+    axis = turn[..., 1:] / np.maximum(sine, 1e-12)
+    return multiply(first, from_rotation_vector(share[..., None] * angle * axis))

@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The artist's curve as mathematics: position, derivatives and arc length.
+
+After [Octopus] §3.5, "setting the route", and beyond it: one cubic Bézier segment as there, or
+any chain of them, poly lines and NURBS, open or closed.
+
+Two mistakes in print are put right here. Eq. 3.18 sums a Bézier curve from i = 1; the sum starts
+at 0. Eq. 3.20 and 3.21 are called velocity and acceleration but lack the factors 3 and 6 of the
+derivatives of eq. 3.19; :meth:`Route.velocity` and :meth:`Route.acceleration` have them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import comb
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import RouteError
+from ...rotations import Floats, normalized
+from .nurbs import bezier_spans
+
+SHORTEST: Final = 1e-6
+"""Metres. A route below it is a point."""
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+_FIRST_PIECES: Final = 4
+_DEEPEST: Final = 24
+_MOST_STEPS: Final = 100
+
+_NOWHERE: Final = "Give the curve at least two points that lie apart."
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A curve in world space, over the parameter s from 0 to 1.
+
+    Make one with :meth:`bezier`, :meth:`poly` or :meth:`nurbs`. Every function takes s (or a
+    distance) of any shape ``(…,)``, clips it to the route and works element by element: what
+    comes out for one s depends on nothing else that is asked at the same time.
+    """
+
+    controls: Floats
+    """(segments, degree + 1, 4) homogeneous control points (w·x, w·y, w·z, w)."""
+    breaks: Floats
+    """(segments + 1,) the parameters at which segments meet, from 0 to 1."""
+    cyclic: bool
+    """Whether the route ends where it starts, and travel goes round."""
+
+    def __post_init__(self) -> None:
+        _check_numbers(self.controls)
+        _check_joints(self.controls[..., :3] / self.controls[..., 3:], self.cyclic)
+        if self.length < SHORTEST:
+            raise RouteError("The route has no length.", _NOWHERE)
+
+    @classmethod
+    def bezier(cls, control_points: ArrayLike, *, cyclic: bool = False) -> Route:
+        """Cubic Bézier segments; each takes an equal share of the parameter.
+
+        One segment is exactly eq. 3.19 of [Octopus].
+
+        Args:
+            control_points: (segments, 4, 3); a segment starts where the one before ends. A cyclic
+                route includes the segment that leads back.
+            cyclic: whether the route is closed.
+
+        Raises:
+            RouteError: fewer than one segment, a gap, a closed route that is open, no length, or
+                numbers that are none.
+        """
+        points = np.asarray(control_points, dtype=np.float64)
+        if points.ndim != 3 or points.shape[1:] != (4, 3) or len(points) == 0:
+            raise RouteError("The route has no Bézier segment.", _NOWHERE)
+        return cls(_homogeneous(points), _equal_breaks(len(points)), cyclic)
+
+    @classmethod
+    def poly(cls, points: ArrayLike, *, cyclic: bool = False) -> Route:
+        """Straight lines through ``points`` (n, 3), and back to the first one if cyclic.
+
+        Each line takes an equal share of the parameter.
+
+        Raises:
+            RouteError: fewer than two points, no length, or numbers that are none.
+        """
+        corners = _points(points)
+        if cyclic and np.any(corners[0] != corners[-1]):
+            corners = np.concatenate([corners, corners[:1]])
+        segments = np.stack([corners[:-1], corners[1:]], axis=1)
+        return cls(_homogeneous(segments), _equal_breaks(len(segments)), cyclic)
+
+    @classmethod
+    def nurbs(
+        cls,
+        points: ArrayLike,
+        weights: ArrayLike,
+        order: int,
+        knots: ArrayLike,
+        *,
+        cyclic: bool = False,
+    ) -> Route:
+        """A non-uniform rational B-spline from ``knots[order − 1]`` to ``knots[n]``.
+
+        The parameter runs evenly over the knots, so spans of equal length have equal shares.
+
+        Args:
+            points: (n, 3); a cyclic route repeats its first points at the end.
+            weights: (n,) positive.
+            order: degree + 1.
+            knots: (n + order,) ascending.
+            cyclic: whether the route is closed; its ends must meet.
+
+        Raises:
+            RouteError: too few points for the order, knots that do not ascend or are of another
+                number, weights that are not positive, a gap (as many equal knots as the order),
+                a closed route that is open, no length, or numbers that are none.
+        """
+        places = _points(points)
+        sizes = np.asarray(weights, dtype=np.float64)
+        values = np.asarray(knots, dtype=np.float64)
+        if not 2 <= order <= len(places):
+            raise RouteError(
+                f"The NURBS route of order {order} has {len(places)} points.",
+                "Lower the order, or add points.",
+            )
+        if sizes.shape != (len(places),) or not np.all(sizes > 0.0):
+            raise RouteError(
+                "The NURBS route has a point without a positive weight.", "Set W of its points."
+            )
+        ascending = values.shape == (len(places) + order,) and bool(np.all(np.diff(values) >= 0.0))
+        if not ascending or not values[len(places)] > values[order - 1]:
+            raise RouteError("The knots of the NURBS route do not fit its points.", "Rebuild it.")
+        spans, between = bezier_spans(places, sizes, order, values)
+        breaks = (between - between[0]) / (between[-1] - between[0])
+        return cls(spans, breaks, cyclic)
+
+    def position(self, s: ArrayLike) -> Floats:
+        """Points of the route ``(…, 3)`` at parameters ``(…,)``: eq. 3.19 for one segment."""
+        return self._derivatives(s, 0)[0]
+
+    def velocity(self, s: ArrayLike) -> Floats:
+        """First derivative by s ``(…, 3)``: the true derivative, 3 × the printed eq. 3.20."""
+        return self._derivatives(s, 1)[1]
+
+    def acceleration(self, s: ArrayLike) -> Floats:
+        """Second derivative by s ``(…, 3)``: the true derivative, 6 × the printed eq. 3.21."""
+        return self._derivatives(s, 2)[2]
+
+    def tangent(self, s: ArrayLike) -> Floats:
+        """Unit vectors along the route ``(…, 3)``.
+
+        Where the velocity is zero (a handle that lies on its point, doubled points, a cusp) the
+        direction between two points close by, just so far apart that they differ.
+        """
+        wanted = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
+        at = wanted.reshape(-1)
+        along = self.velocity(at)
+        still = _norm(along) <= 1e-9 * self.length
+        for reach in np.geomspace(1e-6, 1.0, 13):
+            if not np.any(still):
+                break
+            before, after = np.maximum(at[still] - reach, 0.0), np.minimum(at[still] + reach, 1.0)
+            along[still] = self.position(after) - self.position(before)
+            still &= _norm(along) <= 1e-10 * self.length
+        return normalized(along / self.length).reshape(*wanted.shape, 3)
+
+    @cached_property
+    def length(self) -> float:
+        """Metres along the route."""
+        return float(self._distances[-1])
+
+    def distance_at(self, s: ArrayLike) -> Floats:
+        """Metres along the route ``(…,)`` from its start to parameters ``(…,)``."""
+        at = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
+        piece = np.clip(np.searchsorted(self._pieces, at, "right") - 1, 0, len(self._pieces) - 2)
+        return self._distances[piece] + self._arc(self._pieces[piece], at)
+
+    def parameter_at(self, distance: ArrayLike) -> Floats:
+        """The inverse of :meth:`distance_at`, to the last digits: Newton kept in by bisection."""
+        wanted = np.clip(np.asarray(distance, dtype=np.float64), 0.0, self.length)
+        flat = wanted.reshape(-1)
+        last = len(self._distances) - 2
+        piece = np.clip(np.searchsorted(self._distances, flat, "right") - 1, 0, last)
+        start, low, high = self._pieces[piece], self._pieces[piece], self._pieces[piece + 1]
+        missing = flat - self._distances[piece]
+        # A piece without length has nothing to share out; any point of it is right.
+        whole = self._distances[piece + 1] - self._distances[piece]
+        share = np.divide(missing, whole, out=np.zeros_like(flat), where=whole > 0.0)
+        s = low + share * (high - low)
+        # Each element stops on its own account, so that its last digit depends on no other.
+        busy = np.arange(len(flat))
+        for _ in range(_MOST_STEPS):
+            error = self._arc(start[busy], s[busy]) - missing[busy]
+            low[busy] = np.where(error <= 0.0, s[busy], low[busy])
+            high[busy] = np.where(error >= 0.0, s[busy], high[busy])
+            speed = _norm(self.velocity(s[busy]))
+            step = np.divide(error, speed, out=np.full_like(error, np.inf), where=speed > 0.0)
+            trial = s[busy] - step
+            inside = (trial > low[busy]) & (trial < high[busy])
+            trial = np.where(inside, trial, 0.5 * (low[busy] + high[busy]))
+            done = (np.abs(error) <= 1e-15 * self.length) | (trial == s[busy])
+            s[busy] = np.where(done, s[busy], trial)
+            busy = busy[~done]
+            if len(busy) == 0:
+                break
+        s = np.where(flat <= 0.0, 0.0, np.where(flat >= self.length, 1.0, s))
+        return s.reshape(wanted.shape)
+
+    def reverse(self) -> Route:
+        """The same curve travelled from its end to its start."""
+        return Route(self.controls[::-1, ::-1].copy(), 1.0 - self.breaks[::-1], self.cyclic)
+
+    def transform(self, matrix: ArrayLike) -> Route:
+        """The route moved by an affine matrix (4, 4): turned, scaled, sheared, shifted."""
+        affine = np.asarray(matrix, dtype=np.float64)
+        moved = self.controls @ affine.T
+        return Route(moved, self.breaks, self.cyclic)
+
+    def _derivatives(self, s: ArrayLike, highest: int) -> list[Floats]:
+        """Position and its derivatives by s up to the ``highest`` (0, 1 or 2), each ``(…, 3)``."""
+        at = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
+        segment, share = self._segment(at)
+        t = ((at - self.breaks[segment]) / share)[..., None]
+        homogeneous = _bernstein(self.controls, segment, t, highest)
+        weight = homogeneous[0][..., 3:]
+        result = [homogeneous[0][..., :3] / weight]
+        if highest >= 1:
+            first = homogeneous[1]
+            result.append((first[..., :3] - first[..., 3:] * result[0]) / weight)
+        if highest >= 2:
+            first, second = homogeneous[1], homogeneous[2]
+            bend = second[..., :3] - 2.0 * first[..., 3:] * result[1] - second[..., 3:] * result[0]
+            result.append(bend / weight)
+        # From the parameter of the segment to that of the whole route.
+        return [each / share[..., None] ** power for power, each in enumerate(result)]
+
+    def _arc(self, start: Floats, end: Floats) -> Floats:
+        """Metres from parameters ``start`` to ``end``, both within one piece, by Gauss–Legendre."""
+        half, middle = 0.5 * (end - start), 0.5 * (end + start)
+        speed = self._speed_within(middle)
+        # Summed node by node: a matrix product rounds differently for each number of rows.
+        total = np.zeros_like(half)
+        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            total += weight * speed(middle + node * half)
+        return total * half
+
+    def _speed_within(self, middle: Floats) -> Callable[[Floats], Floats]:
+        """Speeds at parameters within the segments that the parameters ``middle`` lie in."""
+        if np.any(self.controls[..., 3] != 1.0):
+            return lambda s: _norm(self.velocity(s))
+        # Quadrature asks for little else: without weights, the derivative is a polynomial, whose
+        # coefficients are gathered once for all nodes, components first: long rows are quick.
+        segment, share = self._segment(middle)
+        start, hodograph = self.breaks[segment], np.diff(self.controls[..., :3], axis=1)
+        degree = hodograph.shape[1] - 1
+        powers = [
+            np.moveaxis(comb(degree, power) * np.diff(hodograph, power, axis=1)[segment, 0], -1, 0)
+            for power in range(degree, -1, -1)
+        ]
+        powers = [np.ascontiguousarray(each) for each in powers]
+
+        def speed(s: Floats) -> Floats:
+            t = (s - start) / share
+            value = powers[0]
+            for power in powers[1:]:
+                value = t * value + power
+            x, y, z = value
+            return (degree + 1) / share * np.sqrt(x * x + y * y + z * z)
+
+        return speed
+
+    def _segment(self, s: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """Which segment parameters ``(…,)`` lie in, and its share of the route's parameter."""
+        last = len(self.controls) - 1
+        segment = np.clip(np.searchsorted(self.breaks, s, "right") - 1, 0, last)
+        return segment, self.breaks[segment + 1] - self.breaks[segment]
+
+    @cached_property
+    def _pieces(self) -> Floats:
+        """Parameters between which Gauss–Legendre quadrature of the speed is exact.
+
+        Each segment is cut up until quadrature of the halves agrees with that of the whole: that
+        finds cusps, where the speed has a kink.
+        """
+        cuts = np.linspace(0.0, 1.0, _FIRST_PIECES + 1)
+        steps = np.diff(self.breaks)[:, None]
+        edges = np.append((self.breaks[:-1, None] + steps * cuts[:-1]).reshape(-1), 1.0)
+        start, end = edges[:-1], edges[1:]
+        found = [edges]
+        scale = float(np.sum(self._arc(start, end)))
+        for _ in range(_DEEPEST):
+            middle = 0.5 * (start + end)
+            whole, halves = self._arc(start, end), self._arc(start, middle) + self._arc(middle, end)
+            rough = np.abs(whole - halves) > 1e-14 * scale
+            if not np.any(rough):
+                break
+            start, middle, end = start[rough], middle[rough], end[rough]
+            found.append(middle)
+            start, end = np.concatenate([start, middle]), np.concatenate([middle, end])
+        return np.unique(np.concatenate(found))
+
+    @cached_property
+    def _distances(self) -> Floats:
+        """Metres from the start of the route to each of :attr:`_pieces`."""
+        arcs = self._arc(self._pieces[:-1], self._pieces[1:])
+        return np.concatenate([[0.0], np.cumsum(arcs)])
+
+
+def s_bend(start: ArrayLike, front: ArrayLike, reach: float) -> Floats:
+    """Control points (4, 3) of a level S that suits a creature which has none yet.
+
+    It leaves straight ahead, bends to the left and back, and ends facing as it began, so that a
+    walk shows a turn to either side.
+
+    Args:
+        start: (3,) where it begins.
+        front: (3,) direction in which it leaves, of any length.
+        reach: metres from the middle of the creature to its arms' tips.
+    """
+    origin = np.asarray(start, dtype=np.float64)
+    ahead = normalized(front)
+    left = np.cross([0.0, 0.0, 1.0], ahead)
+    return np.stack(
+        [
+            origin,
+            origin + 5.0 * reach * ahead,
+            origin + 3.0 * reach * ahead + 4.0 * reach * left,
+            origin + 8.0 * reach * ahead + 4.0 * reach * left,
+        ]
+    )
+
+
+def _bernstein(controls: Floats, segment: np.ndarray, t: Floats, highest: int) -> list[Floats]:
+    """Bézier segments and their derivatives by their own parameter t, by de Casteljau.
+
+    Args:
+        controls: (segments, degree + 1, 4).
+        segment: (…,) which segment.
+        t: (…, 1) its parameter.
+        highest: highest derivative wanted.
+    """
+    values = [controls[segment, corner] for corner in range(controls.shape[1])]
+    degree = len(values) - 1
+    result: list[Floats] = []
+    for level in range(degree, -1, -1):
+        # With `level` + 1 points left, their differences of that order are the derivative.
+        if level == 2 and highest >= 2:
+            second = values[2] - 2.0 * values[1] + values[0]
+            result.insert(0, degree * (degree - 1) * second)
+        if level == 1 and highest >= 1:
+            result.insert(0, degree * (values[1] - values[0]))
+        if level == 0:
+            result.insert(0, values[0])
+        values = [(1.0 - t) * a + t * b for a, b in pairwise(values)]
+    if degree == 1 and highest >= 2:
+        result.append(np.zeros_like(result[0]))
+    return result
+
+
+def _norm(vectors: Floats) -> Floats:
+    """Lengths of 3-vectors, summed in a fixed order."""
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.sqrt(x * x + y * y + z * z)
+
+
+def _homogeneous(points: Floats) -> Floats:
+    return np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1)
+
+
+def _equal_breaks(segments: int) -> Floats:
+    return np.linspace(0.0, 1.0, segments + 1)
+
+
+def _points(points: ArrayLike) -> Floats:
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) < 2:
+        count = len(array) if array.ndim == 2 else 0
+        raise RouteError(f"The route has {count or 'no'} point{'s' * (count != 1)}.", _NOWHERE)
+    _check_numbers(array)
+    return array
+
+
+def _check_numbers(points: Floats) -> None:
+    if not np.all(np.isfinite(points)):
+        raise RouteError(
+            "The route has a control point whose position is not a number.",
+            "Look for the point in the curve's edit mode, and at the scale of its object.",
+        )
+
+
+def _check_joints(segments: Floats, cyclic: bool) -> None:  # noqa: FBT001
+    """Raise unless each of the segments ``(n, k, 3)`` starts where the one before ends."""
+    # Control points come from single-precision data.
+    near = 1e-5 * (float(np.max(np.abs(segments))) + SHORTEST)
+    if np.any(np.linalg.norm(segments[1:, 0] - segments[:-1, -1], axis=-1) > near):
+        raise RouteError("The route has a gap between two spans.", "Rebuild the curve.")
+    if cyclic and np.linalg.norm(segments[-1, -1] - segments[0, 0]) > near:
+        raise RouteError("The closed route does not end where it starts.", "Rebuild the curve.")

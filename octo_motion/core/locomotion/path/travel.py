@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the body goes along its route: where it is at each time, which way it faces, and the phase
+of its gait.
+
+[Octopus] §3.5 moves its octopus along a Bézier curve with the parameter linear in time. Here too
+if wanted (``speed="NATURAL"``); besides, evenly by arc length, with ease in and out. Gait phase
+advances with the distance travelled, 2π per stride, so that arms and ground agree at any speed.
+
+The canonical body has its left side at +X, its front at −Y and its mantle at +Z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...content_cache import Remembered, key_of
+from ...errors import SettingsError
+from ...rotations import Floats, from_axis_angle, multiply, rotate_in_plane
+from ..gait.table import CYCLE
+from .burst_glide import phase_at_distance, stroke_distance
+from .heading import Bearings, bearings
+from .route import Route
+
+Manner = Literal["WALK", "SWIM"]
+Speed = Literal["EVEN", "NATURAL"]
+Heading = Literal["ALONG", "FIXED"]
+
+_UP: Final = np.array([0.0, 0.0, 1.0])
+_LEFT: Final = np.array([1.0, 0.0])
+_SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
+_SETTLE: Final = 1.0
+"""Strides within which a body that is not upright after a loop comes most of the way."""
+_LAID_FORWARD: Final = np.array([0.0, 0.0, np.sqrt(0.5), -np.sqrt(0.5)])
+"""From a body whose +Z travels and −Y faces up to one whose −Y travels and +Z faces up."""
+
+
+_tables: Final[Remembered[Bearings]] = Remembered(4)
+
+
+@dataclass(frozen=True)
+class TravelSettings:
+    """How a route is travelled. Angles in radians, lengths in metres."""
+
+    manner: Manner = "WALK"
+    """WALK: upright, front along travel. SWIM: mantle (+Z) along travel, the arms trail, and the
+    front faces up as far as it can: the body leans back."""
+    speed: Speed = "EVEN"
+    """EVEN: equal distances in equal times. NATURAL: equal shares of the curve's parameter."""
+    ease_in: float = 0.0
+    """Share of the time spent speeding up, 0…1."""
+    ease_out: float = 0.0
+    """Share of the time spent slowing down, 0…1; the two together at most 1."""
+    stride: float = 1.0
+    """Metres travelled per gait cycle."""
+    heading: Heading = "ALONG"
+    """WALK: whether the front turns with the route or keeps a compass angle. A swimming body
+    turns with its route always."""
+    heading_angle: float = 0.0
+    """WALK, ALONG: turn of the front away from travel, so that a body can crawl sideways; FIXED:
+    compass angle of the front about world Z. Zero faces along travel, or to −Y."""
+    burst: float = 0.6
+    """SWIM: 0 steady … 1 all travel comes with the power stroke and the glide nearly stops."""
+    stroke_phase: float = 0.75 * np.pi
+    """SWIM: phase of the middle of the power stroke. In the table β₁ falls from π/2 to π."""
+    look_ahead: float = 1.0
+    """Strides ahead at which the goal lies for turning; at most the whole of a closed route."""
+    bank: float = 0.0
+    """SWIM: roll into turns; at 1 a turn of θ per stride rolls the body by atan θ."""
+    lean: float = 0.0
+    """SWIM: how far from +Z towards the back the way lies that goes along travel, for bodies whose
+    mantle lies flat behind them; at 90° they swim backwards, upright."""
+    keep_upright: bool = True
+    """WALK: whether the body stays upright, or tilts with the slope of the route."""
+    corner: float = 0.2
+    """Strides before and after a sharp corner within which most of it is turned through. The
+    body stays on the route; bends wider than this are left as they are."""
+
+    def __post_init__(self) -> None:
+        numbers = (
+            *(self.ease_in, self.ease_out, self.stride, self.heading_angle, self.burst),
+            *(self.stroke_phase, self.look_ahead, self.bank, self.corner, self.lean),
+        )
+        if not np.all(np.isfinite(numbers)):
+            raise SettingsError("A setting of the travel is not a number.", "Set it anew.")
+        if self.stride <= 0.0:
+            raise SettingsError(
+                f"The stride is {self.stride:g} m.", "Give a stride longer than nothing."
+            )
+        if min(self.ease_in, self.ease_out) < 0.0 or self.ease_in + self.ease_out > 1.0 + 1e-9:
+            raise SettingsError(
+                f"Ease in ({self.ease_in:g}) and ease out ({self.ease_out:g}) do not fit into the "
+                "time.",
+                "Give shares of the time that are not negative and make 1 at most together.",
+            )
+        if not 0.0 <= self.burst <= 1.0:
+            raise SettingsError(f"The burst is {self.burst:g}.", "Give a value from 0 to 1.")
+        if self.look_ahead < 0.0:
+            raise SettingsError(
+                f"The body looks {self.look_ahead:g} strides ahead.", "Give 0 or more."
+            )
+        if self.corner <= 0.0:
+            raise SettingsError(
+                f"A corner is turned within {self.corner:g} strides.", "Give more than 0."
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """A body's motion along a route, frame by frame."""
+
+    times: Floats
+    """(frames,) from 0, at the start of the route, to 1, at its end."""
+    distance: Floats
+    """(frames,) metres along the route."""
+    phase: Floats
+    """(frames,) radians of the gait, unwrapped, 0 at the start of the route."""
+    positions: Floats
+    """(frames, 3) world space."""
+    rotations: Floats
+    """(frames, 4) world orientations of the canonical body, signs continuous along the route."""
+    turn: Floats
+    """(frames, 2) direction in the body's XY plane towards which travel will have turned a look
+    ahead from here; its length is the angle, at most π. Zero where the route is straight. Of a body
+    that swims as it lies, in the plane across its way."""
+
+
+def bearings_of(route: Route, settings: TravelSettings) -> Bearings:
+    """The table of directions that the functions here ask; made once for several of them."""
+    corner, settle = settings.corner * settings.stride, _SETTLE * settings.stride
+    return _tables.get(key_of(route, corner, settle), lambda: bearings(route, corner, settle))
+
+
+def plan_travel(
+    route: Route, settings: TravelSettings, times: ArrayLike, table: Bearings | None = None
+) -> Travel:
+    """The motion at the given times.
+
+    A frame is a function of its own time: times may come in any order and any density, and one
+    frame alone gives the numbers that it has among others.
+
+    A swimming body bursts and glides, so a stroke covers its stride unevenly, but each whole
+    stroke covers one stride exactly. The phase at the route's end is the one at which the strokes
+    have covered the route's length, so that the body starts at the one end and comes to rest at
+    the other without any stretching.
+
+    Args:
+        route: where to.
+        settings: how.
+        times: (frames,) in 0…1; earlier and later times hold the ends.
+        table: from ``bearings_of``, if it is there already.
+    """
+    at = np.clip(np.asarray(times, dtype=np.float64), 0.0, 1.0)
+    distance, phase = _progress(route, settings, at)
+    table = bearings_of(route, settings) if table is None else table
+    return replace(travel_at(route, settings, table, distance, phase), times=at)
+
+
+def travel_at(
+    route: Route, settings: TravelSettings, table: Bearings, distance: Floats, phase: Floats
+) -> Travel:
+    """The motion at distances (frames,) along the route, with phases (frames,) of the gait.
+
+    Its times count as if all distances took equally long.
+    """
+    distance = np.clip(distance, 0.0, route.length)
+    ahead = distance + min(settings.look_ahead * settings.stride, route.length)
+    turning = _swum if settings.manner == "SWIM" else _walked
+    rotations, turn = turning(table, settings, distance, ahead)
+    size = np.sqrt(turn[:, 0] * turn[:, 0] + turn[:, 1] * turn[:, 1])
+    turn = turn * np.minimum(1.0, np.pi / np.maximum(size, np.pi))[:, None]
+    positions = route.position(route.parameter_at(distance))
+    return Travel(distance / route.length, distance, phase, positions, rotations, turn)
+
+
+def walked_at(
+    route: Route, settings: TravelSettings, table: Bearings, distance: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Where a walking, upright body is at distances (n,) along its route, and before and after it.
+
+    Beyond the ends of an open route it goes straight on; a closed one it goes round again.
+
+    Returns:
+        World positions (n, 3) and orientations (n, 4).
+    """
+    wanted = np.asarray(distance, dtype=np.float64)
+    inside = np.mod(wanted, route.length) if route.cyclic else np.clip(wanted, 0.0, route.length)
+    positions = route.position(route.parameter_at(inside))
+    if not route.cyclic:
+        ends = route.tangent(np.array([0.0, 1.0]))
+        beyond = wanted - inside
+        positions = positions + beyond[:, None] * np.where(beyond[:, None] < 0.0, ends[0], ends[1])
+    upright = replace(settings, keep_upright=True)
+    rotations, _ = _walked(table, upright, inside, inside)
+    return positions, rotations
+
+
+def duration(route: Route, settings: TravelSettings, metres_per_second: float) -> float:
+    """Seconds that the route takes at a cruising speed, slower while it eases in and out.
+
+    Uneven speeds (NATURAL, burst and glide) cruise at it on average.
+    """
+    if not metres_per_second > 0.0:
+        raise SettingsError(
+            f"The speed is {metres_per_second:g} m/s.", "Give a speed greater than zero."
+        )
+    return route.length / (metres_per_second * _mean_speed(settings))
+
+
+def unhurried(
+    settings: TravelSettings, length: float, *, start: float = 0.0, end: float = 0.0
+) -> TravelSettings:
+    """The same travel, but with more time to get going and to stop, if it has too little.
+
+    Args:
+        settings: how the route is travelled.
+        length: metres of the route.
+        start: metres within which the body speeds up at least; 0 leaves that as it is.
+        end: metres within which it slows down at least.
+    """
+    # While the body eases it is half as fast on average, so m = 1 / (1 + a + b) of the time would
+    # do at full speed, a and b being the shares of the way.
+    shares = np.clip(np.array([start, end]) / max(length, 1e-12), 0.0, 1.0)
+    shares /= max(float(shares.sum()), 1.0)
+    own = np.array([settings.ease_in, settings.ease_out])
+    more = np.maximum(2.0 * shares / (1.0 + shares.sum()) - own, 0.0)
+    more *= min(1.0, max(1.0 - float(own.sum()), 0.0) / max(float(more.sum()), 1e-12))
+    ease_in, ease_out = (own + more).tolist()
+    return replace(settings, ease_in=ease_in, ease_out=ease_out)
+
+
+def strides(route: Route, settings: TravelSettings) -> float:
+    """Gait cycles from the start of the route to its end."""
+    return _last_phase(route, settings) / CYCLE
+
+
+def _last_phase(route: Route, settings: TravelSettings) -> float:
+    covered = CYCLE * route.length / settings.stride
+    if settings.manner == "WALK":
+        return covered
+    return phase_at_distance(covered, settings.burst, settings.stroke_phase)
+
+
+def _progress(route: Route, settings: TravelSettings, times: Floats) -> tuple[Floats, Floats]:
+    """Distances and phases ``(frames,)``."""
+    share = _eased(times, settings.ease_in, settings.ease_out) / _mean_speed(settings)
+    if settings.speed == "NATURAL":
+        share = route.distance_at(share) / route.length
+    last = _last_phase(route, settings)
+    phase = share * last
+    if settings.manner == "SWIM":
+        whole = stroke_distance(np.array([last]), settings.burst, settings.stroke_phase)
+        share = stroke_distance(phase, settings.burst, settings.stroke_phase) / whole
+    return np.clip(share, 0.0, 1.0) * route.length, phase
+
+
+def _mean_speed(settings: TravelSettings) -> float:
+    """Of the eased travel, as a share of its cruising speed."""
+    return 1.0 - 0.5 * (settings.ease_in + settings.ease_out)
+
+
+def _eased(times: Floats, ease_in: float, ease_out: float) -> Floats:
+    """Progress at cruising speed 1 that rises and falls as 3t² − 2t³ ``(frames,)``."""
+    run_up = _smooth_ramp(np.minimum(times, ease_in), ease_in)
+    left = 1.0 - times
+    run_out = 0.5 * ease_out - _smooth_ramp(np.minimum(left, ease_out), ease_out)
+    cruise = np.clip(times, ease_in, 1.0 - ease_out) - ease_in
+    return run_up + cruise + run_out
+
+
+def _smooth_ramp(time: Floats, whole: float) -> Floats:
+    """Integral of 3t² − 2t³ over a ramp that takes ``whole``."""
+    if whole <= 0.0:
+        return np.zeros_like(time)
+    t = time / whole
+    return whole * t * t * t * (1.0 - 0.5 * t)
+
+
+def _swum(
+    table: Bearings, settings: TravelSettings, distance: Floats, ahead: Floats
+) -> tuple[Floats, Floats]:
+    """Orientations ``(frames, 4)`` and turns ``(frames, 2)`` of a swimming body."""
+    roll = table.roll_at(distance)
+    if settings.bank:
+        half = 0.5 * min(settings.stride, table.length)
+        per_stride = table.bend_at(distance + half) - table.bend_at(distance - half)
+        sideways = rotate_in_plane(per_stride, -roll)[:, 0].copy()
+        roll = roll + settings.bank * np.arctan(sideways)
+    rotations = multiply(table.carried_at(distance), from_axis_angle(_UP, roll))
+    turn = rotate_in_plane(table.bend_at(ahead) - table.bend_at(distance), -roll)
+    if settings.lean:
+        rotations = multiply(rotations, from_axis_angle(_SIDEWAYS, settings.lean))
+    return rotations, turn
+
+
+def _walked(
+    table: Bearings, settings: TravelSettings, distance: Floats, ahead: Floats
+) -> tuple[Floats, Floats]:
+    """Orientations ``(frames, 4)`` and turns ``(frames, 2)`` of a walking body."""
+    compass = table.compass_at(distance)
+    if settings.heading == "ALONG":
+        off = np.full_like(distance, settings.heading_angle)
+    else:
+        off = settings.heading_angle - compass
+    if settings.keep_upright:
+        rotations = from_axis_angle(_UP, compass + off)
+    else:
+        rolled = from_axis_angle(_UP, table.roll_at(distance))
+        tilted = multiply(multiply(table.carried_at(distance), rolled), _LAID_FORWARD)
+        rotations = multiply(tilted, from_axis_angle(_UP, off))
+    leftwards = table.compass_at(ahead) - compass
+    return rotations, leftwards[:, None] * rotate_in_plane(_LEFT, -off)

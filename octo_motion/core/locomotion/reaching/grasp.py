@@ -1,0 +1,418 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An arm that reaches for an object, winds about it, holds it and lets go.
+
+A grasp is planned once: which stretch of the arm takes hold, and where on the object. That
+stretch then stays fixed on the object, however object and body move; between it and the body the
+arm bends as it must, without stretching. Everything else is a function of its own frame alone:
+the shape that holds, the shape of the reach (see ``reach``) and what the arm does otherwise are
+blended joint by joint in angle space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from operator import itemgetter
+from typing import Final, Literal
+
+import numpy as np
+
+from ...easing import least_jerk, smooth_step
+from ...errors import RigError, SettingsError
+from ...rotations import (
+    Floats,
+    conjugate,
+    from_axis_angle,
+    less_whole_turns,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+)
+from ..gait.ccd import closed
+from ..rig.arm_frames import ArmFrames, blended, frame_of, transported
+from .timeline import Timeline, first_place, folded, front_width, passed
+from .winding import Coil, Profile, Skins, Start, Winding, wind
+
+Mode = Literal["TOUCH", "COIL"]
+
+TOUCH_TURNS: Final = 0.12
+"""Of a turn that an arm lays itself on what it only touches."""
+_SLACK: Final = 1.04
+"""The free part of an arm is at least so many times as long as its way."""
+_LOOSE: Final = 1.5
+"""A free part longer than this is not made for the sake of a shorter coil."""
+_LEAST_FREE: Final = 0.3
+"""Share of the arm between the body and the coil, at least."""
+_LEAST_HELD: Final = 0.1
+"""Share of the arm that takes hold, at least."""
+_TWISTED: Final = 0.8
+"""The twist that brings suckers to the object lies in this last share of the free part."""
+_LIFT: Final = 0.25
+_CLEAR: Final = 0.85
+"""Of the skin's radius: joints on their way keep so far from the object."""
+_CLEAR_BETWEEN: Final = 0.65
+"""The same for the middles of bones, which press in where an arm is wound."""
+_CLEAR_ROUNDING: Final = 0.3
+"""Share of that distance within which joints begin to give way."""
+_FAR: Final = 3.0
+_AT_FAR: Final = 0.5 * (np.sqrt(_FAR * _FAR + 1.0) - _FAR)
+"""What the rounding leaves at so many roundings from the surface."""
+_CLEARINGS: Final = 4
+_TOGETHER: Final = 2
+"""How many joints on either side of one give way with it."""
+_FARTHEST: Final = 0.4
+"""Bone lengths that a joint gives way in one go."""
+_CLOSING: Final = 20
+"""Steps of Newton's method: an arm that is close to what it holds is folded up a lot."""
+_X: Final = np.array([1.0, 0.0, 0.0])
+_Y: Final = np.array([0.0, 1.0, 0.0])
+_UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where the object is at some frames, seen from the armature, in its units."""
+
+    positions: Floats
+    """(frames, 3) of the object's origin."""
+    rotations: Floats
+    """(frames, 4)"""
+
+    def __getitem__(self, chosen: slice | np.ndarray) -> Places:
+        """Some of the frames."""
+        return Places(self.positions[chosen], self.rotations[chosen])
+
+    def seen(self, points: Floats) -> Floats:
+        """Points (…, 3) of the object's frame in armature space, (frames, …, 3)."""
+        shape = (len(self.positions), *(1,) * (points.ndim - 1))
+        turned = rotate(self.rotations.reshape(*shape, 4), points)
+        return turned + self.positions.reshape(*shape, 3)
+
+    def into(self, points: Floats) -> Floats:
+        """Points (frames, …, 3) of armature space in the object's frame."""
+        shape = (len(self.positions), *(1,) * (points.ndim - 2))
+        moved = points - self.positions.reshape(*shape, 3)
+        return rotate(conjugate(self.rotations).reshape(*shape, 4), moved)
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """An object to grasp."""
+
+    profile: Profile
+    """In its own frame, armature units."""
+    places: Places
+    name: str = "The object"
+    """What errors call it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grasp:
+    """What has been planned; see :func:`plan_grasp`."""
+
+    arm: ArmFrames
+    radii: Floats
+    """(bones + 1,) of the skin at the joints."""
+    profile: Profile
+    timeline: Timeline
+    mode: Mode
+    coil: Coil
+    twist: float
+    """Radians of the free part when it touches: later ones are the nearest to it."""
+    up: Floats
+    """(3,) away from the ground, armature space."""
+    wraps: bool
+    """Whether it winds on after the touch."""
+
+    @property
+    def turns(self) -> float:
+        """How often it winds round the object."""
+        return self.coil.angle / (2.0 * np.pi)
+
+    def holding(self, places: Places) -> Floats:
+        """Frames (frames, segments, 4) of the arm that holds the object where it is."""
+        arm, coil, first = self.arm, self.coil, self.coil.first
+        wound = len(coil.facing)
+        own = frame_of(coil.directions, coil.facing)
+        held = multiply(places.rotations[:, None], own)
+        result = np.empty((len(places.positions), len(arm.bones), 4))
+        result[:, :first] = self._free(places, held[:, 0])
+        result[:, first : first + wound] = held
+        # What is left of the arm goes on straight; the reach bends it off.
+        result[:, first + wound :] = held[:, -1:]
+        return result
+
+    def _free(self, places: Places, held: Floats) -> Floats:
+        """Frames (frames, first, 4) from the body to the coil."""
+        arm, first = self.arm, self.coil.first
+        goal = places.seen(self.coil.joints[0]) - arm.root
+        lengths = arm.lengths[:first]
+        outward = rotate(arm.at_rest[0], _X)
+        shape = _approach(lengths, goal, held, outward=outward, up=self.up)
+        shape = closed(np.ascontiguousarray(shape), lengths, goal.T, _CLOSING)
+        near = np.arange(len(goal))
+        for _ in range(_CLEARINGS):
+            joints = arm.root + np.cumsum(
+                lengths[:, None] * np.moveaxis(shape[..., near], -1, 0), axis=1
+            )
+            shifts = self._out_of_the_way(joints[:, :-1], places[near])
+            moves = np.any(shifts != 0.0, axis=(1, 2))
+            near, joints = near[moves], joints[moves]
+            if len(near) == 0:
+                break
+            joints[:, :-1] += shifts[moves]
+            pushed = np.diff(joints, axis=1, prepend=np.broadcast_to(arm.root, (len(near), 1, 3)))
+            pushed = np.ascontiguousarray(np.moveaxis(normalized(pushed), 0, -1))
+            shape[..., near] = closed(pushed, lengths, goal[near].T, _CLOSING)
+        directions = np.moveaxis(shape, -1, 0)
+        frames = transported(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
+        twist = _twist(frames[:, -1], held)
+        twist = self.twist + less_whole_turns(twist - self.twist)
+        share = np.cumsum(lengths) / lengths.sum()
+        angle = twist[:, None] * smooth_step((share - 1.0 + _TWISTED) / _TWISTED)
+        return multiply(frames, from_axis_angle(_X, angle))
+
+    def _out_of_the_way(self, joints: Floats, places: Places) -> Floats:
+        """Shifts (frames, joints, 3) that bring joints 1 … out of the object; armature space."""
+        count = joints.shape[1]
+        middles = 0.5 * (joints[:, 1:] + joints[:, :-1])
+        skin = self.radii[1 : count + 1]
+        between = 0.5 * (skin[1:] + skin[:-1])
+        inside = places.into(np.concatenate([joints, middles], axis=1))
+        thick = np.concatenate([_CLEAR * skin, _CLEAR_BETWEEN * between])
+        lacking = thick - self.profile.clearance(inside)
+        rounding = _CLEAR_ROUNDING * thick
+        shift = 0.5 * (lacking + np.sqrt(lacking * lacking + rounding * rounding))
+        # Nothing gives way from afar.
+        shift = np.where(lacking < -_FAR * rounding, 0.0, shift - _AT_FAR * rounding)
+        most = np.maximum(shift[:, :count], 0.0)
+        most[:, 1:] = np.maximum(most[:, 1:], shift[:, count:])
+        most[:, :-1] = np.maximum(most[:, :-1], shift[:, count:])
+        # Neighbours give way together, and none by more than bones can follow.
+        for _ in range(_TOGETHER):
+            around = np.pad(most, ((0, 0), (1, 1)), mode="edge")
+            most = np.maximum(most, 0.5 * (around[:, 2:] + around[:, :-2]))
+        farthest = _FARTHEST * self.arm.lengths[:count]
+        most = farthest * np.tanh(most / farthest)
+        out = self.profile.way_out(inside[:, :count], skin) * most[..., None]
+        return rotate(places.rotations[:, None], out)
+
+    def _cleared(self, frames: Floats, places: Places, amount: Floats) -> Floats:
+        """An arm (frames, segments, 4) bent round the object by an amount (frames,) of 0…1."""
+        arm, result = self.arm, frames.copy()
+        near = np.flatnonzero(amount > 0.0)
+        for _ in range(_CLEARINGS):
+            joints = arm.joints(result[near])
+            shifts = self._out_of_the_way(joints[:, 1:], places[near])
+            moves = np.any(shifts != 0.0, axis=(1, 2))
+            near, joints = near[moves], joints[moves]
+            if len(near) == 0:
+                break
+            joints[:, 1:] += shifts[moves] * amount[near, None, None]
+            along = normalized(np.diff(joints, axis=1))
+            result[near] = multiply(shortest_arc(rotate(result[near], _X), along), result[near])
+        return result
+
+    def apply(self, times: Floats, places: Places, otherwise: Floats) -> Floats:
+        """Rotations (frames, bones, 4) of the arm, of what it does otherwise (frames, bones, 4).
+
+        Args:
+            times: (frames,) any, in any order.
+            places: of the object at these times.
+            otherwise: in each bone's rest frame, as the result.
+        """
+        arm, lengths, timeline = self.arm, self.arm.lengths, self.timeline
+        weight = timeline.weight(times, arm.reach[:-1] / arm.length)
+        moves = np.any(weight > 0.0, axis=-1)
+        result = otherwise.copy()
+        if not np.any(moves):
+            return result
+        width = front_width(lengths)
+        # What only touches is there with all that it lays on the object.
+        laid = 0 if self.wraps else len(self.coil.facing)
+        touches = arm.reach[self.coil.first + laid] + width
+        ends = arm.length + width if self.wraps else touches
+        front_at = first_place(lengths)
+        front = timeline.front(times[moves], front_at, touches, ends)
+        holding = arm.shape(self.holding(places[moves]))
+        reached = passed(lengths, front)
+        last = self.coil.first + len(self.coil.facing)
+        # Beyond the last turn the arm is left to curl off.
+        reached[:, last:] = 0.0
+        fold = folded(lengths, front)
+        fold[:, 0] = holding[:, 0]
+        reaching = blended(fold, holding, reached)
+        # What holds is out of the way already.
+        loose = 1.0 - least_jerk((front - touches + width) / width)
+        cleared = self._cleared(arm.shaped(reaching), places[moves], loose)
+        reaching = arm.shape(cleared)
+        usual = arm.shape(arm.from_bones(otherwise[moves]))
+        shape = arm.shaped(blended(usual, reaching, weight[moves]))
+        result[moves] = arm.to_bones(shape)
+        return result
+
+
+def plan_grasp(
+    arm: ArmFrames,
+    radii: Floats,
+    target: Target,
+    timeline: Timeline,
+    times: Floats,
+    *,
+    mode: Mode = "COIL",
+    turns: float = 2.0,
+    up: Floats = _UP,
+    name: str = "The arm",
+) -> Grasp:
+    """Decide which stretch of the arm takes hold, and where.
+
+    Args:
+        arm: which.
+        radii: (bones + 1,) of its skin at the joints, armature units.
+        target: the object, at these times.
+        timeline: when.
+        times: (frames,) ascending, at which the object is known.
+        mode: touch it, or wind about it.
+        turns: at most so many.
+        up: (3,) away from the ground, armature space.
+        name: what errors call the arm.
+
+    Raises:
+        SettingsError: the motion does not last from the touch to the release; the object is out
+            of reach at a frame between the two, which is named.
+        RigError: the object has no size, or the arm starts within it.
+    """
+    held = (times >= timeline.contact - 1e-6) & (times <= timeline.release + 1e-6)
+    if not np.any(held):
+        raise SettingsError(
+            f"{name} would touch {target.name} at frame {timeline.contact:g}, outside of the "
+            f"motion, which lasts from frame {times[0]:g} to {times[-1]:g}.",
+            "Change the frames of the reach, or make the motion longer.",
+        )
+    profile, places = target.profile, target.places
+    wanted = TOUCH_TURNS if mode == "TOUCH" else turns
+    holding = places[held]
+    skins = Skins.of(profile, radii)
+    plans: list[tuple[float, Grasp]] = []
+    for sense in (1, -1):
+        coil = _coil(arm, skins, holding, Winding(wanted, sense))
+        if isinstance(coil, Coil):
+            loose = Grasp(arm, radii, profile, timeline, mode, coil, 0.0, up, mode == "COIL")
+            twist = float(_twist_without(arm, loose.holding(holding[:1])[0], coil.first))
+            # Suckers come to the object with as little twist as can be.
+            plans.append((abs(twist) - 1e-3 * sense, replace(loose, twist=twist)))
+    if not plans:
+        raise _too_far(arm, target, times[held], holding, name)
+    return min(plans, key=itemgetter(0))[1]
+
+
+def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coil | None:
+    """The coil of the stretch that takes hold, none if the arm is too short at some place.
+
+    The arm takes hold with as much of it as the free part can spare at every place; where that
+    is more than all the turns need, with a stretch further out, as far as that leaves the free
+    part not too loose.
+    """
+    root = places[:1].into(arm.root[None])[0]
+    # A last bone alone would hold on to nothing.
+    last = int(np.searchsorted(arm.reach, (1.0 - _LEAST_HELD) * arm.length, side="right")) - 1
+    last = min(max(last, 2), len(arm.bones) - 1)
+
+    def wound(first: int) -> Coil:
+        return wind(skins, arm.lengths, Start(first, root), winding)
+
+    def far(coil: Coil) -> float:
+        return float(np.max(np.linalg.norm(places.seen(coil.joints[0]) - arm.root, axis=-1)))
+
+    def enough(first: int) -> bool:
+        try:
+            return bool(arm.reach[first] >= _SLACK * far(wound(first)))
+        except RigError:
+            # With a thinner stretch it may just do.
+            return False
+
+    def spare(first: int) -> bool:
+        coil = wound(first)
+        short = coil.angle < 2.0 * np.pi * winding.turns - 1e-6
+        return not short and bool(arm.reach[first] <= _LOOSE * far(coil))
+
+    # At least two bones are free, and one is left to take hold.
+    least = int(np.searchsorted(arm.reach, _LEAST_FREE * arm.length))
+    least = min(max(least, 2), last)
+    first = _first_true(enough, least, last)
+    if first > last:
+        wound(last)
+        return None
+    if first < last and spare(first):
+        first = _first_true(lambda each: not spare(each), first + 1, last) - 1
+    return wound(first)
+
+
+def _first_true(test: Callable[[int], bool], low: int, high: int) -> int:
+    """The first of low … high for which a test holds, and it holds from there on; else high + 1."""
+    while low <= high:
+        middle = (low + high) // 2
+        if test(middle):
+            high = middle - 1
+        else:
+            low = middle + 1
+    return low
+
+
+def _too_far(
+    arm: ArmFrames, target: Target, times: Floats, places: Places, name: str
+) -> SettingsError:
+    """What to say of an object that the arm cannot hold at all of these times."""
+    profile = target.profile
+    axis = np.linspace(profile.heights[0], profile.heights[-1], 9)[:, None] * _UP
+    ways = places.seen(profile.to_object(axis)) - arm.root
+    far = np.min(np.linalg.norm(ways, axis=-1), axis=-1) / arm.length
+    at = int(np.argmax(far))
+    return SettingsError(
+        f"{target.name} is out of reach of {name} at frame {times[at]:g}: it is {far[at]:.2f} "
+        "arm lengths away, and some of the arm has to lie on it.",
+        "Move it nearer, or change the frames of the reach.",
+    )
+
+
+def _approach(
+    lengths: Floats, goal: Floats, held: Floats, *, outward: Floats, up: Floats
+) -> Floats:
+    """Shape (segments, 3, frames) of the way to a goal (frames, 3), before it is closed.
+
+    A cubic Hermite curve that leaves the body half outwards and arrives as the coil begins; what
+    the arm is too long bows away from the object and from the ground.
+    """
+    along, facing = rotate(held, _X), rotate(held, _Y)
+    far = np.linalg.norm(goal, axis=-1, keepdims=True)
+    straight = goal / np.maximum(far, 1e-9)
+    leaves = normalized(straight + 0.5 * outward) * far
+    arrives = along * far
+    bow = normalized(_LIFT * up - facing)
+    bow = bow - np.sum(bow * straight, axis=-1, keepdims=True) * straight
+    ends = np.cumsum(lengths)
+    u = ((ends - 0.5 * lengths) / ends[-1])[:, None, None]
+    slack = np.maximum(ends[-1] / np.maximum(far, 1e-9) - 1.0, 0.0)
+    bowed = np.sqrt(np.minimum(slack, 1.0) + 1e-4)
+    shape = (
+        (6.0 * u - 6.0 * u * u) * goal
+        + (1.0 - 4.0 * u + 3.0 * u * u) * leaves
+        + (3.0 * u * u - 2.0 * u) * arrives
+        + 3.0 * bowed * far * (1.0 - 2.0 * u) * bow
+    )
+    return np.moveaxis(normalized(shape), 1, -1)
+
+
+def _twist(before: Floats, after: Floats) -> Floats:
+    """Angle (…) about the arm by which a frame is twisted against the one before it."""
+    carried = transported(rotate(after, _X)[..., None, :], before)[..., 0, :]
+    turn = multiply(conjugate(carried), after)
+    return 2.0 * np.arctan2(turn[..., 1], turn[..., 0])
+
+
+def _twist_without(arm: ArmFrames, frames: Floats, first: int) -> Floats:
+    """Twist (…) that the free part has to take on, of an arm planned without any."""
+    directions = rotate(frames[:first], _X)
+    plain = transported(directions, arm.at_rest[0])
+    return less_whole_turns(_twist(plain[-1], frames[first]))

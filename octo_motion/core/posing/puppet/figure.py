@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a puppet is made of: rigid bodies in a tree of ball joints, each with a plastic element.
+
+Units are metres, kilograms, seconds, radians; the world is Blender's, Z up. A body's own frame sits
+at its joint (the head of its bone) with the axes of the bone, +Y along it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...rotations import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """A tree of rigid bodies, parents before children; body i hangs on its parent by joint i.
+
+    The joint of a body without parent ties it to the world: free, or pinned while posing.
+    """
+
+    names: tuple[str, ...]
+    """One for each body: the bone that it moves."""
+    parents: tuple[int, ...]
+    """Index of each body's parent, −1 for a root."""
+    anchors: Floats
+    """(bodies, 3) where a body's joint sits in the frame of its parent; zeros for a root."""
+    rest: Floats
+    """(bodies, 4) orientation at rest seen from the parent's frame (the world's for a root)."""
+    lengths: Floats
+    """(bodies,) of the bones: what a joint's opening is measured against."""
+    masses: Floats
+    """(bodies,)"""
+    centres: Floats
+    """(bodies, 3) centre of mass in the body's frame."""
+    inertias: Floats
+    """(bodies, 3, 3) about the centre of mass, in the body's frame."""
+    capsules: Floats
+    """(bodies, 2, 3) ends of the capsule's axis in the body's frame."""
+    radii: Floats
+    """(bodies,) of the capsules."""
+    limits: Limits
+    elements: Elements
+
+    def __len__(self) -> int:
+        """Number of bodies."""
+        return len(self.names)
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """How far each joint turns from rest, see ``limits``."""
+
+    ranges: Floats
+    """(bodies, 3, 2) least and greatest bend about X, twist about Y (the bone) and bend about Z, in
+    the bone's axes at rest; −π and π where there is no end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Elements:
+    """Coefficients of the three-element model [Plastic, eq. 16–26], about the parent's axes.
+
+    A row per joint and a column per axis; a root's row counts only where the root is pinned.
+    """
+
+    stiffness: Floats
+    """(bodies, 3) K_f, N·m/rad."""
+    damping: Floats
+    """(bodies, 3) D_f, beside the spring, N·m·s/rad."""
+    flow: Floats
+    """(bodies, 3) D_d, in series, N·m·s/rad: how fast the joint gives way."""
+    yield_torque: Floats
+    """(bodies,) N·m: below it the series damper holds; 0 lets it creep always, as in the source."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where the bodies of a figure are."""
+
+    positions: Floats
+    """(bodies, 3) of the joints, world."""
+    orientations: Floats
+    """(bodies, 4), world."""

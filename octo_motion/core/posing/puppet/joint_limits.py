@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a joint turns: a range about each axis of the bone at rest, which need not be even.
+
+A turn from rest is a twist about the bone, +Y, and then the shortest swing that brings the bone to
+where it points. The swing is a rotation vector across the bone, θ n with n ⟂ y₀: its parts about X
+and Z are how far the joint is bent, and have a range each, as the twist has. An elbow that opens
+from 0° to 150° about X and not at all about Z is a hinge; a rig's own limits say no more than that.
+
+With e = n × y₀ the bone points along y = cos θ y₀ + sin θ e. From ẏ = ω × y follow the rates of
+bends and twist, for a relative angular velocity ω,
+
+    ∂(θ n)/∂ω = n nᵀ + θ cot θ e eᵀ − θ e y₀ᵀ,      ∂(twist)/∂ω = y₀ + tan(θ/2) e
+
+all in the bone's axes at rest. Each end of a range that is near is one row (``problem.Stops``).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...rotations import Floats
+from ..solver.problem import Stops
+from .figure import Figure
+from .kinematics import inverse_product, matrices
+
+_ENDLESS = np.pi - 1e-9
+_NEAR = 0.1
+"""Radians from an end at which it is watched, more for joints that turn fast."""
+_BACK = 0.1
+"""rad/s: how fast a joint that was forced beyond an end is led back. So slow that it is no push,
+and yet under a pull that lasts the joint stands still instead of creeping on."""
+_OPEN = 5e-4
+"""cos² of half the swing; a bone that points backwards has no way to say which way it is bent."""
+_TINY = 1e-12
+_ONES = np.ones(3)
+
+
+def bends(turns: Floats) -> Floats:
+    """How far joints are bent about X, twisted about Y, and bent about Z: (…, 3) radians.
+
+    Args:
+        turns: (…, 4) from rest, in the bone's own axes at rest.
+    """
+    w, x, y, z = (turns[..., part] for part in range(4))
+    cosine = np.sqrt(w * w + y * y)
+    sine = np.sqrt(x * x + z * z)
+    # θ n from sin(θ/2) n = (x w + z y, z w − x y)/cos(θ/2).
+    factor = 2.0 * np.arctan2(sine, cosine) / np.maximum(sine * cosine, _TINY)
+    factor = np.where(sine < 1e-9, 2.0, factor)
+    twist = 2.0 * np.arctan2(y, w)
+    twist -= 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
+    result = np.empty((*twist.shape, 3))
+    result[..., 0] = factor * (x * w + z * y)
+    result[..., 1] = twist
+    result[..., 2] = factor * (z * w - x * y)
+    return result
+
+
+def slopes(turns: Floats) -> Floats:
+    """Rates of ``bends`` for angular velocities in the bone's axes at rest: (…, 3, 3).
+
+    Args:
+        turns: (…, 4) as for ``bends``; none by a half turn.
+    """
+    w, x, y, z = (turns[..., part] for part in range(4))
+    cosine = np.maximum(np.sqrt(w * w + y * y), _TINY)
+    sine = np.sqrt(x * x + z * z)
+    whole = np.maximum(sine * cosine, _TINY)
+    straight = sine < 1e-9
+    right = np.where(straight, 1.0, (x * w + z * y) / whole)
+    back = np.where(straight, 0.0, (z * w - x * y) / whole)
+    angle = 2.0 * np.arctan2(sine, cosine)
+    rest = np.where(straight, 1.0, angle * (cosine * cosine - sine * sine) / (2.0 * whole))
+    half = sine / cosine
+    across = right * right
+    along = 1.0 - across
+    result = np.empty((*angle.shape, 3, 3))
+    result[..., 0, 0] = across + along * rest
+    result[..., 2, 2] = along + across * rest
+    result[..., 0, 2] = result[..., 2, 0] = right * back * (1.0 - rest)
+    result[..., 0, 1] = back * angle
+    result[..., 2, 1] = -right * angle
+    result[..., 1, 0] = -back * half
+    result[..., 1, 1] = 1.0
+    result[..., 1, 2] = right * half
+    return result
+
+
+class JointStops:
+    """The joints of a figure that have limits, and the rows that hold them."""
+
+    def __init__(self, figure: Figure, gains: Floats) -> None:
+        """Find them.
+
+        Args:
+            figure: the puppet; limits of roots count for nothing.
+            gains: (bodies,) a of a row at each joint, N·m·s per rad/s.
+        """
+        ranges = np.array(figure.limits.ranges, dtype=np.float64)
+        least = np.where(ranges[..., 0] <= -_ENDLESS, -np.inf, ranges[..., 0])
+        most = np.where(ranges[..., 1] >= _ENDLESS, np.inf, ranges[..., 1])
+        limited = np.isfinite(least).any(axis=1) | np.isfinite(most).any(axis=1)
+        limited &= np.array(figure.parents) >= 0
+        self.joints = np.flatnonzero(limited)
+        """Bodies whose joints have limits."""
+        # Both ends as what has to stay above zero: the bend less the least, the most less it.
+        self._signs = np.array([1.0, -1.0])[:, None]
+        self._ends = np.stack([-least, most], axis=1)[self.joints]
+        self._rest = figure.rest[self.joints]
+        self._axes = matrices(self._rest)
+        self._gains = gains[self.joints]
+        self._count = len(figure)
+
+    def near(self, turns: Floats, frames: Floats, speeds: Floats, step: float) -> tuple[Stops, ...]:
+        """Ends of ranges that a joint could reach within a step or is at, as rows.
+
+        Args:
+            turns: (bodies, 4) of the joints, in the parents' frames.
+            frames: (bodies, 3, 3) of the parents.
+            speeds: (bodies, 3) with which joints turn now, rad/s.
+            step: h.
+        """
+        if not len(self.joints):
+            return ()
+        speeds = speeds[self.joints]
+        fastest = float(np.sqrt((speeds * speeds).sum(axis=1).max()))
+        own = inverse_product(self._rest, turns[self.joints])
+        gaps = self._signs * bends(own)[:, None, :] + self._ends
+        found = gaps < _NEAR + 2.0 * step * fastest
+        found &= (own[:, 0] ** 2 + own[:, 2] ** 2 > _OPEN)[:, None, None]
+        which, side, axis = found.nonzero()
+        if not len(which):
+            return ()
+        # In world axes: rows times the transposed frame of the bone at rest.
+        seen = slopes(own) @ (frames[self.joints] @ self._axes).transpose(0, 2, 1)
+        sizes = np.sqrt((seen * seen) @ _ONES)[which, axis]
+        rows = seen[which, axis] * (self._signs[side] / sizes[:, None])
+        rates = np.maximum(gaps[which, side, axis] / (sizes * step), -_BACK)
+        joints = self.joints[which]
+        spread = np.zeros((self._count, len(which)))
+        spread[joints, np.arange(len(which))] = 1.0
+        labels = 6 * which + 3 * side + axis
+        return (Stops(joints, rows, rates, self._gains[which], spread, labels),)

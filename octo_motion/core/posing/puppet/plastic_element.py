@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plastic element: a spring beside a damper, and a second damper in series that gives way.
+
+[Plastic, eq. 16–26] puts a Voigt part (K_f beside D_f, displacement q_f) in series with a damper
+D_d. Ours has a threshold as well: the series damper moves only where the load λ exceeds the yield
+torque τ (a Bingham element),
+
+    λ = −K_f q_f − D_f w_f,    w = w_f + w_d,    D_d w_d = −(|λ| − τ)₊ λ/|λ|.
+
+With τ = 0 this is the source's element. Over a backward step h, with G = K_f h + D_f and the load
+that the element would bear if it did not flow, λ_e = −K_f q_f[t] − G w[t+1],
+
+    |λ_e| ≤ τ:   λ = λ_e,                                      w_d = 0
+    otherwise:   λ = (D_d λ_e + G τ s) / (D_d + G),            w_d = −s (|λ_e| − τ) / (D_d + G),
+
+with s = λ_e/|λ_e|, and q_f[t+1] = q_f[t] + h (w − w_d). At τ = 0 that is eq. 25 with
+C = (D_d + G)/(D_d G) and D = K_f/G, and eq. 21 for q_f. λ falls as w grows and λ·w_d ≤ 0 whatever
+the step: the element stores or loses energy and never makes any. Axes are the parent's, all
+functions work on arrays ``(…, 3)``; a scalar element is one whose other two axes are zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...rotations import Floats
+from .figure import Elements
+
+_TINY = 1e-300
+_ONES = np.ones(3)
+_UNIT = np.eye(3)
+_INDEX = np.arange(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """How the elements answer a relative angular velocity w over one step."""
+
+    law: PlasticLaw
+    load: Floats
+    """(…, 3) λ, the torque on the child, N·m."""
+    trial: Floats
+    """(…, 3) λ_e, what it would be without flow."""
+    size: Floats
+    """(…) |λ_e|; of no account where nothing flows."""
+    flows: NDArray[np.bool_] | None
+    """(…) where the series damper moves; None where all hold, and the load is linear in w."""
+
+    @property
+    def slope(self) -> Floats:
+        """(…, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
+        law = self.law
+        if self.flows is None:
+            return law.diagonal
+        if law.alike:
+            return self._slope_alike(self.flows)
+        toward = self.trial / (self.size + _TINY)[..., None]
+        # Along s only what the flow leaves, across it also the turning of s. With unequal axes the
+        # exact slope is not symmetric; its symmetric neighbour leads to the same solution.
+        root = np.sqrt(law.backward)
+        ratio = law.shared_yield / (self.size + _TINY)[..., None]
+        middle = -(np.sqrt(ratio)[..., :, None] * np.sqrt(ratio)[..., None, :]) * (
+            toward[..., :, None] * toward[..., None, :]
+        )
+        middle[..., _INDEX, _INDEX] += law.kept + ratio
+        return np.where(
+            self.flows[..., None, None],
+            root[..., :, None] * middle * root[..., None, :],
+            law.diagonal,
+        )
+
+    def _slope_alike(self, flows: NDArray[np.bool_]) -> Floats:
+        """The same for elements whose axes are alike, worked out only for those that flow."""
+        law = self.law
+        which = flows.nonzero()[0]
+        size = self.size.take(which) + _TINY
+        toward = self.trial.take(which, 0) / size[:, None]
+        gain = law.backward[:, 0].take(which)
+        ratio = gain * law.shared_yield[:, 0].take(which) / size
+        across = gain * law.kept[:, 0].take(which) + ratio
+        blocks = across[:, None, None] * _UNIT
+        blocks -= (ratio[:, None] * toward)[:, :, None] * toward[:, None, :]
+        slope = law.diagonal.copy()
+        slope[which] = blocks
+        return slope
+
+    def flow_of(self, which: NDArray[np.int64]) -> Floats:
+        """(which, 3) w_d of those elements, of which each flows."""
+        law = self.law
+        size = self.size.take(which)
+        excess = (size - law.yield_torque.take(which)) / (size + _TINY)
+        toward = self.trial.take(which, 0) * excess[:, None]
+        return -toward * law.compliance.take(which, 0)
+
+    @property
+    def flow(self) -> Floats | None:
+        """(…, 3) w_d: how fast the series damper moves, rad/s; None where all hold."""
+        if self.flows is None:
+            return None
+        excess = np.where(self.flows, self.size - self.law.yield_torque, 0.0)
+        return -self.trial * (excess / (self.size + _TINY))[..., None] * self.law.compliance
+
+
+class PlasticLaw:
+    """The elements of a figure for one step length, with what hangs on both alone worked out."""
+
+    def __init__(self, elements: Elements, step: float) -> None:
+        self.step = step
+        self.stiffness = np.array(elements.stiffness, dtype=np.float64)
+        self.backward = self.stiffness * step + elements.damping
+        """G = K_f h + D_f."""
+        whole = np.asarray(elements.flow, dtype=np.float64) + self.backward
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.compliance = np.where(whole > 0.0, 1.0 / whole, 0.0)
+            """1/(D_d + G), zero where the series damper is rigid."""
+            self.mobility = np.where(self.backward > 0.0, 1.0 / self.backward, 0.0)
+            """1/G, zero where there is no element."""
+        self.share = self.backward * self.compliance
+        """G/(D_d + G), of a load above yield: what the flow takes away."""
+        self.kept = 1.0 - self.share
+        self.yield_torque = np.array(elements.yield_torque, dtype=np.float64)
+        self.shared_yield = (
+            self.share * np.where(np.isfinite(self.yield_torque), self.yield_torque, 0.0)[..., None]
+        )
+        """G τ/(D_d + G)."""
+        self.can_flow = bool(
+            np.any((self.compliance > 0.0) & np.isfinite(self.yield_torque)[..., None])
+        )
+        self.diagonal = np.zeros((*self.backward.shape, 3))
+        self.diagonal[..., _INDEX, _INDEX] = self.backward
+        """(…, 3, 3) slope of an element that holds."""
+        self.held = step * self.diagonal
+        """The same for the impulse over a step."""
+        self.alike = self.yield_torque.ndim == 1 and all(
+            bool((array == array[:, :1]).all())
+            for array in (self.stiffness, self.backward, self.compliance)
+        )
+        """Whether all axes of an element are alike, so that no axes are needed at all."""
+
+    def trial(self, spring: Floats, speed: Floats) -> Floats:
+        """λ_e, the load without flow, from q_f at the step's start and w at its end."""
+        return self.at_rest(spring) - self.backward * speed
+
+    def at_rest(self, spring: Floats) -> Floats:
+        """−K_f q_f (…, 3), the load at rest without flow."""
+        return -self.stiffness * spring
+
+    def respond(self, spring: Floats, speed: Floats) -> Response:
+        """Load, its slope and the flow, from q_f at the step's start and w at its end."""
+        return self.answer(self.trial(spring, speed))
+
+    def answer(self, trial: Floats) -> Response:
+        """The same from λ_e (…, 3)."""
+        if not self.can_flow:
+            return Response(self, trial, trial, _NONE, None)
+        size = np.sqrt((trial * trial) @ _ONES)
+        # With a threshold of 0 it flows even at rest: there its law is linear.
+        flows = size >= self.yield_torque
+        if not flows.any():
+            return Response(self, trial, trial, size, None)
+        if self.alike:
+            which = flows.nonzero()[0]
+            factor = self.shared_yield[:, 0].take(which) / (size.take(which) + _TINY)
+            factor += self.kept[:, 0].take(which)
+            load = trial.copy()
+            load[which] = trial.take(which, 0) * factor[:, None]
+        else:
+            held = self.shared_yield * (trial / (size + _TINY)[..., None])
+            load = np.where(flows[..., None], self.kept * trial + held, trial)
+        return Response(self, load, trial, size, flows)
+
+
+_NONE = np.zeros(0)

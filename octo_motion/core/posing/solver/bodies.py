@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a figure's bodies are and how they move, from one step to the next.
+
+Orientations and the roots' places are the coordinates; everything else follows from them, so no
+joint ever opens. Between steps each body keeps the angular momentum it had, but for what turning it
+would add to its energy.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...rotations import Floats, normalized
+from ..puppet.figure import Figure, Pose
+from ..puppet.kinematics import (
+    exponential,
+    inverse_product,
+    logarithm,
+    product,
+    product_inverse,
+    transforms,
+)
+from .tree import Tree
+
+Integers = NDArray[np.int64]
+
+
+class Bodies:
+    """Poses, velocities and the springs' rest of all bodies."""
+
+    def __init__(self, figure: Figure, tree: Tree, pose: Pose) -> None:
+        """At rest, with relaxed springs."""
+        count = len(figure)
+        self._figure = figure
+        self._tree = tree
+        self.is_root: NDArray[np.bool_] = tree.parents < 0
+        """(bodies,)"""
+        self.parent_or_self = np.where(self.is_root, np.arange(count), tree.parents)
+        """(bodies,) the parent, of a root itself."""
+        self._anchors = figure.anchors[:, :, None].copy()
+        self._inverse_inertias = np.linalg.inv(figure.inertias)
+        self.linear = np.zeros((count, 3))
+        """(bodies, 3) velocities of the centres of mass, world."""
+        self.angular = np.zeros((count, 3))
+        """(bodies, 3)"""
+        self.spin = np.zeros((count, 3))
+        """(bodies, 3) angular momenta about the centres of mass, world axes."""
+        self.place(pose)
+        self.rest = self.turns()
+        """(bodies, 4) where the joints' springs have their rest, in the parents' frames."""
+
+    # Where they are
+
+    def place(self, pose: Pose) -> None:
+        """Take over orientations and the roots' places."""
+        self.orientations = normalized(pose.orientations)
+        """(bodies, 4)"""
+        self.roots = np.array(pose.positions, dtype=np.float64)[self._tree.roots]
+        """(roots, 3)"""
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Matrices and places, from orientations and roots."""
+        tree = self._tree
+        # (bodies, 4, 4) homogeneous, without the places yet; and the same, transposed.
+        self.transforms, self.transposed = transforms(self.orientations)
+        self.matrices = self.transforms[:, :3, :3]
+        """(bodies, 3, 3)"""
+        parents = self.matrices.take(self.parent_or_self, 0)
+        arms = (parents @ self._anchors)[:, :, 0]
+        parents[tree.roots] = _UNIT
+        self.parent_matrices = parents
+        """(bodies, 3, 3) the parents', of roots the world's."""
+        arms[tree.roots] = self.roots
+        self.positions = tree.above @ arms
+        """(bodies, 3) of the joints."""
+
+    def centres(self) -> Floats:
+        """(bodies, 3) of mass, world."""
+        return self.positions + (self.matrices @ self._figure.centres[:, :, None])[:, :, 0]
+
+    def inertias(self) -> Floats:
+        """(bodies, 3, 3) about the centres of mass, world axes."""
+        return self.matrices @ self._figure.inertias @ self.matrices.transpose(0, 2, 1)
+
+    def _parent_turns(self) -> Floats:
+        parents = self.orientations.take(self.parent_or_self, 0)
+        parents[self._tree.roots] = _UNTURNED
+        return parents
+
+    def turns(self) -> Floats:
+        """(bodies, 4) orientation of each body in its parent's frame (a root's in the world's)."""
+        return inverse_product(self._parent_turns(), self.orientations)
+
+    # Springs
+
+    def springs(self) -> Floats:
+        """(bodies, 3) q_f of the elements: rotation vectors in the parents' frames."""
+        return logarithm(product_inverse(self.turns(), self.rest))
+
+    def springs_in_world(self) -> Floats:
+        """(bodies, 3) the same in world axes."""
+        at_rest = product(self._parent_turns(), self.rest)
+        return logarithm(product_inverse(self.orientations, at_rest))
+
+    def relax(self) -> None:
+        """Let the springs have their rest where the joints are."""
+        self.rest = self.turns()
+
+    def rest_springs_at(self, springs: Floats, which: Integers) -> None:
+        """Move springs' rest so that they are bent by ``springs`` (which, 3), parents' frames."""
+        parents = self.orientations.take(self.parent_or_self.take(which), 0)
+        parents[self.is_root.take(which)] = _UNTURNED
+        turns = inverse_product(parents, self.orientations.take(which, 0))
+        self.rest[which] = product(exponential(-springs), turns)
+
+    # How they move
+
+    def stop(self) -> None:
+        """Take all velocities away."""
+        for array in (self.linear, self.angular, self.spin):
+            array[:] = 0.0
+
+    def kept_spin(self) -> Floats:
+        """Angular momenta, shortened where the body's turn would have made energy of them."""
+        local = self.spin[:, None, :] @ self.matrices
+        now = ((local @ self._inverse_inertias) * local)[:, 0] @ _ONES
+        before = (self.spin * self.angular) @ _ONES
+        share = np.maximum(before, 0.0) / (now + 1e-300)
+        share = np.sqrt(np.minimum(share, 1.0))
+        return self.spin * share[:, None]
+
+    def take_velocities(self, velocities: Floats, skewed: Floats) -> None:
+        """Take over spatial velocities (bodies, 6).
+
+        Args:
+            velocities: about a common origin.
+            skewed: (bodies, 3, 3) matrices of the cross product with the centres, from there.
+        """
+        self.angular = velocities[:, :3].copy()
+        self.linear = velocities[:, 3:] - (skewed @ self.angular[:, :, None])[:, :, 0]
+        local = self.angular[:, None, :] @ self.matrices
+        self.spin = (self.matrices @ (local @ self._figure.inertias).transpose(0, 2, 1))[:, :, 0]
+
+    def move(self, turns: Floats, shifts: Floats) -> None:
+        """Turn by rotation vectors (bodies, 3) and shift the roots by (roots, 3), world axes."""
+        orientations = product(exponential(turns), self.orientations)
+        size = np.sqrt((orientations * orientations) @ _FOUR_ONES)
+        orientations /= size[:, None]
+        self.orientations = orientations
+        self.roots = self.roots + shifts
+        self.refresh()
+
+
+_ONES = np.ones(3)
+_FOUR_ONES = np.ones(4)
+_UNIT = np.eye(3)
+_UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])

@@ -1,0 +1,431 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows that bind points of bodies: contacts with friction, and holds (pins and grabs).
+
+Each row answers the velocity w of a point, or of a turn, with an impulse p(w), the nearest one
+that the row can give to what it would give without bound: of a hold within a ball, of a contact
+within Coulomb's cone |p_t| ≤ μ p_n. With a gain a, the gap g and the last step's friction b,
+
+    y_n = −a (w_n + g/h),   y_t = b − a w_t
+    apart    p = 0                                                 where μ |y_t| < −y_n
+    sticks   p = y                                                 where |y_t| ≤ μ y_n
+    slips    p_n = (y_n + μ |y_t|)/(1 + μ²),  p_t = μ p_n y_t/|y_t|     between
+
+or p = P(y), the nearest point of a cone, with y = y₀ − a w. Stretching y stretches p alike, so that
+p = P′(y) y: a tangent of the law is the matrix P′ alone, whatever the velocity is.
+
+That is the cone complementarity of Anitescu (2006), softened as by Castro et al. (2022): every
+impulse is the slope of a convex function of the velocities, so the step has one solution and it can
+always be found. What sticks is held by b wholly once it is at rest, so it does not creep; what
+rests sinks in by h p_n/a, less than a micrometre. By itself this law lifts what slips off with
+w_n = μ |w_t|. So the gap is seen as g + h μ |w_t|, with |w_t| from before (De Saxcé and Feng 1998):
+at the solution where both are the same, it is Coulomb's own law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...rotations import Floats
+from ..puppet.kinematics import skew
+from .contact_detection import Contacts
+
+Integers = NDArray[np.int64]
+
+_GAIN = 10.0
+"""a in masses of the body: a contact settles within a step, as from a push against a wall."""
+_LEAST_SHARE = 0.002
+"""Of the figure's mass: what the lightest body counts for there."""
+_WEIGHT = 9.81
+_TINY = 1e-300
+_UNIT = np.eye(3)
+_ONES = np.ones(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Holds:
+    """Points held in place and turns held back; rows of pins and grabs."""
+
+    bodies: Integers
+    """(holds,)"""
+    points: Floats
+    """(holds, 3) world; of no account where a turn is held."""
+    turns: NDArray[np.bool_]
+    """(holds,) whether the row holds the body's turn, not a point."""
+    gains: Floats
+    """(holds,) a: N·s per m/s, or N·m·s per rad/s."""
+    biases: Floats
+    """(holds, 3) impulses at rest: p = bias − a w."""
+    bounds: Floats
+    """(holds,) greatest impulse; inf where there is none."""
+    errors: Floats
+    """(holds, 3) how far they are from where they are pinned, made good without velocity."""
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.bodies)
+
+
+Flags = NDArray[np.bool_]
+_Touch = tuple[Flags, Flags | None, Floats, Floats, Floats | Flags]
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What the rows do at some velocities, and what is needed for their slopes."""
+
+    wanted: Floats
+    """(rows, 3) y."""
+    impulses: Floats
+    """(rows, 3) p on the body."""
+    sticks: Flags
+    """(contacts,)"""
+    slips: Flags | None
+    """(contacts,) None where none does."""
+    across: Floats
+    """(contacts, 3) y_t."""
+    size: Floats
+    """(contacts,) |y_t|."""
+    shares: Floats | Flags
+    """(contacts,) |p_t|/|y_t|; where it slips, what holds it against slipping another way."""
+    held: Floats
+    """(holds,) share of the impulse without bound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """The rows' laws as planes: p = P y + rest."""
+
+    shares: Floats | None
+    """(rows,) where P is this times the unit matrix; else None."""
+    planes: Floats | None
+    """(rows, 3, 3) P, symmetric and positive semidefinite; else None."""
+    rest: Floats | None
+    """(rows, 3) None where it is zero."""
+    sticks: bytes
+    """Which contacts stick."""
+
+    def same(self, answer: Answer) -> bool:
+        """Whether these planes are the law at another place, where nothing slips."""
+        if self.planes is not None or self.sticks != answer.sticks.tobytes():
+            return False
+        return not len(answer.held) or bool(answer.held.min() == 1.0)
+
+    def impulses(self, wanted: Floats) -> Floats:
+        """(rows, 3) p at y."""
+        if self.planes is None:
+            assert self.shares is not None
+            return self.shares[:, None] * wanted
+        result = (self.planes @ wanted[:, :, None])[:, :, 0]
+        return result if self.rest is None else result + self.rest
+
+    def blocks(self) -> Floats:
+        """(rows, 3, 3) P."""
+        if self.planes is None:
+            assert self.shares is not None
+            return self.shares[:, None, None] * _UNIT
+        return self.planes
+
+
+class Pattern:
+    """What hangs only on which bodies touch or are held: the same for many steps in a row."""
+
+    def __init__(
+        self, contacts: Contacts, holds: Holds | None, masses: Floats, step: float
+    ) -> None:
+        """For bodies of masses (bodies,) and steps of h."""
+        self.key = Pattern.key_of(contacts, holds)
+        count = len(contacts.bodies)
+        self.bodies, self.others = contacts.bodies, contacts.others
+        if holds is not None:
+            self.bodies = np.concatenate([contacts.bodies, holds.bodies])
+            self.others = np.concatenate([contacts.others, np.full(len(holds), -1)])
+        self.paired = np.flatnonzero(self.others >= 0)
+        whole = float(masses.sum())
+        lightest = masses[contacts.bodies]
+        if len(self.paired):
+            other = masses[contacts.others[self.paired]]
+            lightest[self.paired] = np.minimum(lightest[self.paired], other)
+        self.contact_gains = _GAIN * np.maximum(lightest, _LEAST_SHARE * whole)
+        self.gains = self.contact_gains
+        if holds is not None:
+            self.gains = np.concatenate([self.contact_gains, holds.gains])
+            self.turning = count + np.flatnonzero(holds.turns)
+        # As deep as what rests with twice the figure's weight on one point: so far the contact is a
+        # spring. What is deeper is made good by ``corrections``.
+        self.deepest = -2.0 * _WEIGHT * step * whole / self.contact_gains
+        """(contacts,) least g/h that counts, m/s."""
+        self.deepest_gaps = step * self.deepest
+        self.column = self.gains[:, None]
+        self.slipping = contacts.friction / self.contact_gains
+        self.spread = 1.0 / (1.0 + contacts.friction * contacts.friction)
+        self.root_spread = np.sqrt(self.spread)
+        self._crossed: Floats | None = None
+        self._crossing = np.zeros((0, 3, 3))
+
+    def crossing(self, normals: Floats) -> Floats:
+        """(contacts, 3, 3) matrices of n ×."""
+        if normals is not self._crossed:
+            self._crossed, self._crossing = normals, skew(normals)
+        return self._crossing
+
+    @staticmethod
+    def key_of(contacts: Contacts, holds: Holds | None) -> tuple[bytes, ...]:
+        """What tells two patterns apart."""
+        own = (contacts.bodies.tobytes(), contacts.others.tobytes(), contacts.friction.tobytes())
+        if holds is None:
+            return own
+        return (*own, holds.bodies.tobytes(), holds.turns.tobytes(), holds.gains.tobytes())
+
+
+class Rows:
+    """Contacts and holds of one step, as arrays: contacts first."""
+
+    def __init__(  # noqa: PLR0917
+        self,
+        contacts: Contacts,
+        holds: Holds | None,
+        origin: Floats,
+        masses: Floats,
+        step: float,
+        grips: Floats | None = None,
+        pattern: Pattern | None = None,
+    ) -> None:
+        """Put them together.
+
+        Args:
+            contacts: those near enough.
+            holds: pins and grabs; None where there are none.
+            origin: (3,) the common one of spatial velocities.
+            masses: (bodies,)
+            step: h.
+            grips: (contacts, 3) friction of the step before; None where nothing touched.
+            pattern: of the step before, for it may be the same.
+        """
+        self.contacts = contacts
+        self.holds = holds
+        if pattern is None or pattern.key != Pattern.key_of(contacts, holds):
+            pattern = Pattern(contacts, holds, masses, step)
+        self.pattern = pattern
+        self.count = len(contacts.bodies)
+        """Number of contacts, the first rows."""
+        self.bodies, self.others = pattern.bodies, pattern.others
+        self.paired = pattern.paired
+        """Rows between two bodies of the figure."""
+        self.gains = pattern.contact_gains
+        """(contacts,) a."""
+        if holds is None:
+            self.places = contacts.points - origin
+            self.targets = contacts.speeds
+        else:
+            self.places = np.concatenate([contacts.points, holds.points]) - origin
+            self.targets = np.concatenate([contacts.speeds, np.zeros((len(holds), 3))])
+        self.reach = (self.places @ _REACH + _REACH_AT_ORIGIN).reshape(-1, 3, 6)
+        """(rows, 3, 6) from a spatial velocity to that of the point or turn."""
+        if holds is not None and len(pattern.turning):
+            self.reach[pattern.turning] = _TURNS
+        self._step = step
+        self._followed: Floats | None = None
+        self._slip_of: Answer | None = None
+        self._slip = _NO_ONES
+        self._closing = np.maximum(contacts.gaps / step, pattern.deepest)
+        self.rates = self._closing
+        """(contacts,) g/h + μ |w_t|, as ``follow`` was told |w_t| last."""
+        self.grips = grips
+        """(contacts, 3) b; None for zero."""
+        if grips is not None:
+            normals = contacts.normals
+            self.grips = grips - ((grips * normals) @ _ONES)[:, None] * normals
+        self.still = not contacts.speeds.any()
+        """Whether no obstacle moves: then w is the velocity of the points themselves."""
+        self._ask()
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.bodies)
+
+    def _ask(self) -> None:
+        """y₀, from the rates."""
+        count, holds, contacts = self.count, self.holds, self.contacts
+        asked = contacts.normals * (-self.gains * self.rates)[:, None]
+        if self.grips is not None:
+            asked += self.grips
+        if not self.still:
+            asked += self.gains[:, None] * contacts.speeds
+        if holds is None:
+            self.asked = asked
+            return
+        self.asked = np.empty((len(self), 3))
+        """(rows, 3) y₀: what a row wants to give where its point does not move in the world."""
+        self.asked[:count] = asked
+        self.asked[count:] = holds.biases
+
+    def wanted(self, velocities: Floats) -> Floats:
+        """What rows want to give, y (rows, 3), at spatial velocities (bodies, 6)."""
+        return self.asked - self.pattern.column * self._moving(velocities)
+
+    def speeds(self, velocities: Floats) -> Floats:
+        """The rows' velocities w (rows, 3), of spatial velocities (bodies, 6)."""
+        moving = self._moving(velocities)
+        return moving if self.still else moving - self.targets
+
+    def _moving(self, velocities: Floats) -> Floats:
+        own = velocities.take(self.bodies, 0)
+        if len(self.paired):
+            own[self.paired] -= velocities[self.others[self.paired]]
+        return (self.reach @ own[:, :, None])[:, :, 0]
+
+    def slip(self, answer: Answer) -> Floats:
+        """(contacts,) μ |w_t|, m/s: what slipping as then adds to the rates."""
+        if self._slip_of is not answer:
+            # y_t = b − a w_t.
+            apart = answer.across if self.grips is None else answer.across - self.grips
+            self._slip = self.pattern.slipping * np.sqrt((apart * apart) @ _ONES)
+            self._slip_of = answer
+        return self._slip
+
+    def slip_at(self, velocities: Floats) -> Floats:
+        """(contacts,) the same at spatial velocities (bodies, 6)."""
+        normals, w = self.contacts.normals, self.speeds(velocities)[: self.count]
+        across = w - ((w * normals) @ _ONES)[:, None] * normals
+        return self.contacts.friction * np.sqrt((across * across) @ _ONES)
+
+    def follow(self, slip: Floats, tolerance: float) -> bool:
+        """Take over μ |w_t| (contacts,); false where that changes no rate by ``tolerance``, m/s."""
+        change = slip if self._followed is None else np.abs(slip - self._followed)
+        if not len(change) or change.max() <= tolerance:
+            return False
+        self._followed = slip
+        self.rates = self._closing + slip
+        self._ask()
+        return True
+
+    @property
+    def followed(self) -> bool:
+        """Whether any slip was taken over."""
+        return self._followed is not None
+
+    def answer(self, speeds: Floats) -> Answer:
+        """Impulses at w (rows, 3)."""
+        moving = speeds if self.still else speeds + self.targets
+        return self.respond(self.asked - self.pattern.column * moving)
+
+    def respond(self, wanted: Floats) -> Answer:
+        """Impulses at y (rows, 3)."""
+        count, holds = self.count, self.holds
+        impulses = np.empty_like(wanted)
+        if holds is None:
+            return Answer(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
+        pulls = wanted[count:]
+        held = np.minimum(holds.bounds / (np.sqrt((pulls * pulls) @ _ONES) + _TINY), 1.0)
+        np.multiply(pulls, held[:, None], out=impulses[count:])
+        if not count:
+            return Answer(wanted, impulses, _NOBODY, None, _NO_ROWS, _NO_ONES, _NO_ONES, held)
+        return Answer(wanted, impulses, *self._touch(wanted[:count], impulses[:count]), held)
+
+    def _touch(self, y: Floats, impulses: Floats) -> _Touch:
+        """Contacts' impulses (contacts, 3) at y, and what ``Answer`` tells of how they come."""
+        normals, friction = self.contacts.normals, self.contacts.friction
+        push = (y * normals) @ _ONES
+        across = y - push[:, None] * normals
+        size = np.sqrt((across * across) @ _ONES)
+        sticks = size <= friction * push
+        lift = push + friction * size
+        slips = (lift > 0.0) > sticks
+        if not slips.any():
+            np.multiply(y, sticks[:, None], out=impulses)
+            return sticks, None, across, size, sticks
+        # What neither sticks nor slips is apart.
+        load = np.where(sticks, push, slips * (self.pattern.spread * lift))
+        shares = np.where(sticks, 1.0, friction * load / (size + _TINY))
+        np.multiply(normals, load[:, None], out=impulses)
+        impulses += shares[:, None] * across
+        return sticks, slips, across, size, shares
+
+    def tangent(self, answer: Answer) -> Tangent:
+        """The laws as planes that touch them at y."""
+        holds, count = self.holds, self.count
+        sticks = answer.sticks.tobytes()
+        full = holds is not None and bool((answer.held < 1.0).any())
+        if answer.slips is None and not full:
+            shares = answer.sticks.astype(np.float64)
+            if holds is not None:
+                shares = np.concatenate([shares, answer.held])
+            return Tangent(shares, None, None, sticks)
+        planes = np.empty((len(self), 3, 3))
+        if count:
+            planes[:count] = self._cones(answer)
+        rest = None
+        if holds is not None:
+            held = answer.held
+            planes[count:] = held[:, None, None] * _UNIT
+            if full:
+                pulls = answer.impulses[count:]
+                # Not by the bound: it may have changed since.
+                way = pulls / (np.sqrt((pulls * pulls) @ _ONES) + _TINY)[:, None]
+                part = np.where(held < 1.0, held, 0.0)[:, None] * way
+                planes[count:] -= part[:, :, None] * way[:, None, :]
+                rest = np.zeros((len(self), 3))
+                rest[count:] = np.where((held < 1.0)[:, None], pulls, 0.0)
+        return Tangent(None, planes, rest, sticks)
+
+    def _cones(self, answer: Answer) -> Floats:
+        """P′ of the contacts (contacts, 3, 3)."""
+        if answer.slips is None:
+            return answer.sticks[:, None, None] * _UNIT
+        contacts, pattern = self.contacts, self.pattern
+        # Along n + μ t with 1/(1 + μ²), sideways of both with |p_t|/|y_t|.
+        toward = answer.across / (answer.size + _TINY)[:, None]
+        ways = np.empty((len(toward), 3, 2))
+        both = contacts.normals + contacts.friction[:, None] * toward
+        np.multiply(both, (answer.slips * pattern.root_spread)[:, None], out=ways[:, :, 0])
+        aside = np.sqrt(answer.slips * answer.shares)
+        sideways = (pattern.crossing(contacts.normals) @ toward[:, :, None])[:, :, 0]
+        np.multiply(sideways, aside[:, None], out=ways[:, :, 1])
+        planes = ways @ ways.transpose(0, 2, 1)
+        planes += answer.sticks[:, None, None] * _UNIT
+        return planes
+
+    def slopes(self, answer: Answer) -> Floats:
+        """−∂p/∂w (rows, 3, 3), symmetric and positive semidefinite."""
+        return self.pattern.gains[:, None, None] * self.tangent(answer).blocks()
+
+    @property
+    def weighted(self) -> Floats:
+        """(rows, 3, 6) what a row gives less for a spatial velocity: a times ``reach``."""
+        return self.reach * self.pattern.gains[:, None, None]
+
+    def corrections(self, fastest: float) -> Floats | None:
+        """Velocities (rows, 3) that make good what has slipped in; None where nothing has.
+
+        Overlap that is deeper than it need be and pins that are off their place, a fifth of it
+        each step and no faster than ``fastest``. Used for positions alone, never kept as velocity.
+        """
+        count = self.count
+        step = self._step
+        room = self.contacts.gaps - self.pattern.deepest_gaps
+        deep = bool(count) and room.min() < 0.0
+        off = self.holds is not None and bool(self.holds.errors.any())
+        if not (deep or off):
+            return None
+        result = np.zeros((len(self.bodies), 3))
+        if deep:
+            speed = np.clip(-0.2 / step * room, 0.0, fastest)
+            result[:count] = speed[:, None] * self.contacts.normals
+        if off:
+            assert self.holds is not None
+            speed = 0.2 / step * self.holds.errors
+            length = np.sqrt((speed * speed).sum(axis=1, keepdims=True)) + _TINY
+            result[count:] = speed * np.minimum(fastest / length, 1.0)
+        return result
+
+
+_NOBODY = np.zeros(0, dtype=bool)
+_NO_ROWS = np.zeros((0, 3))
+_NO_ONES = np.zeros(0)
+_REACH = np.zeros((3, 18))
+_REACH.reshape(3, 3, 6)[:, :, :3] = -skew(np.eye(3))
+_TURNS = np.concatenate([np.eye(3), np.zeros((3, 3))], axis=1)
+_REACH_AT_ORIGIN = np.concatenate([np.zeros((3, 3)), np.eye(3)], axis=1).ravel()

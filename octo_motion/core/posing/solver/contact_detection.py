@@ -1,0 +1,414 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a figure touches something, or is about to: its capsules against obstacles and each other.
+
+A capsule is seen as spheres along its axis. Both end spheres can touch; between them only the
+nearest one to the obstacle, found on samples no further apart than the radius and then refined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...rotations import Floats, cross, rotate, to_matrix
+from ..puppet.figure import Figure
+from ..puppet.kinematics import rest_pose
+from .obstacles import Obstacle, Plane
+
+Integers = NDArray[np.int64]
+
+_MOST_SAMPLES: Final = 9
+_MOST_KEPT: Final = 1024
+_TINY: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Pairs of points that touch or may within the step."""
+
+    bodies: Integers
+    """(contacts,)"""
+    others: Integers
+    """(contacts,) the other body, −1 where it is an obstacle."""
+    points: Floats
+    """(contacts, 3) on the body's surface, world."""
+    normals: Floats
+    """(contacts, 3) from the other to the body."""
+    gaps: Floats
+    """(contacts,) less than 0 where they overlap."""
+    speeds: Floats
+    """(contacts, 3) of the obstacle's surface there; zero for another body."""
+    friction: Floats
+    """(contacts,)"""
+    labels: Integers
+    """(contacts,) the same number for the same place on the same thing in every step."""
+
+    def __len__(self) -> int:
+        """Number of contacts."""
+        return len(self.bodies)
+
+
+_NONE: Final = Contacts(
+    np.zeros(0, np.int64),
+    np.zeros(0, np.int64),
+    np.zeros((0, 3)),
+    np.zeros((0, 3)),
+    np.zeros(0),
+    np.zeros((0, 3)),
+    np.zeros(0),
+    np.zeros(0, np.int64),
+)
+
+
+@dataclass(eq=False)
+class _Touched:
+    """A plane, and what touched it in the last step: often the same ends again."""
+
+    plane: Plane
+    normal: Floats
+    """(3,)"""
+    reach: Floats
+    """(ends,) how far along the normal an end touches it."""
+    key: tuple[int, bytes] = (0, b"")
+    """First label, and which ends were near."""
+    found: Contacts | None = None
+    """Their contacts, of which places and gaps are old."""
+    inward: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    """(contacts, 3) from the surface to the end's middle."""
+
+
+class Detector:
+    """Finds the contacts of one figure; what hangs on the figure alone is worked out once."""
+
+    def __init__(self, figure: Figure, *, self_collision: bool, friction: float) -> None:
+        self._radii = figure.radii
+        self._friction = friction
+        self._ends = figure.capsules.copy()
+        self._first_label = len(figure) ** 2
+        keep = _separate_ends(figure)
+        self._keep = keep
+        # (2 bodies,) how far from a plane both ends of each capsule touch it; never some.
+        self._end_radii = np.where(keep, figure.radii[:, None], -np.inf).ravel()
+        lengths = np.linalg.norm(figure.capsules[:, 1] - figure.capsules[:, 0], axis=-1)
+        self._long = lengths > 1e-6 * figure.radii + _TINY
+        most = float(np.max(lengths / np.maximum(figure.radii, _TINY), initial=1.0))
+        self._samples = int(min(max(np.ceil(most) + 1, 3), _MOST_SAMPLES))
+        self._pairs = _pairs(figure) if self_collision else None
+        self._planes: dict[int, _Touched] = {}
+        self._corner_cache: dict[int, tuple[Obstacle, Floats | None]] = {}
+        self._reach = float(figure.radii.max(initial=0.0))
+
+    def find(
+        self, positions: Floats, matrices: Floats, obstacles: Sequence[Obstacle], margin: float
+    ) -> Contacts:
+        """Contacts with a gap below ``margin``.
+
+        Args:
+            positions: (bodies, 3) of the joints, world.
+            matrices: (bodies, 3, 3) orientations.
+            obstacles: what can be touched.
+            margin: metres.
+        """
+        if not obstacles and self._pairs is None:
+            return _NONE
+        ends = self._ends @ matrices.transpose(0, 2, 1)
+        ends += positions[:, None]
+        found: list[Contacts] = []
+        boxes: tuple[Floats, Floats] | None = None
+        # Three places on each capsule: its ends and between.
+        label = self._first_label
+        for obstacle in obstacles:
+            if isinstance(obstacle, Plane):
+                contacts = self._on_plane(ends, obstacle, margin, label)
+            else:
+                if boxes is None:
+                    boxes = self._boxes(ends, margin)
+                contacts = self._on_solid(ends, boxes, obstacle, margin, label)
+            label += 3 * len(self._radii)
+            if contacts is not None:
+                found.append(contacts)
+        if self._pairs is not None:
+            contacts = self._on_itself(ends, boxes or self._boxes(ends, margin), margin)
+            if contacts is not None:
+                found.append(contacts)
+        return _joined(found)
+
+    def _boxes(self, ends: Floats, margin: float) -> tuple[Floats, Floats]:
+        around = (self._radii + margin)[:, None]
+        first, second = ends[:, 0], ends[:, 1]
+        return np.minimum(first, second) - around, np.maximum(first, second) + around
+
+    def _on_plane(self, ends: Floats, plane: Plane, margin: float, label: int) -> Contacts | None:
+        touched = self._touched(plane)
+        centres = ends.reshape(-1, 3)
+        gaps = centres @ touched.normal
+        gaps -= touched.reach
+        near = (gaps < margin).nonzero()[0]
+        if not len(near):
+            return None
+        gaps = gaps.take(near)
+        found = touched.found
+        if found is None or touched.key != (label, near.tobytes()):
+            bodies = near >> 1
+            normals = np.tile(touched.normal, (len(near), 1))
+            labels = 3 * bodies + (near & 1) + label
+            touched.inward = self._radii[bodies, None] * normals
+            points = centres.take(near, 0) - touched.inward
+            found = self._contacts(bodies, points, normals, gaps, plane, labels)
+            touched.key = label, near.tobytes()
+            touched.found = None if plane.angular_velocity.any() else found
+            return found
+        points = centres.take(near, 0) - touched.inward
+        return Contacts(
+            found.bodies,
+            found.others,
+            points,
+            found.normals,
+            gaps,
+            found.speeds,
+            found.friction,
+            found.labels,
+        )
+
+    def _on_solid(
+        self,
+        ends: Floats,
+        boxes: tuple[Floats, Floats],
+        obstacle: Obstacle,
+        margin: float,
+        label: int,
+    ) -> Contacts | None:
+        low, high = boxes
+        box = self._world_box(obstacle)
+        if box is None:
+            near = np.arange(len(low))
+        else:
+            near = np.flatnonzero(((low <= box[1]) & (high >= box[0])).all(axis=1))
+        if not len(near):
+            return None
+        frame = to_matrix(obstacle.orientation)
+        local = (ends[near] - obstacle.position) @ frame
+        start, along = local[:, :1], local[:, 1:] - local[:, :1]
+        reach = self._reach + margin
+        shares = np.broadcast_to(
+            np.linspace(0.0, 1.0, self._samples), (len(near), self._samples)
+        ).copy()
+        distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
+        rows = np.arange(len(near))
+        limits = self._radii[near] + margin
+        bodies: list[Integers] = []
+        gaps: list[Floats] = []
+        normals: list[Floats] = []
+        centres: list[Floats] = []
+        labels: list[Integers] = []
+
+        def add(which: Integers, sample: Integers | int, place: int) -> None:
+            bodies.append(near[which])
+            labels.append(3 * near[which] + place + label)
+            gaps.append(distances[which, sample])
+            normals.append(outs[which, sample])
+            centres.append(start[which, 0] + shares[which, sample, None] * along[which, 0])
+
+        for end, sample in ((0, 0), (1, self._samples - 1)):
+            kept = self._keep[near, end] & (distances[:, sample] < limits)
+            add(np.flatnonzero(kept), sample, end)
+        best = np.argmin(distances, axis=1)
+        least = distances[rows, best]
+        slack = 1e-6 * self._radii[near]
+        inner = (best > 0) & (best < self._samples - 1) & self._long[near] & (least < limits)
+        # No nearer than an end, and the end will do.
+        inner &= least < np.minimum(distances[:, 0], distances[:, -1]) - slack
+        picked = np.flatnonzero(inner)
+        if len(picked):
+            width = 1.0 / (self._samples - 1)
+            middle = _middle(shares[picked], distances[picked], slack[picked])
+            start, along = start[picked], along[picked]
+            rows, near, slack = np.arange(len(picked)), near[picked], slack[picked]
+            for _ in range(3):
+                shares = np.clip(middle[:, None] + width * _AROUND, 0.0, 1.0)
+                distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
+                middle = _middle(shares, distances, slack)
+                width *= _AROUND[1] - _AROUND[0]
+            shares = middle[:, None]
+            distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
+            add(rows, 0, 2)
+        chosen = np.concatenate(bodies)
+        if not len(chosen):
+            return None
+        radii = self._radii[chosen]
+        way = np.concatenate(normals) @ frame.T
+        points = np.concatenate(centres) @ frame.T + obstacle.position - radii[:, None] * way
+        gap = np.concatenate(gaps) - radii
+        return self._contacts(chosen, points, way, gap, obstacle, np.concatenate(labels))
+
+    def _on_itself(
+        self, ends: Floats, boxes: tuple[Floats, Floats], margin: float
+    ) -> Contacts | None:
+        low, high = boxes
+        assert self._pairs is not None
+        overlap = self._pairs.copy()
+        for axis in range(3):
+            overlap &= low[:, None, axis] <= high[None, :, axis] - margin
+            overlap &= high[:, None, axis] - margin >= low[None, :, axis]
+        first, second = np.nonzero(overlap)
+        if not len(first):
+            return None
+        on_first, on_second = nearest_on_segments(ends[first], ends[second])
+        away = on_first - on_second
+        distance = np.sqrt((away * away).sum(axis=-1))
+        gaps = distance - self._radii[first] - self._radii[second]
+        near = np.flatnonzero((gaps < margin) & (distance > _TINY))
+        if not len(near):
+            return None
+        normals = away[near] / distance[near, None]
+        bodies = first[near]
+        points = on_first[near] - normals * (self._radii[bodies] + 0.5 * gaps[near])[:, None]
+        return Contacts(
+            bodies,
+            second[near],
+            points,
+            normals,
+            gaps[near],
+            np.zeros((len(near), 3)),
+            np.full(len(near), self._friction),
+            bodies * len(self._radii) + second[near],
+        )
+
+    def _contacts(  # noqa: PLR0917
+        self,
+        bodies: Integers,
+        points: Floats,
+        normals: Floats,
+        gaps: Floats,
+        obstacle: Obstacle,
+        labels: Integers,
+    ) -> Contacts:
+        count = len(bodies)
+        others = np.empty(count, np.int64)
+        others.fill(-1)
+        speeds = np.empty((count, 3))
+        speeds[:] = obstacle.velocity
+        if obstacle.angular_velocity.any():
+            turning = np.broadcast_to(obstacle.angular_velocity, speeds.shape)
+            speeds += cross(turning, points - obstacle.position)
+        friction = np.empty(count)
+        friction.fill(self._friction if obstacle.friction is None else obstacle.friction)
+        return Contacts(bodies, others, points, normals, gaps, speeds, friction, labels)
+
+    def _touched(self, plane: Plane) -> _Touched:
+        """What is known of a plane; kept as long as it stays the same."""
+        known = self._planes.get(id(plane))
+        if known is None or known.plane is not plane:
+            normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
+            known = _Touched(plane, normal, self._end_radii + float(normal @ plane.position))
+            if len(self._planes) > _MOST_KEPT:
+                self._planes.clear()
+            self._planes[id(plane)] = known
+        return known
+
+    def _world_box(self, obstacle: Obstacle) -> Floats | None:
+        """Lower and upper corner in the world; kept as long as the obstacle stays the same."""
+        known = self._corner_cache.get(id(obstacle))
+        if known is not None and known[0] is obstacle:
+            return known[1]
+        bounds = obstacle.bounds
+        box: Floats | None = None
+        if bounds is not None:
+            frame = to_matrix(obstacle.orientation)
+            middle = frame @ bounds.mean(axis=0) + obstacle.position
+            half = np.abs(frame) @ (0.5 * (bounds[1] - bounds[0]))
+            box = np.stack([middle - half, middle + half])
+        if len(self._corner_cache) > _MOST_KEPT:
+            self._corner_cache.clear()
+        self._corner_cache[id(obstacle)] = (obstacle, box)
+        return box
+
+
+def nearest_on_segments(first: Floats, second: Floats) -> tuple[Floats, Floats]:
+    """Nearest points of segments ``(…, 2 ends, 3)``, on each; clamping after Ericson (2005)."""
+    p, d = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
+    q, e = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
+    r = p - q
+    dd, ee, de = (d * d).sum(-1), (e * e).sum(-1), (d * e).sum(-1)
+    dr, er = (d * r).sum(-1), (e * r).sum(-1)
+    determinant = dd * ee - de * de
+    # Parallel: any point will do, take the middle of the first.
+    skew = determinant > 1e-9 * dd * ee + _TINY**2
+    s = np.where(skew, (de * er - dr * ee) / np.where(skew, determinant, 1.0), 0.5)
+    s = np.clip(s, 0.0, 1.0)
+    t = np.clip((de * s + er) / np.maximum(ee, _TINY), 0.0, 1.0)
+    s = np.clip((de * t - dr) / np.maximum(dd, _TINY), 0.0, 1.0)
+    return p + s[..., None] * d, q + t[..., None] * e
+
+
+def _middle(shares: Floats, distances: Floats, slack: Floats) -> Floats:
+    """(rows,) the middle of the samples that are as near as the nearest: of a flat top, its."""
+    least = distances <= distances.min(axis=1, keepdims=True) + slack[:, None]
+    return (shares * least).sum(axis=1) / least.sum(axis=1)
+
+
+def _separate_ends(figure: Figure) -> NDArray[np.bool_]:
+    """(bodies, 2) which end spheres can touch first: none that lies within a neighbour's."""
+    keep = np.ones((len(figure), 2), dtype=bool)
+    for body, parent in enumerate(figure.parents):
+        if parent < 0:
+            continue
+        joint = figure.anchors[body]
+        near = np.linalg.norm(figure.capsules[body, 0])
+        for end in range(2):
+            apart = near + np.linalg.norm(figure.capsules[parent, end] - joint)
+            larger = figure.radii[parent] - figure.radii[body]
+            if apart <= max(larger, 0.0) + 1e-6 * figure.radii[body] and keep[parent, end]:
+                keep[body, 0] = False
+            elif apart <= max(-larger, 0.0) + 1e-6 * figure.radii[body] and keep[body, 0]:
+                keep[parent, end] = False
+    return keep
+
+
+def _pairs(figure: Figure) -> NDArray[np.bool_]:
+    """(bodies, bodies) which capsules may collide: no neighbours, none that overlap at rest."""
+    count = len(figure)
+    parents = np.array(figure.parents)
+    allowed = np.triu(np.ones((count, count), dtype=bool), 1)
+    for body, parent in enumerate(parents):
+        if parent >= 0:
+            allowed[parent, body] = False
+            allowed[np.ix_([body], np.flatnonzero(parents == parent))] = False
+    ends = rest_ends(figure)
+    first, second = np.nonzero(allowed)
+    if len(first):
+        a, b = nearest_on_segments(ends[first], ends[second])
+        room = np.linalg.norm(a - b, axis=-1) - figure.radii[first] - figure.radii[second]
+        overlapping = room <= 0.0
+        allowed[first[overlapping], second[overlapping]] = False
+    return allowed
+
+
+def rest_ends(figure: Figure) -> Floats:
+    """(bodies, 2, 3) ends of the capsules' axes in the rest pose, from the first root's joint."""
+    pose = rest_pose(figure)
+    return pose.positions[:, None] + rotate(pose.orientations[:, None], figure.capsules)
+
+
+def _joined(found: list[Contacts]) -> Contacts:
+    if not found:
+        return _NONE
+    if len(found) == 1:
+        return found[0]
+    return Contacts(
+        np.concatenate([each.bodies for each in found]),
+        np.concatenate([each.others for each in found]),
+        np.concatenate([each.points for each in found]),
+        np.concatenate([each.normals for each in found]),
+        np.concatenate([each.gaps for each in found]),
+        np.concatenate([each.speeds for each in found]),
+        np.concatenate([each.friction for each in found]),
+        np.concatenate([each.labels for each in found]),
+    )
+
+
+_AROUND: Final = np.linspace(-1.0, 1.0, 7)

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pins and hands as rows of a step: each holds a point of a body and, where asked to, its turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...rotations import Floats
+from ..puppet.kinematics import logarithm, product, product_inverse
+from .bodies import Bodies
+from .constraint_rows import Holds
+from .hand_spring import Coupling, Grab
+
+_PIN_GAIN = 1e5
+"""Of pins, in masses of the figure: they give way by h·g/10⁵ a second before they are put right."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pin:
+    """A joint that is held where it is."""
+
+    body: int
+    position: Floats
+    """(3,) world."""
+    orientation: Floats
+    """(4,) world."""
+    firm: bool
+    """Whether the orientation is held as well."""
+
+
+class Holding:
+    """The rows of pins and grabs, pins first; of each its point and then its turn."""
+
+    def __init__(self, mass: float, size: float, step: float) -> None:
+        """For a figure of a mass, kg, and a typical length, m, in steps of h."""
+        self._pin_gains = (_PIN_GAIN * mass, _PIN_GAIN * mass * size**2)
+        self._step = step
+        self._key: tuple[object, ...] = ()
+
+    def rows(self, bodies: Bodies, pins: Sequence[Pin], grabs: Sequence[Grab]) -> Holds | None:
+        """What holds the bodies where they are now; None where nothing does."""
+        if not (pins or grabs):
+            return None
+        key: tuple[object, ...] = (
+            tuple((pin.body, pin.firm) for pin in pins),
+            tuple((grab.body, grab.coupling, grab.target_orientation is None) for grab in grabs),
+        )
+        if key != self._key:
+            self._arrange(pins, grabs)
+            self._key = key
+        # Points: where they are, where they are wanted, and how fast that moves.
+        locals_, targets, speeds = [], [], []
+        for pin in pins:
+            locals_.append(_NOTHING)
+            targets.append(pin.position)
+            speeds.append(_NOTHING)
+            if pin.firm:
+                locals_.append(_NOTHING)
+                targets.append(_NOTHING)
+                speeds.append(_NOTHING)
+        for grab in grabs:
+            locals_.append(grab.point)
+            targets.append(grab.target_position)
+            speeds.append(grab.target_velocity[:3])
+            if grab.target_orientation is not None:
+                locals_.append(_NOTHING)
+                targets.append(_NOTHING)
+                speeds.append(grab.target_velocity[3:])
+        held = self._bodies
+        arms = (bodies.matrices.take(held, 0) @ np.array(locals_)[:, :, None])[:, :, 0]
+        points = bodies.positions.take(held, 0) + arms
+        ways = np.array(targets) - points
+        if len(self._turning):
+            ways[self._turning] = self._turns(bodies, pins, grabs)
+        return Holds(
+            held,
+            points,
+            self._turns_held,
+            self._gains,
+            self._stiffness * ways + self._gains[:, None] * np.array(speeds),
+            self._bounds,
+            self._pinned * ways,
+        )
+
+    def _turns(self, bodies: Bodies, pins: Sequence[Pin], grabs: Sequence[Grab]) -> Floats:
+        """(turns, 3) rotation vectors from where bodies are to where they are wanted."""
+        firm = [(pin.orientation, _UNTURNED) for pin in pins if pin.firm]
+        hands = [
+            (grab.target_orientation, grab.grip)
+            for grab in grabs
+            if grab.target_orientation is not None
+        ]
+        pairs = np.array(firm + hands)
+        wanted = product(pairs[:, 0], pairs[:, 1])
+        now = bodies.orientations.take(self._bodies[self._turning], 0)
+        return logarithm(product_inverse(wanted, now))
+
+    def _arrange(self, pins: Sequence[Pin], grabs: Sequence[Grab]) -> None:
+        """What stays the same as long as the same bodies are held."""
+        h = self._step
+        # Body, whether a turn, gain, stiffness, bound, whether a pin.
+        rows: list[tuple[int, bool, float, float, float, bool]] = []
+        for pin in pins:
+            rows.append((pin.body, False, self._pin_gains[0], 0.0, np.inf, True))
+            if pin.firm:
+                rows.append((pin.body, True, self._pin_gains[1], 0.0, np.inf, True))
+        for grab in grabs:
+            coupling: Coupling = grab.coupling
+            stiffness, damping = h * coupling.stiffness, coupling.damping
+            gain = h * (stiffness + damping)
+            rows.append((grab.body, False, gain, stiffness, h * coupling.force_limit, False))
+            if grab.target_orientation is not None:
+                stiffness, damping = h * coupling.turning_stiffness, coupling.turning_damping
+                gain = h * (stiffness + damping)
+                rows.append((grab.body, True, gain, stiffness, h * coupling.torque_limit, False))
+        held, turns, gains, stiff, bounds, pinned = zip(*rows, strict=True)
+        self._bodies = np.array(held)
+        self._turns_held = np.array(turns)
+        self._turning = np.flatnonzero(self._turns_held)
+        self._gains = np.array(gains)
+        self._stiffness = np.array(stiff)[:, None]
+        self._bounds = np.array(bounds)
+        self._pinned = np.array(pinned, dtype=np.float64)[:, None]
+
+
+_NOTHING = np.zeros(3)
+_UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Forward kinematics of just those bones that are asked for, over all frames at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ...rotations import (
+    Floats,
+    conjugate,
+    from_matrix,
+    from_rotation_vector,
+    multiply,
+    normalized,
+    rotate,
+    to_rotation_vector,
+)
+from ...skeleton import Skeleton
+from .clip import Clip
+
+
+class Posture:
+    """Where bones are, in armature space, bone by bone as needed.
+
+    What was computed is kept: a bone's rotation must not change after it, or one beneath it, has
+    been asked for.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        rotations: Callable[[Sequence[int]], Floats],
+        location: Callable[[int], Floats],
+    ) -> None:
+        self.skeleton = skeleton
+        self.rotations = rotations
+        """(frames, bones, 4) of some bones, each in its rest frame."""
+        self.location = location
+        """(frames, 3) of a bone, in its rest frame."""
+        self._orientations: dict[int, Floats] = {}
+        self._heads: dict[int, Floats] = {}
+        self._turns: dict[int, Floats] = {}
+
+    def rotation(self, bone: int) -> Floats:
+        """(frames, 4) of a bone, in its rest frame."""
+        return self.rotations([bone])[:, 0]
+
+    def turn(self, bone: int) -> Floats:
+        """How a bone has turned from its rest pose, (frames, 4)."""
+        if bone not in self._turns:
+            back = conjugate(self.skeleton.rest_rotations[bone])
+            self._turns[bone] = multiply(self.orientation(bone), back)
+        return self._turns[bone]
+
+    def carried(self, bone: int) -> Floats:
+        """A bone's orientation before its own rotation, (frames, 4) or (4,)."""
+        rest, parent = self.skeleton.rest_rotations[bone], self.skeleton.parents[bone]
+        if parent < 0 or not self.skeleton.inherits_rotation[bone]:
+            return rest
+        return multiply(self.turn(parent), rest)
+
+    def location_axes(self, bone: int) -> Floats:
+        """The axes in which a bone's location is given, (frames, 4) or (4,)."""
+        rest, parent = self.skeleton.rest_rotations[bone], self.skeleton.parents[bone]
+        return rest if parent < 0 else multiply(self.turn(parent), rest)
+
+    def unmoved_head(self, bone: int) -> Floats:
+        """Where a bone's head is before its own location, (frames, 3) or (3,)."""
+        parent = self.skeleton.parents[bone]
+        if parent < 0:
+            return self.skeleton.heads[bone]
+        offset = self.skeleton.heads[bone] - self.skeleton.heads[parent]
+        return self.head(parent) + rotate(self.turn(parent), offset)
+
+    def orientation(self, bone: int) -> Floats:
+        """(frames, 4), armature space."""
+        if bone not in self._orientations:
+            self._orientations[bone] = multiply(self.carried(bone), self.rotation(bone))
+        return self._orientations[bone]
+
+    def head(self, bone: int) -> Floats:
+        """(frames, 3), armature space."""
+        if bone not in self._heads:
+            moved = self.location(bone)
+            position = self.unmoved_head(bone)
+            if np.any(moved):
+                position = position + rotate(self.location_axes(bone), moved)
+            self._heads[bone] = np.broadcast_to(position, moved.shape)
+        return self._heads[bone]
+
+
+def posture_of(skeleton: Skeleton, rotations: Floats, locations: Floats) -> Posture:
+    """The posture of arrays (frames, bones, 4) and (frames, bones, 3)."""
+    return Posture(skeleton, lambda bones: rotations[:, bones], lambda bone: locations[:, bone])
+
+
+def sampled(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
+    """A clip at any times, in its own frame numbers; beyond its ends it stands still.
+
+    Args:
+        clip: the clip.
+        frames: (frames,)
+        seams: (frames,) how much of the step from the clip's last pose to its first is added.
+    """
+    before, after, share = _between(clip, frames)
+    between = share.any()
+    looped = seams is not None and seams.any()
+
+    def rotations(bones: Sequence[int]) -> Floats:
+        own = np.asarray(bones, dtype=np.intp)
+        values = clip.rotations[before[:, None], own]
+        if between:
+            values = slerp(values, clip.rotations[after[:, None], own], share[:, None])
+        if looped:
+            assert seams is not None
+            step = multiply(conjugate(clip.rotations[-1, own]), clip.rotations[0, own])
+            added = seams[:, None, None] * to_rotation_vector(step)
+            values = multiply(values, from_rotation_vector(added))
+        return values
+
+    def location(bone: int) -> Floats:
+        values = clip.locations[before, bone]
+        if between:
+            values = values + share[:, None] * (clip.locations[after, bone] - values)
+        if looped:
+            assert seams is not None
+            step = clip.locations[0, bone] - clip.locations[-1, bone]
+            values = values + seams[:, None] * step
+        return values
+
+    return Posture(clip.skeleton, rotations, location)
+
+
+def sampled_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[int]) -> Floats:
+    """Scales (frames, bones, 3) of some bones of a clip at any times, like :func:`sampled`."""
+    if clip.scales is None:
+        return np.ones((len(frames), len(bones), 3))
+    before, after, share = _between(clip, frames)
+    own = np.asarray(bones, dtype=np.intp)
+    values = clip.scales[before[:, None], own]
+    values += share[:, None, None] * (clip.scales[after[:, None], own] - values)
+    return values + seams[:, None, None] * (clip.scales[0, own] - clip.scales[-1, own])
+
+
+def sampled_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
+    """The armature object at any times: rotations (frames, 4), places (frames, 3), and scale."""
+    before, after, share = _between(clip, frames)
+    first, second = clip.world[before], clip.world[after]
+    turns = from_matrix(first[:, :3, :3] / clip.scale)
+    if share.any():
+        turns = slerp(turns, from_matrix(second[:, :3, :3] / clip.scale), share)
+    places = first[:, :3, 3] + share[:, None] * (second[:, :3, 3] - first[:, :3, 3])
+    return turns, places, clip.scale
+
+
+def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
+    """Between two orientations (…, 4) the short way, at constant speed; share (…) in [0, 1]."""
+    cosine = np.sum(first * second, axis=-1)
+    near = np.where(cosine[..., None] < 0.0, -second, second)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    sine = np.sin(angle)
+    small = sine < 1e-6
+    divisor = np.where(small, 1.0, sine)
+    left = np.where(small, 1.0 - share, np.sin((1.0 - share) * angle) / divisor)
+    right = np.where(small, share, np.sin(share * angle) / divisor)
+    result = normalized(left[..., None] * first + right[..., None] * near)
+    # At a frame of the clip's own the very values of the clip.
+    return np.where((share == 0.0)[..., None], first, result)
+
+
+def _between(clip: Clip, frames: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:
+    """Indices of the clip's frames on either side of each time, and how far it is between."""
+    place: Floats = np.interp(frames, clip.frames, np.arange(len(clip), dtype=np.float64))
+    # A time that misses a frame by rounding alone is that frame.
+    whole = np.round(place)
+    place = np.where(np.abs(place - whole) < 1e-6, whole, place)
+    before = np.floor(place).astype(np.intp)
+    after = np.minimum(before + 1, len(clip) - 1)
+    return before, after, np.asarray(place - before)

@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One limb of a humanoid: the sequence of bones that fits names and lengths best."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...rotations import Floats
+from ...skeleton import Skeleton
+from .bone_names import BoneName
+
+ARM: Final = ("clavicle", "upper_arm", "forearm", "hand")
+LEG: Final = ("thigh", "shin", "foot", "toe")
+OPTIONAL_PARTS: Final = frozenset({"clavicle", "toe"})
+
+_LEAST_WEIGHT: Final = 0.12
+"""Below, a name says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A skeleton with what its names say, and its mid plane as far as names tell."""
+
+    skeleton: Skeleton
+    names: tuple[BoneName, ...]
+    sides: tuple[str, ...]
+    """Side of each bone: its own, else that of the nearest ancestor that has one."""
+    size: float
+    """Diagonal of the box around the body, armature units."""
+    left: Floats | None
+    """(3,) unit vector to the side whose bones are named left; none without such names."""
+    middle: Floats
+    """(3,) a point of the mid plane."""
+
+    def is_ancestor(self, bone: int, other: int) -> bool:
+        """Whether a bone carries another one."""
+        return bone in self.ancestors(other)
+
+    def ancestors(self, bone: int) -> list[int]:
+        """Parents up to the root, nearest first."""
+        found = []
+        parent = self.skeleton.parents[bone]
+        while parent >= 0:
+            found.append(parent)
+            parent = self.skeleton.parents[parent]
+        return found
+
+    def common_ancestor(self, bones: Sequence[int]) -> int | None:
+        """The lowest bone that is or carries all of these."""
+        shared = [bones[0], *self.ancestors(bones[0])]
+        for other in bones[1:]:
+            chain = {other, *self.ancestors(other)}
+            shared = [bone for bone in shared if bone in chain]
+        return shared[0] if shared else None
+
+    def off_middle(self, bone: int) -> float:
+        """Distance of a bone's head from the mid plane, as a share of the body's size."""
+        if self.left is None:
+            return 1.0
+        return abs(float((self.skeleton.heads[bone] - self.middle) @ self.left)) / self.size
+
+
+def body_of(skeleton: Skeleton, names: tuple[BoneName, ...]) -> Body:
+    """Size, sides and mid plane of a skeleton."""
+    sides: list[str] = []
+    for name, parent in zip(names, skeleton.parents, strict=True):
+        sides.append(name.side or (sides[parent] if parent >= 0 else ""))
+    heads = skeleton.heads[[not each.machinery for each in names]]
+    if len(heads) < 2:
+        heads = skeleton.heads
+    size = float(np.linalg.norm(np.ptp(heads, axis=0))) or 1.0
+    stems: dict[tuple[str, str], int] = {}
+    for bone, name in enumerate(names):
+        if name.side:
+            stems.setdefault((name.side, name.stem), bone)
+    pairs = [
+        (bone, stems["R", stem])
+        for (side, stem), bone in stems.items()
+        if side == "L" and ("R", stem) in stems
+    ]
+    if not pairs:
+        return Body(skeleton, names, tuple(sides), size, None, heads.mean(axis=0))
+    left, right = skeleton.heads[np.array(pairs).T]
+    across = (left - right).sum(axis=0)
+    length = float(np.linalg.norm(across))
+    axis = across / length if length > 1e-6 * size else None
+    return Body(skeleton, names, tuple(sides), size, axis, (0.5 * (left + right)).mean(axis=0))
+
+
+def find_limb(
+    body: Body, parts: tuple[str, ...], side: str
+) -> tuple[dict[str, tuple[int, float]], dict[str, list[int]]]:
+    """The bones of a limb by what their names say, each with the weight of its name.
+
+    Of all ways to choose one bone for each part, the one with the best sum of the names' weights
+    and of how well neighbours follow one another, found by dynamic programming.
+    """
+    candidates = {
+        part: {
+            bone: weight
+            for bone in range(len(body.skeleton))
+            if body.sides[bone] == side and (weight := _fit(body, bone, part)) > _LEAST_WEIGHT
+        }
+        for part in parts
+    }
+    chosen = _best_sequence(body, {part: each for part, each in candidates.items() if each})
+    rivals: dict[str, list[int]] = {}
+    for part in ("hand", "toe"):
+        if part not in chosen:
+            continue
+        bone = chosen[part]
+        rivals[part] = [
+            other
+            for other, weight in candidates[part].items()
+            if weight >= candidates[part][bone] and _are_beside(body, bone, other)
+        ]
+        if part == "hand" and rivals[part] and "forearm" in chosen:
+            chosen[part] = _straightest(body, chosen["forearm"], [bone, *rivals[part]])
+    found = {part: (bone, candidates[part][bone]) for part, bone in chosen.items()}
+    return found, {part: others for part, others in rivals.items() if others}
+
+
+def _are_beside(body: Body, one: int, other: int) -> bool:
+    """Whether two bones hang on the same limb, but neither on the other."""
+    return (
+        one != other
+        and body.names[one].layer == body.names[other].layer
+        and not body.is_ancestor(one, other)
+        and not body.is_ancestor(other, one)
+        and bool(set(body.ancestors(one)[:2]) & set(body.ancestors(other)[:2]))
+    )
+
+
+def _straightest(body: Body, before: int, bones: Sequence[int]) -> int:
+    """The bone whose far end deviates least from the one before it."""
+    skeleton = body.skeleton
+    along = skeleton.rest_matrices[before][:3, 1]
+
+    def deviation(bone: int) -> float:
+        children = skeleton.children[bone]
+        tip = skeleton.heads[list(children)].mean(axis=0) if children else skeleton.tails[bone]
+        way = tip - skeleton.heads[before]
+        return 1.0 - float(way @ along) / max(float(np.linalg.norm(way)), 1e-12)
+
+    return min(bones, key=deviation)
+
+
+def _fit(body: Body, bone: int, part: str) -> float:
+    """Weight of a bone for a part by its own name and place."""
+    weight = body.names[bone].weights.get(part, 0.0)
+    if weight == 0.0:
+        return 0.0
+    if body.skeleton.constrained[bone]:
+        # Keys have no effect on it; there is another one that moves it.
+        weight -= 0.3 * weight
+    parent = body.skeleton.parents[bone]
+    if parent >= 0 and body.names[parent].weights.get(part, 0.0) >= body.names[bone].weights[part]:
+        # "upperarm01 → upperarm02": the first one is the joint.
+        weight -= 0.1 * weight
+    if part in {"upper_arm", "thigh"} and body.off_middle(bone) < 0.005:
+        # A limb starts beside the mid plane: "hip joint" bones lie on it.
+        weight *= 0.3
+    if part == "clavicle" and body.off_middle(bone) < 0.005:
+        # So does a collar bone, where there are two in a row.
+        weight *= 0.85
+    return weight
+
+
+def _best_sequence(body: Body, candidates: Mapping[str, Mapping[int, float]]) -> dict[str, int]:
+    best: dict[tuple[str, int], tuple[float, dict[str, int]]] = {}
+    for part, bones in candidates.items():
+        following: dict[tuple[str, int], tuple[float, dict[str, int]]] = {}
+        for bone, weight in bones.items():
+            options = [(weight, {part: bone})]
+            options += [
+                (
+                    score + weight + _follows(body, before, bone, chain) - _left_out(last, part),
+                    {**chain, part: bone},
+                )
+                for (last, before), (score, chain) in best.items()
+                if bone not in chain.values()
+            ]
+            following[part, bone] = max(options, key=lambda option: option[0])
+        # A part may be left out: chains that end before stay in the race.
+        best |= following
+    if not best:
+        return {}
+    return max(best.values(), key=lambda option: option[0])[1]
+
+
+def _left_out(before: str, part: str) -> float:
+    """What it costs to leave out parts that every body has between two."""
+    parts = ARM if part in ARM else LEG
+    between = parts[parts.index(before) + 1 : parts.index(part)]
+    return 0.5 * sum(each not in OPTIONAL_PARTS for each in between)
+
+
+def _follows(body: Body, before: int, bone: int, chain: Mapping[str, int]) -> float:
+    """How well a bone follows the one before it in the limb; 0.2 at best."""
+    skeleton = body.skeleton
+    part = next(name for name, each in chain.items() if each == before)
+    gap = float(np.linalg.norm(skeleton.heads[bone] - skeleton.heads[before]))
+    score = -_unevenness(body, before, chain, gap)
+    if body.names[bone].layer != body.names[before].layer:
+        score -= 0.3
+    if part != "clavicle" and gap < 0.01 * body.size:
+        score -= 1.0
+    if skeleton.parents[bone] == before:
+        return score + 0.2
+    if body.is_ancestor(before, bone):
+        return score + 0.2 - _skipped(body, before, bone, part, gap)
+    near = 0.05 * body.size + 0.2 * skeleton.lengths[before]
+    if float(np.linalg.norm(skeleton.heads[bone] - skeleton.tails[before])) < near:
+        # The rig moves it by constraints: feet and hands of IK rigs.
+        return score - 0.3
+    return score - (0.5 if _continues(body, before, bone, chain) else 2.0)
+
+
+def _continues(body: Body, before: int, bone: int, chain: Mapping[str, int]) -> bool:
+    """Whether a bone lies where the lower part of a limb would end, about as long as the upper."""
+    uppers = [chain[part] for part in ("upper_arm", "thigh") if part in chain]
+    if not uppers or uppers[0] == before:
+        return False
+    heads = body.skeleton.heads
+    upper, lower = heads[before] - heads[uppers[0]], heads[bone] - heads[before]
+    lengths = float(np.linalg.norm(upper)), float(np.linalg.norm(lower))
+    straight = float(upper @ lower) > 0.5 * lengths[0] * lengths[1]
+    return straight and 0.6 * lengths[0] < lengths[1] < 1.7 * lengths[0]
+
+
+def _unevenness(body: Body, before: int, chain: Mapping[str, int], gap: float) -> float:
+    """What it costs if the two long parts of a limb are of very different lengths."""
+    uppers = [chain[part] for part in ("upper_arm", "thigh") if part in chain]
+    if not uppers or uppers[0] == before:
+        return 0.0
+    heads = body.skeleton.heads
+    upper = float(np.linalg.norm(heads[before] - heads[uppers[0]]))
+    least = 0.01 * body.size
+    return min(1.0, 0.3 * abs(float(np.log(max(gap, least) / max(upper, least)))))
+
+
+def _skipped(body: Body, before: int, bone: int, part: str, gap: float) -> float:
+    """What it costs to leave out the bones between two: the more, the longer they are."""
+    heads = body.skeleton.heads
+    cost = 0.0
+    child = bone
+    for between in body.ancestors(bone):
+        if between == before:
+            break
+        name = body.names[between]
+        step = float(np.linalg.norm(heads[child] - heads[between])) / max(gap, 1e-9)
+        if not name.machinery:
+            # Another bone of the same part is no loss.
+            cost += min(step, 1.0) * (1.0 - min(name.weights.get(part, 0.0), 1.0))
+        child = between
+    return cost * (0.3 if part in {"clavicle", "foot"} else 2.0)

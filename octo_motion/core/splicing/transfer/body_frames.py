@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of the body from which parts are seen: the chest's and the pelvis's.
+
+Each is fixed to a bone but built from landmarks, so that it does not hang on how a file lays its
+bones' axes: X to the body's left, Y to its back, Z up along the trunk, as for a figure that faces
+Blender's front. The landmarks are taken at rest, where shoulders are not shrugged.
+
+A rest pose may itself be posed (FBX files come like that). Where two skeletons carry the same
+joints at the same places of the bone, these joints are laid over each other instead: the frames
+then agree to the last digit whatever the rest poses are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...errors import ClipError
+from ...rotations import Floats, conjugate, from_matrix, multiply, normalized, rotate
+from ...skeleton import Skeleton
+from ..clip.posture import Posture
+from ..humanoid.landmarks import Landmarks
+from .parts import landmark_bone
+
+_CHEST_JOINTS: Final = (
+    *("clavicle.L", "clavicle.R", "upper_arm.L", "upper_arm.R"),
+    *("neck", "head"),
+)
+_PELVIS_JOINTS: Final = ("thigh.L", "thigh.R", "spine", "chest")
+
+_SAME: Final = 0.01
+"""Of its size: how far joints may lie off each other and count as the same body's."""
+
+_FLAT: Final = 0.02
+"""Of its length: joints that spread less than this sideways do not tell how a bone is turned."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyFrame:
+    """A frame that rides on a bone."""
+
+    bone: int
+    """The bone, or −1 for the armature itself."""
+    turn: Floats
+    """(4,) from the frame's axes to the bone's."""
+    origin: Floats
+    """(3,) from the bone's head, along the bone's axes."""
+    joints: dict[str, Floats]
+    """Places of the joints that hang on the bone, along the bone's axes, by landmark."""
+
+    def orientation(self, posture: Posture) -> Floats:
+        """(frames, 4), armature space."""
+        if self.bone < 0:
+            return self.turn
+        return multiply(posture.orientation(self.bone), self.turn)
+
+    def place(self, posture: Posture) -> Floats:
+        """Origin (frames, 3), armature space."""
+        if self.bone < 0:
+            return self.origin
+        return posture.head(self.bone) + rotate(posture.orientation(self.bone), self.origin)
+
+    def at_rest(self, skeleton: Skeleton) -> Floats:
+        """Orientation (4,) in the rest pose, armature space."""
+        if self.bone < 0:
+            return self.turn
+        return multiply(skeleton.rest_rotations[self.bone], self.turn)
+
+
+def chest_frame(skeleton: Skeleton, landmarks: Landmarks) -> BodyFrame:
+    """The chest's frame; its origin is midway between the shoulders.
+
+    Raises:
+        ClipError: a landmark is missing, or they lie in one line.
+    """
+    chest, left, right, top, low = (
+        landmark_bone(skeleton, landmarks, *choices)
+        for choices in (
+            ("chest",),
+            ("upper_arm.L",),
+            ("upper_arm.R",),
+            ("neck", "head"),
+            ("spine", "hips"),
+        )
+    )
+    heads = skeleton.heads
+    return _frame(
+        skeleton,
+        landmarks,
+        chest,
+        axes=(heads[left] - heads[right], heads[top] - heads[low]),
+        origin=0.5 * (heads[left] + heads[right]),
+        joints=_CHEST_JOINTS,
+    )
+
+
+def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> BodyFrame:
+    """The pelvis's frame; its origin is midway between the hip joints.
+
+    Raises:
+        ClipError: a landmark is missing, or they lie in one line.
+    """
+    hips, left, right, top = (
+        landmark_bone(skeleton, landmarks, *choices)
+        for choices in (("hips",), ("thigh.L",), ("thigh.R",), ("neck", "head"))
+    )
+    heads = skeleton.heads
+    middle = 0.5 * (heads[left] + heads[right])
+    return _frame(
+        skeleton,
+        landmarks,
+        hips,
+        axes=(heads[left] - heads[right], heads[top] - middle),
+        origin=middle,
+        joints=_PELVIS_JOINTS,
+    )
+
+
+def chain_frame(skeleton: Skeleton, bones: Sequence[int]) -> BodyFrame:
+    """The frame of a chain that is no limb of a humanoid: fixed to what the chain hangs on, with
+    X along the chain at rest and Z up.
+    """
+    root, parent = bones[0], skeleton.parents[bones[0]]
+    along = skeleton.tails[bones[-1]] - skeleton.heads[root]
+    up = np.array([0.0, 0.0, 1.0])
+    side = np.cross(up, along)
+    if np.linalg.norm(side) < 1e-3 * np.linalg.norm(along):
+        side = np.array([0.0, 1.0, 0.0])
+    x, y = normalized(along), normalized(side)
+    y = normalized(y - np.dot(x, y) * x)
+    turn = from_matrix(np.stack([x, y, np.cross(x, y)], axis=-1))
+    if parent < 0:
+        return BodyFrame(-1, turn, skeleton.heads[root], {})
+    back = conjugate(skeleton.rest_rotations[parent])
+    offset = rotate(back, skeleton.heads[root] - skeleton.heads[parent])
+    return BodyFrame(parent, multiply(back, turn), offset, {})
+
+
+def laid_over(splice: BodyFrame, base: BodyFrame) -> BodyFrame:
+    """The splice body's frame, made to agree with the base's where the two are the same body."""
+    names = sorted(splice.joints.keys() & base.joints.keys())
+    if splice.joints.keys() != base.joints.keys() or len(names) < 2:
+        return splice
+    # The bone's own head is a joint as well.
+    ours = np.array([np.zeros(3), *(base.joints[name] for name in names)])
+    theirs = np.array([np.zeros(3), *(splice.joints[name] for name in names)])
+    our_middle, their_middle = ours.mean(axis=0), theirs.mean(axis=0)
+    ours, theirs = ours - our_middle, theirs - their_middle
+    spreads = [np.linalg.svd(points, compute_uv=False) for points in (ours, theirs)]
+    if any(spread[1] <= _FLAT * spread[0] for spread in spreads):
+        return splice
+    scale = np.linalg.norm(ours) / np.linalg.norm(theirs)
+    left, _, right = np.linalg.svd(ours.T @ theirs)
+    proper = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
+    turn = left @ proper @ right
+    misses = np.linalg.norm(ours - scale * theirs @ turn.T, axis=1)
+    if misses.max() > _SAME * np.linalg.norm(ours):
+        return splice
+    back = conjugate(from_matrix(turn))
+    origin = their_middle + rotate(back, base.origin - our_middle) / scale
+    return BodyFrame(splice.bone, multiply(back, base.turn), origin, splice.joints)
+
+
+def _frame(
+    skeleton: Skeleton,
+    landmarks: Landmarks,
+    bone: int,
+    *,
+    axes: tuple[Floats, Floats],
+    origin: Floats,
+    joints: Sequence[str],
+) -> BodyFrame:
+    left, up = (normalized(axis) for axis in axes)
+    up = up - np.dot(left, up) * left
+    if np.linalg.norm(left) < 0.5 or np.linalg.norm(up) < 1e-3:
+        raise ClipError(
+            f"Left, right and up cannot be told at '{skeleton.names[bone]}': its joints lie in "
+            "one line.",
+            "Look at the bone table.",
+        )
+    up = normalized(up)
+    axes_matrix = np.stack([left, np.cross(up, left), up], axis=-1)
+    back = conjugate(skeleton.rest_rotations[bone])
+    head = skeleton.heads[bone]
+    places = {
+        name: rotate(back, skeleton.heads[child] - head)
+        for name in joints
+        if (child := _child_towards(skeleton, landmarks, bone, name)) is not None
+    }
+    return BodyFrame(
+        bone, multiply(back, from_matrix(axes_matrix)), rotate(back, origin - head), places
+    )
+
+
+def _child_towards(
+    skeleton: Skeleton, landmarks: Landmarks, bone: int, landmark: str
+) -> int | None:
+    """The child of a bone on the way to a landmark: its head is fixed to the bone."""
+    name = landmarks.get(landmark)
+    child = skeleton.index.get(name, -1) if name is not None else -1
+    while child >= 0 and skeleton.parents[child] != bone:
+        child = skeleton.parents[child]
+    return child if child >= 0 else None

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Legs that bring their travel with them: the hips follow the splice clip through the world.
+
+Without it feet skate: legs of one walk above the ground covered by another. The splice's path is
+turned about the vertical and shifted so that it begins where the base stands and the way it faces;
+what the base does afterwards goes on from where the path has led. Heights are measured from the
+ground on which each clip stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...errors import ClipError
+from ...rotations import (
+    Floats,
+    conjugate,
+    from_axis_angle,
+    from_rotation_vector,
+    multiply,
+    rotate,
+    to_rotation_vector,
+)
+from ..clip.clip import Clip
+from ..clip.posture import Posture, sampled, sampled_world, slerp
+from ..clip.timing import Window
+from ..humanoid.correspondence import chain_length
+from .body_frames import BodyFrame
+from .carry import Carrier, Side
+from .parts import landmark_bone
+
+_UP: Final = np.array([0.0, 0.0, 1.0])
+_LEVEL: Final = np.array([1.0, 1.0, 0.0])
+
+_GROUND_SAMPLES: Final = 500
+"""Frames of a clip that are looked at to find the ground."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """A body frame in the world: orientations (frames, 4) and places (frames, 3)."""
+
+    orientations: Floats
+    places: Floats
+
+
+class Travel:
+    """What of the way through the world does not hang on its timing.
+
+    Args:
+        carrier: a leg, seen from the pelvis.
+        ground: height of the ground on which the base stands, world units.
+
+    Raises:
+        ClipError: the base's hips cannot leave their parent.
+    """
+
+    def __init__(self, carrier: Carrier, ground: float) -> None:
+        self._carrier = carrier
+        self._ground = ground
+        self._other_ground = ground_height(carrier.splice)
+        ours, theirs = carrier.base, carrier.splice
+        skeleton, hips = ours.skeleton, carrier.frames[0].bone
+        if skeleton.connected[hips] and skeleton.parents[hips] >= 0:
+            name, parent = skeleton.names[hips], skeleton.names[skeleton.parents[hips]]
+            raise ClipError(
+                f"'{name}' cannot travel: it is connected to '{parent}'.",
+                "Turn off its Connected (bone properties, Relations), or With Travel.",
+            )
+        self._ratio = _leg(ours) * ours.clip.scale / (_leg(theirs) * theirs.clip.scale)
+
+    def move(
+        self, clip: Clip, span: Window, base: Posture, rotations: Floats, locations: Floats
+    ) -> None:
+        """Write rotation and location of the hips into the base's arrays.
+
+        Args:
+            clip: the base; of its frames at least the first and last of the splice.
+            span: when the splice acts on these frames.
+            base: the posture of all these frames, as it was.
+            rotations: (frames, bones, 4) of them, to be changed.
+            locations: (frames, bones, 3), likewise.
+        """
+        ours = self._carrier.frames[0]
+        own = _path(clip, ours, base, clip.frames)
+        path = self._path(span)
+        first, last = span.frames.start, span.frames.stop - 1
+        # Begin where the base is, and the way it faces.
+        turn = _heading(own.orientations[first], path.orientations[0])
+        places = own.places[first] + self._ratio * rotate(turn, path.places - path.places[0])
+        heights = path.places[:, 2] - self._other_ground
+        places[:, 2] = self._ground + self._ratio * heights
+        orientations = multiply(turn, path.orientations)
+        # Go on from where it ends.
+        away = _heading(orientations[-1], own.orientations[last])
+        shift = (places[-1] - rotate(away, own.places[last])) * _LEVEL
+        later = _Path(
+            multiply(away, own.orientations[first:]), rotate(away, own.places[first:]) + shift
+        )
+        count = len(places)
+        leaving = (span.weights < span.entering)[:, None]
+        goal_turns = np.where(leaving, later.orientations[:count], own.orientations[span.frames])
+        goal_places = np.where(leaving, later.places[:count], own.places[span.frames])
+        weights = span.weights
+        later.orientations[:count] = slerp(goal_turns, orientations, weights)
+        later.places[:count] = goal_places + weights[:, None] * (places - goal_places)
+        _write_hips(clip, ours, base, later, (rotations, locations))
+
+    def _path(self, span: Window) -> _Path:
+        """The splice's pelvis through the world, round after round where it loops."""
+        clip, frame = self._carrier.splice.clip, self._carrier.frames[1]
+        path = _path(clip, frame, sampled(clip, span.splice_frames), span.splice_frames)
+        if not (span.rounds.any() or span.seams.any()):
+            return path
+        ends = np.array([clip.frames[0], clip.frames[-1]])
+        ends = _path(clip, frame, sampled(clip, ends), ends)
+        # Each round goes on from where the one before has led, and the way it faced then.
+        turn = _heading(ends.orientations[1], ends.orientations[0])
+        numbers = np.arange(span.rounds.max() + 1.0)
+        angle = 2.0 * np.arctan2(turn[3], turn[0])
+        turns = from_axis_angle(_UP, angle * numbers)
+        step = rotate(turns, (ends.places[1] - ends.places[0]) * _LEVEL)
+        shifts = np.concatenate([np.zeros((1, 3)), np.cumsum(step, axis=0)[:-1]])
+        # What is left of the step at the seam: how the pelvis leans, and how high it is.
+        lean = to_rotation_vector(
+            multiply(conjugate(ends.orientations[1]), multiply(turn, ends.orientations[0]))
+        )
+        rise = (ends.places[0] - ends.places[1]) * _UP
+        own = turns[span.rounds]
+        added = from_rotation_vector(span.seams[:, None] * lean)
+        places = rotate(own, path.places - ends.places[0]) + shifts[span.rounds] + ends.places[0]
+        return _Path(
+            multiply(multiply(own, path.orientations), added),
+            places + span.seams[:, None] * rise,
+        )
+
+
+def _write_hips(
+    clip: Clip,
+    frame: BodyFrame,
+    base: Posture,
+    path: _Path,
+    arrays: tuple[Floats, Floats],
+) -> None:
+    """Write a path of the pelvis from some frame on to the end."""
+    rotations, locations = arrays
+    first = len(clip) - len(path.places)
+    chosen = slice(first, None)
+    turns, shifts, scale = sampled_world(clip, clip.frames[chosen])
+    back = conjugate(turns)
+    orientation = multiply(multiply(back, path.orientations), conjugate(frame.turn))
+    place = rotate(back, path.places - shifts) / scale - rotate(orientation, frame.origin)
+
+    def part(values: Floats) -> Floats:
+        return values[chosen] if values.ndim == 2 else values
+
+    bone = frame.bone
+    rotations[chosen, bone] = multiply(conjugate(part(base.carried(bone))), orientation)
+    moved = place - part(base.unmoved_head(bone))
+    locations[chosen, bone] = rotate(conjugate(part(base.location_axes(bone))), moved)
+
+
+def _path(clip: Clip, frame: BodyFrame, posture: Posture, frames: Floats) -> _Path:
+    turns, shifts, scale = sampled_world(clip, frames)
+    return _Path(
+        multiply(turns, frame.orientation(posture)),
+        shifts + scale * rotate(turns, frame.place(posture)),
+    )
+
+
+def _heading(goal: Floats, start: Floats) -> Floats:
+    """The turn about the vertical (4,) that brings one orientation closest to another."""
+    between = multiply(goal, conjugate(start))
+    return from_axis_angle(_UP, 2.0 * np.arctan2(between[3], between[0]))
+
+
+def _leg(side: Side) -> float:
+    """Length of the legs, armature units."""
+    names = ("thigh", "shin", "foot")
+    marks = side.humanoid()
+    return 0.5 * sum(
+        chain_length(
+            side.skeleton, [landmark_bone(side.skeleton, marks, f"{name}.{left}") for name in names]
+        )
+        for left in "LR"
+    )
+
+
+def ground_height(side: Side) -> float:
+    """Height of the lowest point that a foot reaches in a clip, world units."""
+    clip, marks = side.clip, side.humanoid()
+    count = min(len(clip), _GROUND_SAMPLES)
+    chosen = clip.frames[np.linspace(0, len(clip) - 1, count).astype(np.intp)]
+    posture = sampled(clip, chosen)
+    turns, shifts, scale = sampled_world(clip, chosen)
+    heights = [
+        (shifts + scale * rotate(turns, posture.head(landmark_bone(clip.skeleton, marks, foot))))[
+            :, 2
+        ].min()
+        for foot in ("foot.L", "foot.R")
+    ]
+    return float(min(heights))

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the joint of a limb has to turn so that the limb comes to lie where it was seen to be.
+
+A limb is its triangle: joint, elbow (or knee), hand (or foot). After [Splice], section 2.2: the
+limb is put onto the joint with all its own inner rotations; one rotation makes the normals of its
+triangle and of the wanted one agree, a second one, about the normal, brings the hand into the
+wanted direction. The source says nothing on a limb that is straight, and has no normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...rotations import (
+    Floats,
+    conjugate,
+    cross,
+    from_axis_angle,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+)
+
+_STRAIGHT: Final = np.radians(5.0)
+"""Bend below which a triangle says nothing of how a limb is turned about itself."""
+
+_BENT: Final = np.radians(60.0)
+"""Bend above which it says all. In between it is believed little by little: on a body of other
+proportions the triangle of a limb that is almost straight is another one, and a knee or an elbow
+that leaves straight fast would spin the limb."""
+
+_SHAPED: Final = np.radians(40.0)
+"""Bend above which a limb of other proportions bends as far as its point asks."""
+
+_AGREES: Final = np.radians(45.0)
+_DISAGREES: Final = np.radians(120.0)
+"""Angles between the normals up to which they are made to agree, and from which the triangles are
+so unlike (bodies of other proportions) that their normals say nothing."""
+
+_FOLDED: Final = np.radians(130.0)
+"""Bend from which a triangle says less and less again, down to nothing as the limb is folded."""
+
+_TIGHT: Final = np.radians(150.0)
+_TIGHTEST: Final = np.radians(170.0)
+"""Bends beyond which no limb folds of itself to reach a point: the first is left slowly."""
+
+_MOVED: Final = np.radians(5.0)
+"""Change of a bend that is worth turning a straight limb to its hinge."""
+
+SOFT: Final = 0.03
+"""Of a limb's length: the last stretch of its reach, over which it straightens slowly. To follow a
+point exactly up to the end of its reach an elbow would have to open ever faster there, without
+bound, and to stop at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """Joints of a limb over time, (frames, 3) each."""
+
+    joint: Floats
+    elbow: Floats
+    hand: Floats
+
+
+def joint_turn(limb: Limb, wanted: Limb) -> Floats:
+    """The rotation (frames, 4) about a limb's joint that brings it to the wanted one's shape.
+
+    The hand points from the joint exactly where the wanted one does. About that direction the limb
+    is turned until the normals agree: both together are the source's two rotations. The flatter
+    one of the triangles, the less it is turned, down to the smallest rotation that aims the hand,
+    which keeps the upper limb's orientation as it was put on.
+
+    Args:
+        limb: as it was put onto the joint.
+        wanted: with the same joint, and elbow and hand where they were seen to be.
+    """
+    own, goal = normalized(limb.hand - limb.joint), normalized(wanted.hand - limb.joint)
+    aimed = shortest_arc(own, goal)
+    normal = rotate(aimed, cross(limb.elbow - limb.joint, limb.hand - limb.elbow))
+    other = cross(wanted.elbow - limb.joint, wanted.hand - wanted.elbow)
+    sine = np.sum(cross(normal, other) * goal, axis=-1)
+    angle = np.arctan2(sine, np.sum(normal * other, axis=-1))
+    # It has faded out long before half a turn, where the way round would jump.
+    trust = _smooth((_DISAGREES - np.abs(angle)) / (_DISAGREES - _AGREES))
+    share = np.minimum(_bend(limb), _bend(wanted)) * trust
+    return multiply(from_axis_angle(goal, angle * share), aimed)
+
+
+def reach(
+    limb: Limb, target: Floats, hinge: Floats, *, alike: bool = True
+) -> tuple[Floats, Floats]:
+    """Bend a limb so that its hand, which points at the target already, lands on it.
+
+    It does so exactly up to the last stretch of its reach (:data:`SOFT`), and where it is already.
+    How fast the elbow opens is bounded by how fast hand and target move.
+
+    The elbow stays on the side on which it is. A straight limb has no side: it bends about its
+    hinge, and so does one that is bent the wrong way by a trifle.
+
+    Args:
+        limb: the limb.
+        target: (frames, 3)
+        hinge: (frames, 3) unit vectors about which the elbow bends.
+        alike: whether the limb is of the proportions for which the target was seen. If not, the
+            point means less than the shape: what is straight stays straight.
+
+    Returns:
+        Rotations (frames, 4) of the upper and of the lower limb.
+    """
+    first, second = limb.elbow - limb.joint, limb.hand - limb.elbow
+    upper, lower = np.linalg.norm(first, axis=-1), np.linalg.norm(second, axis=-1)
+    normal = cross(first, second)
+    now = np.arctan2(np.linalg.norm(normal, axis=-1), np.sum(first * second, axis=-1))
+    wanted = _wanted_bend(upper, lower, limb, target, now)
+    bend = wanted if alike else now + _told(now, _SHAPED) * (wanted - now)
+    swung = _lift(upper, lower, bend) - _lift(upper, lower, now)
+    direction = normalized(limb.hand - limb.joint)
+    across = normalized(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
+    plane = normal / np.maximum(upper * lower, 1e-12)[:, None]
+    missing = np.maximum(np.sin(_STRAIGHT) - np.linalg.norm(plane, axis=-1), 0.0)
+    missing = missing * _smooth(np.abs(bend - now) / _MOVED)
+    axis = normalized(plane + missing[:, None] * across)
+    straight = ~np.any(axis, axis=-1)
+    axis[straight] = across[straight]
+    # About the limb's line: from its own plane to that in which it bends.
+    sine = np.sum(cross(normal, axis) * direction, axis=-1)
+    turn = from_axis_angle(direction, np.arctan2(sine, np.sum(normal * axis, axis=-1)))
+    upper_turn = multiply(from_axis_angle(axis, -swung), turn)
+    lower_turn = multiply(from_axis_angle(axis, bend - now - swung), turn)
+    # The elbow goes round the limb's line to its new side, the bones do not twist with it.
+    return _untwisted(upper_turn, first), _untwisted(lower_turn, second)
+
+
+def _wanted_bend(upper: Floats, lower: Floats, limb: Limb, target: Floats, now: Floats) -> Floats:
+    """The bend (frames,) with which a hand is as far from the joint as its target, softened.
+
+    Args:
+        upper: (frames,) length of the upper limb.
+        lower: (frames,) of the lower limb.
+        limb: the limb.
+        target: (frames, 3)
+        now: (frames,) the bend that the limb has.
+    """
+    product = np.maximum(upper * lower, 1e-12)
+    distance = np.linalg.norm(target - limb.joint, axis=-1)
+
+    def bend_at(reached: Floats) -> Floats:
+        cosine = (reached**2 - upper**2 - lower**2) / (2.0 * product)
+        return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+    def eased(passed: Floats, edge: Floats, bend: Floats, room: Floats) -> Floats:
+        """Beyond an edge: on as fast as it came there, and gently to rest."""
+        speed = edge / np.maximum(product * np.sin(bend), 1e-12)
+        share = np.clip(passed * speed / np.maximum(room, 1e-12), 0.0, 2.0)
+        return room * (1.0 - (1.0 - 0.5 * share) ** 2)
+
+    soft = SOFT * (upper + lower)
+    far = upper + lower - soft
+    near = np.sqrt(upper**2 + lower**2 + 2.0 * product * np.cos(_TIGHT))
+    straight, tight = bend_at(far), np.full(len(far), _TIGHT)
+    bend = bend_at(np.clip(distance, near, far))
+    bend -= eased(distance - far, far, straight, straight)
+    bend += eased(near - distance, near, tight, _TIGHTEST - tight)
+    # At both ends of its reach a limb that is there already stays as it is.
+    ends = np.maximum(1.0 - now / np.maximum(straight, 1e-12), (now - _TIGHT) / (np.pi - _TIGHT))
+    span = soft * np.clip(ends, 0.0, 1.0)
+    off = np.abs(distance - np.linalg.norm(limb.hand - limb.joint, axis=-1))
+    own = 1.0 - _smooth(off / np.maximum(span, 1e-9 * (upper + lower)))
+    return own * now + (1.0 - own) * bend
+
+
+def _lift(upper: Floats, lower: Floats, bend: Floats) -> Floats:
+    """The angle (frames,) at the joint between the upper limb and the line to the hand."""
+    return np.arctan2(lower * np.sin(bend), upper + lower * np.cos(bend))
+
+
+def _untwisted(turn: Floats, segment: Floats) -> Floats:
+    """The smallest rotation that points a segment where this one does."""
+    start = normalized(segment)
+    return shortest_arc(start, rotate(turn, start))
+
+
+def hinge_axis(limb: Limb, orientation: Floats) -> Floats:
+    """The axis (3,) about which a limb bends over a clip, along the upper limb's own axes.
+
+    Args:
+        limb: the joints over the clip.
+        orientation: (frames, 4) of the upper limb.
+    """
+    normals = cross(limb.elbow - limb.joint, limb.hand - limb.elbow)
+    mean = rotate(conjugate(orientation), normals).mean(axis=0)
+    along = rotate(conjugate(orientation), limb.elbow - limb.joint).mean(axis=0)
+    if np.linalg.norm(mean) > 1e-3 * np.sum(along**2):
+        return normalized(mean)
+    # Always straight: any axis across the limb is as good.
+    return normalized(np.cross(along, np.eye(3)[np.argmin(np.abs(along))]))
+
+
+def _bend(limb: Limb) -> Floats:
+    """0 … 1: how much a limb's triangle says of its turn."""
+    upper, lower = limb.elbow - limb.joint, limb.hand - limb.elbow
+    sine = np.linalg.norm(cross(upper, lower), axis=-1)
+    return _told(np.arctan2(sine, np.sum(upper * lower, axis=-1)), _BENT)
+
+
+def _told(bend: Floats, bent: float) -> Floats:
+    """0 … 1: how much a bend (frames,) says, if one as large as ``bent`` says all."""
+    opened = _smooth((bend - _STRAIGHT) / (bent - _STRAIGHT))
+    shut = np.pi - _STRAIGHT
+    return np.minimum(opened, _smooth((shut - bend) / (shut - _FOLDED)))
+
+
+def _smooth(share: Floats) -> Floats:
+    bounded = np.clip(share, 0.0, 1.0)
+    return bounded * bounded * (3.0 - 2.0 * bounded)

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Splicing: a part of one clip put onto another, and stacks of such splices.
+
+After Takebayashi, Nishio and Kobori, "Motion synthesis based on splicing of parts" [Splice]: what
+is kept of a part is where it lies as seen from the chest (the trunk: from the pelvis), and a
+splice's result can be the base of the next. Beyond the source: legs are seen from the pelvis,
+unless asked otherwise, for a chest that bows would lift them off the ground; a limb may reach for
+the exact point; clavicles may belong to the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from ...errors import ClipError
+from ...rotations import (
+    Floats,
+    conjugate,
+    continuous,
+    from_rotation_vector,
+    multiply,
+    to_rotation_vector,
+)
+from ..clip.clip import Clip
+from ..clip.posture import posture_of, sampled, sampled_scales
+from ..clip.timing import Timing, Window, middle, window
+from ..humanoid.landmarks import Landmarks
+from .carry import Carrier, Side, carriers, carry
+from .leg_travel import Travel, ground_height
+from .parts import Part
+
+Reach = Literal["direction", "exact"]
+SeenFrom = Literal["", "chest", "pelvis"]
+
+_LEG_PIECES: Final = frozenset({"leg.L", "leg.R"})
+
+
+@dataclass(frozen=True, eq=False)
+class Splice:
+    """One part of one clip, and when. All that is needed to do it again."""
+
+    part: Part
+    clip: Clip
+    timing: Timing
+    landmarks: Landmarks | None = None
+    """Of the splice clip's skeleton; a chain needs none."""
+    reach: Reach = "direction"
+    """Hands and feet in the direction where they were seen (the source), or on the very point."""
+    travel: bool = False
+    """Whether legs bring the splice clip's way through the world with them."""
+    clavicle: bool = True
+    """Whether an arm takes its clavicle along, where both skeletons have one; the source's joint
+    is the shoulder."""
+    seen_from: SeenFrom = ""
+    """From where legs are seen: the pelvis if empty, the chest in the source."""
+    mute: bool = False
+
+
+def build(base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice]) -> Clip:
+    """All splices of a stack, each onto the result of those before. Nothing given is changed.
+
+    Raises:
+        ClipError: a bone or landmark is missing, or a timing makes no sense.
+    """
+    result = base
+    for each in splicers(base, landmarks, splices):
+        result = each.onto(result, each.window(each.splice.timing))
+    return result
+
+
+def spliced(base: Clip, landmarks: Landmarks | None, splice: Splice) -> Clip:
+    """One splice onto a clip; the result has the base's frames, bones and name.
+
+    Raises:
+        ClipError: a bone or landmark is missing, or the timing makes no sense.
+    """
+    return Splicer(base, landmarks, splice).at(splice.timing)
+
+
+def splicers(base: Clip, landmarks: Landmarks | None, splices: Iterable[Splice]) -> list[Splicer]:
+    """All splices of a stack that are not muted, made ready.
+
+    Raises:
+        ClipError: a bone or landmark is missing.
+    """
+    # The ground is where the base stands on it, whatever is done to its legs on the way.
+    return [Splicer(base, landmarks, each) for each in splices if not each.mute]
+
+
+class Splicer:
+    """A splice made ready: what does not hang on its timing is found once.
+
+    For a timing that is dragged, with few frames in sight: poses do not hang on each other, but
+    for where legs have led to by then, and for the way round that easing takes.
+    """
+
+    def __init__(self, base: Clip, landmarks: Landmarks | None, splice: Splice) -> None:
+        """Match the two skeletons.
+
+        Raises:
+            ClipError: a bone or landmark is missing.
+        """
+        if splice.travel and not _LEG_PIECES.intersection(splice.part.pieces):
+            raise ClipError(
+                f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
+            )
+        seen_from = "pelvis" if splice.travel else splice.seen_from
+        sides = Side(base, landmarks), Side(splice.clip, splice.landmarks)
+        self.splice = splice
+        self._base = base
+        self._pieces = carriers(splice.part, *sides, clavicle=splice.clavicle, seen_from=seen_from)
+        self._bones = sorted({bone for piece in self._pieces for bone in piece.bones})
+        self._travel = None
+        if splice.travel:
+            self._travel = Travel(self._pieces[0], ground_height(sides[0]))
+
+    def window(self, timing: Timing) -> Window:
+        """What a timing means for the base.
+
+        Raises:
+            ClipError: the timing makes no sense.
+        """
+        return window(timing, self._base, self.splice.clip)
+
+    def at(self, timing: Timing, rows: Iterable[int] | None = None) -> Clip:
+        """The base with the part spliced on at this timing, all of it or some of its frames.
+
+        Args:
+            timing: when the splice acts.
+            rows: numbers of frames, from 0.
+
+        Raises:
+            ClipError: the timing makes no sense.
+        """
+        span = self.window(timing)
+        if rows is None:
+            return self.onto(self._base, span)
+        wanted = sorted(set(rows))
+        needed = self.needed(span, wanted)
+        few = self.onto(self._base.taken(needed), span.taken(np.asarray(needed, dtype=np.intp)))
+        return few.taken(np.searchsorted(needed, wanted))
+
+    def needed(self, span: Window, rows: Iterable[int]) -> list[int]:
+        """Frames on which the result at these hangs, themselves included, ascending."""
+        needed = set(rows)
+        for row in tuple(needed):
+            needed.update(span.easing(row))
+        if self._travel is not None and max(needed, default=0) >= span.frames.start:
+            needed |= {span.frames.start, span.frames.stop - 1} if len(span.weights) else set()
+        return sorted(needed)
+
+    def onto(self, base: Clip, span: Window) -> Clip:
+        """Put the part onto a clip of the base's skeleton.
+
+        Args:
+            base: the clip, or of its frames those that are :meth:`needed`.
+            span: when the splice acts on these frames.
+        """
+        if span.frames.stop == span.frames.start:
+            return base
+        rotations, locations = base.rotations.copy(), base.locations.copy()
+        before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
+        moment = sampled(self.splice.clip, span.splice_frames, span.seams)
+        # Views: what is written here is written into the whole.
+        turned, moved = rotations[span.frames], locations[span.frames]
+        exact = self.splice.reach == "exact"
+        for piece in self._pieces:
+            carry(piece, before, moment, turned, moved, exact=exact)
+        if (span.weights < 1.0).any():
+            _ease(base, span, self._bones, turned, moved)
+        if self._travel is not None:
+            whole = posture_of(base.skeleton, base.rotations, base.locations)
+            self._travel.move(base, span, whole, rotations, locations)
+        scales = _scaled(base, self.splice.clip, span, self._pieces)
+        return replace(base, rotations=rotations, locations=locations, scales=scales)
+
+
+def _scaled(base: Clip, splice: Clip, span: Window, pieces: Sequence[Carrier]) -> Floats | None:
+    """The base's scales with those of the part, which only mean something on the same bones."""
+    if base.scales is None and splice.scales is None:
+        return None
+    shape = base.locations.shape
+    scales = np.ones(shape) if base.scales is None else base.scales.copy()
+    # A view: what is written here is written into the whole.
+    acting = scales[span.frames]
+    weights = span.weights[:, None, None]
+    for piece in pieces:
+        pairs = piece.match.pairs if piece.match.same_rest else {}
+        bones = [bone for bone in piece.bones if bone in pairs]
+        others = [pairs[bone] for bone in bones]
+        rest = [bone for bone in piece.bones if bone not in pairs]
+        there = sampled_scales(splice, span.splice_frames, span.seams, others)
+        acting[:, bones] += weights * (there - acting[:, bones])
+        acting[:, rest] += weights * (1.0 - acting[:, rest])
+    return scales
+
+
+def _ease(
+    base: Clip, span: Window, bones: Sequence[int], rotations: Floats, locations: Floats
+) -> None:
+    """Mix the base back in where the splice comes and goes."""
+    leaving = span.weights < span.entering
+    for chosen in (np.flatnonzero((span.weights < 1.0) & side) for side in (~leaving, leaving)):
+        if not len(chosen):
+            continue
+        frames = chosen + span.frames.start
+        weights = span.weights[chosen][:, None]
+        own = base.rotations[frames][:, bones]
+        # The way round is chosen once, where the two are about equally strong, and kept: the short
+        # way frame by frame would jump where they are half a turn apart.
+        between = continuous(multiply(conjugate(own), rotations[chosen][:, bones]))
+        center = middle(weights[:, 0])
+        between = np.where(between[center, :, :1] < 0.0, -between, between)
+        mixed = multiply(own, _power(between, weights))
+        # Where the splice has no weight yet, the very values of the base.
+        rotations[np.ix_(chosen, bones)] = np.where(weights[..., None] == 0.0, own, mixed)
+        still = base.locations[frames][:, bones]
+        there = locations[np.ix_(chosen, bones)]
+        locations[np.ix_(chosen, bones)] = still + weights[..., None] * (there - still)
+
+
+def _power(quaternions: Floats, shares: Floats) -> Floats:
+    """A share of each rotation, along the way round that its sign says."""
+    far = quaternions[..., :1] < 0.0
+    vector = to_rotation_vector(quaternions)
+    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
+    # The sign of a quaternion tells the short way round from the long one.
+    long_way = 1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9)
+    vector = np.where(far, vector * long_way, vector)
+    return from_rotation_vector(vector * shares[..., None])

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where in a base a splice fits best: legs that do the same at the same time.
+
+After Heck, Kovar and Gleicher, "Splicing Upper-Body Actions with Locomotion" (2006), who align two
+motions by dynamic time warping of their lower bodies. There the warp itself is used; here it only
+judges, with little slack, each moment at which the splice could begin, for the artist to choose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...rotations import Floats, conjugate, rotate
+from ..clip.clip import Clip
+from ..clip.posture import sampled
+from ..humanoid.correspondence import chain_length
+from ..humanoid.landmarks import Landmarks
+from .body_frames import laid_over, pelvis_frame
+from .carry import Side
+from .parts import landmark_bone
+
+_RATE: Final = 20.0
+"""Samples per second: more than legs need."""
+
+_LONGEST: Final = 160
+"""Samples of the splice that are compared; longer ones are sampled less often."""
+
+_SLACK: Final = 0.08
+"""Of the splice's length: how far the two may run ahead of each other."""
+
+_LEAST: Final = 0.5
+"""Of the splice's length (and of the base's): what has to overlap for a comparison to mean much."""
+
+_APART: Final = 0.2
+"""Seconds between two suggestions."""
+
+_SWING: Final = 0.1
+"""Seconds by which speeds are multiplied to stand beside positions."""
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A moment at which a splice could begin."""
+
+    base_start: float
+    """Frame of the base."""
+    splice_start: float
+    """Frame of the splice clip."""
+    cost: float
+    """How unlike the legs are from then on, on average, in leg lengths; 0 is the same."""
+
+
+def suggest_timings(
+    base: tuple[Clip, Landmarks],
+    splice: tuple[Clip, Landmarks],
+    *,
+    splice_start: float | None = None,
+    rate: float = 1.0,
+    length: float | None = None,
+    count: int = 3,
+) -> list[Suggestion]:
+    """The best moments for a splice to begin, best first, none close to another.
+
+    Args:
+        base: the base and its landmarks.
+        splice: the splice clip and its landmarks.
+        splice_start: frame of the splice clip to begin with, its first if none is given.
+        rate: speed of the splice clip.
+        length: frames of the base that the splice lasts; none: as long as there is motion.
+        count: at most how many.
+
+    Raises:
+        ClipError: a landmark is missing.
+    """
+    ours, theirs = Side(*base), Side(*splice)
+    start = splice[0].frames[0] if splice_start is None else splice_start
+    end = splice[0].frames[-1]
+    if length is not None:
+        end = min(end, start + length / base[0].rate * splice[0].rate * rate)
+    seconds = max((end - start) / splice[0].rate / rate, 1e-3)
+    pace = min(_RATE, _LONGEST / seconds)
+    splice_frames = np.arange(start, end + 1e-6, splice[0].rate * rate / pace)
+    theirs_seen = _legs(theirs, ours, splice_frames, pace)
+    step = base[0].rate / pace
+    first, last = base[0].frames[0], base[0].frames[-1]
+    # Samples may be several frames apart; every frame may be the one to begin with.
+    grids = [np.arange(first + phase, last + 1e-6, step) for phase in range(max(1, round(step)))]
+    grids = [grid for grid in grids if len(grid)]
+    costs = np.concatenate(
+        [_warped(_distances(_legs(ours, ours, grid, pace), theirs_seen)) for grid in grids]
+    )
+    frames = np.round(np.concatenate(grids))
+    apart = _APART * base[0].rate
+    found: list[Suggestion] = []
+    for number in np.argsort(costs, kind="stable"):
+        if len(found) == count or not np.isfinite(costs[number]):
+            break
+        frame = float(frames[number])
+        if all(abs(frame - other.base_start) >= apart for other in found):
+            found.append(Suggestion(frame, float(start), float(costs[number])))
+    return found
+
+
+def _legs(side: Side, base: Side, frames: Floats, pace: float) -> Floats:
+    """Where knees and feet are in the pelvis's frame and how they swing, (frames, 24), in leg
+    lengths.
+    """
+    marks = side.humanoid()
+    skeleton = side.skeleton
+    reference = pelvis_frame(base.skeleton, base.humanoid())
+    frame = laid_over(pelvis_frame(skeleton, marks), reference)
+    posture = sampled(side.clip, frames)
+    back, place = conjugate(frame.orientation(posture)), frame.place(posture)
+    positions = []
+    for left in "LR":
+        joints = [
+            landmark_bone(skeleton, marks, f"{name}.{left}") for name in ("thigh", "shin", "foot")
+        ]
+        length = chain_length(skeleton, joints)
+        positions += [rotate(back, posture.head(bone) - place) / length for bone in joints[1:]]
+    seen = np.concatenate(positions, axis=-1)
+    speeds = np.gradient(seen, axis=0) * pace if len(seen) > 1 else np.zeros_like(seen)
+    return np.concatenate([seen, _SWING * speeds], axis=-1)
+
+
+def _distances(ours: Floats, theirs: Floats) -> Floats:
+    """(base, splice) distances of all samples from all."""
+    squares = np.sum(ours**2, axis=1)[:, None] + np.sum(theirs**2, axis=1) - 2.0 * ours @ theirs.T
+    return np.sqrt(np.maximum(squares, 0.0) / 4.0)
+
+
+def _warped(distances: Floats) -> Floats:
+    """Cost (base,) of beginning at each base sample: dynamic time warping within a band, per
+    sample; infinite where too little overlaps.
+    """
+    samples, length = distances.shape
+    band = max(1, round(_SLACK * length))
+    width = 2 * band + 1
+    least = max(2, round(_LEAST * min(length, samples)))
+    starts = np.arange(samples)
+    shifts = np.arange(-band, band + 1)
+    costs = np.full((samples, width), np.inf)
+    costs[:, band] = 0.0
+    result = np.full(samples, np.inf)
+    for step in range(length):
+        at = starts[:, None] + step + shifts
+        inside = (at >= starts[:, None]) & (at < samples)
+        here = np.where(inside, distances[np.clip(at, 0, samples - 1), step], np.inf)
+        if step > 0:
+            # The base waits (its shift shrinks by one) or both go on.
+            waits = np.concatenate([costs[:, 1:], np.full((samples, 1), np.inf)], axis=1)
+            costs = np.minimum(costs, waits)
+        costs = costs + here
+        for shift in range(1, width):
+            # The splice waits.
+            costs[:, shift] = np.minimum(costs[:, shift], costs[:, shift - 1] + here[:, shift])
+        last = np.minimum(samples - starts, length) - 1 == step
+        if step + 1 >= least:
+            result[last] = costs[last].min(axis=1) / (step + 1)
+    return result

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What happens at some frames, spread over those before and after it.
+
+A value at one frame hangs on the frames round it, the same number to either side, and on nothing
+else: it is the same in whatever portions a motion is made. A loop has no ends; elsewhere the first
+and the last frame go on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .rotations import Floats
+
+_PASSES = 3
+"""Means in a row: what comes of them has neither corner nor jump."""
+
+
+def reach(width: int) -> int:
+    """Frames to either side that :func:`blurred` looks at."""
+    return _PASSES * width
+
+
+def blurred(values: Floats, width: int, *, cyclic: bool = False) -> Floats:
+    """Means (frames, …) over neighbouring frames, three in a row: nearly a bell.
+
+    Args:
+        values: (frames, …)
+        width: frames to either side of each mean.
+        cyclic: whether the last frame is the first again.
+    """
+    result = values
+    for _ in range(_PASSES):
+        around = _around(result, width, cyclic=cyclic)
+        sums = np.concatenate([np.zeros_like(around[:1]), np.cumsum(around, axis=0)])
+        result = (sums[2 * width + 1 :] - sums[: -2 * width - 1]) / (2 * width + 1)
+    return result
+
+
+def widened(values: Floats, frames: int, *, cyclic: bool = False) -> Floats:
+    """The greatest value (frames, …) within so many frames to either side."""
+    around = _around(values, frames, cyclic=cyclic)
+    done, wanted = 1, 2 * frames + 1
+    while done < wanted:
+        step = min(done, wanted - done)
+        around = np.maximum(around[:-step], around[step:])
+        done += step
+    return around
+
+
+def covered(values: Floats, width: int, *, cyclic: bool = False) -> Floats:
+    """A smooth course (frames, …) that is nowhere below the values."""
+    return blurred(widened(values, reach(width), cyclic=cyclic), width, cyclic=cyclic)
+
+
+def _around(values: Floats, frames: int, *, cyclic: bool) -> Floats:
+    """The same with so many frames more at either end."""
+    count = len(values)
+    numbers = np.arange(-frames, count + frames)
+    if cyclic and count > 1:
+        return values[numbers % (count - 1)]
+    return values[np.clip(numbers, 0, count - 1)]

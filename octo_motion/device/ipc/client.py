@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's end of the bridge: start it, talk to it, notice when it is gone.
+
+Nothing here waits, but for the start. Call ``poll`` often, at each tick of a modal operator or a
+timer; it takes microseconds when nothing has come.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import IO, Final
+
+from ...core.errors import DeviceError
+from ...core.posing.puppet.figure import Figure, Pose
+from ...core.posing.solver.obstacles import Obstacle
+from ..calibration import Phase
+from .channel import ChannelClosedError
+from .messages import (
+    Button,
+    Calibrate,
+    CalibrationMessage,
+    DeviceMessage,
+    FigureMessage,
+    Goodbye,
+    Hello,
+    Message,
+    Notice,
+    ObstacleMessage,
+    Order,
+    Pins,
+    Place,
+    PointerMessage,
+    PoseMessage,
+    Times,
+)
+from .process import Child
+
+_MOST_WAITING: Final = 100_000_000
+"""Bytes: a scene's meshes are sent at one go, two dozen of the largest."""
+
+
+_SILENT: Final = 5.0
+"""s; it speaks once a second at least."""
+
+
+class State(Enum):
+    """Whether there is a bridge."""
+
+    OFF = "off"
+    RUNNING = "running"
+    LOST = "lost"
+    """It ended without having been stopped; what it last said is kept. Offer to start it again."""
+
+
+@dataclass
+class Client:
+    """The bridge as Blender sees it; what it says is kept here, the newest of each kind."""
+
+    state: State = State.OFF
+    pose: Pose | None = None
+    """The newest; stays when the bridge is lost."""
+    steps: int = 0
+    """Of the simulation when ``pose`` was true."""
+    devices: dict[int, DeviceMessage] = field(default_factory=dict[int, DeviceMessage])
+    """By pointer: those that are there."""
+    lost_devices: int = 0
+    """How often a device has gone since the start; what it held was let go."""
+    pointers: dict[int, PointerMessage] = field(default_factory=dict[int, PointerMessage])
+    calibrating: dict[int, CalibrationMessage] = field(
+        default_factory=dict[int, CalibrationMessage]
+    )
+    """By pointer: what has been learned so far, of devices that are being calibrated."""
+    calibrated: dict[int, CalibrationMessage] = field(default_factory=dict[int, CalibrationMessage])
+    """By pointer: what was learned, to be kept, then cleared, by the caller."""
+    times: Times | None = None
+    hello: Hello | None = None
+    notices: list[Notice] = field(default_factory=list[Notice])
+    """To be shown, then cleared, by the caller."""
+    heard: float = 0.0
+    """``time.monotonic`` of the last word."""
+    _placed: int = 0
+    """How often the bridge was told where the puppet is."""
+    _child: Child | None = None
+    _arguments: tuple[str, ...] = ()
+    _python: Path | None = None
+    _figure: tuple[Figure, Pose] | None = None
+    _pins: dict[int, bool] = field(default_factory=dict[int, bool])
+
+    def start(
+        self,
+        arguments: Sequence[str] = (),
+        python: Path | None = None,
+        log_to: IO[bytes] | None = None,
+    ) -> None:
+        """Start the bridge; one that runs is stopped first.
+
+        Args:
+            arguments: Options of ``python -m octo_motion.device bridge``.
+            python: Executable; None finds Blender's own.
+            log_to: Open file for the bridge's messages; None: Blender's console.
+
+        Raises:
+            DeviceError: it cannot be started.
+        """
+        self.stop()
+        self._arguments, self._python = tuple(arguments), python
+        self._forget_devices()
+        self.times = self.hello = None
+        self.lost_devices = self._placed = 0
+        self._child = Child.start(("bridge", *arguments), python, log_to)
+        self._child.channel.most_waiting = _MOST_WAITING
+        self.state = State.RUNNING
+        self.heard = time.monotonic()
+
+    def restart(self) -> None:
+        """Start a lost bridge again, with the figure it had, in its last pose.
+
+        Raises:
+            DeviceError: it cannot be started, and stays lost.
+        """
+        try:
+            self.start(self._arguments, self._python)
+        except DeviceError:
+            self.state = State.LOST
+            raise
+        if self._figure is not None:
+            figure, pose = self._figure
+            self.send_figure(figure, self.pose or pose)
+            self.send_pins(self._pins)
+
+    def stop(self) -> None:
+        """End the bridge, if there is one; hands let go at once."""
+        child, self._child = self._child, None
+        if child is not None:
+            if child.running:
+                with contextlib.suppress(ChannelClosedError):
+                    child.channel.send(Goodbye())
+            child.stop()
+        self.state = State.OFF
+
+    def send(self, message: Message) -> None:
+        """Say something to the bridge; without one, nothing happens."""
+        if self._child is None:
+            return
+        self._placed += isinstance(message, Place)
+        try:
+            self._child.channel.send(message)
+        except ChannelClosedError:
+            self._lose()
+
+    def send_figure(self, figure: Figure, pose: Pose) -> None:
+        """Simulate this puppet from now on, standing like this."""
+        self._figure = (figure, pose)
+        self.pose = pose
+        self.steps = 0
+        self.send(FigureMessage.of(figure))
+        self.send(Place(pose.positions, pose.orientations))
+
+    def send_pose(self, pose: Pose) -> None:
+        """Put the puppet into a pose, at rest; hands let go."""
+        self.pose = pose
+        self.send(Place(pose.positions, pose.orientations))
+
+    def send_pins(self, pins: dict[int, bool]) -> None:
+        """Pin these bodies where they are, and no others.
+
+        Args:
+            pins: By body, whether its orientation is held as well.
+        """
+        self._pins = dict(pins)
+        count = len(self._figure[0]) if self._figure else 0
+        self.send(Pins(tuple(1 + pins[body] if body in pins else 0 for body in range(count))))
+
+    def send_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
+        """Add or move something solid; None takes it away."""
+        self.send(ObstacleMessage.of(number, obstacle))
+
+    def poll(self) -> list[Button]:
+        """Take in all that the bridge has said.
+
+        Returns:
+            Buttons of devices that were pressed or let go, in order.
+        """
+        buttons: list[Button] = []
+        if self._child is None:
+            return buttons
+        try:
+            messages = self._child.channel.receive()
+        except ChannelClosedError:
+            self._lose()
+            return buttons
+        for message in messages:
+            self.heard = time.monotonic()
+            match message:
+                case PoseMessage() if message.placed == self._placed:
+                    self.pose = Pose(message.positions, message.orientations)
+                    self.steps = message.step
+                case PointerMessage():
+                    self.pointers[message.pointer] = message
+                case DeviceMessage():
+                    self._hear_device(message)
+                case Button():
+                    buttons.append(message)
+                case Times():
+                    self.times = message
+                case CalibrationMessage():
+                    self._hear_calibration(message)
+                case Hello():
+                    self.hello = message
+                case Notice():
+                    self.notices.append(message)
+                case _:
+                    pass
+        return buttons
+
+    def calibrate(self, pointer: int, order: Order) -> None:
+        """Begin to learn a device's zero and range, finish, or give it up."""
+        self.send(Calibrate(pointer, order))
+
+    def _hear_calibration(self, message: CalibrationMessage) -> None:
+        if message.phase in {Phase.REST, Phase.REACH}:
+            self.calibrating[message.pointer] = message
+            return
+        self.calibrating.pop(message.pointer, None)  # finished, or given up
+        if message.phase == Phase.DONE:
+            self.calibrated[message.pointer] = message
+
+    def _hear_device(self, message: DeviceMessage) -> None:
+        if message.present:
+            self.devices[message.pointer] = message
+        else:
+            self.lost_devices += 1
+            self.devices.pop(message.pointer, None)
+            self.pointers.pop(message.pointer, None)
+            self.calibrating.pop(message.pointer, None)
+
+    def _forget_devices(self) -> None:
+        for each in (self.devices, self.pointers, self.calibrating, self.calibrated):
+            each.clear()
+
+    def _lose(self) -> None:
+        """The bridge is gone: say so, and keep what it last said."""
+        child, self._child = self._child, None
+        if child is not None:
+            child.stop(0.0)
+        self.state = State.LOST
+        self._forget_devices()
+        self.notices.append(
+            Notice(
+                "The program between Blender and the device has ended.",
+                "The pose and all keys are kept; start it again to go on.",
+            )
+        )
+
+    @property
+    def silent(self) -> bool:
+        """Whether a bridge that runs has not said a word for long: it hangs, or gave up."""
+        return self.state is State.RUNNING and time.monotonic() - self.heard > _SILENT
+
+    @property
+    def process_id(self) -> int | None:
+        """Of the bridge, for tests and the curious."""
+        return self._child.process_id if self._child else None

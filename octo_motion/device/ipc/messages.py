@@ -1,0 +1,604 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender, the bridge and the loop at the device say to each other.
+
+A message is a header (magic, version, kind, length of what follows) and fields of fixed layout;
+docs/device.md has the table. Whoever reads one gets a frozen object or a ``MessageError``.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Annotated, ClassVar, Final, Self, TypedDict, get_args, get_type_hints
+
+import numpy as np
+
+from ...core.errors import DeviceError, OctoMotionError
+from ...core.posing.puppet.figure import Elements, Figure, Limits
+from ...core.posing.solver.obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
+from ...core.posing.solver.world import WorldSettings
+from ...core.rotations import Floats
+from ..calibration import Calibration, Phase
+from ..haptics.local_model import Held, Pull
+from ..hid.response import Axes, Response
+from ..spatial import IDENTITY, ZERO, Quaternion, Vector, unit
+from .codec import (
+    F64,
+    FLAG,
+    I32,
+    QUATERNION,
+    SIX,
+    U8,
+    U16,
+    U32,
+    VECTOR,
+    Many,
+    MessageError,
+    Number,
+    Record,
+    Table,
+    Text,
+)
+
+VERSION: Final = 2
+MAGIC: Final = b"OMDV"
+HEADER: Final = struct.Struct("<4sHHI")
+MOST_BYTES: Final = 4_000_000
+"""Of one message: a figure of 4096 bodies needs 2 MB, a mesh of 50,000 triangles 3.6 MB."""
+MOST_POINTS: Final = 150_000
+
+
+@dataclass(frozen=True)
+class Message:
+    """What all messages have in common."""
+
+    KIND: ClassVar[int]
+    _record: ClassVar[Record]
+    _names: ClassVar[tuple[str, ...]]
+
+
+# --- Blender and the bridge ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Hello(Message):
+    """The bridge's first word: who it is, and how well it may keep time."""
+
+    KIND = 1
+    process: Annotated[int, U32]
+    python: Annotated[str, Text(64)]
+    priority: Annotated[str, Text(32)]
+    """Of the loop at the device: real-time, raised or normal."""
+
+
+@dataclass(frozen=True, eq=False)
+class FigureMessage(Message):
+    """The puppet; ends what was simulated before."""
+
+    KIND = 2
+    names: Annotated[tuple[str, ...], Many(Text(256), 4096)]
+    parents: Annotated[tuple[int, ...], Many(I32, 4096)]
+    anchors: Annotated[Floats, Table((3,))]
+    rest: Annotated[Floats, Table((4,))]
+    lengths: Annotated[Floats, Table()]
+    masses: Annotated[Floats, Table()]
+    centres: Annotated[Floats, Table((3,))]
+    inertias: Annotated[Floats, Table((3, 3))]
+    capsules: Annotated[Floats, Table((2, 3))]
+    radii: Annotated[Floats, Table()]
+    limits: Annotated[Floats, Table((3, 2))]
+    stiffness: Annotated[Floats, Table((3,))]
+    damping: Annotated[Floats, Table((3,))]
+    flow: Annotated[Floats, Table((3,))]
+    yield_torque: Annotated[Floats, Table(endless=True)]
+
+    @classmethod
+    def of(cls, figure: Figure) -> FigureMessage:
+        """The message that carries a figure."""
+        return cls(
+            *(figure.names, tuple(map(int, figure.parents)), figure.anchors, figure.rest),
+            *(figure.lengths, figure.masses, figure.centres, figure.inertias),
+            *(figure.capsules, figure.radii, figure.limits.ranges),
+            *(figure.elements.stiffness, figure.elements.damping, figure.elements.flow),
+            figure.elements.yield_torque,
+        )
+
+    def figure(self) -> Figure:
+        """The figure that came.
+
+        Raises:
+            MessageError: its arrays do not fit each other, or it is no tree.
+        """
+        count = len(self.names)
+        if len(self.parents) != count or any(
+            len(value) != count
+            for each in fields(self)
+            if isinstance(value := getattr(self, each.name), np.ndarray)
+        ):
+            raise MessageError("arrays of different lengths")
+        if any(not -1 <= parent < index for index, parent in enumerate(self.parents)):
+            raise MessageError("a parent does not come before its child")
+        if count == 0 or (self.masses <= 0.0).any() or (self.lengths <= 0.0).any():
+            raise MessageError("a body without mass or length")
+        if (self.yield_torque < 0.0).any():
+            raise MessageError("a joint that yields to less than nothing")
+        return Figure(
+            *(self.names, self.parents, self.anchors, self.rest, self.lengths, self.masses),
+            *(self.centres, self.inertias, self.capsules, self.radii),
+            Limits(self.limits),
+            Elements(self.stiffness, self.damping, self.flow, self.yield_torque),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Place(Message):
+    """Blender to bridge: the puppet is to stand like this, at rest."""
+
+    KIND = 3
+    positions: Annotated[Floats, Table((3,))]
+    orientations: Annotated[Floats, Table((4,))]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseMessage(Message):
+    """Bridge to Blender: the puppet stands like this."""
+
+    KIND = 4
+    placed: Annotated[int, U32]
+    """How often it was put into a pose: what was said before the last one is out of date."""
+    step: Annotated[int, U32]
+    time: Annotated[float, F64]
+    """s simulated since the figure came."""
+    positions: Annotated[Floats, Table((3,))]
+    orientations: Annotated[Floats, Table((4,))]
+
+
+@dataclass(frozen=True)
+class Pins(Message):
+    """Blender to bridge: which bodies stay where they are."""
+
+    KIND = 5
+    pinned: Annotated[tuple[int, ...], Many(U8, 4096)]
+    """For each body 0: free, 1: its joint stays in its place, 2: and it does not turn."""
+
+
+@dataclass(frozen=True)
+class Grab(Message):
+    """Blender to bridge: a key stands in for a device's button."""
+
+    KIND = 6
+    pointer: Annotated[int, U8]
+    grab: Annotated[bool, FLAG]
+    """False lets go."""
+
+
+@dataclass(frozen=True)
+class Settings(Message):
+    """Blender to bridge: how devices behave."""
+
+    KIND = 7
+    force: Annotated[float, F64] = 1.0
+    """0 to 1 of the force that the device can give."""
+    grab_button: Annotated[int, U8] = 0
+    """255: none."""
+    key_button: Annotated[int, U8] = 1
+    """255: none."""
+    toggle: Annotated[bool, FLAG] = False
+    """One press grabs and another lets go; else the button is held."""
+    dead_man: Annotated[bool, FLAG] = True
+    """Without a hand on a device that can tell, there is no force."""
+    reach: Annotated[float, F64] = 0.1
+    """m, how near to a body the pointer must be to grab it."""
+    speed: Annotated[float, F64] = Response.speed
+    angular_speed: Annotated[float, F64] = Response.angular_speed
+    gain: Annotated[Axes, SIX] = Response.gain
+    dead_zone: Annotated[Axes, SIX] = Response.dead_zone
+    curve: Annotated[Axes, SIX] = Response.curve
+
+    def response(self) -> Response:
+        """Of space mice.
+
+        Raises:
+            MessageError: a value is out of range.
+        """
+        try:
+            return Response(self.speed, self.angular_speed, self.gain, self.dead_zone, self.curve)
+        except DeviceError as error:
+            raise MessageError(error.problem) from error
+
+
+@dataclass(frozen=True)
+class Workspace(Message):
+    """Blender to bridge: where a device's room lies in the scene."""
+
+    KIND = 8
+    pointer: Annotated[int, U8]
+    origin: Annotated[Vector, VECTOR] = ZERO
+    """World, of the middle of the device's room."""
+    orientation: Annotated[Quaternion, QUATERNION] = IDENTITY
+    """World, of the device's axes: the view's, so that right is right."""
+    scale: Annotated[float, F64] = 1.0
+    """m in the scene for each m of the hand."""
+
+
+@dataclass(frozen=True)
+class DeviceMessage(Message):
+    """Bridge to Blender: a device came, changed or went."""
+
+    KIND = 9
+    pointer: Annotated[int, U8]
+    present: Annotated[bool, FLAG]
+    kind: Annotated[int, U8]
+    """As ``driver.Kind``."""
+    force: Annotated[float, F64]
+    """N, 0 without force."""
+    torque: Annotated[float, F64]
+    """N·m, 0 without torque."""
+    stiffness: Annotated[float, F64]
+    """N/m of the coupling, 0 without force."""
+    angular_stiffness: Annotated[float, F64]
+    """N·m/rad of the coupling."""
+    name: Annotated[str, Text(128)]
+    identity: Annotated[str, Text(400)]
+    """The same for the same device next time."""
+    buttons: Annotated[tuple[str, ...], Many(Text(64), 64)]
+
+
+@dataclass(frozen=True)
+class PointerMessage(Message):
+    """Bridge to Blender, as often as poses: where a pointer is and what it feels."""
+
+    KIND = 10
+    pointer: Annotated[int, U8]
+    body: Annotated[int, I32]
+    """Held, −1: none."""
+    position: Annotated[Vector, VECTOR]
+    """World, of the device."""
+    orientation: Annotated[Quaternion, QUATERNION]
+    coupled_position: Annotated[Vector, VECTOR]
+    """World, of the point that is held; the device's own where nothing is."""
+    coupled_orientation: Annotated[Quaternion, QUATERNION]
+    force: Annotated[Vector, VECTOR]
+    """N on the hand, device axes."""
+    torque: Annotated[Vector, VECTOR]
+    buttons: Annotated[int, U32]
+
+
+@dataclass(frozen=True)
+class Button(Message):
+    """Bridge to Blender: a device's button was pressed or let go."""
+
+    KIND = 11
+    pointer: Annotated[int, U8]
+    button: Annotated[int, U8]
+    pressed: Annotated[bool, FLAG]
+
+
+@dataclass(frozen=True)
+class Times(Message):
+    """Bridge to Blender, once a second: how well time is kept."""
+
+    KIND = 12
+    rate: Annotated[float, F64]
+    """Hz of the loop at the device."""
+    late: Annotated[tuple[float, ...], Number("d", 4)]
+    """s at 50, 99, 99.9 % and the longest."""
+    computing: Annotated[tuple[float, ...], Number("d", 4)]
+    missed: Annotated[int, U32]
+    step: Annotated[float, F64]
+    """s that a step of the simulation takes to compute."""
+    pace: Annotated[float, F64]
+    """Simulated against real time; 1 keeps up."""
+    lag: Annotated[float, F64]
+    """s from what a hand that holds something does to the pose that follows from it."""
+
+
+@dataclass(frozen=True)
+class Notice(Message):
+    """Bridge to Blender: something to tell the user."""
+
+    KIND = 13
+    problem: Annotated[str, Text(1000)]
+    remedy: Annotated[str, Text(1000)]
+
+
+@dataclass(frozen=True)
+class Goodbye(Message):
+    """Either way: this ends."""
+
+    KIND = 14
+
+
+@dataclass(frozen=True)
+class Buzz(Message):
+    """Blender to bridge: let a device push gently, a moment each way."""
+
+    KIND = 15
+    pointer: Annotated[int, U8]
+
+
+@dataclass(frozen=True)
+class WorldMessage(Message):
+    """Blender to bridge: what holds for the whole simulation, see ``WorldSettings``."""
+
+    KIND = 16
+    step: Annotated[float, F64] = 2e-3
+    gravity: Annotated[Vector, VECTOR] = ZERO
+    self_collision: Annotated[bool, FLAG] = False
+    friction: Annotated[float, F64] = 0.6
+    drag: Annotated[float, F64] = 0.0
+
+    def settings(self) -> WorldSettings:
+        """The settings that came.
+
+        Raises:
+            MessageError: a value is out of range.
+        """
+        if not 1e-4 <= self.step <= 0.02 or self.friction < 0.0 or self.drag < 0.0:
+            raise MessageError("settings of the world that cannot be")
+        return WorldSettings(
+            step=self.step,
+            gravity=self.gravity,
+            self_collision=self.self_collision,
+            friction=self.friction,
+            drag=self.drag,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ObstacleMessage(Message):
+    """Blender to bridge: something that the puppet can touch, new or elsewhere."""
+
+    KIND = 17
+    number: Annotated[int, U16]
+    """The sender's; the same number replaces."""
+    shape: Annotated[int, U8]
+    """0: gone; 1 plane, 2 sphere, 3 capsule, 4 box, 5 convex hull, 6 mesh."""
+    position: Annotated[Vector, VECTOR]
+    orientation: Annotated[Quaternion, QUATERNION]
+    velocity: Annotated[Vector, VECTOR]
+    angular_velocity: Annotated[Vector, VECTOR]
+    friction: Annotated[float, F64]
+    """−1: the world's."""
+    size: Annotated[float, F64]
+    """Radius of sphere and capsule, thickness of a mesh."""
+    points: Annotated[Floats, Table((3,), MOST_POINTS)]
+    """Ends of a capsule, half sizes of a box, three corners for each triangle; own frame."""
+
+    @classmethod
+    def of(cls, number: int, obstacle: Obstacle | None) -> ObstacleMessage:
+        """The message that carries an obstacle; None takes it away."""
+        if obstacle is None:
+            none = np.zeros((0, 3))
+            return cls(number, 0, ZERO, IDENTITY, ZERO, ZERO, -1.0, 0.0, none)
+        size, points = 0.0, np.zeros((0, 3))
+        match obstacle:
+            case Plane():
+                shape = 1
+            case Sphere():
+                shape, size = 2, obstacle.radius
+            case Capsule():
+                shape, size, points = 3, obstacle.radius, obstacle.ends
+            case Box():
+                shape, points = 4, obstacle.half[None]
+            case Hull():
+                shape, points = 5, obstacle.corners.reshape(-1, 3)
+            case Mesh():
+                shape, size = 6, obstacle.thickness
+                points = obstacle.corners.reshape(-1, 3)
+            case _:
+                raise MessageError(f"no message carries a {type(obstacle).__name__}")
+        return cls(
+            *(number, shape, tuple(obstacle.position), tuple(obstacle.orientation)),
+            *(tuple(obstacle.velocity), tuple(obstacle.angular_velocity)),
+            -1.0 if obstacle.friction is None else obstacle.friction,
+            *(size, points),
+        )
+
+    def obstacle(self) -> Obstacle | None:
+        """The obstacle that came; None: it is gone.
+
+        Raises:
+            MessageError: it makes no sense.
+        """
+        turn = unit(self.orientation)
+        if turn is None or self.size < 0.0:
+            raise MessageError("an obstacle that cannot be")
+        place = _Placed(
+            position=np.array(self.position),
+            orientation=np.array(turn),
+            velocity=np.array(self.velocity),
+            angular_velocity=np.array(self.angular_velocity),
+            friction=None if self.friction < 0.0 else self.friction,
+        )
+        count = len(self.points)
+        wanted = {0: 0, 1: 0, 2: 0, 3: 2, 4: 1}.get(self.shape, count)
+        if count != wanted or (self.shape >= 5 and (count == 0 or count % 3)):
+            raise MessageError("an obstacle with a wrong number of points")
+        try:
+            match self.shape:
+                case 0:
+                    return None
+                case 1:
+                    return Plane(**place)
+                case 2:
+                    return Sphere(**place, radius=self.size)
+                case 3:
+                    return Capsule(**place, ends=self.points, radius=self.size)
+                case 4:
+                    return Box(**place, half=np.abs(self.points[0]))
+                case 5:
+                    return Hull(**place, corners=self.points.reshape(-1, 3, 3))
+                case 6:
+                    corners = self.points.reshape(-1, 3, 3)
+                    return Mesh(**place, corners=corners, thickness=self.size)
+        except OctoMotionError as error:
+            raise MessageError(error.problem) from error
+        raise MessageError(f"an obstacle of shape {self.shape}")
+
+
+class _Placed(TypedDict):
+    position: Floats
+    orientation: Floats
+    velocity: Floats
+    angular_velocity: Floats
+    friction: float | None
+
+
+class Order(IntEnum):
+    """What is to be done about a device's calibration."""
+
+    CANCEL = 0
+    BEGIN = 1
+    FINISH = 2
+
+
+@dataclass(frozen=True)
+class Calibrate(Message):
+    """Blender to bridge: learn a device's zero and range, or stop learning."""
+
+    KIND = 18
+    pointer: Annotated[int, U8]
+    order: Annotated[int, U8]
+    """As ``Order``."""
+
+
+@dataclass(frozen=True)
+class CalibrationMessage(Message):
+    """Either way: a device's zero and range, to be used or as far as they are learned."""
+
+    KIND = 19
+    pointer: Annotated[int, U8]
+    phase: Annotated[int, U8]
+    """As ``calibration.Phase``; to the bridge: done."""
+    rest: Annotated[Axes, SIX]
+    least: Annotated[Axes, SIX]
+    most: Annotated[Axes, SIX]
+
+    @classmethod
+    def of(cls, pointer: int, calibration: Calibration, phase: Phase = Phase.DONE) -> Self:
+        """The message that carries a calibration."""
+        return cls(pointer, phase, calibration.rest, calibration.least, calibration.most)
+
+    def calibration(self) -> Calibration:
+        """The calibration that came.
+
+        Raises:
+            MessageError: it makes no sense.
+        """
+        try:
+            return Calibration(self.rest, self.least, self.most)
+        except DeviceError as error:
+            raise MessageError(error.problem) from error
+
+
+# --- The bridge and the loop at the device -------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class HandMessage(Message):
+    """Loop to bridge, each tick: what a hand does."""
+
+    KIND = 20
+    pointer: Annotated[int, U8]
+    time: Annotated[float, F64]
+    grab: Annotated[int, U32]
+    """Counts grabs; 0 while nothing is wanted."""
+    position: Annotated[Vector, VECTOR]
+    orientation: Annotated[Quaternion, QUATERNION]
+    velocity: Annotated[Vector, VECTOR]
+    angular_velocity: Annotated[Vector, VECTOR]
+    force: Annotated[Vector, VECTOR]
+    torque: Annotated[Vector, VECTOR]
+    buttons: Annotated[int, U32]
+
+
+@dataclass(frozen=True)
+class HeldMessage(Message):
+    """Bridge to loop, each step: where the held body is."""
+
+    KIND = 21
+    pointer: Annotated[int, U8]
+    grab: Annotated[int, U32]
+    """Which grab this answers."""
+    held: Annotated[bool, FLAG]
+    """False: there was nothing near, or it was let go."""
+    time: Annotated[float, F64]
+    """When this was true, by ``time.perf_counter``."""
+    holds: Annotated[float, F64]
+    """s for which the next word is not expected: so long does the local model do instead."""
+    position: Annotated[Vector, VECTOR]
+    orientation: Annotated[Quaternion, QUATERNION]
+    velocity: Annotated[Vector, VECTOR]
+    angular_velocity: Annotated[Vector, VECTOR]
+    pull: Annotated[tuple[float, ...], SIX]
+    force: Annotated[Vector, VECTOR]
+    torque: Annotated[Vector, VECTOR]
+
+    def body(self) -> Held:
+        """As the local model takes it."""
+        return Held(
+            *(self.position, self.orientation, self.velocity, self.angular_velocity),
+            *(Pull(*self.pull), self.force, self.torque),
+        )
+
+
+@dataclass(frozen=True)
+class LoopTimesMessage(Message):
+    """Loop to bridge, once a second."""
+
+    KIND = 22
+    rate: Annotated[float, F64]
+    late: Annotated[tuple[float, ...], Number("d", 4)]
+    computing: Annotated[tuple[float, ...], Number("d", 4)]
+    missed: Annotated[int, U32]
+
+
+def _kinds() -> dict[int, type[Message]]:
+    kinds: dict[int, type[Message]] = {}
+    for kind in Message.__subclasses__():
+        hints = get_type_hints(kind, include_extras=True)
+        kind._names = tuple(each.name for each in fields(kind))  # noqa: SLF001 - ours
+        codecs = tuple(get_args(hints[name])[1] for name in kind._names)  # noqa: SLF001
+        kind._record = Record(codecs)  # noqa: SLF001
+        kinds[kind.KIND] = kind
+    return kinds
+
+
+KINDS: Final = _kinds()
+
+
+def pack(message: Message) -> bytes:
+    """A message with its header."""
+    values = tuple(getattr(message, name) for name in message._names)  # noqa: SLF001 - ours
+    body = message._record.pack(values)  # noqa: SLF001
+    return HEADER.pack(MAGIC, VERSION, message.KIND, len(body)) + body
+
+
+def read_header(data: bytes) -> tuple[int, int]:
+    """Kind of a message, and how many bytes follow its header.
+
+    Raises:
+        MessageError: no header of ours, another version, an unknown kind, or too long.
+    """
+    magic, version, kind, length = HEADER.unpack(data)
+    if magic != MAGIC:
+        raise MessageError("not one of our messages")
+    if version != VERSION:
+        raise MessageError(f"version {version} of the messages, not {VERSION}")
+    if kind not in KINDS:
+        raise MessageError(f"an unknown kind of message, {kind}")
+    if length > MOST_BYTES:
+        raise MessageError("a message is too long")
+    return kind, length
+
+
+def read_body(kind: int, body: bytes) -> Message:
+    """The message of a kind whose bytes these are.
+
+    Raises:
+        MessageError: they are not.
+    """
+    values = KINDS[kind]._record.unpack(body)  # noqa: SLF001 - ours
+    return KINDS[kind](*values)

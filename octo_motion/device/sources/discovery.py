@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finding devices as they come, and opening them.
+
+Listing what is plugged in takes milliseconds, on Windows much longer; a device that does not answer
+takes seconds, and so does a service that listens and says nothing. None of that may keep the loop
+from the devices that are there: it is done on a thread of its own, one look at a time, and not
+begun while a hand holds something.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Final
+
+from ...core.errors import DeviceError
+from ..driver import DeviceLostError, Driver
+from ..hid import system
+from ..hid.force_device import ForceDevice, is_force_device
+from ..hid.response import Response
+from ..hid.space_mouse import SpaceMouse, is_space_mouse
+from .haply import PORT as HAPLY_PORT
+from .haply import Haply
+from .network import Port
+from .simulated_hand import SimulatedHand
+
+log = logging.getLogger(__name__)
+
+_EVERY: Final = 0.5
+"""s between two looks at what is plugged in, where looking is cheap."""
+_EVERY_COSTLY: Final = 2.0
+"""s, where it is not."""
+_SETTLES: Final = 1.5
+"""s that the system may take to let us read what was just plugged in; then the user is told."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Where to look for devices."""
+
+    hid: bool = True
+    haply: bool = True
+    haply_port: int = HAPLY_PORT
+    simulated: bool = False
+    network: tuple[str, int] | None = None
+    """udp or tcp, and the port's number."""
+    key: bytes = b""
+    """Of the network's packets."""
+
+
+class Discovery:
+    """Looks for devices as long as it is asked to; never waits."""
+
+    def __init__(self, sources: Sources) -> None:
+        self._port = Port(*sources.network, sources.key) if sources.network else None
+        self._simulated = sources.simulated
+        self._search = _Search(sources) if sources.hid or sources.haply else None
+        self.problems: list[DeviceError] = []
+        """What the user should be told; each once."""
+
+    def look(self) -> Iterator[Driver]:
+        """The devices that have come since the last look, opened."""
+        if self._simulated:
+            self._simulated = False
+            yield SimulatedHand()
+        if self._port is not None:
+            device = self._port.device()
+            if device is not None:
+                yield device
+        if self._search is not None:
+            self._search.ask()
+            while self._search.problems:
+                self.problems.append(self._search.problems.popleft())
+            while self._search.drivers:
+                yield self._search.drivers.popleft()
+
+    def lost(self, identity: str) -> None:
+        """A device that was opened is gone; it may come again."""
+        if self._search is not None:
+            self._search.gone.append(identity)
+
+    def close(self) -> None:
+        """Look no more."""
+        if self._port is not None:
+            self._port.close()
+        if self._search is not None:
+            self._search.close()
+
+
+class _Search:
+    """The thread that looks; knows which devices are in use, and which could not be opened.
+
+    It and the loop talk through the queues alone.
+    """
+
+    def __init__(self, sources: Sources) -> None:
+        self.drivers: deque[Driver] = deque()
+        """Opened, to be taken by the loop."""
+        self.problems: deque[DeviceError] = deque()
+        self.gone: deque[str] = deque()
+        """Identities of devices that the loop has lost."""
+        self._sources = sources
+        self._used: dict[str, bytes] = {}
+        """By identity, the paths of devices that are open."""
+        self._refused: dict[str, float] = {}
+        """By identity, since when a device could not be opened."""
+        self._told: set[str] = set()
+        self._seen: object = object()
+        self._looked = self._looked_for_haply = -_EVERY_COSTLY
+        self._asked = threading.Event()
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def ask(self) -> None:
+        """Ask for one more look; where one is under way, it must do."""
+        if self._thread.ident is None:
+            self._thread.start()
+        self._asked.set()
+
+    def close(self) -> None:
+        """Look no more; what was found and not taken is closed."""
+        self._closed = True
+        self._asked.set()
+        while self.drivers:
+            self.drivers.popleft().close()
+
+    def _run(self) -> None:
+        # One thread for all looks: on a Mac hidapi hears of new devices on the first one's alone.
+        while self._asked.wait() and not self._closed:
+            self._asked.clear()
+            try:
+                self._look()
+            except Exception:
+                log.exception("Looking for devices failed")
+                time.sleep(_EVERY_COSTLY)
+
+    def _look(self) -> None:
+        now = time.monotonic()
+        while self.gone:
+            self._used.pop(self.gone.popleft(), None)
+            self._seen = object()
+        if self._sources.haply and "haply" not in self._used:
+            self._look_for_haply(now)
+        if self._sources.hid:
+            self._look_for_hid(now)
+
+    def _found(self, identity: str, path: bytes, driver: Driver) -> None:
+        self._used[identity] = path
+        self._refused.pop(identity, None)
+        self._told.discard(identity)
+        self.drivers.append(driver)
+        if self._closed:  # meanwhile: whoever closed has not seen this one
+            with suppress(IndexError, DeviceLostError):
+                self.drivers.popleft().close()
+
+    def _look_for_haply(self, now: float) -> None:
+        if now - self._looked_for_haply < _EVERY_COSTLY:
+            return
+        self._looked_for_haply = now
+        try:
+            device = Haply.open(self._sources.haply_port)
+        except DeviceError as error:
+            self._refuse("haply", error, now, at_once=True)
+            return
+        if device is not None:
+            self._found("haply", b"", device)
+
+    def _look_for_hid(self, now: float) -> None:
+        cheap = system.fingerprint()
+        if now - self._looked < (_EVERY_COSTLY if cheap is None else _EVERY):
+            return
+        self._looked = now
+        if cheap is not None and cheap == self._seen and not self._refused.keys() - {"haply"}:
+            return
+        self._seen = cheap
+        try:
+            listed = system.list_devices()
+        except DeviceError as error:
+            self._refuse("hidapi", error, now, at_once=True)
+            return
+        except OSError as error:
+            log.warning("Devices cannot be listed: %s", error)
+            return
+        twins = [replace(each, twin=True) for each in listed]
+        self._forget_refused({each.identity for each in (*listed, *twins)} | {"haply"})
+        paths = {each.path for each in listed}
+        for each in listed:
+            if each.path in self._used.values():
+                continue
+            found = each
+            in_use = self._used.get(each.identity)
+            if in_use is not None:
+                if in_use not in paths:
+                    continue  # the same device, plugged in again before its loss was noticed
+                found = replace(each, twin=True)
+            driver = self._open(found, now)
+            if driver is not None:
+                self._found(found.identity, found.path, driver)
+
+    def _open(self, found: system.Found, now: float) -> Driver | None:
+        try:
+            if is_force_device(found):
+                return ForceDevice.open(found)
+            if is_space_mouse(found):
+                return SpaceMouse.open(found, Response())
+        except DeviceError as error:
+            self._refuse(found.identity, error, now)
+        return None
+
+    def _refuse(
+        self, identity: str, error: DeviceError, now: float, *, at_once: bool = False
+    ) -> None:
+        since = self._refused.setdefault(identity, now)
+        if identity not in self._told and (at_once or now - since >= _SETTLES):
+            self._told.add(identity)
+            self.problems.append(error)
+            log.warning("%s", error)
+
+    def _forget_refused(self, there: set[str]) -> None:
+        """Of what was pulled out; plugged in again it is told anew."""
+        for identity in self._refused.keys() - there:
+            del self._refused[identity]
+            self._told.discard(identity)

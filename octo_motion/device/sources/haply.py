@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Driver of Haply's Inverse3 through the maker's service on this computer.
+
+After the service's published messages (docs.haply.co, Inverse SDK 3.5: "WebSocket Protocol",
+"Simulation Channel", "Device Configuration", "HTTP"): a WebSocket at port 10001; the service sends
+one inventory, then exactly one state for each message that it gets. So a message is sent for each
+state that came. Its default axes are Blender's: X right, Y forward, Z up; metres and newtons. The
+first message names the session and its axes, the first one to a device says where to count from.
+What its version is, the service says by HTTP: at the same port, before 3.5 at the one below.
+
+The Inverse3 gives force alone. Orientation and buttons are those of the grip.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import re
+import time
+from math import isfinite
+from typing import Any, Final
+
+from ...core.errors import DeviceError
+from ..driver import Description, DeviceLostError, Dynamics, Kind, Sample
+from ..spatial import IDENTITY, ZERO, Quaternion, Vector, subtract, unit
+from .websocket import WebSocket, WebSocketError
+
+HOST: Final = "127.0.0.1"
+PORT: Final = 10001
+OLDEST, TOO_NEW = (3, 1), (4, 0)
+_CONFIGURABLE: Final = (3, 5)
+"""From here on a session can be given a name and axes."""
+_ANSWER_SECONDS: Final = 0.02
+"""After so long without an answer the next message is sent all the same."""
+_LOST_SECONDS: Final = 0.5
+_BUTTONS: Final = ("a", "b", "c")
+_FARTHEST: Final = 10.0
+_FASTEST: Final = 1000.0
+"""m, m/s: no hand is."""
+
+_MIDDLE: Final[Vector] = (0.0, -0.14, 0.15)
+"""m: about the middle of the reach, where a service before 3.5 cannot be asked to count from it."""
+
+INVERSE3: Final = Dynamics(force=8.0, damping=0.3, delay=0.001, resolution=1e-5)
+"""Cautious guesses: the service tells none of these. What they leave open is the passivity
+controller's business."""
+
+
+def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] | None:
+    """Version of the service that runs here; None where none does.
+
+    Raises:
+        DeviceError: it is too old or too new.
+    """
+    told = (_told_version(each, seconds) for each in (port, port - 1))
+    found = next((each for each in told if each is not None), None)
+    if found is None:
+        return None
+    version = (int(found[1]), int(found[2]))
+    if not OLDEST <= version < TOO_NEW:
+        raise DeviceError(
+            f"The Haply service has version {found[0]}, which Octo Motion does not speak.",
+            "Install a version from 3.1 on and before 4 with the Haply Hub.",
+        )
+    return version
+
+
+def _told_version(port: int, seconds: float) -> re.Match[str] | None:
+    """What whoever listens at a port says of its version."""
+    connection = http.client.HTTPConnection(HOST, port, timeout=seconds)
+    try:
+        connection.request("GET", "/version")
+        answer = connection.getresponse()
+        data: Any = json.loads(answer.read(65536)) if answer.status == 200 else None
+    except (OSError, http.client.HTTPException, ValueError, OverflowError):
+        return None
+    finally:
+        connection.close()
+    data = data.get("data", data) if isinstance(data, dict) else {}
+    if not isinstance(data, dict):
+        return None
+    return re.search(r"(\d+)\.(\d+)", str(data.get("git_tag") or data.get("git_describe") or ""))
+
+
+class Haply:
+    """One Inverse3, and the grip on it where there is one."""
+
+    def __init__(self, socket: WebSocket, version: tuple[int, int]) -> None:
+        self._socket: WebSocket | None = socket
+        self._version = version
+        self._device = ""
+        self._greeted = self._centred = version < _CONFIGURABLE
+        self._asked = 0.0
+        self._answered = self._told = time.perf_counter()
+        self._force: Vector = ZERO
+        self._description = Description(
+            name="Haply Inverse3",
+            identity="haply",
+            kind=Kind.POSE,
+            buttons=("A", "B", "C"),
+            dynamics=INVERSE3,
+        )
+
+    @classmethod
+    def open(cls, port: int = PORT) -> Haply | None:
+        """The service's device; None where no service runs.
+
+        Raises:
+            DeviceError: the service is too old or too new.
+        """
+        version = service_version(port)
+        if version is None:
+            return None
+        try:
+            return cls(WebSocket.connect(HOST, port), version)
+        except WebSocketError:
+            return None
+
+    @property
+    def description(self) -> Description:
+        """Who it is."""
+        return self._description
+
+    def read(self) -> Sample | None:
+        """The newest state.
+
+        Raises:
+            DeviceLostError: service or device are gone.
+        """
+        if self._socket is None:
+            raise DeviceLostError(self._description.name)
+        try:
+            texts = self._socket.receive()
+        except WebSocketError as error:
+            raise DeviceLostError(self._description.name) from error
+        now = time.perf_counter()
+        if not texts:
+            if now - self._answered > _LOST_SECONDS:
+                raise DeviceLostError(self._description.name)
+            return None
+        self._answered, self._asked = now, 0.0
+        state = parse(texts[-1], self._device)
+        if state is None:
+            if not self._device:
+                self._say({})  # no device yet: ask again
+            elif now - self._told > _LOST_SECONDS:
+                raise DeviceLostError(self._description.name)  # pulled out; the service goes on
+            return None
+        self._told = now
+        self._device, sample = state
+        if self._version < _CONFIGURABLE:
+            sample = sample._replace(position=subtract(sample.position, _MIDDLE))
+        return sample._replace(time=now)
+
+    def send(self, force: Vector, torque: Vector) -> None:  # noqa: ARG002 - it has no torque
+        """Ask for a force; sent once the service has answered the message before.
+
+        Raises:
+            DeviceLostError: the service is gone.
+        """
+        if self._socket is None:
+            raise DeviceLostError(self._description.name)
+        self._force = force
+        if self._asked and time.perf_counter() - self._asked < _ANSWER_SECONDS:
+            return
+        x, y, z = force
+        device: dict[str, Any] = {
+            "device_id": self._device,
+            "commands": {"set_cursor_force": {"values": {"x": x, "y": y, "z": z}}},
+        }
+        if self._device and not self._centred:
+            self._centred = True
+            device["configure"] = {"preset": {"preset": "arm_front_centered"}}
+        self._say({"inverse3": [device]})
+
+    def _say(self, message: dict[str, Any]) -> None:
+        if not self._greeted:
+            configure = {
+                "profile": {"name": "octo-motion:posing"},
+                "basis": {"permutation": "XYZ"},
+            }
+            message = {**message, "session": {"configure": configure}}
+        self._greeted = True
+        self._asked = time.perf_counter()
+        assert self._socket is not None
+        try:
+            self._socket.send(json.dumps(message))
+        except WebSocketError as error:
+            raise DeviceLostError(self._description.name) from error
+
+    def close(self) -> None:
+        """Take force away and leave the service."""
+        if self._socket is not None:
+            self._asked = 0.0
+            try:
+                if self._device:
+                    self.send(ZERO, ZERO)
+            except DeviceLostError:
+                pass
+            self._socket.close()
+            self._socket = None
+
+
+def parse(text: str, device: str = "") -> tuple[str, Sample] | None:
+    """Device and state that a message of the service tells; None where it tells none.
+
+    Args:
+        text: JSON.
+        device: Id of the device that is wanted; else the first one.
+    """
+    try:
+        message: Any = json.loads(text)
+        entries: Any = message["inverse3"]
+        found = next(each for each in entries if not device or each["device_id"] == device)
+        state = found["state"]
+        position, velocity = _vector(state["cursor_position"]), _vector(state["cursor_velocity"])
+        status = found.get("status") or {}
+        if max(map(abs, position)) > _FARTHEST or max(map(abs, velocity)) > _FASTEST:
+            return None
+        orientation, buttons = _grip(message)
+        return str(found["device_id"])[:64], Sample(
+            *(0.0, position, orientation, velocity, ZERO, buttons),
+            # An arm that does not know where it is, or has no power, is given no force.
+            held=bool(status.get("calibrated", True) and status.get("power_supply", True)),
+        )
+    except (ValueError, KeyError, StopIteration, TypeError, AttributeError):
+        return None
+    except (RecursionError, OverflowError):  # nested too deep, a number beyond all floats
+        return None
+
+
+def _grip(message: dict[str, Any]) -> tuple[Quaternion, int]:
+    for kind in ("wireless_verse_grip", "verse_grip", "custom_verse_grip"):
+        for each in message.get(kind) or ():
+            state = each["state"]
+            turn = state.get("orientation") or {}
+            w, x, y, z = (float(turn.get(name, 0.0)) for name in "wxyz")
+            pressed = state.get("buttons") or {}
+            if "button" in state:  # the wired grip has one
+                pressed = {"a": state["button"]}
+            buttons = sum(bool(pressed.get(name)) << bit for bit, name in enumerate(_BUTTONS))
+            return unit((w, x, y, z)) or IDENTITY, buttons
+    return IDENTITY, 0
+
+
+def _vector(value: dict[str, Any]) -> Vector:
+    x, y, z = (float(value[name]) for name in "xyz")
+    if not (isfinite(x) and isfinite(y) and isfinite(z)):
+        raise ValueError("not finite")
+    return (x, y, z)

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A hand on a force device that exists in numbers alone: for tests, and for trying out.
+
+The device is a mass with viscous and dry friction that measures in steps; the hand is a spring and
+a damper towards where it wants to be, and trembles. Between two samples the force is held, and the
+mass moves on in many small steps, as a real one would: what a sampled loop does to it shows here.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ..driver import Description, Dynamics, Kind, Sample
+from ..spatial import (
+    IDENTITY,
+    ZERO,
+    Quaternion,
+    Vector,
+    add,
+    add_scaled,
+    conjugate,
+    dot,
+    from_rotation_vector,
+    length,
+    multiply,
+    scale,
+    subtract,
+    to_rotation_vector,
+    turned,
+)
+
+Wish = Callable[[float], tuple[Vector, Quaternion]]
+"""Where the hand wants to be at a time (s)."""
+
+
+def rest(_seconds: float) -> tuple[Vector, Quaternion]:
+    """A hand that stays in the middle."""
+    return ZERO, IDENTITY
+
+
+def circling(seconds: float) -> tuple[Vector, Quaternion]:
+    """A hand that draws a circle of 5 cm and turns to and fro, every 4 s."""
+    angle = 0.5 * math.pi * seconds
+    turn = from_rotation_vector((0.0, 0.6 * math.sin(angle), 0.0))
+    return (0.05 * math.cos(angle) - 0.05, 0.0, 0.05 * math.sin(angle)), turn
+
+
+@dataclass
+class Hand:
+    """Body and mechanics. Defaults: a light grip on a desktop device."""
+
+    device: Dynamics = field(
+        default_factory=lambda: Dynamics(force=8.0, torque=0.4, damping=0.5, angular_damping=0.0012)
+    )
+    mass: float = 0.15
+    """kg, of device and fingers."""
+    inertia: float = 2e-4
+    """kg·m²"""
+    stiffness: float = 60.0
+    """N/m between where the hand is and where it wants to be; 0: nobody holds the device."""
+    damping: float = 2.0
+    """N·s/m, likewise."""
+    angular_stiffness: float = 0.3
+    """N·m/rad"""
+    angular_damping: float = 0.004
+    """N·m·s/rad"""
+    tremor: float = 1e-4
+    """m, of a hand that trembles at 8 to 12 Hz."""
+    seed: int = 1
+    wish: Wish = rest
+    steps: int = 8
+    """Small steps to a millisecond."""
+
+    position: Vector = ZERO
+    orientation: Quaternion = IDENTITY
+    velocity: Vector = ZERO
+    angular_velocity: Vector = ZERO
+    seconds: float = 0.0
+    _force: Vector = ZERO
+    _torque: Vector = ZERO
+    _coming: deque[tuple[float, Vector, Vector]] = field(
+        default_factory=deque[tuple[float, Vector, Vector]]
+    )
+
+    def __post_init__(self) -> None:
+        """Draw the tremor."""
+        dice = random.Random(self.seed)  # noqa: S311 - a tremor, not a secret
+        self._waves = [
+            [(dice.uniform(50.0, 75.0), dice.uniform(0.0, 6.3), 1.0 / 3.0) for _ in range(3)]
+            for _axis in range(3)
+        ]
+
+    def feel(self, force: Vector, torque: Vector) -> None:
+        """Hold a force from now on (after the device's delay)."""
+        self._coming.append((self.seconds + self.device.delay, force, torque))
+
+    def move(self, period: float) -> None:
+        """Let time pass."""
+        count = max(1, round(period * 1000.0 * self.steps))
+        step = period / count
+        for _ in range(count):
+            while self._coming and self._coming[0][0] <= self.seconds + 1e-9:
+                _, self._force, self._torque = self._coming.popleft()
+            self._step(step)
+
+    def _step(self, step: float) -> None:
+        place, turn = self.wish(self.seconds)
+        place = add(place, self._tremble())
+        pull = subtract(
+            add_scaled(
+                scale(subtract(place, self.position), self.stiffness),
+                *(self.velocity, -(self.damping if self.stiffness else 0.0)),
+            ),
+            _friction(self.velocity, self.device.damping, self.device.friction),
+        )
+        self.velocity = add_scaled(self.velocity, add(pull, self._force), step / self.mass)
+        self.position = add_scaled(self.position, self.velocity, step)
+        apart = to_rotation_vector(multiply(turn, conjugate(self.orientation)))
+        twist = subtract(
+            add_scaled(
+                scale(apart, self.angular_stiffness),
+                *(self.angular_velocity, -(self.angular_damping if self.stiffness else 0.0)),
+            ),
+            _friction(
+                *(self.angular_velocity, self.device.angular_damping),
+                self.device.angular_friction,
+            ),
+        )
+        self.angular_velocity = add_scaled(
+            self.angular_velocity, add(twist, self._torque), step / self.inertia
+        )
+        self.orientation = turned(self.orientation, self.angular_velocity, step)
+        self.seconds += step
+
+    def _tremble(self) -> Vector:
+        if not self.tremor or not self.stiffness:
+            return ZERO
+        x, y, z = (
+            self.tremor * sum(size * math.sin(rate * self.seconds + at) for rate, at, size in waves)
+            for waves in self._waves
+        )
+        return (x, y, z)
+
+    def measured(self) -> Vector:
+        """Where the device says that the hand is."""
+        step = self.device.resolution
+        if not step:
+            return self.position
+        x, y, z = self.position
+        return (
+            math.floor(x / step) * step,
+            math.floor(y / step) * step,
+            math.floor(z / step) * step,
+        )
+
+    def energy(self) -> float:
+        """J of motion."""
+        return 0.5 * self.mass * dot(self.velocity, self.velocity) + 0.5 * self.inertia * dot(
+            self.angular_velocity, self.angular_velocity
+        )
+
+
+def _friction(velocity: Vector, viscous: float, dry: float) -> Vector:
+    speed = length(velocity)
+    # Dry friction over the first tenth of a millimetre per second is a steep viscous one.
+    return scale(velocity, viscous + dry / max(speed, 1e-4))
+
+
+class SimulatedHand:
+    """The hand as a device, moving in real time."""
+
+    def __init__(
+        self, hand: Hand | None = None, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self.hand = hand or Hand(wish=circling)
+        self.buttons = 0
+        self._clock = clock
+        self._last = clock()
+        self._description = Description(
+            name="Simulated hand",
+            identity="simulated",
+            kind=Kind.POSE,
+            buttons=("Grab", "Key"),
+            dynamics=self.hand.device,
+        )
+
+    @property
+    def description(self) -> Description:
+        """Who it is."""
+        return self._description
+
+    def read(self) -> Sample | None:
+        """Where the hand has got to."""
+        now = self._clock()
+        # After a pause (a stopped process) the hand does not race through all that time.
+        self.hand.move(min(now - self._last, 0.01))
+        self._last = now
+        hand = self.hand
+        return Sample(
+            *(now, hand.measured(), hand.orientation, hand.velocity, hand.angular_velocity),
+            self.buttons,
+        )
+
+    def send(self, force: Vector, torque: Vector) -> None:
+        """Let the hand feel a force."""
+        self.hand.feel(force, torque)
+
+    def close(self) -> None:
+        """Nothing to let go."""

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contacts with the ground: shown, shifted and cleared, and their part of the panel."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+from bpy.props import FloatProperty
+
+from ....blender.rig.armature import active_armature
+from ....blender.rig.arms import require_editable
+from ....blender.scene.contact_markers import markers, remove_markers
+from ....core.errors import OctoMotionError, SettingsError
+from ...armature_operator import ArmatureOperator
+from ...local_view import show_in_local_view
+from ...operator_base import OctoOperator
+from ..generate_motion import prepare
+from ..reading.ground import resting
+from ..settings.contact_overrides import changed_by_hand, gathered, once_called, store
+from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..writing.write_motion import show_contacts
+
+
+class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_show"
+    bl_label = "Show Contacts"
+    bl_description = (
+        "Put a marker wherever an arm takes hold of the ground. Drag or turn a marker and the arm "
+        "holds on there; delete it and the arm does not; then generate again"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        shot = prepare(armature, context)
+        if shot.standing is None or shot.in_place:
+            raise SettingsError(
+                "This motion has no contacts with the ground.",
+                "Choose a walk along a route, and Hold the Ground.",
+            )
+        count = show_contacts(armature, shot)
+        show_in_local_view(context, *markers(armature))
+        self.report({"INFO"}, f"{count} contacts.")
+
+
+class OCTO_MOTION_OT_contacts_hide(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_hide"
+    bl_label = "Hide Contacts"
+    bl_description = "Take the markers away. What was changed on them is kept"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        require_editable(armature)
+        settings = locomotion_settings(armature).ground
+        store(settings, gathered(settings, armature))
+        _take_away(context, armature)
+
+
+class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_clear"
+    bl_label = "Free Contacts"
+    bl_description = (
+        "Forget what was moved, locked, shifted or deleted: all contacts are again where the gait "
+        "has them"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        require_editable(armature)
+        settings = locomotion_settings(armature).ground
+        shown = bool(settings.shown)
+        store(settings, {})
+        _take_away(context, armature)
+        if not shown:
+            return
+        try:
+            shot = prepare(armature, context)
+        except OctoMotionError as error:
+            # They are free all the same.
+            self.report({"WARNING"}, f"No markers are shown: {error}")
+            return
+        if shot.standing is not None and not shot.in_place:
+            show_contacts(armature, shot)
+
+
+class OCTO_MOTION_OT_contacts_shift(OctoOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.contacts_shift"
+    bl_label = "Shift Contacts in Time"
+    bl_description = (
+        "Let the arms of the selected markers take hold so many frames later, or earlier if it is "
+        "negative; then generate again"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    frames: FloatProperty(
+        name="Frames",
+        description="How much later the contact is",
+        default=2.0,
+        soft_min=-24.0,
+        soft_max=24.0,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Go to object mode first")
+            return False
+        if not _selected(context):
+            cls.poll_message_set("Select markers of contacts")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> None:
+        for item in _selected(context):
+            own: Any = item.octo_motion.contact  # type: ignore[attr-defined]
+            own.shift += self.frames / max(own.cycle_frames, 1e-6)
+
+
+def _selected(context: bpy.types.Context) -> list[bpy.types.Object]:
+    chosen = context.selected_objects
+    return [item for item in chosen if item.octo_motion.contact.armature]  # type: ignore[attr-defined]
+
+
+def _take_away(context: bpy.types.Context, armature: bpy.types.Object) -> None:
+    """Take all markers away; the armature is active if what was active is gone."""
+    settings = locomotion_settings(armature).ground
+    remove_markers(armature, once_called(settings))
+    settings.shown = ""
+    layer = context.view_layer
+    if layer is not None and layer.objects.active is None and armature in layer.objects.values():
+        layer.objects.active = armature
+
+
+def draw_rest(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+    """Whether the creature stands at the ends of its way."""
+    ground = settings.ground
+    column = layout.column(heading="Rest")
+    for name, text, ease in (
+        ("start_at_rest", "At Start", settings.ease_in),
+        ("come_to_rest", "At End", settings.ease_out),
+    ):
+        row = column.row()
+        row.active = ease > 0.0
+        row.prop(ground, name, text=text)
+    column = layout.column()
+    column.active = any(resting(settings))
+    column.prop(ground, "rest_within")
+
+
+def draw_ground(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+    """How arms hold the ground, and where."""
+    ground = settings.ground
+    layout.active = ground.use and settings.table.manner != "SWIM"
+    column = layout.column(align=True)
+    column.prop(ground, "duty")
+    column.prop(ground, "planted")
+    column = layout.column(align=True)
+    column.prop(ground, "stretch")
+    column.prop(ground, "lift")
+    column = layout.column(align=True)
+    column.prop(ground, "lean")
+    column.prop(ground, "smoothing")
+    row = layout.row(align=True)
+    if ground.shown:
+        row.operator(OCTO_MOTION_OT_contacts_hide.bl_idname, icon="HIDE_ON")
+    else:
+        row.operator(OCTO_MOTION_OT_contacts_show.bl_idname, icon="EMPTY_SINGLE_ARROW")
+    row.operator(OCTO_MOTION_OT_contacts_clear.bl_idname, text="", icon="LOOP_BACK")
+    if count := changed_by_hand(ground):
+        layout.label(text=f"{count} contact{'s' * (count > 1)} changed by hand", icon="PINNED")
+
+
+class OCTO_MOTION_PT_contact(bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_contact"
+    bl_label = "Contact"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Octo Motion"
+    bl_order = 0
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        item = context.object
+        return item is not None and bool(item.octo_motion.contact.armature)  # type: ignore[attr-defined]
+
+    def draw(self, context: bpy.types.Context) -> None:
+        item, layout = context.object, self.layout
+        assert item is not None
+        assert layout is not None
+        own: Any = item.octo_motion.contact  # type: ignore[attr-defined]
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.label(text=f"{own.arm}, cycle {own.cycle}", icon="PINNED")
+        layout.label(text=f"Frames {own.frame_on:.0f} to {own.frame_off:.0f}", icon="TIME")
+        layout.prop(own, "locked")
+        layout.prop(own, "shift")
+        layout.operator(OCTO_MOTION_OT_contacts_shift.bl_idname)
+
+
+CLASSES: Final = (
+    OCTO_MOTION_OT_contacts_show,
+    OCTO_MOTION_OT_contacts_hide,
+    OCTO_MOTION_OT_contacts_clear,
+    OCTO_MOTION_OT_contacts_shift,
+    OCTO_MOTION_PT_contact,
+)

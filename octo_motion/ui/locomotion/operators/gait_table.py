@@ -1,0 +1,451 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators on gait tables: presets, files, knots and curves of single pairs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import bpy
+import numpy as np
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+
+from ....blender.animation.actions import writable_armature
+from ....blender.files import presets
+from ....blender.rig.armature import active_armature
+from ....core.errors import GaitError
+from ....core.locomotion.gait import table as gait
+from ....core.locomotion.gait.table import CYCLE
+from ...armature_operator import ArmatureOperator
+from ..settings.gait import SIDES, fill_curve, fill_offsets, fill_table, used
+from ..settings.properties import (
+    OCTO_MOTION_PG_locomotion,
+    load_gait,
+    locomotion_settings,
+    read_gait,
+    set_gait,
+)
+
+if TYPE_CHECKING:
+    from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+
+def _settings(context: bpy.types.Context) -> OCTO_MOTION_PG_locomotion:
+    """Settings that can be written.
+
+    Raises:
+        WriteError: the armature is linked.
+    """
+    armature = active_armature(context)
+    writable_armature(armature)
+    return locomotion_settings(armature)
+
+
+def _editable(settings: OCTO_MOTION_PG_locomotion) -> Any:
+    """The table, filled from its preset if it was not yet."""
+    table = read_gait(settings)
+    if not used(settings.table.curves):
+        set_gait(settings, table)
+    return settings.table
+
+
+def _active(collection: Any, index: int, what: str) -> Any:
+    if not 0 <= index < len(collection):
+        raise GaitError(f"No {what} is chosen.", f"Choose one, or add a {what}.")
+    return collection[index]
+
+
+def _chosen_curve(settings: OCTO_MOTION_PG_locomotion) -> tuple[int, gait.GaitCurve]:
+    """The pair that is chosen in the list, 0 for all, and its angles.
+
+    Raises:
+        GaitError: none is chosen.
+    """
+    pair = 0
+    if listed := used(settings.table.curves):
+        pair = _active(listed, settings.table.active_curve, "pair").pair
+    return pair, read_gait(settings).curves[pair]
+
+
+def _curve_of(table: Any, pair: int) -> Any:
+    """The table's item with the angles of a pair."""
+    return next(curve for curve in used(table.curves) if curve.pair == pair)
+
+
+# --- Presets -------------------------------------------------------------------------------------
+
+
+class OCTO_MOTION_OT_gait_load(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_load"
+    bl_label = "Load Gait"
+    bl_description = "Load a gait into the table, in place of what is there"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(
+        name="Name",
+        description="Gait to load; without a name the current one is loaded afresh",
+        search=lambda _operator, _context, _text: presets.gait_names(),
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        load_gait(settings, self.name or settings.gait)
+
+
+class OCTO_MOTION_OT_gait_save(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_save"
+    bl_label = "Save Gait as Preset"
+    bl_description = "Keep the table among your own gaits, for this and all other files"
+    bl_options = {"REGISTER", "UNDO"}
+
+    name: StringProperty(
+        name="Name", description="What the gait is called from now on", options={"SKIP_SAVE"}
+    )
+    overwrite: BoolProperty(
+        name="Overwrite",
+        description="Replace a gait of yours that has this name",
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(
+        self,
+        context: bpy.types.Context,
+        event: bpy.types.Event,  # noqa: ARG002
+    ) -> set[OperatorReturnItems]:
+        """Ask for the name."""
+        current = locomotion_settings(active_armature(context)).gait
+        own = current in presets.user_gait_names()
+        self.name = current if own else f"my {current}"
+        self.overwrite = own
+        assert context.window_manager is not None
+        return context.window_manager.invoke_props_dialog(self)
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        table = gait.renamed(read_gait(settings), self.name.strip())
+        presets.save_gait(table, overwrite=self.overwrite)
+        set_gait(settings, table)
+        self.report({"INFO"}, f"Saved the gait '{table.name}'.")
+
+
+class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_remove"
+    bl_label = "Remove Gait Preset"
+    bl_description = (
+        "Delete a gait of yours from disk, for all files. The table keeps what is loaded"
+    )
+    # A deleted file does not come back with undo; the settings stay as they are.
+    bl_options = {"REGISTER"}
+
+    name: StringProperty(
+        name="Name",
+        description="Gait to delete; without a name the current one",
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(
+        self, context: bpy.types.Context, event: bpy.types.Event
+    ) -> set[OperatorReturnItems]:
+        """Ask first."""
+        assert context.window_manager is not None
+        return context.window_manager.invoke_confirm(self, event)
+
+    def run(self, context: bpy.types.Context) -> None:
+        name = self.name or _settings(context).gait
+        presets.remove_gait(name)
+        self.report({"INFO"}, f"Removed the gait '{name}'.")
+
+
+class _FileOperator(ArmatureOperator):
+    """Asks for a file."""
+
+    filename_ext: Final = presets.SUFFIX
+
+    filepath: StringProperty(
+        name="File",
+        description="The gait's file (JSON)",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    filter_glob: StringProperty(default=f"*{presets.SUFFIX}", options={"HIDDEN"})
+
+    def invoke(
+        self,
+        context: bpy.types.Context,
+        event: bpy.types.Event,  # noqa: ARG002
+    ) -> set[OperatorReturnItems]:
+        """Open the file browser."""
+        assert context.window_manager is not None
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def _path(self) -> Path:
+        if not self.filepath:
+            raise GaitError("No file is given.", "Choose one.")
+        return Path(bpy.path.abspath(self.filepath))
+
+
+class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_export"
+    bl_label = "Export Gait"
+    bl_description = "Write the table to a JSON file, to hand it on or to edit it as text"
+    # A file that was written stays when something else is undone.
+    bl_options = {"REGISTER"}
+
+    check_existing: BoolProperty(default=True, options={"HIDDEN"})
+
+    def invoke(
+        self, context: bpy.types.Context, event: bpy.types.Event
+    ) -> set[OperatorReturnItems]:
+        """Propose the gait's name, in the file browser."""
+        if not self.filepath:
+            name = bpy.path.clean_name(locomotion_settings(active_armature(context)).gait)
+            self.filepath = f"{name}{presets.SUFFIX}"
+        return super().invoke(context, event)
+
+    def check(self, context: bpy.types.Context) -> bool:  # noqa: ARG002
+        """Keep the file's ending."""
+        proper = bpy.path.ensure_ext(self.filepath, presets.SUFFIX)
+        if proper == self.filepath:
+            return False
+        self.filepath = proper
+        return True
+
+    def run(self, context: bpy.types.Context) -> None:
+        # Of a linked armature as well.
+        table = read_gait(locomotion_settings(active_armature(context)))
+        path = self._path()
+        presets.write_gait(table, path)
+        self.report({"INFO"}, f"Wrote the gait '{table.name}' to '{path.name}'.")
+
+
+class OCTO_MOTION_OT_gait_import(_FileOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_import"
+    bl_label = "Import Gait"
+    bl_description = "Load the table from a JSON file"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        set_gait(_settings(context), presets.read_gait(self._path()))
+
+
+# --- The table -----------------------------------------------------------------------------------
+
+
+class OCTO_MOTION_OT_gait_curve_add(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_curve_add"
+    bl_label = "Add Pair"
+    bl_description = "Give one pair of arms angles of its own, to begin with those it has now"
+    bl_options = {"REGISTER", "UNDO"}
+
+    pair: IntProperty(
+        name="Pair",
+        description="Pair of arms, 1 in front; 0 takes the first that has none of its own",
+        min=0,
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        taken = set(read_gait(settings).curves)
+        pair = self.pair or next(each for each in range(1, len(taken) + 2) if each not in taken)
+        if pair in taken:
+            raise GaitError(f"Pair {pair} has angles of its own already.", "Choose another pair.")
+        table = read_gait(settings)
+        curves = {**table.curves, pair: table.curves[0]}
+        fill_table(_editable(settings), replace(table, curves=curves))
+        settings.table.active_curve = sorted(curves).index(pair)
+
+
+class OCTO_MOTION_OT_gait_curve_remove(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_curve_remove"
+    bl_label = "Remove Pair"
+    bl_description = "Let the chosen pair move like all others again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        table, group = read_gait(settings), settings.table
+        pair = _active(used(group.curves), group.active_curve, "pair").pair
+        if pair == 0:
+            raise GaitError("The angles for all arms cannot be removed.", "Choose a pair.")
+        before = group.active_curve
+        curves = {each: curve for each, curve in table.curves.items() if each != pair}
+        fill_table(group, replace(table, curves=curves))
+        group.active_curve = before - 1
+
+
+class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_knot_add"
+    bl_label = "Add Knot"
+    bl_description = "Add a knot half-way to the next one, without changing the motion"
+    bl_options = {"REGISTER", "UNDO"}
+
+    knot: IntProperty(
+        name="Knot",
+        description="Row after which the knot is added, counted from 0; -1 fills the widest gap",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        pair, shape = _chosen_curve(settings)
+        # As they are listed, which need not be in order.
+        listed = used(settings.table.curves)
+        phases = shape.phases[:-1].tolist()
+        if listed:
+            phases = [each.phase for each in used(listed[settings.table.active_curve].knots)]
+        if self.knot >= len(phases):
+            raise GaitError(f"There is no row {self.knot}.", "Choose a knot of the table.")
+        if self.knot < 0:
+            gap = int(np.argmax(np.diff(shape.phases)))
+        else:
+            phase = phases[self.knot] % CYCLE
+            gap = int(np.clip(np.searchsorted(shape.phases, phase + 1e-4) - 1, 0, None))
+            gap = min(gap, len(shape.phases) - 2)
+        middle = 0.5 * (shape.phases[gap] + shape.phases[gap + 1])
+        if shape.phases[gap + 1] - shape.phases[gap] < np.radians(1.0):
+            raise GaitError("There is no room for a knot.", "Move the next knot further away.")
+        angles = shape.evaluate(np.array([middle]))[0]
+        curve = _curve_of(_editable(settings), pair)
+        # Sorted, and with a knot at 0 if there was none: the same motion, in good order.
+        fill_curve(
+            curve,
+            gait.GaitCurve(
+                np.insert(shape.phases, gap + 1, middle),
+                np.insert(shape.angles, gap + 1, angles, axis=0),
+                free=shape.free,
+            ),
+        )
+        curve.active_knot = gap + 1
+
+
+class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_knot_remove"
+    bl_label = "Remove Knot"
+    bl_description = "Remove this knot: the angles then run evenly between its neighbours"
+    bl_options = {"REGISTER", "UNDO"}
+
+    knot: IntProperty(
+        name="Knot",
+        description="Row to remove, counted from 0; -1 takes the last",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        pair, shape = _chosen_curve(settings)
+        count = len(shape.phases) - 1
+        knot = self.knot if self.knot >= 0 else count - 1
+        if knot >= count:
+            raise GaitError(f"There is no row {knot}.", "Choose a knot of the table.")
+        if knot == 0:
+            raise GaitError("A cycle cannot do without its first knot.", "Change its angles.")
+        shape = gait.GaitCurve(
+            np.delete(shape.phases, knot), np.delete(shape.angles, knot, axis=0), free=shape.free
+        )
+        fill_curve(_curve_of(_editable(settings), pair), shape)
+
+
+class OCTO_MOTION_OT_gait_offset_add(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_offset_add"
+    bl_label = "Add Offset"
+    bl_description = "Give one arm a phase of its own, whatever the spread says"
+    bl_options = {"REGISTER", "UNDO"}
+
+    pair: IntProperty(name="Pair", description="Pair of the arm, 1 in front", min=1, default=1)
+    side: EnumProperty(name="Side", description="Side of the arm", items=SIDES)
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        table = read_gait(settings)
+        if (self.pair, self.side) in table.offsets:
+            raise GaitError(
+                f"Pair {self.pair} {self.side.lower()} has an offset already.",
+                "Change that one, or choose another arm.",
+            )
+        offsets = {**table.offsets, (self.pair, self.side): 0.0}
+        fill_offsets(_editable(settings), offsets)
+        settings.table.active_offset = sorted(offsets).index((self.pair, self.side))
+
+
+class OCTO_MOTION_OT_gait_offset_remove(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.gait_offset_remove"
+    bl_label = "Remove Offset"
+    bl_description = "Let this arm follow the spread again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    offset: IntProperty(
+        name="Offset",
+        description="Row to remove, counted from 0; -1 takes the last",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        settings = _settings(context)
+        offsets = sorted(read_gait(settings).offsets.items())
+        number = self.offset if self.offset >= 0 else len(offsets) - 1
+        _active(offsets, number, "offset")
+        del offsets[number]
+        fill_offsets(_editable(settings), dict(offsets))
+
+
+class OCTO_MOTION_MT_gait_offset(bpy.types.Menu):
+    bl_idname = "OCTO_MOTION_MT_gait_offset"
+    bl_label = "Add Offset"
+    bl_description = "Give one arm a phase of its own, whatever the spread says"
+
+    def draw(self, context: bpy.types.Context | None) -> None:
+        layout = self.layout
+        assert layout is not None
+        assert context is not None
+        settings = locomotion_settings(active_armature(context))
+        taken = {(each.pair, each.side) for each in used(settings.table.offsets)}
+        for pair, side, name in sorted({(arm.pair, arm.side, arm.name) for arm in settings.arms}):
+            if (pair, side) not in taken:
+                chosen: Any = layout.operator(OCTO_MOTION_OT_gait_offset_add.bl_idname, text=name)
+                chosen.pair, chosen.side = pair, side
+        if not settings.arms:
+            layout.label(text="Detect the arms first", icon="INFO")
+
+
+class OCTO_MOTION_MT_gait(bpy.types.Menu):
+    bl_idname = "OCTO_MOTION_MT_gait"
+    bl_label = "Gait"
+    bl_description = "Load, save, import and export gaits"
+
+    def draw(self, context: bpy.types.Context | None) -> None:  # noqa: ARG002
+        layout = self.layout
+        assert layout is not None
+        layout.operator(OCTO_MOTION_OT_gait_load.bl_idname, text="Reload", icon="FILE_REFRESH")
+        layout.separator()
+        layout.operator(OCTO_MOTION_OT_gait_save.bl_idname, text="Save as Preset…", icon="ADD")
+        layout.operator(OCTO_MOTION_OT_gait_remove.bl_idname, text="Remove Preset", icon="REMOVE")
+        layout.separator()
+        layout.operator(OCTO_MOTION_OT_gait_import.bl_idname, text="Import…", icon="IMPORT")
+        layout.operator(OCTO_MOTION_OT_gait_export.bl_idname, text="Export…", icon="EXPORT")
+
+
+CLASSES: Final = (
+    OCTO_MOTION_OT_gait_load,
+    OCTO_MOTION_OT_gait_save,
+    OCTO_MOTION_OT_gait_remove,
+    OCTO_MOTION_OT_gait_export,
+    OCTO_MOTION_OT_gait_import,
+    OCTO_MOTION_OT_gait_curve_add,
+    OCTO_MOTION_OT_gait_curve_remove,
+    OCTO_MOTION_OT_gait_knot_add,
+    OCTO_MOTION_OT_gait_knot_remove,
+    OCTO_MOTION_OT_gait_offset_add,
+    OCTO_MOTION_OT_gait_offset_remove,
+    OCTO_MOTION_MT_gait_offset,
+    OCTO_MOTION_MT_gait,
+)

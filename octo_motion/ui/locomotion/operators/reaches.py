@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of reaches: added, removed, drawn."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+from bpy.props import EnumProperty, StringProperty
+
+from ....blender.rig.armature import active_armature
+from ....blender.rig.arms import require_editable
+from ....blender.scene.grasp_target import WITH_SURFACE
+from ....core.errors import RigError, SettingsError
+from ...armature_operator import ArmatureOperator
+from ...list_operators import ListKind, RemoveOperator
+from ...panel_base import ItemRows
+from ..reading.arm_items import bones_of
+from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..settings.reaches import MODES
+
+_SECONDS_TO_REACH: Final = 1.25
+_SECONDS_TO_HOLD: Final = 2.0
+
+
+_REACHES: Final = ListKind(
+    settings=locomotion_settings,
+    check=require_editable,
+    items="reaches",
+    active="active_reach",
+    one="a reach",
+    instead="Mute it instead.",
+)
+
+
+class OCTO_MOTION_UL_reaches(ItemRows, bpy.types.UIList):
+    """A row for each reach: on or off, name, when it touches."""
+
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "mute", text="", icon="HIDE_ON" if item.mute else "HIDE_OFF", emboss=False)
+        name = row.row()
+        name.active = not item.mute
+        # Red: its object is gone.
+        name.alert = item.target is None and item.mode != "CURL"
+        name.prop(item, "name", text="", emboss=False)
+        at = row.row()
+        at.alignment = "RIGHT"
+        at.active = not item.mute
+        at.label(text=str(item.frame_contact))
+
+
+class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.reach_add"
+    bl_label = "Add Reach"
+    bl_description = (
+        "Let an arm reach for an object: select the object, then Shift click the creature. The "
+        "arm touches it at the current frame, and is in place when you generate. Without an "
+        "object the arm curls up. In pose mode it is the arm of the active bone, else the one "
+        "nearest to the object"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    mode: EnumProperty(name="Mode", description="What the arm does", items=MODES, default="COIL")
+    target: StringProperty(
+        name="Object",
+        description="What it reaches for; the other selected object if empty",
+        options={"SKIP_SAVE"},
+    )
+    arm: StringProperty(
+        name="Arm",
+        description="Name of the arm in the list; if empty, that of the active bone in pose mode, "
+        "else the nearest",
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        require_editable(armature)
+        settings: Any = locomotion_settings(armature)
+        target = self._target(context, armature)
+        mode = "CURL" if target is None else self.mode
+        arm = self._arm(context, armature, settings)
+        if not arm and mode == "CURL":
+            raise SettingsError(
+                "It is not said which arm curls, or what to reach for.",
+                "Select an object and Shift click the creature; or click a bone of the arm in "
+                "pose mode.",
+            )
+        scene = context.scene
+        assert scene is not None
+        rate = scene.render.fps / scene.render.fps_base
+        item = settings.reaches.add()
+        taken = {each.name for each in settings.reaches if each != item}
+        base = name = "Curl" if target is None else target.name
+        number = 1
+        while name in taken:
+            name, number = f"{base}.{number:03}", number + 1
+        item.name, item.arm, item.target, item.mode = name, arm, target, mode
+        item.frame_contact = scene.frame_current
+        item.frame_start = item.frame_contact - round(_SECONDS_TO_REACH * rate)
+        item.frame_release = item.frame_contact + round(_SECONDS_TO_HOLD * rate)
+        settings.active_reach = len(settings.reaches) - 1
+
+    def _target(
+        self, context: bpy.types.Context, armature: bpy.types.Object
+    ) -> bpy.types.Object | None:
+        if self.mode == "CURL":
+            return None
+        if self.target:
+            found = bpy.data.objects.get(self.target)
+            if found is None or found.type not in WITH_SURFACE:
+                raise SettingsError(
+                    f"There is no object '{self.target}' with a surface.",
+                    "Choose an object with faces.",
+                )
+            return found
+        others = [
+            each
+            for each in context.selected_objects
+            if each not in (armature, context.object)
+            and each.type in WITH_SURFACE
+            and each.find_armature() != armature
+        ]
+        if len(others) > 1:
+            raise SettingsError(
+                f"{len(others)} other objects are selected.",
+                "Select one object, then Shift click the creature.",
+            )
+        return others[0] if others else None
+
+    def _arm(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> str:
+        if self.arm:
+            if self.arm not in settings.arms:
+                raise RigError(
+                    f"There is no arm '{self.arm}' in the list.", "Choose one of the list's arms."
+                )
+            return self.arm
+        bone = context.active_pose_bone
+        if context.mode == "POSE" and bone is not None and bone.id_data == armature:
+            for item in settings.arms:
+                if bone.name in bones_of(item):
+                    return str(item.name)
+        return ""
+
+
+class OCTO_MOTION_OT_reach_remove(RemoveOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.reach_remove"
+    bl_label = "Remove Reach"
+    bl_description = "Take the active reach off the list. Generate to see the motion without it"
+    KIND = _REACHES
+
+
+def draw_reaches(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+    """The list, and what belongs to its active reach."""
+    row = layout.row()
+    row.template_list(
+        OCTO_MOTION_UL_reaches.__name__, "", settings, "reaches", settings, "active_reach", rows=2
+    )
+    column = row.column(align=True)
+    column.operator(OCTO_MOTION_OT_reach_add.bl_idname, text="", icon="ADD")
+    column.operator(OCTO_MOTION_OT_reach_remove.bl_idname, text="", icon="REMOVE")
+    item = _REACHES.active_item(settings)
+    if item is None:
+        return
+    layout = layout.column()
+    layout.active = not item.mute
+    layout.row().prop(item, "mode", expand=True)
+    if item.mode != "CURL":
+        layout.prop(item, "target")
+    layout.prop_search(item, "arm", settings, "arms")
+    if item.mode == "COIL":
+        layout.prop(item, "turns")
+        layout.prop(item, "carry")
+    if item.mode != "CURL":
+        layout.prop(item, "axis")
+    column = layout.column(align=True)
+    column.prop(item, "frame_start", text="Frame Start")
+    column.prop(item, "frame_contact", text="Closed" if item.mode == "CURL" else "Contact")
+    column.prop(item, "frame_release", text="Release")
+    column = layout.column(align=True)
+    if item.mode == "COIL":
+        column.prop(item, "coil_frames", text="Frames to Coil")
+        column.prop(item, "back_frames", text="Back")
+    else:
+        column.prop(item, "back_frames", text="Frames Back")
+
+
+CLASSES: Final[tuple[type, ...]] = (
+    OCTO_MOTION_UL_reaches,
+    OCTO_MOTION_OT_reach_add,
+    OCTO_MOTION_OT_reach_remove,
+)

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a shot reads of its rig: arms, body, root bone, and what stands in their way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, cast
+
+import bpy
+import numpy as np
+
+from ....blender.animation.leftover_poses import SCALE, animated_bones, displaced_bones
+from ....blender.rig.armature import armature_data, is_driven_object
+from ....blender.rig.arms import world_directions
+from ....core.errors import RigError
+from ....core.locomotion.gait.gait_poser import Arm
+from ....core.locomotion.rig.arm_chains import BodyFrame, Side, body_frame, chain_of, is_driven
+from ....core.locomotion.rig.detection import Detection, detect_arms
+from ....core.rotations import Floats
+from ....core.skeleton import Skeleton
+from ..settings.properties import OCTO_MOTION_PG_locomotion
+from .arm_items import bones_of
+from .previous_action import previous_action
+
+_UNEQUAL: Final = 1e-3
+
+
+def uniform_scale(armature: bpy.types.Object, world: Floats) -> float:
+    """Metres of the armature's unit.
+
+    Raises:
+        RigError: its world matrix is no rotation and one scale.
+    """
+    axes = world[:3, :3]
+    sizes = np.linalg.norm(axes, axis=0)
+    name = f"'{armature.name}'"
+    if not np.isfinite(world).all() or sizes.min() < 1e-9:
+        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
+    scale = float(sizes.mean())
+    if np.ptp(sizes) > _UNEQUAL * scale:
+        shown = ", ".join(f"{size:.4g}" for size in sizes)
+        raise RigError(
+            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
+        )
+    if np.abs(axes.T @ axes / scale**2 - np.eye(3)).max() > _UNEQUAL:
+        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
+    if np.linalg.det(axes) < 0.0:
+        raise RigError(
+            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
+        )
+    # A world matrix has the scale but for the rounding of its rotation, and rotation is what an
+    # earlier result changes: the same settings must give the same keys.
+    own = np.abs(np.array(armature.scale) * np.array(armature.delta_scale)).mean()
+    return float(own) if np.isclose(own, scale, rtol=1e-5) else float(f"{scale:.6g}")
+
+
+def listed_arms(
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, skeleton: Skeleton
+) -> tuple[tuple[Arm, ...], BodyFrame, Detection | None]:
+    """Arms of the list, or those that are found where it is empty."""
+    if len(settings.arms) == 0:
+        found = detect_arms(skeleton, *world_directions(armature))
+        arms = tuple(Arm(each.name, each.bones, each.side, each.pair) for each in found.arms)
+        return arms, found.body, found
+    arms = tuple(
+        Arm(
+            name=item.name,
+            bones=bones_of(item),
+            side=cast("Side", item.side),
+            pair=item.pair,
+            phase=item.phase,
+            flip=item.flip,
+        )
+        for item in settings.arms
+        if item.enabled
+    )
+    if not arms:
+        raise RigError("All arms are switched off.", "Switch on at least one in the list.")
+    return arms, listed_body(settings, skeleton, arms, None), None
+
+
+def listed_body(
+    settings: OCTO_MOTION_PG_locomotion,
+    skeleton: Skeleton,
+    arms: tuple[Arm, ...],
+    detection: Detection | None,
+) -> BodyFrame:
+    """Where the body lies in the armature, as its settings or detection say."""
+    if detection is not None:
+        found = [arm.bones for arm in arms]
+        return body_frame(skeleton, found, detection.up, detection.front)
+    # The body stays where it is, whichever arms are switched off.
+    bones = [bones_of(item) for item in settings.arms if item.bones]
+    return body_frame(skeleton, bones, settings.body_up, settings.body_front)
+
+
+def chosen_root_bone(
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, detection: Detection | None
+) -> str:
+    """The bone that carries the body, "" for none.
+
+    Raises:
+        RigError: there is none to choose, or it cannot move.
+    """
+    if settings.travel_on == "OBJECT":
+        return ""
+    name = settings.root_bone or (detection.root_bone if detection else "")
+    if not name and settings.travel_on == "NONE":
+        return ""
+    if not name:
+        raise RigError(
+            f"'{armature.name}' has no root bone.",
+            "Choose the bone that carries the body, or let the object travel.",
+        )
+    bone = armature_data(armature).bones.get(name)
+    if bone is None:
+        raise RigError(
+            f"'{armature.name}' has no bone '{name}' to travel on.", "Choose another root bone."
+        )
+    if bone.use_connect and bone.parent is not None:
+        raise RigError(
+            f"The root bone '{name}' is connected to its parent and cannot move.",
+            "Disconnect it, or choose the topmost bone.",
+        )
+    if not bone.use_local_location and bone.parent is not None:
+        raise RigError(
+            f"The root bone '{name}' does not move along its own axes.",
+            "Switch on Local Location in its Relations, or choose the topmost bone.",
+        )
+    return name
+
+
+def told_of_driven(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
+    """What there is to say of arms that constraints or drivers move."""
+    bones = [bone for arm in arms for bone in arm.bones if is_driven(skeleton, [bone])]
+    if not bones:
+        return []
+    count = "one bone" if len(bones) == 1 else f"{len(bones)} bones"
+    told = (
+        f"Constraints or drivers move {count} of the arms ('{bones[0]}'{' …' * (len(bones) > 1)}): "
+        "keys there have little or no effect while those are on."
+    )
+    return [told]
+
+
+def told_of_constraints(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    root_bone: str,
+) -> list[str]:
+    """What there is to say of constraints and drivers that move the body."""
+    told: list[str] = []
+    if root_bone and is_driven(skeleton, [root_bone]):
+        told.append(
+            f"Constraints or drivers move the root bone '{root_bone}': its keys have no "
+            "effect while those are on."
+        )
+    if settings.travel_on == "OBJECT" and any(
+        not each.mute and each.influence > 0.0 for each in armature.constraints
+    ):
+        told.append(f"Constraints move '{armature.name}' away from its route.")
+    if settings.travel_on == "OBJECT" and is_driven_object(armature):
+        told.append(f"Drivers move '{armature.name}' away from its route.")
+    return told
+
+
+def told_of_showing(armature: bpy.types.Object, render: bpy.types.RenderSettings) -> list[str]:
+    """What there is to say of a motion that is there, but is not shown as it is."""
+    told = told_of_layers(armature)
+    if armature_data(armature).pose_position == "REST":
+        told.append(
+            f"'{armature.name}' is shown in its rest position: its arms do not move. Choose Pose "
+            "Position in the properties of the armature."
+        )
+    if render.frame_map_old != render.frame_map_new:
+        told.append(
+            f"The scene stretches time ({render.frame_map_old} to {render.frame_map_new}): the "
+            "motion plays at another speed than it was made for. Set both to the same number in "
+            "the output properties."
+        )
+    return told
+
+
+def told_of_layers(armature: bpy.types.Object) -> list[str]:
+    """What there is to say of NLA tracks that do not let the motion through as it is."""
+    data = armature.animation_data
+    tracks = data.nla_tracks if data is not None and data.use_nla else ()
+    if data is None or not any(len(track.strips) for track in tracks if not track.mute):
+        return []
+    name = f"'{armature.name}'"
+    if any(track.is_solo for track in tracks):
+        return [f"A solo NLA track of {name} hides the motion. Switch its star off."]
+    if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
+        told = (
+            f"The NLA mixes the motion of {name} with its tracks. In the NLA editor's sidebar set "
+            "Blending to Replace and Influence to 1 if it should not."
+        )
+        return [told]
+    return []
+
+
+def keyed_anew(
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, root_bone: str
+) -> set[str]:
+    """Bones that carry the body and whose present pose does not last: the root bone gets keys, and
+    what the motion before has keyed goes back to rest if it is not keyed again.
+    """
+    previous = previous_action(armature, settings)
+    return {root_bone} | (animated_bones(previous) if previous is not None else set())
+
+
+def posed_carriers(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    arms: tuple[Arm, ...],
+    root_bone: str,
+) -> list[str]:
+    """Bones that carry arms, get no keys and are posed: by an artist, or by an imported file."""
+    for arm in arms:
+        # Complains of bones that are gone.
+        chain_of(skeleton, arm.bones)
+    turned = {bone for arm in arms for bone in arm.bones}
+    carrying: set[int] = set()
+    for bone in turned:
+        parent = skeleton.parents[skeleton.index[bone]]
+        while parent >= 0 and parent not in carrying:
+            carrying.add(parent)
+            parent = skeleton.parents[parent]
+    own = {skeleton.names[number] for number in carrying} - turned
+    own -= keyed_anew(settings, armature, root_bone)
+    return displaced_bones(armature, (), sorted(own))
+
+
+def told_of_poses(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    arms: tuple[Arm, ...],
+    carriers: Sequence[str],
+) -> list[str]:
+    """What there is to say of poses that stay and move the arms.
+
+    Args:
+        settings: of the armature.
+        armature: the armature object.
+        arms: its arms.
+        carriers: bones that move the arms and could not be reckoned with.
+    """
+    turned = [bone for arm in arms for bone in arm.bones]
+    if (previous := previous_action(armature, settings)) is not None:
+        stretched_by_it = animated_bones(previous, SCALE)
+        turned = [bone for bone in turned if bone not in stretched_by_it]
+    found = [*displaced_bones(armature, turned, ()), *carriers]
+    if not found:
+        return []
+    count = "one bone" if len(found) == 1 else f"{len(found)} bones"
+    told = (
+        f"The pose of {count} moves the arms ('{found[0]}'): the body stands off its route by "
+        "that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not."
+    )
+    return [told]

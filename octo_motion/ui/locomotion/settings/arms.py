@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One arm of the list, as it is saved with the armature object.
+
+Names of arms and bones are what Blender tells the items of a linked list apart by: a library
+override that renames one gets the whole list once more when the file is opened again. So they
+alone cannot be overridden.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    StringProperty,
+)
+
+from .contact_overrides import rename_arm
+from .gait import OVERRIDE, OVERRIDE_LIST, SIDES
+
+
+def _renamed(arm: ArmItem, _context: bpy.types.Context) -> None:
+    """Let what speaks of an arm by its name follow: reaches, and contacts that were changed."""
+    before, arm.known_as = arm.known_as, arm.name
+    if before not in ("", arm.name):
+        rename_arm(arm.id_data, before, arm.name)
+
+
+class ArmBoneItem(bpy.types.PropertyGroup):
+    """A bone of an arm."""
+
+    name: StringProperty(name="Bone", description="Name of the bone")
+
+
+class ArmItem(bpy.types.PropertyGroup):
+    """An arm: its bones from root to tip, and its place in the gait."""
+
+    name: StringProperty(
+        name="Name", description="What this arm is called in the list", update=_renamed
+    )
+    known_as: StringProperty(
+        name="Known As",
+        description="What it was called until its name was changed",
+        options={"HIDDEN"},
+    )
+    bones: CollectionProperty(
+        name="Bones",
+        description="The arm's bones, from its root to its tip",
+        type=ArmBoneItem,
+        override=OVERRIDE_LIST,
+    )
+    side: EnumProperty(
+        name="Side",
+        description="Side of the body. Gaits mirror forward and backward between left and right",
+        items=SIDES,
+        override=OVERRIDE,
+    )
+    pair: IntProperty(
+        name="Pair",
+        description="Which pair it belongs to, counted from 1 in front. Gaits can give each pair "
+        "its own motion, and shift the pairs against one another",
+        default=1,
+        min=1,
+        override=OVERRIDE,
+    )
+    phase: FloatProperty(
+        name="Phase",
+        description="How far this arm is ahead of its place in the gait: 360° is a whole cycle",
+        subtype="ANGLE",
+        soft_min=-math.tau,
+        soft_max=math.tau,
+        step=500,
+        precision=1,
+        override=OVERRIDE,
+    )
+    flip: BoolProperty(
+        name="Flip",
+        description="Mirror this arm's motion: forward and twist turn the other way, for an arm "
+        "that moves backward where others move forward",
+        override=OVERRIDE,
+    )
+    enabled: BoolProperty(
+        name="Enabled",
+        description="Move this arm. Switched off, it gets no keys and keeps its pose",
+        default=True,
+        override=OVERRIDE,
+    )
+
+
+CLASSES: Final[tuple[type, ...]] = (ArmBoneItem, ArmItem)

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a walk stands on, as it is set: ``octo_motion.locomotion.ground``."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+import numpy as np
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+from ....core.locomotion.ground.stance_settings import StanceSettings
+from .gait import OVERRIDE, OVERRIDE_LIST
+
+
+def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
+    """Whether an object is offered as ground: a mesh, but nobody's own skin."""
+    return candidate.type == "MESH" and candidate.find_armature() != settings.id_data
+
+
+class ContactItem(bpy.types.PropertyGroup):
+    """What an artist wants of one contact: it stays when the motion is generated again."""
+
+    arm: StringProperty(name="Arm", description="Name of the arm in the list", override=OVERRIDE)
+    cycle: IntProperty(
+        name="Cycle", description="Number of the arm's cycle along the route", override=OVERRIDE
+    )
+    removed: BoolProperty(
+        name="Removed", description="The arm does not touch the ground here", override=OVERRIDE
+    )
+    shift: FloatProperty(
+        name="Shift",
+        description="Share of a cycle by which the contact is later, negative if it is earlier",
+        default=0.0,
+        min=-0.3,
+        max=0.3,
+        step=1,
+        precision=3,
+        override=OVERRIDE,
+    )
+    locked: BoolProperty(
+        name="Locked",
+        description="The contact stays where it is in the world, however the route or the gait "
+        "are changed",
+        override=OVERRIDE,
+    )
+    position: FloatVectorProperty(
+        name="Position",
+        description="Where the arm touches the ground, if the contact is locked",
+        subtype="TRANSLATION",
+        size=3,
+        override=OVERRIDE,
+    )
+    heading: FloatProperty(
+        name="Heading",
+        description="Which way the arm lies from there, about the world's Z axis, if the contact "
+        "is locked",
+        subtype="ANGLE",
+        override=OVERRIDE,
+    )
+
+
+class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
+    """How a walking creature stands on the ground."""
+
+    use: BoolProperty(
+        name="Hold the Ground",
+        description="Walking, each arm takes hold of the ground and does not slide over it, while "
+        "the body moves on. Off, the arms move as the gait alone has them",
+        default=True,
+        override=OVERRIDE,
+    )
+    object: PointerProperty(
+        name="Ground",
+        description="Mesh to walk on, as it is seen: with its modifiers, moved and scaled. Without "
+        "one, the ground is where the route is",
+        type=bpy.types.Object,
+        poll=may_be_ground,
+        override=OVERRIDE,
+    )
+    duty: FloatProperty(
+        name="Hold",
+        description="Share of its cycle for which an arm holds on to the ground. More keeps more "
+        "arms down at a time; less gives them longer swings",
+        subtype="FACTOR",
+        default=StanceSettings.duty,
+        min=0.1,
+        max=0.85,
+        override=OVERRIDE,
+    )
+    planted: FloatProperty(
+        name="Planted",
+        description="Share of the arm, from its tip, that lies on the ground while it holds on",
+        subtype="FACTOR",
+        default=StanceSettings.planted,
+        min=0.1,
+        max=0.8,
+        override=OVERRIDE,
+    )
+    stretch: FloatProperty(
+        name="Stretch",
+        description="How much longer an arm may get as it pushes, becoming thinner: 0.4 is 40 %. "
+        "Only bones that hand their scale on aligned or not at all stretch; others bend instead",
+        default=StanceSettings.stretch,
+        min=0.0,
+        soft_max=1.0,
+        max=2.0,
+        step=5,
+        override=OVERRIDE,
+    )
+    lift: FloatProperty(
+        name="Lift",
+        description="How high above the ground an arm is at least in the middle of its swing, in "
+        "arm lengths",
+        default=StanceSettings.lift,
+        min=0.0,
+        soft_max=0.3,
+        max=1.0,
+        step=1,
+        precision=3,
+        override=OVERRIDE,
+    )
+    lean: FloatProperty(
+        name="Lean",
+        description="How far the body leans with the ground: 0 stays upright, 1 follows its slope",
+        subtype="FACTOR",
+        default=StanceSettings.lean,
+        min=0.0,
+        max=1.0,
+        override=OVERRIDE,
+    )
+    smoothing: FloatProperty(
+        name="Smoothing",
+        description="Over what length the body evens the ground out, in arm lengths. Less follows "
+        "every bump",
+        default=StanceSettings.smoothing,
+        min=0.05,
+        soft_max=2.0,
+        max=10.0,
+        step=5,
+        override=OVERRIDE,
+    )
+    start_at_rest: BoolProperty(
+        name="Start at Rest",
+        description="All arms lie on the ground at the start, and leave it as the body gets going. "
+        "Only with an Ease In: without one the creature comes walking",
+        default=True,
+        override=OVERRIDE,
+    )
+    come_to_rest: BoolProperty(
+        name="Come to Rest",
+        description="All arms lie on the ground at the end: each takes its last step in time. Only "
+        "with an Ease Out: without one the creature walks on",
+        default=True,
+        override=OVERRIDE,
+    )
+    rest_within: FloatProperty(
+        name="Within",
+        description="Cycles of the gait that the body takes at least to get going from its rest, "
+        "and to come to it, if that is more than Ease In and Out give it",
+        default=1.0,
+        min=0.0,
+        soft_max=4.0,
+        max=100.0,
+        step=10,
+        override=OVERRIDE,
+    )
+    shown: StringProperty(
+        name="Shown",
+        description="Which contacts have markers",
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+    contacts: CollectionProperty(
+        name="Contacts",
+        description="Contacts that were moved, locked, shifted or removed by hand",
+        type=ContactItem,
+        override=OVERRIDE_LIST,
+    )
+
+
+def stance_settings(settings: OCTO_MOTION_PG_ground) -> StanceSettings:
+    """The settings as core has them."""
+    return StanceSettings(
+        duty=float(np.round(settings.duty, 6)),
+        planted=settings.planted,
+        stretch=settings.stretch,
+        lift=settings.lift,
+        lean=settings.lean,
+        smoothing=settings.smoothing,
+    )
+
+
+class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
+    """What a marker stands for: ``Object.octo_motion.contact``."""
+
+    armature: StringProperty(
+        name="Armature",
+        description="Object whose arm touches here",
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+    arm: StringProperty(
+        name="Arm", description="Name of the arm", options={"HIDDEN"}, override=OVERRIDE
+    )
+    cycle: IntProperty(
+        name="Cycle",
+        description="Number of the arm's cycle along the route",
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+    locked: BoolProperty(
+        name="Locked",
+        description="The contact stays here, however the route or the gait are changed. One that "
+        "was dragged or turned is locked; free it to have it where the gait wants it",
+        override=OVERRIDE,
+    )
+    shift: FloatProperty(
+        name="Shift",
+        description="Share of a cycle by which the contact is later, negative if it is earlier",
+        min=-0.3,
+        max=0.3,
+        step=1,
+        precision=3,
+        override=OVERRIDE,
+    )
+    position: FloatVectorProperty(
+        name="Position",
+        description="Where the marker was put",
+        size=3,
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+    heading: FloatProperty(
+        name="Heading",
+        description="How the marker was turned",
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+    frame_on: FloatProperty(
+        name="From",
+        description="Frame at which the arm takes hold",
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+    frame_off: FloatProperty(
+        name="To",
+        description="Frame at which the arm lets go",
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+    cycle_frames: FloatProperty(
+        name="Cycle Frames",
+        description="Frames that a cycle takes there",
+        default=1.0,
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
+
+
+CLASSES: Final = (OCTO_MOTION_PG_contact, ContactItem, OCTO_MOTION_PG_ground)
