@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import bpy
 
-COMMAND: Final = "octo_motion"
-"""Name of the command."""
+from .command_line import COMMAND
 
 _handles: list[Any] = []
 

@@ -11,6 +11,9 @@ from typing import Final
 from .quality_limits import NAMES
 from .shot_request import EXPORT_SUFFIXES, HIGHEST_FPS, MOST_FRAMES
 
+COMMAND: Final = "octo_motion"
+"""Name of the command."""
+
 _STATUS: Final = "Exit status: 0 all went well, 1 something failed, 2 wrong arguments or job."
 
 _GENERATE: Final = """\

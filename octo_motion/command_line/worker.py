@@ -17,7 +17,7 @@ import bpy
 
 from ..core.errors import OctoMotionError
 from ..ui.locomotion.writing.summary import Summary
-from .blender_command import COMMAND
+from .command_line import COMMAND
 from .outputs import remove_staged, write_json
 from .processes import dying_with_parent
 from .quality_limits import LimitError, quality

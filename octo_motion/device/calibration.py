@@ -17,7 +17,7 @@ from typing import Final
 
 from ..core.errors import DeviceError
 from .driver import Kind
-from .hid.response import Axes
+from .response import Axes
 
 _NOTHING: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _FULL: Final[Axes] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)

@@ -26,7 +26,7 @@ from ..core.rotations import (
     rotate,
     to_rotation_vector,
 )
-from .haptics.local_model import Pull
+from .held_body import Pull
 from .ipc.messages import DeviceMessage, HandMessage, HeldMessage, Settings
 from .spatial import IDENTITY, ZERO, Vector
 

@@ -10,7 +10,8 @@ from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
 from .locomotion.settings.ground import OCTO_MOTION_PG_contact
-from .locomotion.settings.properties import OCTO_MOTION_PG_locomotion, make_overridable
+from .locomotion.settings.properties import OCTO_MOTION_PG_locomotion
+from .override_groups import make_overridable
 from .posing.properties import OCTO_MOTION_PG_posing
 from .splicing.properties import OCTO_MOTION_PG_splicing
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.animation import actions
-from octo_motion.blender.animation.actions import Channel
 from octo_motion.core import rotations
 from octo_motion.core.errors import RigError
+from octo_motion.core.keyframes.channel import Channel
 from octo_motion.core.locomotion.metrics import report as figures
 from octo_motion.core.rotations import EULER_ORDERS, Floats
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.animation import actions
-from octo_motion.blender.animation.actions import Channel
 from octo_motion.core.errors import RigError, WriteError
+from octo_motion.core.keyframes.channel import Channel
 
 BONES = ("Arm", "Tip", "Eye")
 

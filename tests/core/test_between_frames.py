@@ -6,9 +6,9 @@ import pytest
 
 from octo_motion.core.locomotion.clearance.subframe_clearance import ArmsOverGround, raised_between
 from octo_motion.core.locomotion.ground.walk import Raise
-from octo_motion.core.locomotion.metrics.report import Poses
 from octo_motion.core.locomotion.rig.arm_frames import arm_frames
 from octo_motion.core.locomotion.rig.placement import object_transforms
+from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle, multiply, rotate
 from tests.core.grounds import GROUNDS, Walker, largest_turn, walker
 

@@ -9,9 +9,10 @@ import pytest
 
 from octo_motion.core.locomotion.clearance.capsule_overlap import Overlap, Separation
 from octo_motion.core.locomotion.ground.surface import Plane
-from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, Poses, figures
+from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, figures
 from octo_motion.core.locomotion.rig.arm_frames import ArmFrames
 from octo_motion.core.locomotion.rig.bone_rotations import ArmRest
+from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import IDENTITY, from_axis_angle
 
 COUNT = 5

@@ -7,8 +7,8 @@ import pytest
 from octo_motion.core.locomotion.clearance.subframe_clearance import ArmsOverGround
 from octo_motion.core.locomotion.clearance.swim_clearance import afloat, off_ground
 from octo_motion.core.locomotion.ground.surface import Plane
-from octo_motion.core.locomotion.metrics.report import Poses
 from octo_motion.core.locomotion.rig.arm_frames import arm_frames
+from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.grounds import GROUNDS, largest_turn, walker
 

@@ -14,10 +14,10 @@ from octo_motion.core.errors import DeviceError
 from octo_motion.device.calibration import NONE, Calibration, Calibrator, Phase, reached
 from octo_motion.device.driver import Kind
 from octo_motion.device.hid.multi_axis import classic_layout
-from octo_motion.device.hid.response import Axes, Response
 from octo_motion.device.hid.space_mouse import SpaceMouse
 from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.codec import MessageError
+from octo_motion.device.response import Axes, Response
 from tests.device.parts import FakeHandle, found
 from tests.device.test_pointer import ROCK, Table
 

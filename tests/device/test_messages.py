@@ -23,7 +23,7 @@ from octo_motion.core.posing.solver.obstacles import (
     Sphere,
 )
 from octo_motion.device.calibration import Calibration, Phase
-from octo_motion.device.haptics.local_model import Pull
+from octo_motion.device.held_body import Pull
 from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.codec import MessageError
 from tests.core.puppets import doll, posed, soft

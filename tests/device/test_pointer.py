@@ -14,8 +14,8 @@ from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.core.rotations import from_rotation_vector
 from octo_motion.device.calibration import Calibration
 from octo_motion.device.driver import DeviceLostError, Kind, Sample
-from octo_motion.device.haptics.local_model import Held, Pull
 from octo_motion.device.haptics.pointer import Pointer
+from octo_motion.device.held_body import Held, Pull
 from octo_motion.device.ipc.messages import DeviceMessage, Settings, Workspace
 from octo_motion.device.simulation import Hand as HandInWorld
 from octo_motion.device.simulation import Simulation

@@ -19,8 +19,8 @@ import pytest
 
 from octo_motion.device.driver import DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
-from octo_motion.device.haptics.local_model import Pull
 from octo_motion.device.haptics.schedule import Schedule
+from octo_motion.device.held_body import Pull
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.channel import Channel, Listener, connect

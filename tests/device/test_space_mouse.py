@@ -15,8 +15,8 @@ from octo_motion.core.errors import DeviceError
 from octo_motion.device.driver import DeviceLostError, Kind
 from octo_motion.device.hid import space_mouse, system
 from octo_motion.device.hid.descriptor import parse
-from octo_motion.device.hid.response import Axes, Response
 from octo_motion.device.hid.space_mouse import SpaceMouse, is_space_mouse
+from octo_motion.device.response import Axes, Response
 from tests.device.parts import SPACE_MOUSE, FakeHandle, found
 
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.metrics import measures as quality
-from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, Poses
+from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured
+from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import rotate
 from octo_motion.ui.locomotion.generate_motion import prepare
 from octo_motion.ui.locomotion.settings import quality as quality_report

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from operator import itemgetter
 from typing import Final
@@ -19,6 +18,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RigError, WriteError
+from ...core.keyframes.channel import Channel
 from ...core.keyframes.reduction import BezierKeys
 from ...core.rotations import (
     Floats,
@@ -51,18 +51,6 @@ rounds them anew."""
 
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
-
-
-@dataclass(frozen=True, eq=False)
-class Channel:
-    """One animated property: as many F-curves as it has components."""
-
-    data_path: str
-    values: Floats
-    """(frames, components)"""
-    group: str
-    keys: BezierKeys | None = None
-    """What is written in place of one linear key per frame."""
 
 
 def writable_armature(obj: bpy.types.Object) -> None:

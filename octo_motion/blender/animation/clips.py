@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.errors import ClipError
+from ...core.keyframes.channel import Channel
 from ...core.rotations import (
     IDENTITY,
     Floats,
@@ -29,7 +30,6 @@ from ...core.splicing.clip.unpose import orientations_of, unposed
 from ...core.splicing.transfer.parts import beneath
 from ..rig.armature import armature_data, read_skeleton, world_matrix
 from .actions import (
-    Channel,
     delta_rotation,
     location_channel,
     object_channels,

@@ -17,12 +17,13 @@ import bpy
 import numpy as np
 
 from ...core.errors import WriteError
+from ...core.keyframes.channel import Channel
 from ...core.keyframes.reduction import LOCATION, Limb, Track, reduce_keys
 from ...core.rotations import Floats
+from ..rig.armature import carrying_axes
 from . import keying_settings as keying
-from .actions import Channel, location_channel, rotation_channels, writable_armature
+from .actions import location_channel, rotation_channels, writable_armature
 from .key_arrays import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
-from .preview_pose import carrying_axes
 
 Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
 

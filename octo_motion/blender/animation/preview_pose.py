@@ -9,6 +9,7 @@ import bpy
 from mathutils import Matrix, Quaternion, Vector
 
 from ...core.rotations import Floats
+from ..rig.armature import carrying_axes
 
 _CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 
@@ -64,9 +65,3 @@ def show_pose(
             if not bone.bone.use_local_location:
                 place = carrying_axes(bone.bone) @ place
             bone.matrix_basis = Matrix.LocRotScale(place[:], Quaternion(rotation), size)
-
-
-def carrying_axes(bone: bpy.types.Bone) -> Matrix:
-    """A bone's axes, seen along those in which its location is given when it is not local."""
-    axes = bone.matrix_local.to_3x3()
-    return axes if bone.parent is None else bone.parent.matrix_local.to_3x3().inverted() @ axes

@@ -7,6 +7,7 @@ from typing import Final
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...core.content_cache import Remembered
 from ...core.errors import RigError
@@ -168,3 +169,9 @@ def is_driven_object(obj: bpy.types.Object) -> bool:
 def _vertex_group_names(armature: bpy.types.Object) -> set[str]:
     """Names of the vertex groups of all meshes that the armature deforms."""
     return {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}
+
+
+def carrying_axes(bone: bpy.types.Bone) -> Matrix:
+    """A bone's axes, seen along those in which its location is given when it is not local."""
+    axes = bone.matrix_local.to_3x3()
+    return axes if bone.parent is None else bone.parent.matrix_local.to_3x3().inverted() @ axes

@@ -15,7 +15,7 @@ from mathutils import Quaternion, Vector
 from ...core.errors import RigError
 from ...core.posing.puppet.figure import Figure, Pose
 from ...core.rotations import Floats, conjugate, from_matrix, multiply, rotate
-from ..animation.preview_pose import carrying_axes
+from .armature import carrying_axes
 from .puppet_reading import Rig, even_scale, posed_bones, read_rig
 
 _NOTHING = 1e-9

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import exp
-from typing import Final, NamedTuple
+from typing import Final
 
+from ..held_body import Held, Pull
 from ..spatial import (
     IDENTITY,
     ZERO,
@@ -34,37 +35,6 @@ from ..spatial import (
 
 _FADE: Final = 0.004
 """s in which a difference falls to a third."""
-
-
-class Pull(NamedTuple):
-    """How the simulation ties the held body to the pointer, and how the body gives way."""
-
-    stiffness: float = 0.0
-    """N/m of the simulation's own coupling."""
-    damping: float = 0.0
-    """N·s/m"""
-    angular_stiffness: float = 0.0
-    """N·m/rad"""
-    angular_damping: float = 0.0
-    """N·m·s/rad"""
-    mobility: float = 0.0
-    """1/kg of the body at the point held; 0: it keeps its velocity whatever pulls."""
-    angular_mobility: float = 0.0
-    """1/(kg·m²)"""
-
-
-class Held(NamedTuple):
-    """What the simulation knows of a held body, at the point where it is held."""
-
-    position: Vector
-    orientation: Quaternion
-    velocity: Vector
-    angular_velocity: Vector
-    pull: Pull = Pull()
-    force: Vector = ZERO
-    """N, that its own coupling used in its last step."""
-    torque: Vector = ZERO
-    """N·m, likewise."""
 
 
 @dataclass

@@ -9,6 +9,7 @@ from typing import Final
 
 from ..calibration import NONE, Calibration, Calibrator
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
+from ..held_body import Held
 from ..hid.space_mouse import SpaceMouse
 from ..ipc.messages import HandMessage, Settings, Workspace
 from ..spatial import (
@@ -29,7 +30,7 @@ from ..spatial import (
     unit,
 )
 from .coupling import Gains, gains_for, wrench
-from .local_model import Held, LocalModel
+from .local_model import LocalModel
 from .passivity import DAMPING, STORED, Observer
 from .safety import Limits, Shaper
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from ..response import Axes
 from .descriptor import Field, Layout, Way
 from .models import RANGE
-from .response import Axes
 
 _DESKTOP: Final = 0x01
 _BUTTONS: Final = 0x09

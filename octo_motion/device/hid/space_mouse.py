@@ -8,11 +8,11 @@ from typing import Final
 
 from ..calibration import NONE
 from ..driver import Description, Kind, Sample
+from ..response import Axes, Response
 from ..spatial import Vector
 from .descriptor import DescriptorError, Layout, parse
 from .models import USAGE, USAGE_PAGE, model_of
 from .multi_axis import MultiAxis, classic_layout
-from .response import Axes, Response
 from .system import Found, Handle, Line, descriptor_of, open_device
 
 _STILL: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

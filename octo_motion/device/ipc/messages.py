@@ -20,8 +20,8 @@ from ...core.posing.solver.obstacles import Box, Capsule, Hull, Mesh, Obstacle, 
 from ...core.posing.solver.world import WorldSettings
 from ...core.rotations import Floats
 from ..calibration import Calibration, Phase
-from ..haptics.local_model import Held, Pull
-from ..hid.response import Axes, Response
+from ..held_body import Held, Pull
+from ..response import Axes, Response
 from ..spatial import IDENTITY, ZERO, Quaternion, Vector, unit
 from .codec import (
     F64,

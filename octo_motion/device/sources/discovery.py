@@ -22,8 +22,8 @@ from ...core.errors import DeviceError
 from ..driver import DeviceLostError, Driver
 from ..hid import system
 from ..hid.force_device import ForceDevice, is_force_device
-from ..hid.response import Response
 from ..hid.space_mouse import SpaceMouse, is_space_mouse
+from ..response import Response
 from .haply import PORT as HAPLY_PORT
 from .haply import Haply
 from .network import Port

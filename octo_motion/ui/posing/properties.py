@@ -11,8 +11,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 
 from ...blender.rig.armature import armature_data
 from ...core.posing.puppet.bone_roles import SMALLEST
-from ..locomotion.settings.gait import OVERRIDE
-from ..locomotion.settings.properties import make_overridable
+from ..override_flags import OVERRIDE
+from ..override_groups import make_overridable
 
 MATERIALS: Final = (
     ("CLAY", "Clay", "Gives way slowly and stays: as soft as it is pulled", 0),

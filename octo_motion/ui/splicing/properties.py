@@ -9,7 +9,7 @@ import bpy
 from bpy.props import PointerProperty
 
 from ...blender.rig.armature import armature_data
-from ..locomotion.settings.properties import make_overridable
+from ..override_groups import make_overridable
 from .landmark_properties import OCTO_MOTION_PG_landmarks
 from .splice_properties import SpliceStack
 

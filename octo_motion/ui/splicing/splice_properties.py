@@ -20,7 +20,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ..locomotion.settings.gait import OVERRIDE, OVERRIDE_LIST
+from ..override_flags import OVERRIDE, OVERRIDE_LIST
 
 PARTS: Final = (
     ("RIGHT_ARM", "Right Arm", "From the right collar bone or shoulder to the fingers", 0),

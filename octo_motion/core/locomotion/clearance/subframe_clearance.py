@@ -21,9 +21,9 @@ from ...batched import turned
 from ...rotations import Floats, rotate
 from ...temporal_filter import covered
 from ..ground.surface import Ground
-from ..metrics.report import Poses, automatic
 from ..rig.arm_batches import ArmsTogether, alike
 from ..rig.arm_frames import ArmFrames
+from ..rig.poses import Poses, automatic
 
 _TOLERATED: Final = 0.002
 """Arm lengths that a joint may be below the ground half way between frames …"""

@@ -16,7 +16,7 @@ import numpy as np
 from ...easing import smooth_step
 from ...rotations import Floats, conjugate, multiply, rotate, shortest_arc
 from ..ground.arm_curves import raised
-from ..metrics.report import Poses
+from ..rig.poses import Poses
 from .subframe_clearance import ArmsOverGround
 
 _OVER: Final = 0.03

@@ -15,7 +15,8 @@ from ...keyframes.playback import rotations_of, values_at
 from ...rotations import Floats
 from ...skeleton import Skeleton
 from ..rig.placement import carried_by_root_bone
-from .report import Measured, Poses, between
+from ..rig.poses import Poses, between
+from .report import Measured
 
 
 @dataclass(frozen=True, eq=False)

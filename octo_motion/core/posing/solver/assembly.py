@@ -7,11 +7,11 @@ import numpy as np
 
 from ...rotations import Floats
 from ..puppet.figure import Figure
-from ..puppet.joint_limits import JointStops
 from ..puppet.kinematics import skew
 from ..puppet.plastic_element import PlasticLaw
 from .bodies import Bodies
 from .constraint_rows import Rows
+from .joint_stops import JointStops
 from .problem import Problem, moments
 from .state import WorldSettings
 from .tree import Tree

@@ -8,7 +8,6 @@ from typing import Final
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty
 
 from ....blender.rig.skin_radii import skin_key, skin_parts, skin_radii
 from ....core.content_cache import Remembered, key_of
@@ -20,7 +19,6 @@ from ....core.locomotion.rig.arm_chains import BodyFrame
 from ....core.locomotion.rig.arm_frames import ArmFrames, arm_frames
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
-from ..settings.gait import OVERRIDE
 
 DEEP: Final = TOLD["OVERLAP"]
 """Share of a radius by which arms may overlap without a word: flesh gives."""
@@ -105,25 +103,6 @@ class Apart:
             f"overlaps at {share:.0f} % of the frames."
         )
         return (told,)
-
-
-class KeepingApart:
-    """What ``Object.octo_motion.locomotion`` has of it."""
-
-    keep_apart: BoolProperty(
-        name="Keep Apart",
-        description="Arms that would pass through each other or through the body make way: those "
-        "in the air, and what does not lie on the ground of those that hold on",
-        default=True,
-        override=OVERRIDE,
-    )
-    tell_overlaps: BoolProperty(
-        name="Tell Overlaps",
-        description="After generating, say at which frame an arm passes deepest through another "
-        "or through the body, if by more than a tenth of its thickness",
-        default=True,
-        override=OVERRIDE,
-    )
 
 
 _known: Final[Remembered[Apart]] = Remembered(2)

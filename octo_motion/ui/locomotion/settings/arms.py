@@ -21,8 +21,9 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...override_flags import OVERRIDE, OVERRIDE_LIST
 from .contact_overrides import rename_arm
-from .gait import OVERRIDE, OVERRIDE_LIST, SIDES
+from .gait import SIDES
 
 
 def _renamed(arm: ArmItem, _context: bpy.types.Context) -> None:

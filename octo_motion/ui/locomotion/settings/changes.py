@@ -15,7 +15,7 @@ from bpy.props import (
 )
 
 from ....blender.files import presets
-from .gait import OVERRIDE, OVERRIDE_LIST
+from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 
 def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:

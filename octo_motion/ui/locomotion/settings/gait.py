@@ -11,7 +11,7 @@ first. So whatever an artist does with them, the table closes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -29,18 +29,7 @@ from ....core.errors import GaitError
 from ....core.locomotion.gait import table as gait
 from ....core.locomotion.gait.table import ANGLES, CYCLE, LINKS, GaitCurve, GaitTable
 from ....core.rotations import Floats
-
-if TYPE_CHECKING:
-    from bpy.stub_internal.rna_enums import (
-        PropertyOverrideFlagCollectionItems,
-        PropertyOverrideFlagItems,
-    )
-
-OVERRIDE: Final[set[PropertyOverrideFlagItems]] = {"LIBRARY_OVERRIDABLE"}
-OVERRIDE_LIST: Final[set[PropertyOverrideFlagCollectionItems]] = {
-    "LIBRARY_OVERRIDABLE",
-    "USE_INSERTION",
-}
+from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 DEFAULT_GAIT: Final = "walk"
 _DEFAULT: Final = gait.presets()[DEFAULT_GAIT]

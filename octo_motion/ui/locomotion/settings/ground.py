@@ -18,7 +18,7 @@ from bpy.props import (
 )
 
 from ....core.locomotion.ground.stance_settings import StanceSettings
-from .gait import OVERRIDE, OVERRIDE_LIST
+from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 
 def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:

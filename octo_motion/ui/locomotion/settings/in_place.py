@@ -8,10 +8,10 @@ from typing import Any, Final
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from ....blender.animation.actions import Channel
+from ....core.keyframes.channel import Channel
 from ....core.locomotion.path.in_place import breaths
 from ....core.rotations import Floats
-from .gait import OVERRIDE
+from ...override_flags import OVERRIDE
 
 _IN_PLACE: Final = (
     "Nothing travels: whole cycles on the spot, whose last frame meets the first, for games and "

@@ -8,7 +8,7 @@ from typing import Any, Final
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from .gait import OVERRIDE
+from ...override_flags import OVERRIDE
 
 SWITCHED: Final[set[str]] = set()
 """Names of the armatures whose Live was switched, until somebody has looked."""

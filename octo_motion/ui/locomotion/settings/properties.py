@@ -27,20 +27,14 @@ from ....core.errors import GaitError
 from ....core.locomotion.gait.gait_poser import MOST_STEADY, GaitSettings
 from ....core.locomotion.gait.table import GaitTable
 from ....core.locomotion.path.travel import TravelSettings
-from ..reading.skin import KeepingApart
+from ...override_flags import OVERRIDE, OVERRIDE_LIST
+from ...override_groups import make_overridable
 from .arms import ArmItem
 from .changes import OCTO_MOTION_PG_change
-from .gait import (
-    DEFAULT_GAIT,
-    OVERRIDE,
-    OVERRIDE_LIST,
-    OCTO_MOTION_PG_gait_table,
-    fill_table,
-    read_table,
-    used,
-)
+from .gait import DEFAULT_GAIT, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
 from .ground import OCTO_MOTION_PG_ground
 from .in_place import TRAVEL_IN_PLACE, InPlace
+from .keep_apart import KeepingApart
 from .live import Live
 from .quality import QualityReport
 from .reaches import Reaches
@@ -587,26 +581,6 @@ def locomotion_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion
     armature_data(armature)
     make_overridable(armature)
     return cast("OCTO_MOTION_PG_locomotion", armature.octo_motion.locomotion)  # type: ignore[attr-defined]
-
-
-def make_overridable(armature: bpy.types.Object) -> None:
-    """Let a library override keep its settings where the linked object has none.
-
-    Blender 5.2 compares groups of properties with those of the linked object. Where that has
-    never had any, it saves an override of the group as a whole, which it cannot read back. A
-    group comes into being when it is looked at.
-    """
-    override = armature.override_library
-    if override is not None and isinstance(override.reference, bpy.types.Object):
-        _look_at(override.reference.octo_motion)  # type: ignore[attr-defined]
-
-
-def _look_at(group: bpy.types.PropertyGroup) -> None:
-    for definition in group.bl_rna.properties:
-        if definition.type == "POINTER" and definition.identifier != "rna_type":
-            value = getattr(group, definition.identifier)
-            if isinstance(value, bpy.types.PropertyGroup):
-                _look_at(value)
 
 
 def load_gait(settings: OCTO_MOTION_PG_locomotion, name: str) -> None:

@@ -22,7 +22,7 @@ from ....blender.rig.armature import active_armature
 from ....core.errors import RigError, SettingsError
 from ....core.locomotion.metrics.report import TOLD, Figure
 from ...armature_operator import ArmatureOperator
-from .gait import OVERRIDE, OVERRIDE_LIST
+from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 if TYPE_CHECKING:
     from .properties import OCTO_MOTION_PG_locomotion

@@ -17,7 +17,7 @@ from bpy.props import (
 )
 
 from ....blender.scene.grasp_target import WITH_SURFACE
-from .gait import OVERRIDE, OVERRIDE_LIST
+from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 MODES: Final = (
     ("COIL", "Coil", "Wind about the object, hold it, and let go", 0),

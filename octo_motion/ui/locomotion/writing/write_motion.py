@@ -26,7 +26,7 @@ from ....core.locomotion.ground.surface import Ground
 from ....core.locomotion.ground.swing_smoothing import Steady
 from ....core.locomotion.ground.walk import Raise
 from ....core.locomotion.metrics.played_motion import Rig, as_keyed
-from ....core.locomotion.metrics.report import TOLD, Figure, Measured, Poses, automatic, figures
+from ....core.locomotion.metrics.report import TOLD, Figure, Measured, figures
 from ....core.locomotion.motion.few_keys import Body, Motion, Tolerances, reduced
 from ....core.locomotion.path.gait_changes import between
 from ....core.locomotion.path.route import Route
@@ -34,6 +34,7 @@ from ....core.locomotion.path.travel import Travel, TravelSettings, plan_travel
 from ....core.locomotion.rig.arm_chains import BodyFrame
 from ....core.locomotion.rig.detection import Detection
 from ....core.locomotion.rig.placement import object_transforms, root_bone_transforms
+from ....core.locomotion.rig.poses import Poses, automatic
 from ....core.rotations import IDENTITY, Floats, from_matrix, rotate
 from ....core.skeleton import Skeleton
 from ..reading.arm_items import bones_of, write_arms, write_body

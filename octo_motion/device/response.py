@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from math import copysign, isfinite
 from typing import Final
 
-from ...core.errors import DeviceError
+from ..core.errors import DeviceError
 
 Axes = tuple[float, float, float, float, float, float]
 """Along X, Y, Z, then about X, Y, Z; Blender's axes."""
