@@ -6,7 +6,8 @@ from __future__ import annotations
 import sys
 from importlib.util import find_spec
 
-from .command_line.command_line import parse
+from .command_line import main as run_command
+from .command_line import parse
 
 PROGRAM = "python -m octo_motion"
 
@@ -26,11 +27,10 @@ def main() -> int:
         )
         return 2
     from . import register, unregister  # noqa: PLC0415
-    from .command_line import commands  # noqa: PLC0415
 
     register()
     try:
-        return commands.main(arguments, PROGRAM, has_open_file=False)
+        return run_command(arguments, PROGRAM, has_open_file=False)
     finally:
         # Blender 4.5 as a module hangs at exit while an operator is registered.
         unregister()

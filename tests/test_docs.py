@@ -382,7 +382,7 @@ def test_every_gait_that_comes_along_is_in_the_guide() -> None:
     from octo_motion.core.locomotion.gait import table as gait
 
     guide = text_of(REPOSITORY / "docs" / "guide.md")
-    assert [name for name in gait.presets() if f"`{name}`" not in guide] == []
+    assert [name for name in gait.gait_presets() if f"`{name}`" not in guide] == []
 
 
 # --- Messages ------------------------------------------------------------------------------------

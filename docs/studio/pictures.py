@@ -123,7 +123,7 @@ def rig() -> Pixels:
 
 def gaits() -> Pixels:
     """Curves of the presets that the source has."""
-    presets = gait.presets()
+    presets = gait.gait_presets()
     return plot.gait_pixels([presets["walk"], presets["swim"]], (1000, 600))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import plot
 from stage import Pixels
 
-from octo_motion.core.posing.puppet.figure import Elements, Figure, Limits, Pose
+from octo_motion.core.posing.puppet.figure import Elements, Figure, JointRanges, Pose
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.puppet.plastic_element import PlasticLaw
 from octo_motion.core.posing.solver.world import World, WorldSettings
@@ -102,7 +102,7 @@ def _arm() -> Figure:
         inertias=np.tile(np.diag([across, 0.5 * mass * _RADIUS**2, across]), (_BONES, 1, 1)),
         capsules=ends,
         radii=np.full(_BONES, _RADIUS),
-        limits=Limits(np.tile([-np.pi, np.pi], (_BONES, 3, 1))),
+        limits=JointRanges(np.tile([-np.pi, np.pi], (_BONES, 3, 1))),
         elements=Elements(zeros, zeros, zeros, np.zeros(_BONES)),
     )
     return replace(figure, elements=elements_for(figure, "wire"))

@@ -12,8 +12,8 @@ from typing import Final
 import bpy
 
 from ..core.errors import OctoMotionError, SettingsError, WriteError
-from ..core.locomotion.gait import table as gait
-from ..ui.locomotion.writing.summary import Summary
+from ..core.locomotion.gait import gait_to_json
+from ..ui.locomotion.writing import Summary
 from .command_line import parse
 from .job_file import Known, export_fault, is_gait_file, read_gait_file
 from .job_runner import STOPPED, BakeOptions, bake
@@ -218,7 +218,7 @@ def _gait(name: str, may_name: Known) -> str:
     if not name:
         return ""
     table = read_gait_file(Path(name)) if is_gait_file(name) else may_name.gait(name)
-    return gait.to_json(table)
+    return gait_to_json(table)
 
 
 def _complain(error: OctoMotionError, status: int) -> int:

@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..core.errors import OctoMotionError
-from ..core.locomotion.gait import table as gait
-from ..core.locomotion.gait.table import GaitTable
-from ..core.locomotion.octopus.shape import OctopusShape
+from ..core.locomotion.gait import GaitError, GaitTable, gait_from_json, gait_to_json
+from ..core.locomotion.octopus import OctopusShape
 from ..core.posing.pose_script import parse_script
 from .motion_files import is_motion
 from .quality_limits import read_limits
@@ -96,14 +95,14 @@ class JobShot:
 
 
 @dataclass(frozen=True)
-class Job:
+class JobFile:
     """A job file that was found to be in order."""
 
     path: Path
     shots: tuple[JobShot, ...]
 
 
-def read_job(path: Path, known: Known, report: Path) -> Job:
+def read_job(path: Path, known: Known, report: Path) -> JobFile:
     """The shots of a job file.
 
     Args:
@@ -148,7 +147,7 @@ def read_job(path: Path, known: Known, report: Path) -> Job:
     faults += _path_faults(shots, path, report)
     if faults:
         raise JobError(f"'{path}'", faults)
-    return Job(path, tuple(shots))
+    return JobFile(path, tuple(shots))
 
 
 def load_gait_file(shot: JobShot) -> ShotEntry:
@@ -159,7 +158,7 @@ def load_gait_file(shot: JobShot) -> ShotEntry:
     """
     if shot.gait_file is None:
         return shot.entry
-    return replace(shot.entry, gait=gait.to_json(read_gait_file(shot.gait_file)))
+    return replace(shot.entry, gait=gait_to_json(read_gait_file(shot.gait_file)))
 
 
 def read_gait_file(path: Path) -> GaitTable:
@@ -172,8 +171,8 @@ def read_gait_file(path: Path) -> GaitTable:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = (isinstance(error, OSError) and error.strerror) or "it is not text"
-        raise gait.GaitError(f"'{path}' cannot be read: {reason}.", "Give a gait file.") from error
-    return gait.from_json(text, f"'{path}'")
+        raise GaitError(f"'{path}' cannot be read: {reason}.", "Give a gait file.") from error
+    return gait_from_json(text, f"'{path}'")
 
 
 def is_gait_file(name: str) -> bool:
@@ -479,7 +478,7 @@ class _Reader:
         if is_gait_file(name):
             return "", self._resolved(name)
         try:
-            return gait.to_json(self._known.gait(name)), None
+            return gait_to_json(self._known.gait(name)), None
         except OctoMotionError as error:
             self._fault(str(error))
             return "", None

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from ..core.errors import OctoMotionError
 from .fingerprint import digest, fingerprint
-from .job_file import Job, JobError, JobShot, Known, load_gait_file, read_job
+from .job_file import JobError, JobFile, JobShot, Known, load_gait_file, read_job
 from .outputs import commit, staged
 from .processes import Ended, Task, check_jobs, last_lines, run_processes
 from .report import ShotRecord, count, judge, read_report, write_report
 from .setting_values import unknown
 from .shot_request import ShotEntry
-from .worker import Answer, child_command, child_environment, read_answer, write_request
+from .worker import WorkerAnswer, child_command, child_environment, read_answer, write_request
 
 STOPPED = 130
 """Exit status of a run that was stopped by Ctrl-C, as shells have it."""
@@ -85,7 +85,7 @@ def bake(
     return run.all(plans, jobs)
 
 
-def _chosen(job: Job, only: Sequence[str]) -> list[JobShot]:
+def _chosen(job: JobFile, only: Sequence[str]) -> list[JobShot]:
     names = [shot.entry.name for shot in job.shots]
     if faults := [unknown("shot", name, names) for name in only if name not in names]:
         raise JobError(f"'{job.path}'", faults)
@@ -128,7 +128,7 @@ def _plan(shot: JobShot, run: _Run, problems: Mapping[Path, str], *, force: bool
 class _Run:
     """The state of a job while it runs."""
 
-    job: Job
+    job: JobFile
     records: dict[str, ShotRecord]
     report: Path
     say: Callable[[str], None]
@@ -225,11 +225,11 @@ class _Run:
         error: str,
         seconds: float | None = None,
         log: str = "",
-        answer: Answer | None = None,
+        answer: WorkerAnswer | None = None,
     ) -> None:
         name = plan.entry.name
         before = self.records.get(name)
-        said = answer or Answer()
+        said = answer or WorkerAnswer()
         self.records[name] = ShotRecord(
             name=name,
             status="failed",

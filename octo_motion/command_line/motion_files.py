@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from ..core.errors import ClipError
-from ..core.splicing.clip.bvh_check import check_bvh
+from ..core.splicing.clip import check_bvh
 
 SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from ..core.errors import OctoMotionError, SettingsError
-from ..core.locomotion.metrics.report import KINDS, Figure
+from ..core.locomotion.metrics import KINDS, Figure
 from .setting_values import unknown
 
 NAMES: Final = tuple(kind.lower() for kind in KINDS)

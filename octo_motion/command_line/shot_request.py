@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from ..core.locomotion.octopus.shape import OctopusShape
+from ..core.locomotion.octopus import OctopusShape
 from .setting_values import Value
 
 EXPORT_SUFFIXES: Final = (".glb", ".fbx", ".abc")

@@ -11,19 +11,17 @@ from typing import Any, Final
 import bpy
 from mathutils import Matrix
 
-from ..blender.animation import actions
+from ..blender.animation import writable_armature
 from ..blender.overrides import linked_names
-from ..blender.rig.armature import read_skeleton, world_matrix
-from ..blender.scene.contact_markers import remove_markers
-from ..blender.scene.curves import add_route_curve
-from ..blender.scene.octopus import add_octopus
+from ..blender.rig import read_skeleton, world_matrix
+from ..blender.scene import add_octopus, add_route_curve, remove_markers
 from ..core.errors import OctoMotionError, RigError, RouteError, SettingsError, WriteError
-from ..core.locomotion.gait import table as gait
-from ..core.locomotion.rig.detection import detect_arms
+from ..core.locomotion.gait import gait_from_json
+from ..core.locomotion.rig import detect_arms
 from ..ui.locomotion.generate_motion import generate
 from ..ui.locomotion.settings.contact_overrides import once_called, store
 from ..ui.locomotion.settings.properties import locomotion_settings, set_gait
-from ..ui.locomotion.writing.summary import Summary
+from ..ui.locomotion.writing import Summary
 from . import pose_runner as pose_stage
 from . import splice_runner as splice_stage
 from .exports import check_export, export
@@ -223,10 +221,10 @@ def _context(scene: bpy.types.Scene, armature: bpy.types.Object) -> Any:
 
 def _apply(entry: ShotEntry, armature: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """Write what the shot asks for into the armature's settings."""
-    actions.writable_armature(armature)
+    writable_armature(armature)
     settings: Any = locomotion_settings(armature)
     if entry.gait:
-        set_gait(settings, gait.from_json(entry.gait))
+        set_gait(settings, gait_from_json(entry.gait))
     for name, value in entry.settings.items():
         *groups, last = name.split(".")
         group = settings

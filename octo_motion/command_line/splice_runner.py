@@ -10,13 +10,12 @@ from typing import Any, Final
 
 import bpy
 
-from ..blender.animation import actions
-from ..blender.animation.cycles import lasting
-from ..blender.scene.imports import NOTE, ImportedClip, import_clip
+from ..blender.animation import lasting, writable_armature
+from ..blender.scene import NOTE, ImportedClip, import_clip
 from ..core.errors import ClipError, OctoMotionError
 from ..ui.splicing.properties import splicing_settings
 from ..ui.splicing.splice_properties import PARTS
-from ..ui.splicing.stack import Reader, prepare, write
+from ..ui.splicing.stack import ClipReader, prepare_splices, write
 from .motion_files import check_motion, files_within
 from .setting_values import Value, unknown
 from .shot_request import HIGHEST_FPS, NewSplice, SpliceWork, frame_rate
@@ -160,7 +159,7 @@ def splice(
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    actions.writable_armature(armature)
+    writable_armature(armature)
     stack = _stack(armature)
     if work.splices is None and not has_splices(armature):
         raise ClipError(
@@ -182,7 +181,7 @@ def splice(
                 _add(armature, each, clips, base_file)
             except OctoMotionError as error:
                 raise type(error)(f"Splice {number}: {error.problem}", error.remedy) from error
-    prepared = prepare(armature)
+    prepared = prepare_splices(armature)
     made = write(prepared, prepared.compute())
     first, last = (round(each) for each in bpy.data.actions[made.action].frame_range)
     warnings = (*clips.warnings, *made.warnings)
@@ -235,7 +234,7 @@ def _add(
         group, _, landmark = name.rpartition("landmarks.")
         (values if group or landmark == name else landmarks)[landmark] = value
     _set(_stack(source).landmarks, landmarks)
-    reader, stack = Reader(), _stack(armature)
+    reader, stack = ClipReader(), _stack(armature)
     slot, visual = str(values.get("slot", "")), bool(values.get("visual", False))
     begins = float(reader.base(armature).clip.frames[0])
     frames = reader.source(source, action, slot, visual=visual).clip.frames

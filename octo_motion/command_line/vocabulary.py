@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..blender.files import presets
+from ..blender.files import load_gait
 from ..core.errors import OctoMotionError
 from ..ui.locomotion.settings.changes import ChangeItem
 from ..ui.locomotion.settings.ground import ContactItem
@@ -32,7 +32,7 @@ def known() -> Known:
     """What shots may name in this Blender."""
     return Known(
         settings=_by_name(_settings(OCTO_MOTION_PG_locomotion)),
-        gait=presets.load_gait,
+        gait=load_gait,
         splicing_settings=_by_name(_settings(OCTO_MOTION_PG_splicing)),
         splice_settings=_by_name(
             (

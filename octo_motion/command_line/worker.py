@@ -16,7 +16,7 @@ from typing import Any, Final
 import bpy
 
 from ..core.errors import OctoMotionError
-from ..ui.locomotion.writing.summary import Summary
+from ..ui.locomotion.writing import Summary
 from .command_line import COMMAND
 from .outputs import remove_staged, write_json
 from .processes import dying_with_parent
@@ -31,7 +31,7 @@ _PACKAGE: Final = __name__.removesuffix(".command_line.worker")
 
 
 @dataclass(frozen=True)
-class Answer:
+class WorkerAnswer:
     """What a process says about its shot."""
 
     error: str = ""
@@ -83,13 +83,13 @@ def write_request(path: Path, entry: ShotEntry, places: Mapping[Path, Path]) -> 
     write_json(path, {"entry": entry.to_plain(), "places": plain})
 
 
-def read_answer(path: Path) -> Answer | None:
+def read_answer(path: Path) -> WorkerAnswer | None:
     """What a process has said, or None if it ended before it could."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
-    return Answer(**content)
+    return WorkerAnswer(**content)
 
 
 def run_shot(request: Path, answer: Path) -> int:

@@ -20,10 +20,10 @@ _Result = TypeVar("_Result")
 
 _PLAIN: Final = frozenset({bool, int, float, str, type(None)})
 
-_ALL: Final[weakref.WeakSet[Remembered[Any]]] = weakref.WeakSet()
+_ALL: Final[weakref.WeakSet[ContentCache[Any]]] = weakref.WeakSet()
 
 
-class Remembered(Generic[_Result]):
+class ContentCache(Generic[_Result]):
     """The last few results of one function.
 
     Args:
@@ -39,7 +39,7 @@ class Remembered(Generic[_Result]):
         """What was made for this key, else what is made now. It must not be changed afterwards.
 
         Args:
-            key: from :func:`key_of`, of everything that the result depends on.
+            key: from :func:`content_key`, of everything that the result depends on.
             make: makes it; if it raises, nothing is kept.
         """
         if key in self._kept:
@@ -60,13 +60,13 @@ class Remembered(Generic[_Result]):
         self._kept.clear()
 
 
-def forget() -> None:
+def clear_caches() -> None:
     """Keep no result of any function: another file, another world."""
     for each in list(_ALL):
         each.clear()
 
 
-def key_of(*values: Any) -> bytes:
+def content_key(*values: Any) -> bytes:
     """A hash of values: numbers, texts, arrays, and tuples, mappings and dataclasses of them.
 
     A dataclass that is asked for often may keep the key of its fields as ``content``.

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .content_cache import key_of
+from .content_cache import content_key
 from .rotations import Floats, from_matrix, multiply, rotate
 
 
@@ -45,7 +45,7 @@ class Skeleton:
     @cached_property
     def content(self) -> bytes:
         """A key of all of it (``remembered.key_of``)."""
-        return key_of(*(getattr(self, each.name) for each in fields(self)))
+        return content_key(*(getattr(self, each.name) for each in fields(self)))
 
     @cached_property
     def index(self) -> dict[str, int]:

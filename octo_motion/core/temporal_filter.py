@@ -16,7 +16,7 @@ _PASSES = 3
 """Means in a row: what comes of them has neither corner nor jump."""
 
 
-def reach(width: int) -> int:
+def blur_reach(width: int) -> int:
     """Frames to either side that :func:`blurred` looks at."""
     return _PASSES * width
 
@@ -50,7 +50,7 @@ def widened(values: Floats, frames: int, *, cyclic: bool = False) -> Floats:
 
 def covered(values: Floats, width: int, *, cyclic: bool = False) -> Floats:
     """A smooth course (frames, …) that is nowhere below the values."""
-    return blurred(widened(values, reach(width), cyclic=cyclic), width, cyclic=cyclic)
+    return blurred(widened(values, blur_reach(width), cyclic=cyclic), width, cyclic=cyclic)
 
 
 def _around(values: Floats, frames: int, *, cyclic: bool) -> Floats:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .driver import Driver
-    from .sources.discovery import Sources
+    from .sources import Sources
 
 # Arrays here are small: threads of a numerical library would only wait for each other. This must be
 # set before numpy is first imported.
@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _list()
     if options.command == "descriptor":
         return _descriptor(table=options.table)
-    from .ipc.process import end_now  # noqa: PLC0415
+    from .ipc import end_now  # noqa: PLC0415
 
     sources = _sources(parser, options)
     if not 50.0 <= options.rate <= 4000.0:
@@ -77,8 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Sources:
-    from .sources.discovery import Sources  # noqa: PLC0415 - numpy after the variables above
-    from .sources.network import KEY_BYTES  # noqa: PLC0415
+    from .sources import KEY_BYTES, Sources  # noqa: PLC0415 - what help does without
 
     if options.udp is not None and options.tcp is not None:
         parser.error("--udp and --tcp exclude each other")
@@ -107,15 +106,16 @@ def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> So
 
 def _list() -> int:
     from ..core.errors import DeviceError  # noqa: PLC0415
-    from .hid import system  # noqa: PLC0415
-    from .hid.force_device import is_force_device  # noqa: PLC0415
-    from .hid.models import model_of  # noqa: PLC0415
-    from .hid.space_mouse import is_space_mouse  # noqa: PLC0415
+    from .hid import (  # noqa: PLC0415
+        is_force_device,
+        is_space_mouse,
+        list_devices,
+        model_of,
+        open_device,
+    )
 
     try:
-        found = [
-            each for each in system.list_devices() if is_space_mouse(each) or is_force_device(each)
-        ]
+        found = [each for each in list_devices() if is_space_mouse(each) or is_force_device(each)]
     except DeviceError as error:
         print(error, file=sys.stderr)
         return 1
@@ -127,23 +127,23 @@ def _list() -> int:
         name = model.name if model else each.name or "unknown"
         print(f"{each.vendor:04x}:{each.product:04x}  {name} ({kind})")
         try:
-            system.open_device(each).close()
+            open_device(each).close()
         except DeviceError as error:
             print(f"           {error}")
     return 0
 
 
 def _descriptor(*, table: bool) -> int:
-    from .hid import force_profile  # noqa: PLC0415
+    from .hid import REPORTS, SIZES, report_descriptor  # noqa: PLC0415
 
     if table:
-        for number, (way, items) in force_profile.REPORTS.items():
-            print(f"Report {number}, {way}, {force_profile.SIZES[number]} bytes with its number")
+        for number, (way, items) in REPORTS.items():
+            print(f"Report {number}, {way}, {SIZES[number]} bytes with its number")
             for each in items:
                 kind = {"B": "u8", "H": "u16", "I": "u32", "h": "i16", "i": "i32"}[each.code]
                 print(f"  {each.name:<20}{kind} × {each.count}  {each.unit}")
         return 0
-    data = force_profile.report_descriptor()
+    data = report_descriptor()
     for at in range(0, len(data), 12):
         print(", ".join(f"0x{byte:02x}" for byte in data[at : at + 12]) + ",")
     return 0
@@ -151,7 +151,7 @@ def _descriptor(*, table: bool) -> int:
 
 def _watch(sources: Sources, seconds: float) -> int:
     from .driver import DeviceLostError  # noqa: PLC0415
-    from .sources.discovery import Discovery  # noqa: PLC0415
+    from .sources import Discovery  # noqa: PLC0415
 
     discovery = Discovery(sources)
     drivers: list[Driver] = []

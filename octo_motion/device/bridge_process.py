@@ -18,27 +18,31 @@ from pathlib import Path
 from typing import Final
 
 from ..core.errors import DeviceError, OctoMotionError
-from ..core.posing.puppet.figure import Pose
-from ..core.posing.solver.world import WorldSettings
+from ..core.posing.puppet import Pose
+from ..core.posing.solver import WorldSettings
 from .calibration import Phase
-from .haptics.schedule import Schedule
-from .ipc.channel import Channel, ChannelClosedError, Listener
-from .ipc.messages import (
+from .haptics import Schedule
+from .ipc import (
     Button,
     Buzz,
     Calibrate,
     CalibrationMessage,
+    ChannelClosedError,
+    Child,
     DeviceMessage,
     FigureMessage,
     Goodbye,
     Grab,
     HandMessage,
     Hello,
+    Listener,
     LoopTimesMessage,
     Message,
+    MessageChannel,
     MessageError,
     Notice,
     ObstacleMessage,
+    Parent,
     Pins,
     Place,
     PointerMessage,
@@ -48,8 +52,7 @@ from .ipc.messages import (
     Workspace,
     WorldMessage,
 )
-from .ipc.process import Child, Parent
-from .simulation import Hand, Simulation
+from .simulation import SimulatedPointer, Simulation
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +70,7 @@ _SETTLED: Final = 60.0
 class Bridge:
     """What the bridge does, turn by turn."""
 
-    def __init__(self, blender: Channel, hand_arguments: Sequence[str]) -> None:
+    def __init__(self, blender: MessageChannel, hand_arguments: Sequence[str]) -> None:
         self._blender = blender
         self._hand_arguments = tuple(hand_arguments)
         self._hands: Child | None = None
@@ -228,7 +231,7 @@ class Bridge:
                 droppable=True,
             )
 
-    def _pointer(self, told: HandMessage, hand: Hand | None) -> PointerMessage:
+    def _pointer(self, told: HandMessage, hand: SimulatedPointer | None) -> PointerMessage:
         place, turn, body = told.position, told.orientation, -1
         if hand is not None and hand.handle is not None and self.simulation is not None:
             held, turned = self.simulation.coupled(hand.handle)

@@ -17,30 +17,31 @@ from typing import Final
 from ..core.errors import DeviceError
 from .calibration import Calibration, Phase
 from .driver import DeviceLostError, Driver
-from .haptics.pointer import Pointer
-from .haptics.schedule import Schedule, make_real_time
-from .hid.space_mouse import SpaceMouse
-from .ipc.channel import Channel, ChannelClosedError, Listener
-from .ipc.messages import (
+from .haptics import Pointer, Schedule, make_real_time
+from .hid import SpaceMouse
+from .ipc import (
     Button,
     Buzz,
     Calibrate,
     CalibrationMessage,
+    ChannelClosedError,
     DeviceMessage,
     Goodbye,
     Grab,
     HeldMessage,
     Hello,
+    Listener,
     LoopTimesMessage,
     Message,
+    MessageChannel,
     MessageError,
     Notice,
     Order,
+    Parent,
     Settings,
     Workspace,
 )
-from .ipc.process import Parent
-from .sources.discovery import Discovery, Sources
+from .sources import Discovery, Sources
 
 log = logging.getLogger(__name__)
 
@@ -61,7 +62,7 @@ class HandLoop:
     """All devices of this machine, tick by tick."""
 
     def __init__(
-        self, channel: Channel, discovery: Discovery, schedule: Schedule, period: float
+        self, channel: MessageChannel, discovery: Discovery, schedule: Schedule, period: float
     ) -> None:
         self._channel = channel
         self._discovery = discovery

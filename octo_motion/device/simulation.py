@@ -13,11 +13,9 @@ from typing import Final
 import numpy as np
 
 from ..core.posing.picking import capsules_in_world
-from ..core.posing.puppet.figure import Figure, Pose
-from ..core.posing.solver.hand_spring import Coupling
-from ..core.posing.solver.hand_spring import Grab as Handle
-from ..core.posing.solver.obstacles import Obstacle
-from ..core.posing.solver.world import World, WorldSettings
+from ..core.posing.puppet import Figure, Pose
+from ..core.posing.solver import Coupling, Obstacle, World, WorldSettings
+from ..core.posing.solver import Grab as Handle
 from ..core.rotations import (
     Floats,
     conjugate,
@@ -27,7 +25,7 @@ from ..core.rotations import (
     to_rotation_vector,
 )
 from .held_body import Pull
-from .ipc.messages import DeviceMessage, HandMessage, HeldMessage, Settings
+from .ipc import DeviceMessage, HandMessage, HeldMessage, Settings
 from .spatial import IDENTITY, ZERO, Vector
 
 log = logging.getLogger(__name__)
@@ -62,7 +60,7 @@ _PAUSE: Final = 0.05
 
 
 @dataclass
-class Hand:
+class SimulatedPointer:
     """A pointer, as the simulation knows it."""
 
     told: HandMessage
@@ -123,7 +121,7 @@ class Simulation:
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.world = World(figure, pose, settings)
-        self.hands: dict[int, Hand] = {}
+        self.hands: dict[int, SimulatedPointer] = {}
         self.reach = Settings.reach
         self.steps = 0
         self.cost = 0.0
@@ -207,7 +205,7 @@ class Simulation:
             device: What it holds in reality.
             scale: m of the scene for a metre of the hand.
         """
-        hand = self.hands.setdefault(message.pointer, Hand(message))
+        hand = self.hands.setdefault(message.pointer, SimulatedPointer(message))
         if message.time != hand.told.time:
             hand.silence = 0.0
         hand.told, hand.device, hand.scale = message, device, scale
@@ -222,7 +220,7 @@ class Simulation:
         if hand is not None:
             self._release(hand)
 
-    def _grab(self, hand: Hand) -> None:
+    def _grab(self, hand: SimulatedPointer) -> None:
         point, turn = np.array(hand.told.position), np.array(hand.told.orientation)
         body, gap = nearest_body(self.world.figure, self.world.pose(), point)
         if gap > self.reach:
@@ -240,13 +238,13 @@ class Simulation:
         )
         self._wake()
 
-    def _release(self, hand: Hand) -> None:
+    def _release(self, hand: SimulatedPointer) -> None:
         if hand.handle is not None:
             self.world.release(hand.handle)
         hand.handle, hand.grab = None, 0
         self._wake()
 
-    def _coupling(self, hand: Hand) -> Coupling:
+    def _coupling(self, hand: SimulatedPointer) -> Coupling:
         """How firmly a hand holds: so that what it can feel fits the puppet's weight.
 
         The hand feels its own spring over the way by which the body lags behind. A world's
@@ -437,7 +435,7 @@ class Simulation:
             if hand.told.grab:
                 yield self._held(pointer, hand, now)
 
-    def _held(self, pointer: int, hand: Hand, now: float) -> HeldMessage:
+    def _held(self, pointer: int, hand: SimulatedPointer, now: float) -> HeldMessage:
         grab = hand.handle
         if grab is None:
             return HeldMessage(

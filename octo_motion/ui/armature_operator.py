@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..blender.rig.armature import active_armature
+from ..blender.rig import active_armature
 from ..core.errors import RigError
 from .operator_base import OctoOperator
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from bl_operators.presets import AddPresetBase
 
-from ..blender.rig.armature import active_armature
+from ..blender.rig import active_armature
 from ..core.errors import RigError
 
 if TYPE_CHECKING:

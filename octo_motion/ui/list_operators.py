@@ -11,7 +11,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..blender.overrides import linked_names
-from ..blender.rig.armature import active_armature
+from ..blender.rig import active_armature
 from ..core.errors import RigError
 from .armature_operator import ArmatureOperator
 

@@ -8,7 +8,7 @@ from typing import Any, Final, cast
 
 import bpy
 
-from ..blender.rig.armature import active_armature
+from ..blender.rig import active_armature
 from ..core.errors import RigError
 
 _CHARACTER: Final = 6.5

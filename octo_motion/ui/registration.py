@@ -8,7 +8,6 @@ from typing import Any
 
 import bpy
 
-from ..command_line import blender_command as command_line
 from . import at_work, settings
 from .locomotion import panels
 from .locomotion.operators import (
@@ -111,7 +110,6 @@ def register() -> None:
     setups.register()
     for menu, draw in MENUS:
         menu.append(draw)
-    command_line.register()
 
 
 def unregister() -> None:
@@ -119,7 +117,6 @@ def unregister() -> None:
     at_work.stop_all()
     posing.unregister()
     device_settings.unregister()
-    command_line.unregister()
     for menu, draw in reversed(MENUS):
         menu.remove(draw)
     setups.unregister()

@@ -25,7 +25,7 @@ from tests.bench.stopwatch import Place, Stopwatch
 PARTS: dict[str, list[Place]] = {
     "read rig, route, settings": [(workflow, "prepare")],
     "travel along the route": [(shot, "plan_travel"), (shot, "object_transforms")],
-    "gait angles and targets": [(generator.Generator, "pose"), (generator, "pseudo_targets")],
+    "gait angles and targets": [(generator.GaitPoser, "pose"), (generator, "pseudo_targets")],
     "solve (CCD)": [(generator, "solve"), (generator, "asked_shape")],
     "joints to bone rotations": [(generator, "bone_rotations")],
     "values of the channels": [(shot.Shot, "_channels")],

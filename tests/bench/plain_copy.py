@@ -12,8 +12,8 @@ import numpy as np
 
 from octo_motion.core.rotations import conjugate, multiply
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.posture import sampled, slerp
-from octo_motion.core.splicing.clip.timing import window
+from octo_motion.core.splicing.clip.posture import sample_clip, slerp
+from octo_motion.core.splicing.clip.timing import splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.transfer.parts import part_bones
 from octo_motion.core.splicing.transfer.splice import Splice
@@ -28,8 +28,8 @@ def plain_copy(base: Clip, landmarks: Landmarks, splice: Splice) -> Clip:
         splice: part, clip and timing; how it reaches and travels says nothing here.
     """
     assert splice.landmarks is not None
-    span = window(splice.timing, base, splice.clip)
-    moment = sampled(splice.clip, span.splice_frames)
+    span = splice_window(splice.timing, base, splice.clip)
+    moment = sample_clip(splice.clip, span.splice_frames)
     part = set(part_bones(splice.part, base.skeleton, landmarks, clavicle=splice.clavicle))
     rotations = base.rotations.copy()
     for landmark, name in landmarks.bones.items():

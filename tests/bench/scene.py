@@ -15,7 +15,7 @@ from octo_motion.core.locomotion.gait.pseudo_targets import (
     link_rotations,
     pseudo_targets,
 )
-from octo_motion.core.locomotion.gait.table import evaluate
+from octo_motion.core.locomotion.gait.table import gait_angles
 from octo_motion.core.locomotion.path.travel import plan_travel
 from octo_motion.core.locomotion.rig.arm_chains import arm_azimuths, joint_positions
 from octo_motion.core.rotations import Floats, from_axis_angle, rotate
@@ -62,7 +62,7 @@ def groups(armature: bpy.types.Object) -> list[Group]:
     shot = prepare(armature, bpy.context)
     body, skeleton = shot.body, shot.skeleton
     phases = shot.generator.arm_phases(plan_travel(shot.route, shot.travel, shot.times).phase)
-    angles = evaluate(shot.gait, phases, tuple(arm.pair for arm in shot.arms))
+    angles = gait_angles(shot.gait, phases, tuple(arm.pair for arm in shot.arms))
     azimuths = arm_azimuths(skeleton, [arm.bones for arm in shot.arms], body)
     result: list[Group] = []
     for number, arm in enumerate(shot.arms):

@@ -199,7 +199,7 @@ def _dragged(hero: Any, part: str) -> tuple[float, float]:
     """Milliseconds of a move of the mouse with one splice of this part: median and slowest."""
     import bpy
 
-    from octo_motion.ui.splicing.stack import prepare
+    from octo_motion.ui.splicing.stack import prepare_splices
     from octo_motion.ui.splicing.timing_drag import DragSession
 
     splices = hero.octo_motion.splicing.splices
@@ -209,7 +209,7 @@ def _dragged(hero: Any, part: str) -> tuple[float, float]:
     splices[0].with_travel, splices[0].mode = "travel" in part, "EXACT"
     scene: Any = bpy.context.scene
     scene.frame_set(scene.frame_start + 500)
-    session = DragSession(prepare(hero), 0, scene)
+    session = DragSession(prepare_splices(hero), 0, scene)
     session.show()
     moves = []
     for number in range(_MOVES):

@@ -26,7 +26,7 @@ from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import Floats
 from octo_motion.core.splicing.clip.bvh_check import check_bvh
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.timing import Timing, window
+from octo_motion.core.splicing.clip.timing import Timing, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.quality import (
@@ -224,7 +224,7 @@ def _slip(result: Clip, base: Clip, landmarks: Landmarks, splice: Splice) -> Flo
     leg = result.scale * limb_length(result.skeleton, landmarks, "leg.L")
     if splice.part == LEGS:
         assert splice.landmarks is not None
-        span = window(splice.timing, base, splice.clip)
+        span = splice_window(splice.timing, base, splice.clip)
         whole = span.weights >= 1.0
         still = feet_at_rest(splice.clip, splice.landmarks, span.splice_frames[whole])
         chosen = np.arange(len(base))[span.frames][whole]

@@ -22,18 +22,18 @@ def no_gaits_of_the_user() -> Iterator[None]:
 
 
 def my_gait(name: str = "my walk") -> gait.GaitTable:
-    return gait.renamed(gait.presets()["walk"], name)
+    return gait.renamed_gait(gait.gait_presets()["walk"], name)
 
 
 def test_a_gait_comes_back_as_it_was_saved() -> None:
     presets.save_gait(my_gait())
     assert "my walk" in presets.gait_names()
-    assert gait.to_json(presets.load_gait("my walk")) == gait.to_json(my_gait())
+    assert gait.gait_to_json(presets.load_gait("my walk")) == gait.gait_to_json(my_gait())
 
 
 def test_gaits_of_the_extension_come_first() -> None:
     presets.save_gait(my_gait("a walk"))
-    assert presets.gait_names() == [*gait.presets(), "a walk"]
+    assert presets.gait_names() == [*gait.gait_presets(), "a walk"]
 
 
 def test_it_is_known_which_gaits_there_are() -> None:
@@ -64,7 +64,7 @@ def test_a_gait_is_overwritten_only_on_demand() -> None:
     presets.save_gait(my_gait())
     with pytest.raises(GaitError, match="already"):
         presets.save_gait(my_gait())
-    other = gait.renamed(gait.presets()["swim"], "my walk")
+    other = gait.renamed_gait(gait.gait_presets()["swim"], "my walk")
     presets.save_gait(other, overwrite=True)
     assert presets.load_gait("my walk").manner == "SWIM"
 

@@ -21,8 +21,8 @@ from octo_motion.core.rotations import (
     rotate,
 )
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.posture import posture_of, sampled
-from octo_motion.core.splicing.clip.timing import Timing, window
+from octo_motion.core.splicing.clip.posture import posture_of, sample_clip
+from octo_motion.core.splicing.clip.timing import Timing, splice_window
 from octo_motion.core.splicing.clip.unpose import unposed
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
@@ -37,7 +37,7 @@ from octo_motion.core.splicing.transfer.parts import (
     Part,
     part_bones,
 )
-from octo_motion.core.splicing.transfer.splice import Reach, Splice, build, spliced
+from octo_motion.core.splicing.transfer.splice import Reach, Splice, build_splices, spliced
 
 # Blender's importer leaves the file open.
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
@@ -270,7 +270,7 @@ def at_pace(clip: Clip, seconds: float, pace: float) -> Clip:
     """A clip there and back for so long, so many frames a second, without a jump."""
     span = clip.frames[-1] - clip.frames[0]
     passed = np.mod(np.arange(0.0, seconds, 1.0 / pace) * clip.rate, 2.0 * span)
-    posture = sampled(clip, clip.frames[0] + np.minimum(passed, 2.0 * span - passed))
+    posture = sample_clip(clip, clip.frames[0] + np.minimum(passed, 2.0 * span - passed))
     bones = range(len(clip.skeleton))
     rotations = np.stack([posture.rotation(bone) for bone in bones], axis=1)
     return replace(
@@ -407,7 +407,7 @@ def test_a_clip_that_loops_has_no_pop_where_it_begins_again(shared_data: SharedD
             fine = at_pace(base, seconds, pace)
             splice = Splice(part, clip, timing, marks, travel=travel)
             result = spliced(fine, landmarks, splice)
-            seams = np.flatnonzero(np.diff(window(timing, fine, clip).rounds))
+            seams = np.flatnonzero(np.diff(splice_window(timing, fine, clip).rounds))
             assert len(seams) == 2
             turns = angle_between(result.rotations[1:], result.rotations[:-1]).max(axis=1)
             jumps.append((turns[seams].max(), np.delete(turns, seams).max()))
@@ -452,7 +452,7 @@ def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: Share
     ):
         timing = Timing(1, other.frames[0], rate=base.rate / other.rate)
         splices = [Splice(part, other, timing, others) for part in parts]
-        result = build(base, landmarks, splices)
+        result = build_splices(base, landmarks, splices)
         frames = min(len(result), len(other))
         for upper, lower in (
             ("clavicle", "upper_arm"),
@@ -508,7 +508,7 @@ def test_the_sources_own_experiment_becomes_new_actions(shared_data: SharedData)
                 (LEFT_ARM, punch, punching),
             )
         ]
-        result = build(base, landmarks, splices)
+        result = build_splices(base, landmarks, splices)
         action = write_clip(armature, result, name="Walk, throw, punch")
         assert armature.animation_data.action == action != source
         read = read_clip(armature)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from octo_motion.core.locomotion.gait.gait_poser import GaitSettings, Generator
-from octo_motion.core.locomotion.gait.table import presets
+from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
+from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.ground.body_height import BodyLine, body_line, leaning
-from octo_motion.core.locomotion.ground.contact_timing import Even, at_rest
-from octo_motion.core.locomotion.ground.footholds import Wish, cycles_at
+from octo_motion.core.locomotion.ground.contact_timing import EvenTiming, timing_at_rest
+from octo_motion.core.locomotion.ground.footholds import ContactOverride, cycles_at
 from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
-from octo_motion.core.locomotion.ground.surface import Ground, HeightField, Plane
+from octo_motion.core.locomotion.ground.surface import Ground, HeightField, LevelGround
 from octo_motion.core.locomotion.ground.walk import GroundedPoses, GroundedWalk
 from octo_motion.core.locomotion.path.route import Route
 from octo_motion.core.locomotion.path.travel import (
@@ -45,9 +45,9 @@ def bumps(height: float = 0.3) -> HeightField:
 
 
 GROUNDS: dict[str, Ground] = {
-    "plane": Plane(0.0),
-    "slope": Plane(0.0, (0.0, float(np.tan(np.radians(20.0))))),
-    "side slope": Plane(0.0, (float(np.tan(np.radians(20.0))), 0.0)),
+    "plane": LevelGround(0.0),
+    "slope": LevelGround(0.0, (0.0, float(np.tan(np.radians(20.0))))),
+    "side slope": LevelGround(0.0, (float(np.tan(np.radians(20.0))), 0.0)),
     "bumps": bumps(),
 }
 
@@ -57,7 +57,7 @@ class Walker:
     """A body of unit arm length that walks."""
 
     skeleton: Skeleton
-    generator: Generator
+    generator: GaitPoser
     body: BodyFrame
     route: Route
     travel: TravelSettings
@@ -127,7 +127,7 @@ def walker(
     route: Route = STRAIGHT,
     stretch: bool = False,
     settings: StanceSettings = StanceSettings(),  # noqa: B008 - frozen
-    wishes: Sequence[Wish] = (),
+    wishes: Sequence[ContactOverride] = (),
     rolls: np.random.Generator | None = None,
     rest: float = 0.0,
     radii: tuple[float, float] = (0.045, 0.012),
@@ -138,15 +138,15 @@ def walker(
     With ``rest`` it starts and ends at a standstill, within so many cycles.
     """
     skeleton, made, body = body_with_arms(arms, joints, rolls=rolls)
-    table = presets()[gait]
-    generator = Generator(skeleton, made, body, GaitSettings(table, stand=True, **options))
+    table = gait_presets()[gait]
+    generator = GaitPoser(skeleton, made, body, GaitSettings(table, stand=True, **options))
     travel = TravelSettings(stride=table.stride * generator.arm_length)
     rhythm = None
     if rest:
         slow = rest * travel.stride
         travel = unhurried(travel, route.length, start=slow, end=slow)
-        rhythm = at_rest(
-            Even(travel.stride, generator.offsets),
+        rhythm = timing_at_rest(
+            EvenTiming(travel.stride, generator.offsets),
             route.length,
             start=True,
             end=True,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from octo_motion.core.posing.puppet.figure import Elements, Figure, Limits, Pose
+from octo_motion.core.posing.puppet.figure import Elements, Figure, JointRanges, Pose
 from octo_motion.core.posing.puppet.joint_limits import bends
 from octo_motion.core.posing.puppet.kinematics import pose_of, product
 from octo_motion.core.posing.solver.hand_spring import Coupling
@@ -50,7 +50,7 @@ def puppet(
     elements: Elements | None = None,
     *,
     rest: Floats | None = None,
-    limits: Limits | None = None,
+    limits: JointRanges | None = None,
 ) -> Figure:
     """Capsules along Y from each joint."""
     count = len(parents)
@@ -72,7 +72,7 @@ def puppet(
         inertias=np.array([inertia for _, inertia in bodies]),
         capsules=ends,
         radii=np.array(radii, dtype=np.float64),
-        limits=limits or Limits(np.tile([-np.pi, np.pi], (count, 3, 1))),
+        limits=limits or JointRanges(np.tile([-np.pi, np.pi], (count, 3, 1))),
         elements=elements or free(count),
     )
 

@@ -31,7 +31,7 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
 
 
 def closed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
-    return columns(ccd.closed(columns(directions), lengths, columns(goal)))
+    return columns(ccd.close_group(columns(directions), lengths, columns(goal)))
 
 
 def a_group(seed: int, count: int, batch: int = 8) -> tuple[Floats, Floats, Floats]:
@@ -141,7 +141,7 @@ def test_a_goal_out_of_reach_is_pointed_at_with_a_stretched_group(seed: int, cou
 @given(seeds, st.floats(0.0, 1.0))
 def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) -> None:
     random = np.random.default_rng(seed)
-    chain = ccd.Chain(np.full(12, 1 / 12), (4, 4, 4), np.full(12, 0.4))
+    chain = ccd.JointChain(np.full(12, 1 / 12), (4, 4, 4), np.full(12, 0.4))
     angles = random.uniform(-1.2, 1.2, (20, 3, 2))
     sway = np.broadcast_to([0.02, 0.17], (20, 2))
     mirrored = np.array([1.0, -1.0])
@@ -157,7 +157,7 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
         links = link_rotations(with_bank)
         targets = pseudo_targets(links, (1.0 + contraction(with_bank)) / 3)
         shape = ccd.asked_shape(chain, np.moveaxis(angles, 0, -1), sway.T)
-        solution = ccd.solve(
+        solution = ccd.solve_ccd(
             chain, shape, np.moveaxis(links, 0, -1), np.moveaxis(targets, 0, -1), softness=softness
         )
         return columns(solution)
@@ -168,7 +168,7 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
 
 
 def test_the_asked_shape_joins_smoothly_from_link_to_link() -> None:
-    chain = ccd.Chain(np.full(300, 1 / 300), (100, 100, 100), np.full(300, 0.4))
+    chain = ccd.JointChain(np.full(300, 1 / 300), (100, 100, 100), np.full(300, 0.4))
     angles = np.radians(np.array([[[20.0, 0.0], [-50.0, 10.0], [30.0, -20.0]]]))
     from octo_motion.core.locomotion.gait.pseudo_targets import link_rotations
 
@@ -202,7 +202,7 @@ def test_a_goal_at_the_root_leaves_finite_numbers(count: int) -> None:
 def test_a_goal_however_far_away_is_pointed_at(far: float, give: float) -> None:
     directions, lengths, goal = a_group(3, 4)
     goal = far * normalized(goal)
-    found = columns(ccd.closed(columns(directions), lengths, columns(goal), give=give))
+    found = columns(ccd.close_group(columns(directions), lengths, columns(goal), give=give))
     assert normalized(chord(found, lengths)) == pytest.approx(normalized(goal), abs=1e-6)
     away = np.linalg.norm(goal, axis=-1)
     assert np.all(ccd.overreach(away, np.full(away.shape, lengths.sum()), give) <= 1e-9)

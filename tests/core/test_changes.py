@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.path.gait_changes import (
-    Change,
-    between,
-    changes_by_height,
-    check_changes,
+    GaitTransition,
+    check_transitions,
+    slerp_rotations,
+    transition_windows,
+    transitions_by_height,
     way_weights,
-    windows,
 )
 from octo_motion.core.rotations import angle_between, normalized
 
@@ -23,7 +23,11 @@ quaternions = unit.filter(lambda each: np.linalg.norm(each) > 0.1).map(normalize
 
 @given(st.lists(st.floats(-3.0, 30.0), min_size=1, max_size=30))
 def test_body_is_always_on_its_way_and_on_one_alone_outside_of_changes(at: list[float]) -> None:
-    changes = (Change(2.0, 4.0, 1), Change(5.0, 6.0, 2), Change(8.0, 9.0, 0))
+    changes = (
+        GaitTransition(2.0, 4.0, 1),
+        GaitTransition(5.0, 6.0, 2),
+        GaitTransition(8.0, 9.0, 0),
+    )
     distance = np.array(at)
     weights = way_weights(changes, 3, distance)
     np.testing.assert_allclose(weights.sum(axis=-1), 1.0)
@@ -34,7 +38,7 @@ def test_body_is_always_on_its_way_and_on_one_alone_outside_of_changes(at: list[
 
 
 def test_speed_of_a_change_neither_jumps_at_its_start_nor_at_its_end() -> None:
-    change = (Change(1.0, 2.0, 1),)
+    change = (GaitTransition(1.0, 2.0, 1),)
     for edge in (1.0, 2.0):
         steps = []
         for fine in (1e-3, 0.5e-3):
@@ -46,7 +50,7 @@ def test_speed_of_a_change_neither_jumps_at_its_start_nor_at_its_end() -> None:
 def test_route_that_rises_is_swum_and_walked_where_it_comes_down() -> None:
     distance = np.linspace(0.0, 20.0, 400)
     height = 2.0 * np.exp(-((distance - 10.0) ** 2) / 8.0)
-    up, down = changes_by_height(distance, height, take_off=1.0, length=2.0)
+    up, down = transitions_by_height(distance, height, take_off=1.0, length=2.0)
     assert (up.way, down.way) == (1, 0)
     assert np.interp(up.middle, distance, height) == pytest.approx(1.0, abs=1e-3)
     assert up.middle + down.middle == pytest.approx(20.0, abs=0.05)
@@ -55,12 +59,12 @@ def test_route_that_rises_is_swum_and_walked_where_it_comes_down() -> None:
 def test_hop_too_short_for_a_change_is_walked() -> None:
     distance = np.linspace(0.0, 20.0, 400)
     height = 2.0 * np.exp(-((distance - 10.0) ** 2) / 0.5)
-    assert changes_by_height(distance, height, take_off=1.0, length=2.0) == ()
+    assert transitions_by_height(distance, height, take_off=1.0, length=2.0) == ()
 
 
 def test_route_that_begins_high_is_swum_from_its_start() -> None:
     distance = np.linspace(0.0, 20.0, 400)
-    first, last = changes_by_height(distance, 3.0 - 0.2 * distance, take_off=1.0, length=2.0)
+    first, last = transitions_by_height(distance, 3.0 - 0.2 * distance, take_off=1.0, length=2.0)
     assert first.end <= 0.0
     assert (first.way, last.way, last.middle) == (1, 0, pytest.approx(10.0))
 
@@ -77,9 +81,9 @@ holds = st.lists(st.floats(0.05, 1.0), min_size=0, max_size=30).map(
 def test_no_arm_goes_over_while_it_holds_on(
     arms: list[tuple[tuple[np.ndarray, np.ndarray], ...]], start: float
 ) -> None:
-    change = Change(start, start + 2.0, 1)
+    change = GaitTransition(start, start + 2.0, 1)
     before, after = [each[0] for each in arms], [each[1] for each in arms]
-    found = windows(change, before, after)
+    found = transition_windows(change, before, after)
     assert np.all(found.end - found.start >= 0.4 * 2.0 - 1e-9)
     assert np.all(found.start >= change.start - 1e-9)
     assert np.all(found.end <= change.end + 1e-9)
@@ -93,7 +97,7 @@ def test_no_arm_goes_over_while_it_holds_on(
 def test_between_two_poses_a_bone_takes_the_shortest_way(
     first: np.ndarray, second: np.ndarray, share: float
 ) -> None:
-    there = between(first, second, np.array(share))
+    there = slerp_rotations(first, second, np.array(share))
     whole = angle_between(first, second)
     assert angle_between(first, there) == pytest.approx(share * whole, abs=1e-6)
     assert angle_between(there, second) == pytest.approx((1.0 - share) * whole, abs=1e-6)
@@ -102,12 +106,12 @@ def test_between_two_poses_a_bone_takes_the_shortest_way(
 @pytest.mark.parametrize(
     ("changes", "told"),
     [
-        ([Change(1.0, 3.0, 1), Change(2.0, 4.0, 0)], "Two changes of gait overlap"),
-        ([Change(11.0, 13.0, 1)], "is not on the route"),
-        ([Change(1.0, 1.0, 1)], "has no length"),
-        ([Change(float("nan"), 1.0, 1)], "has no length"),
+        ([GaitTransition(1.0, 3.0, 1), GaitTransition(2.0, 4.0, 0)], "Two changes of gait overlap"),
+        ([GaitTransition(11.0, 13.0, 1)], "is not on the route"),
+        ([GaitTransition(1.0, 1.0, 1)], "has no length"),
+        ([GaitTransition(float("nan"), 1.0, 1)], "has no length"),
     ],
 )
-def test_senseless_changes_are_refused(changes: list[Change], told: str) -> None:
+def test_senseless_changes_are_refused(changes: list[GaitTransition], told: str) -> None:
     with pytest.raises(SettingsError, match=told):
-        check_changes(changes, 10.0)
+        check_transitions(changes, 10.0)

@@ -11,8 +11,8 @@ from octo_motion.core.locomotion.reaching.winding import (
     Coil,
     Profile,
     Skins,
-    Start,
     Winding,
+    WindingStart,
     profile_of,
     wind,
 )
@@ -37,7 +37,7 @@ def wound(
     profile: Profile, start: Floats, sense: int = 1, turns: float = 3.0, first: int = 12
 ) -> Coil:
     skins = Skins.of(profile, RADII)
-    return wind(skins, LENGTHS, Start(first, start), Winding(turns, sense))
+    return wind(skins, LENGTHS, WindingStart(first, start), Winding(turns, sense))
 
 
 def outside(profile: Profile, away: float = 0.5) -> Floats:
@@ -152,7 +152,7 @@ def test_an_arm_winds_alike_whatever_the_unit_of_length(size: float, taper: floa
 
     def angle(size: float) -> float:
         profile = profile_of(size * vertices, faces)
-        start = Start(12, outside(profile, 0.5 * size))
+        start = WindingStart(12, outside(profile, 0.5 * size))
         return wind(Skins.of(profile, size * radii), size * LENGTHS, start, Winding(3.0, 1)).angle
 
     # Joints are lifted until they lack nothing: which of them do is a matter of the last digits.

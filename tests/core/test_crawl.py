@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.ground.arm_clearance import Outline
 from octo_motion.core.locomotion.ground.crawl_planner import (
+    CrawlHolds,
+    CrawlPath,
     CrawlSettings,
-    Holds,
-    Journey,
     plan_crawl,
 )
 from octo_motion.core.locomotion.ground.foothold_reach import span
@@ -35,7 +35,7 @@ journeys = st.builds(
 
 def journey(
     facing: float = 0.0, bend: float = 0.0, length: float = 6.0, azimuths: np.ndarray = EIGHT
-) -> Journey:
+) -> CrawlPath:
     """A way of even curvature, the body turned away from it by an angle; arms one metre long."""
     distance = np.arange(0.0, length, 0.02)
     heading = bend * distance
@@ -43,10 +43,10 @@ def journey(
     body = np.cumsum(ahead, axis=0) * 0.02
     turned = heading[:, None] + facing + azimuths
     outward = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
-    return Journey(distance, body[:, None] + 0.12 * outward, outward, ahead, 1.0)
+    return CrawlPath(distance, body[:, None] + 0.12 * outward, outward, ahead, 1.0)
 
 
-def corner(facing: float, azimuths: np.ndarray = EIGHT) -> Journey:
+def corner(facing: float, azimuths: np.ndarray = EIGHT) -> CrawlPath:
     """A way that turns left by a quarter within a fifth of an arm length."""
     distance = np.arange(0.0, 5.0, 0.02)
     heading = 0.5 * np.pi * np.clip((distance - 2.5) / 0.2 + 0.5, 0.0, 1.0)
@@ -54,10 +54,10 @@ def corner(facing: float, azimuths: np.ndarray = EIGHT) -> Journey:
     turned = heading[:, None] + facing + azimuths
     outward = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
     body = np.cumsum(ahead, axis=0) * 0.02
-    return Journey(distance, body[:, None] + 0.12 * outward, outward, ahead, 1.0)
+    return CrawlPath(distance, body[:, None] + 0.12 * outward, outward, ahead, 1.0)
 
 
-def nearest(way: Journey, holds: Holds) -> float:
+def nearest(way: CrawlPath, holds: CrawlHolds) -> float:
     """How near arms that hold on come to each other, seen from above."""
     middles = np.clip(0.5 * (holds.start + holds.end), 0.0, way.distance[-1])
     then = np.searchsorted(way.distance, middles)
@@ -74,14 +74,14 @@ def nearest(way: Journey, holds: Holds) -> float:
     return found
 
 
-def holding(holds: Holds, distance: np.ndarray) -> np.ndarray:
+def holding(holds: CrawlHolds, distance: np.ndarray) -> np.ndarray:
     """(samples, holds)"""
     return (holds.start <= distance[:, None]) & (distance[:, None] < holds.end)
 
 
 @tried
 @given(journeys, st.integers(0, 9))
-def test_an_arm_lets_go_before_it_takes_hold_again(way: Journey, seed: int) -> None:
+def test_an_arm_lets_go_before_it_takes_hold_again(way: CrawlPath, seed: int) -> None:
     holds = plan_crawl(way, CrawlSettings(seed=seed))
     assert np.all(holds.end > holds.start)
     same = holds.arm[1:] == holds.arm[:-1]
@@ -90,7 +90,7 @@ def test_an_arm_lets_go_before_it_takes_hold_again(way: Journey, seed: int) -> N
 
 @tried
 @given(journeys, st.integers(0, 9))
-def test_every_hold_is_within_reach_while_it_lasts(way: Journey, seed: int) -> None:
+def test_every_hold_is_within_reach_while_it_lasts(way: CrawlPath, seed: int) -> None:
     holds = plan_crawl(way, CrawlSettings(seed=seed))
     asked = CrawlSettings()
     for number, on in enumerate(holding(holds, way.distance).T):
@@ -135,7 +135,7 @@ def test_nearly_always_three_arms_hold_and_one_pushes(facing: float) -> None:
 
 @tried
 @given(journeys, st.integers(0, 9))
-def test_every_hold_lasts_and_every_swing_has_its_time(way: Journey, seed: int) -> None:
+def test_every_hold_lasts_and_every_swing_has_its_time(way: CrawlPath, seed: int) -> None:
     asked = CrawlSettings(seed=seed)
     holds = plan_crawl(way, asked)
     assert np.all(holds.end - holds.start >= asked.shortest - 1e-9)
@@ -147,7 +147,7 @@ def test_every_hold_lasts_and_every_swing_has_its_time(way: Journey, seed: int) 
 @tried
 @given(journeys, st.integers(0, 9))
 def test_the_plan_says_where_an_arm_takes_hold_as_seen_from_its_root(
-    way: Journey, seed: int
+    way: CrawlPath, seed: int
 ) -> None:
     holds = plan_crawl(way, CrawlSettings(seed=seed))
     inside = 0.5 * (holds.start + holds.end)
@@ -194,7 +194,7 @@ def test_a_body_that_stands_has_all_arms_on_the_ground(length: float) -> None:
         assert (last - holds.start[on[-1]]).min() > 0.05
 
 
-def winding(seed: int) -> Journey:
+def winding(seed: int) -> CrawlPath:
     """A way full of corners, at whose ends the body stands."""
     random = np.random.default_rng(seed)
     count = int(random.integers(60, 300))
@@ -207,7 +207,7 @@ def winding(seed: int) -> Journey:
     outward = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
     distance = np.linspace(0.0, 0.02 * (count - 1), count)
     roots = body[:, None] + 0.12 * outward
-    return Journey(distance, roots, outward, ahead, 1.0, stands=(True, True))
+    return CrawlPath(distance, roots, outward, ahead, 1.0, stands=(True, True))
 
 
 @given(st.integers(0, 2**31), st.sampled_from([0.3, 0.6, 0.8]))

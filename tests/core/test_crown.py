@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.gait.swim_spread import opened
+from octo_motion.core.locomotion.gait.swim_spread import swim_azimuths
 from octo_motion.core.locomotion.rig.arm_chains import BodyFrame, arm_azimuths, body_frame
 from octo_motion.core.rotations import Floats
 from octo_motion.core.skeleton import Skeleton
@@ -45,7 +45,7 @@ def squid(count: int) -> tuple[Skeleton, list[tuple[str, ...]], BodyFrame]:
 
 def test_a_fan_opens_all_round_in_its_order() -> None:
     at_rest = np.radians([8.0, -4.0, 22.0, -19.0, 82.0, -83.0, 95.0, -95.0])
-    found = opened(*fan(at_rest), LYING)
+    found = swim_azimuths(*fan(at_rest), LYING)
     np.testing.assert_array_equal(np.argsort(found), np.argsort(at_rest))
     # Evenly, with a gap below, where the fan was open.
     np.testing.assert_allclose(np.diff(np.sort(found)), 2.0 * np.pi / 9.0)
@@ -53,7 +53,7 @@ def test_a_fan_opens_all_round_in_its_order() -> None:
 
 
 def test_arms_round_the_mouth_stay_where_they_are() -> None:
-    found = opened(*squid(8), LYING)
+    found = swim_azimuths(*squid(8), LYING)
     around = 2.0 * np.pi * (np.arange(8) + 0.5) / 8
     # Up is where the front is for a body that is reared up.
     np.testing.assert_allclose(np.cos(found - around), 1.0, atol=1e-9)
@@ -62,11 +62,13 @@ def test_arms_round_the_mouth_stay_where_they_are() -> None:
 @pytest.mark.parametrize("lean", [0.0, 1e-6])
 def test_a_body_that_does_not_lie_keeps_its_arms(lean: float) -> None:
     rig = fan(np.radians([10.0, -10.0, 60.0, -60.0, 100.0, -100.0]))
-    found, kept = opened(*rig, lean), arm_azimuths(*rig)
+    found, kept = swim_azimuths(*rig, lean), arm_azimuths(*rig)
     np.testing.assert_allclose(found, kept, atol=1e-9)
 
 
 def test_the_further_it_lies_the_further_its_arms_have_opened() -> None:
     rig = fan(np.radians([5.0, -5.0, 20.0, -20.0]))
-    widest = [float(np.ptp(opened(*rig, lean))) for lean in np.radians([0.0, 10.0, 20.0, 40.0])]
+    widest = [
+        float(np.ptp(swim_azimuths(*rig, lean))) for lean in np.radians([0.0, 10.0, 20.0, 40.0])
+    ]
     assert np.all(np.diff(widest) > 0.0)

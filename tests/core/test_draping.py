@@ -4,7 +4,7 @@
 import numpy as np
 
 from octo_motion.core.locomotion.ground.foothold_relaxation import settled
-from octo_motion.core.locomotion.ground.surface import Ground, HeightField, Plane
+from octo_motion.core.locomotion.ground.surface import Ground, HeightField, LevelGround
 from octo_motion.core.rotations import rotate_in_plane
 
 ROOTS = np.tile(np.array([0.0, 0.0, 0.16]), (8, 5, 1))
@@ -31,7 +31,7 @@ def falls(ground: Ground, turns: np.ndarray, farther: np.ndarray) -> np.ndarray:
 
 
 def test_on_level_ground_and_on_a_slope_no_arm_looks_around() -> None:
-    for ground in (Plane(0.0), Plane(0.0, (0.1, 0.2))):
+    for ground in (LevelGround(0.0), LevelGround(0.0, (0.1, 0.2))):
         turns, farther = settled(ground, ROOTS, AIMS, AIMS, AWAY, sizes=SIZES)
         assert not turns.any()
         assert not farther.any()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.clearance.capsule_overlap import Overlap, Separation
-from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, figures
 from octo_motion.core.locomotion.rig.arm_frames import ArmFrames
 from octo_motion.core.locomotion.rig.bone_rotations import ArmRest
@@ -46,7 +46,7 @@ def still() -> Measured:
         poses=poses(),
         misses=np.zeros((COUNT, 2)),
         scale=1.0,
-        ground=Plane(0.0),
+        ground=LevelGround(0.0),
         lying=[np.ones((COUNT, 3), dtype=bool), np.ones((COUNT, 3), dtype=bool)],
         cycles=np.zeros((COUNT, 2), dtype=int),
         separation=Separation(np.zeros(COUNT), ()),

@@ -16,12 +16,12 @@ from octo_motion.core.rotations import Floats
 from tests.core import oracle
 
 HEAD, PITCH, BANK = range(3)
-PRESETS = gait.presets()
+PRESETS = gait.gait_presets()
 seeds = st.integers(0, 2**31)
 
 
 def angles_of(name: str, phases: Floats) -> Floats:
-    return gait.evaluate(PRESETS[name], np.asarray(phases)[:, None], (1,))[:, 0]
+    return gait.gait_angles(PRESETS[name], np.asarray(phases)[:, None], (1,))[:, 0]
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_a_pair_may_have_a_curve_of_its_own() -> None:
     own = gait.curve_from_degrees([0, 180, 360], head=[[0, 30, 0], [0, 0, 0], [0, 0, 0]])
     table = dataclasses.replace(PRESETS["walk"], curves={**PRESETS["walk"].curves, 4: own})
 
-    angles = gait.evaluate(table, np.full((1, 2), np.pi), (1, 4))
+    angles = gait.gait_angles(table, np.full((1, 2), np.pi), (1, 4))
 
     assert np.degrees(angles[0, 0, 0, HEAD]) == pytest.approx(-50.0)
     assert np.degrees(angles[0, 1, 0, HEAD]) == pytest.approx(30.0)
@@ -175,7 +175,7 @@ def test_arms_links_cycles_and_seeds_vary_apart() -> None:
 def test_a_saved_gait_loads_as_it_was(name: str) -> None:
     table = dataclasses.replace(PRESETS[name], offsets={(1, "LEFT"): 0.5, (2, "CENTER"): -1.0})
 
-    loaded = gait.from_json(gait.to_json(table))
+    loaded = gait.gait_from_json(gait.gait_to_json(table))
 
     for field in dataclasses.fields(table):
         if field.name not in {"curves", "offsets"}:
@@ -189,7 +189,7 @@ def test_a_saved_gait_loads_as_it_was(name: str) -> None:
 
 
 def damaged(**changes: Any) -> str:
-    content = json.loads(gait.to_json(PRESETS["walk"]))
+    content = json.loads(gait.gait_to_json(PRESETS["walk"]))
     curve = content["pairs"]["all"]
     for key, value in changes.items():
         if key in curve:
@@ -233,6 +233,6 @@ FLAT = [0.0] * 5
 )
 def test_a_damaged_gait_file_says_what_is_wrong_with_it(text: str, message: str) -> None:
     with pytest.raises(GaitError) as caught:
-        gait.from_json(text)
+        gait.gait_from_json(text)
 
     assert message in str(caught.value)

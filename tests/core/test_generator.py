@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait
-from octo_motion.core.locomotion.gait.gait_poser import Arm, ArmPoses, GaitSettings, Generator
+from octo_motion.core.locomotion.gait.gait_poser import Arm, ArmPoses, GaitPoser, GaitSettings
 from octo_motion.core.locomotion.rig.arm_chains import BodyFrame
 from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import UP, body_with_arms, posed_joints
 
-PRESETS = gait.presets()
+PRESETS = gait.gait_presets()
 BUILDS = (3, 7, 12, 30)
 every_preset = pytest.mark.parametrize("name", sorted(PRESETS))
 every_build = pytest.mark.parametrize("joints", BUILDS)
@@ -32,7 +32,7 @@ def straight(frames: int) -> Floats:
     return np.zeros((frames, 2))
 
 
-def posed(generator: Generator, frames: int = 48) -> ArmPoses:
+def posed(generator: GaitPoser, frames: int = 48) -> ArmPoses:
     phases = cycle(frames)
     return generator.pose(phases, straight(len(phases)))
 
@@ -46,7 +46,7 @@ def test_groups_end_within_a_thousandth_of_the_arm_from_their_targets(
     name: str, joints: int
 ) -> None:
     skeleton, arms, body = body_with_arms(8, joints)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS[name]))
 
     assert posed(generator, 360).misses.max() <= 1e-3
 
@@ -55,7 +55,7 @@ def test_groups_end_within_a_thousandth_of_the_arm_from_their_targets(
 @every_build
 def test_bones_keep_their_lengths_and_stay_joined(name: str, joints: int) -> None:
     skeleton, arms, body = body_with_arms(8, joints, 0.6)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS[name]))
 
     poses = posed(generator)
 
@@ -72,7 +72,7 @@ def test_no_bone_pops(name: str, joints: int) -> None:
     # A pop keeps its size however small the time step; all else halves with the step, once steps
     # are fine enough to see the fastest moment: when a group passes through its full length.
     skeleton, arms, body = body_with_arms(1, joints)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS[name]))
 
     coarse, fine = (
         angle_between(turns[:-1], turns[1:]).max(axis=0)
@@ -87,7 +87,7 @@ def test_no_bone_pops(name: str, joints: int) -> None:
 def test_the_reported_miss_is_the_one_that_the_bones_show(name: str) -> None:
     skeleton, arms, body = body_with_arms(4, 12)
     with_gait = GaitSettings(PRESETS[name])
-    generator = Generator(skeleton, arms, body, with_gait)
+    generator = GaitPoser(skeleton, arms, body, with_gait)
     poses = posed(generator)
 
     # Arm 0 points halfway between front and left. Seen in its frame, x outward:
@@ -125,7 +125,7 @@ def generator_sizes(lengths: Floats) -> tuple[int, int, int]:
 @given(st.integers(0, 2**31), st.sampled_from(sorted(PRESETS)))
 def test_frames_come_out_alike_in_any_order_and_alone(seed: int, name: str) -> None:
     skeleton, arms, body = body_with_arms(3, 7)
-    generator = Generator(
+    generator = GaitPoser(
         skeleton, arms, body, GaitSettings(PRESETS[name], variation=(-0.2, 0.2), seed=seed)
     )
     random = np.random.default_rng(seed)
@@ -144,7 +144,7 @@ def test_frames_come_out_alike_in_any_order_and_alone(seed: int, name: str) -> N
 
 def test_long_shots_do_not_differ_from_short_ones() -> None:
     skeleton, arms, body = body_with_arms(8, 3)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
     phases = np.linspace(0.0, 100.0, 1500)  # more than are solved at a time
 
     whole = generator.pose(phases, straight(1500)).rotations
@@ -156,7 +156,7 @@ def test_long_shots_do_not_differ_from_short_ones() -> None:
 @pytest.mark.parametrize("limits", [(0.0, 0.0), (-0.1, 0.1)])
 def test_no_frames_are_no_poses(limits: tuple[float, float]) -> None:
     skeleton, arms, body = body_with_arms(2, 3)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], variation=limits))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"], variation=limits))
 
     assert generator.pose(np.empty(0), np.empty((0, 2))).rotations.shape == (0, 6, 4)
 
@@ -177,7 +177,7 @@ def test_rest_pose_and_bone_roll_do_not_change_where_the_joints_go(seed: int, jo
 
     found = []
     for skeleton, arms, body in (plain, odd):
-        generator = Generator(skeleton, arms, body, settings_)
+        generator = GaitPoser(skeleton, arms, body, settings_)
         poses = posed(generator, 24)
         joints_of = [posed_joints(skeleton, arm, poses.rotations, generator.bones) for arm in arms]
         found.append(np.stack([each - each[:, :1] for each in joints_of]))
@@ -188,7 +188,7 @@ def test_rest_pose_and_bone_roll_do_not_change_where_the_joints_go(seed: int, jo
 @pytest.mark.parametrize(("arms", "joints"), [(1, 3), (1, 200), (5, 4), (64, 5), (6, 11)])
 def test_any_number_of_arms_and_bones_reaches_its_targets(arms: int, joints: int) -> None:
     skeleton, listed, body = body_with_arms(arms, joints)
-    generator = Generator(skeleton, listed, body, GaitSettings(PRESETS["walk"]))
+    generator = GaitPoser(skeleton, listed, body, GaitSettings(PRESETS["walk"]))
 
     poses = posed(generator, 40)
 
@@ -199,8 +199,8 @@ def test_any_number_of_arms_and_bones_reaches_its_targets(arms: int, joints: int
 def test_arms_of_different_builds_are_each_solved_with_their_own() -> None:
     skeleton, arms, body = body_with_arms(2, 12)
     shorter = (arms[0], dataclasses.replace(arms[1], bones=arms[1].bones[:8]))
-    both = Generator(skeleton, shorter, body, GaitSettings(PRESETS["walk"]))
-    alone = Generator(skeleton, shorter[1:], body, GaitSettings(PRESETS["walk"]))
+    both = GaitPoser(skeleton, shorter, body, GaitSettings(PRESETS["walk"]))
+    alone = GaitPoser(skeleton, shorter[1:], body, GaitSettings(PRESETS["walk"]))
 
     mixed = posed(both).rotations[:, 12:]
 
@@ -212,7 +212,7 @@ def test_the_size_of_the_rig_does_not_change_its_rotations() -> None:
     large = body_with_arms(2, 12, 100.0)
 
     one, other = (
-        posed(Generator(*rig, GaitSettings(PRESETS["swim"]))).rotations for rig in (small, large)
+        posed(GaitPoser(*rig, GaitSettings(PRESETS["swim"]))).rotations for rig in (small, large)
     )
 
     # Segments are compared as shares of the arm, to six digits.
@@ -222,10 +222,10 @@ def test_the_size_of_the_rig_does_not_change_its_rotations() -> None:
 # --- What the settings do ------------------------------------------------------------------------
 
 
-def generated(rig: tuple[Skeleton, tuple[Arm, ...], BodyFrame], **changes: object) -> Generator:
+def generated(rig: tuple[Skeleton, tuple[Arm, ...], BodyFrame], **changes: object) -> GaitPoser:
     skeleton, arms, body = rig
     chosen = {"gait": PRESETS["walk"], **changes}
-    return Generator(skeleton, arms, body, GaitSettings(**chosen))  # type: ignore[arg-type]
+    return GaitPoser(skeleton, arms, body, GaitSettings(**chosen))  # type: ignore[arg-type]
 
 
 def test_zero_variation_is_the_table_itself_whatever_the_seed() -> None:
@@ -252,7 +252,7 @@ def test_the_same_seed_gives_the_same_keys_and_another_seed_others() -> None:
 def test_left_and_right_mirror_each_other(name: str) -> None:
     table = dataclasses.replace(PRESETS[name], spread_sides=0.0)
     skeleton, arms, body = body_with_arms(6, 9)
-    generator = Generator(skeleton, arms, body, GaitSettings(table))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(table))
     poses = posed(generator)
 
     left, right = (
@@ -268,7 +268,7 @@ def test_positive_pitch_turns_arms_of_both_sides_to_the_front() -> None:
         curves={0: gait.curve_from_degrees([0, 180, 360], pitch=[[30] * 3, [0] * 3, [0] * 3])},
     )
     skeleton, arms, body = body_with_arms(2, 6)  # to the left and to the right
-    generator = Generator(skeleton, arms, body, GaitSettings(table))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(table))
     poses = posed(generator, 2)
 
     for arm in arms:
@@ -278,8 +278,8 @@ def test_positive_pitch_turns_arms_of_both_sides_to_the_front() -> None:
 
 def test_flip_mirrors_what_an_arm_takes_for_the_front() -> None:
     skeleton, arms, body = body_with_arms(2, 6)
-    plain = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk_literal"]))
-    flipped = Generator(
+    plain = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk_literal"]))
+    flipped = GaitPoser(
         skeleton,
         (dataclasses.replace(arms[0], flip=True), arms[1]),
         body,
@@ -297,8 +297,8 @@ def test_flip_mirrors_what_an_arm_takes_for_the_front() -> None:
 def test_an_arms_own_phase_puts_it_ahead() -> None:
     skeleton, arms, body = body_with_arms(2, 6)
     ahead = (dataclasses.replace(arms[0], phase=0.5 * np.pi), arms[1])
-    plain = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
-    shifted = Generator(skeleton, ahead, body, GaitSettings(PRESETS["walk"]))
+    plain = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    shifted = GaitPoser(skeleton, ahead, body, GaitSettings(PRESETS["walk"]))
 
     now = shifted.pose(np.array([1.0]), straight(1)).rotations
     later = plain.pose(np.array([1.0 + 0.5 * np.pi]), straight(1)).rotations
@@ -308,7 +308,7 @@ def test_an_arms_own_phase_puts_it_ahead() -> None:
 
 def test_without_phase_spread_all_arms_move_together() -> None:
     skeleton, arms, body = body_with_arms(8, 6)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], phase_spread=0.0))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"], phase_spread=0.0))
 
     heights = [
         posed_joints(skeleton, arm, posed(generator).rotations, generator.bones)[..., 2]
@@ -320,7 +320,7 @@ def test_without_phase_spread_all_arms_move_together() -> None:
 
 def test_arms_turn_towards_the_goal_by_the_share_asked_for() -> None:
     skeleton, arms, body = body_with_arms(4, 12)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["swim"], turning=0.5))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["swim"], turning=0.5))
     left = np.array([[0.4, 0.0]])
     phase = np.array([0.2])
 
@@ -335,7 +335,7 @@ def test_arms_turn_towards_the_goal_by_the_share_asked_for() -> None:
 
 
 def posed_pitches(
-    skeleton: Skeleton, arms: tuple[Arm, ...], generator: Generator, phase: Floats, turn: Floats
+    skeleton: Skeleton, arms: tuple[Arm, ...], generator: GaitPoser, phase: Floats, turn: Floats
 ) -> Floats:
     """Compass angle of each arm's tip, seen from its root."""
     poses = generator.pose(phase, turn)
@@ -439,7 +439,7 @@ def test_a_body_that_lies_closes_its_arms_before_its_face_and_opens_them_all_rou
         arm for arm in arms if body.to_body(skeleton.heads[skeleton.index[arm.bones[0]]])[1] < 0
     ]
     body = dataclasses.replace(body, center=np.zeros(3))
-    generator = Generator(
+    generator = GaitPoser(
         skeleton, ahead, body, GaitSettings(PRESETS["swim"], give=0.08, lean=0.5 * np.pi)
     )
     assert len(ahead) == 8
@@ -463,7 +463,7 @@ def test_walking_and_swimming_arms_do_not_wring_themselves() -> None:
     # Twist about its own bone: what a straight arm carried along the same way would not have.
     for name in ("walk", "swim"):
         skeleton, arms, body = body_with_arms(2, 12)
-        generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name]))
+        generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS[name]))
         turns = posed(generator).rotations
         twist = 2.0 * np.arctan2(np.abs(turns[..., 2]), np.abs(turns[..., 0]))
         assert np.max(twist) <= 1e-9
@@ -473,7 +473,7 @@ def test_bank_twists_each_group_by_its_own_angle() -> None:
     curve = gait.curve_from_degrees([0, 180, 360], bank=[[30, 30, 30], [0, 0, 0], [-12, -12, -12]])
     table = dataclasses.replace(PRESETS["swim"], curves={0: curve})
     skeleton, arms, body = body_with_arms(2, 12, taper=0.0)
-    generator = Generator(skeleton, arms, body, GaitSettings(table, sway=0.0))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(table, sway=0.0))
 
     turns = posed(generator, 2).rotations[0].reshape(2, 12, 4)
     twist = np.degrees(2.0 * np.arctan2(turns[..., 2], turns[..., 0]))
@@ -485,7 +485,7 @@ def test_bank_twists_each_group_by_its_own_angle() -> None:
 def test_suckers_stay_below_while_walking() -> None:
     # Local -Z is the sucker side of a rig whose bones are rolled with Z up.
     skeleton, arms, body = body_with_arms(8, 12)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
     basis = np.zeros((97, len(skeleton), 4))
     basis[..., 0] = 1.0
     basis[:, [skeleton.index[bone] for bone in generator.bones]] = posed(generator, 96).rotations
@@ -503,8 +503,8 @@ def test_suckers_stay_below_while_walking() -> None:
 
 def test_clearance_is_how_deep_a_whole_cycle_reaches() -> None:
     skeleton, arms, body = body_with_arms(8, 12)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], variation=(0.0, 0.1)))
-    plain = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"], variation=(0.0, 0.1)))
+    plain = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"]))
 
     lowest = min(
         posed_joints(skeleton, arm, posed(plain, 96).rotations, plain.bones)[..., 2].min()
@@ -524,7 +524,7 @@ def test_standing_there_are_arms_on_the_ground_at_any_time_and_none_is_below(
     name: str, always: int, joints: int
 ) -> None:
     skeleton, arms, body = body_with_arms(8, joints)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS[name], stand=True))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS[name], stand=True))
 
     poses = posed(generator, 96)
 
@@ -546,7 +546,7 @@ def test_standing_there_are_arms_on_the_ground_at_any_time_and_none_is_below(
 @pytest.mark.parametrize("joints", [7, 12, 30])
 def test_standing_pops_nothing(joints: int) -> None:
     skeleton, arms, body = body_with_arms(1, joints)
-    generator = Generator(skeleton, arms, body, GaitSettings(PRESETS["walk"], stand=True))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"], stand=True))
 
     coarse, fine = (
         angle_between(turns[:-1], turns[1:]).max(axis=0)
@@ -574,7 +574,7 @@ def test_no_arms_are_a_clear_error() -> None:
     skeleton, _, body = body_with_arms(2, 3)
 
     with pytest.raises(RigError, match=r"The list of arms is empty\. Detect the arms"):
-        Generator(skeleton, (), body, GaitSettings(PRESETS["walk"]))
+        GaitPoser(skeleton, (), body, GaitSettings(PRESETS["walk"]))
 
 
 def test_arms_that_share_a_bone_are_a_clear_error() -> None:
@@ -582,7 +582,7 @@ def test_arms_that_share_a_bone_are_a_clear_error() -> None:
     sharing = (arms[0], dataclasses.replace(arms[1], bones=arms[0].bones[2:]))
 
     with pytest.raises(RigError, match=r"Bone 'arm0\.2' is in two arms, 'Arm 0' and 'Arm 1'\."):
-        Generator(skeleton, sharing, body, GaitSettings(PRESETS["walk"]))
+        GaitPoser(skeleton, sharing, body, GaitSettings(PRESETS["walk"]))
 
 
 def test_a_bone_that_is_gone_is_a_clear_error() -> None:
@@ -590,7 +590,7 @@ def test_a_bone_that_is_gone_is_a_clear_error() -> None:
     gone = (dataclasses.replace(arms[0], bones=(*arms[0].bones, "lost")),)
 
     with pytest.raises(RigError, match="has no bone 'lost'"):
-        Generator(skeleton, gone, body, GaitSettings(PRESETS["walk"]))
+        GaitPoser(skeleton, gone, body, GaitSettings(PRESETS["walk"]))
 
 
 @pytest.mark.parametrize(

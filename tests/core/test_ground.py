@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from octo_motion.core.errors import GroundError
 from octo_motion.core.locomotion.ground.surface import (
     HeightField,
-    Plane,
-    along_path,
+    LevelGround,
+    ground_along_path,
     normals,
     passes_over_itself,
-    sampled,
+    sample_ground,
 )
 from octo_motion.core.rotations import Floats
 
@@ -36,7 +36,7 @@ points = st.tuples(st.floats(-1.4, 1.4), st.floats(-5.4, 1.4)).map(np.array)
 
 @given(points, st.floats(-0.5, 0.5))
 def test_a_sloping_face_is_met_exactly(point: Floats, rise: float) -> None:
-    ground = sampled(square(-9, 9, 0.3, rise), PATH, ALL, **NEED)
+    ground = sample_ground(square(-9, 9, 0.3, rise), PATH, ALL, **NEED)
     assert ground.height(point) == pytest.approx(0.3 - rise * point[1], abs=1e-9)
     # A sample's width from the border, where the grid ends, slopes are halved.
     if abs(point[0]) < 1.3 and -5.3 < point[1] < 1.3:
@@ -45,8 +45,8 @@ def test_a_sloping_face_is_met_exactly(point: Floats, rise: float) -> None:
 
 @given(points)
 def test_a_plane_and_its_sampled_face_agree(point: Floats) -> None:
-    plane = Plane(0.3, (0.0, -0.25))
-    field = sampled(square(-9, 9, 0.3, 0.25), PATH, ALL, **NEED)
+    plane = LevelGround(0.3, (0.0, -0.25))
+    field = sample_ground(square(-9, 9, 0.3, 0.25), PATH, ALL, **NEED)
     assert field.height(point) == pytest.approx(plane.height(point), abs=1e-9)
     up = normals(plane, point)
     assert np.linalg.norm(up) == pytest.approx(1.0)
@@ -60,7 +60,9 @@ def test_fine_faces_are_sampled_like_coarse_ones() -> None:
     grid = np.stack([*np.broadcast_arrays(x[:, None], y), z], axis=-1)
     corners = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-2)
     faces = np.concatenate([corners[..., [0, 1, 2], :], corners[..., [0, 2, 3], :]])
-    ground = sampled(faces.reshape(-1, 3, 3), PATH, ALL, reach=1.5, spacing=0.025, headroom=2.0)
+    ground = sample_ground(
+        faces.reshape(-1, 3, 3), PATH, ALL, reach=1.5, spacing=0.025, headroom=2.0
+    )
     at = np.random.default_rng(1).uniform([-1.4, -5.0], [1.4, 1.0], (500, 2))
     exact = 0.15 * np.sin(5.0 * at[:, 0]) * np.cos(5.0 * at[:, 1])
     # Bilinear between samples: an eighth of the curvature, 3.75, times the spacing squared.
@@ -69,33 +71,33 @@ def test_fine_faces_are_sampled_like_coarse_ones() -> None:
 
 def test_a_roof_above_the_route_is_no_ground() -> None:
     faces = np.concatenate([square(-9, 9, 0.0), square(-9, 9, 3.0)])
-    assert sampled(faces, PATH, ALL, **NEED).height(np.zeros(2)) == pytest.approx(0.0)
+    assert sample_ground(faces, PATH, ALL, **NEED).height(np.zeros(2)) == pytest.approx(0.0)
 
 
 def test_a_route_drawn_deep_below_a_mountain_still_walks_on_it() -> None:
-    ground = sampled(square(-9, 9, 5.0), PATH, ALL, **NEED)
+    ground = sample_ground(square(-9, 9, 5.0), PATH, ALL, **NEED)
     assert ground.height(np.zeros(2)) == pytest.approx(5.0)
 
 
 def test_of_a_solid_body_the_top_counts() -> None:
     faces = np.concatenate([square(-9, 9, -1.0), square(-9, 9, 0.2)])
-    assert sampled(faces, PATH, ALL, **NEED).height(np.zeros(2)) == pytest.approx(0.2)
+    assert sample_ground(faces, PATH, ALL, **NEED).height(np.zeros(2)) == pytest.approx(0.2)
 
 
 def test_beside_its_border_the_ground_goes_on_level() -> None:
-    ground = sampled(square(-5.0, 0.5, 0.0, 0.1), PATH, ALL, **NEED)
+    ground = sample_ground(square(-5.0, 0.5, 0.0, 0.1), PATH, ALL, **NEED)
     assert ground.height(np.array([1.2, -2.0])) == pytest.approx(0.2, abs=0.02)
 
 
 def test_a_ground_without_faces_is_told() -> None:
     with pytest.raises(GroundError, match=r"no faces\. Choose a mesh"):
-        sampled(np.empty((0, 3, 3)), PATH, ALL, **NEED)
+        sample_ground(np.empty((0, 3, 3)), PATH, ALL, **NEED)
 
 
 def test_upright_faces_alone_are_no_ground() -> None:
     wall = np.array([[[0.0, -9.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 9.0]]])
     with pytest.raises(GroundError, match="leaves the ground after 0 %"):
-        sampled(wall, PATH, ALL, **NEED)
+        sample_ground(wall, PATH, ALL, **NEED)
 
 
 @pytest.mark.parametrize("nowhere", [np.nan, np.inf])
@@ -104,7 +106,7 @@ def test_a_face_with_a_corner_that_is_nowhere_is_no_ground(nowhere: float, axis:
     broken = square(-1.0, 1.0)
     broken[0, 1, axis] = nowhere
     faces = np.concatenate([square(-9, 9, 0.3), broken])
-    ground = sampled(faces, PATH, ALL, **NEED)
+    ground = sample_ground(faces, PATH, ALL, **NEED)
     # All of the other face counts, and where there is none of it the one below.
     assert ground.height(np.array([0.5, -0.8])) == pytest.approx(0.3)
     assert np.all(np.isfinite(ground.heights))
@@ -112,16 +114,16 @@ def test_a_face_with_a_corner_that_is_nowhere_is_no_ground(nowhere: float, axis:
 
 def test_a_route_that_leaves_the_ground_is_told_where() -> None:
     with pytest.raises(GroundError, match=r"leaves the ground after 5[0-9] % of its length"):
-        sampled(square(-2.1, 2.1), PATH, ALL, **NEED)
+        sample_ground(square(-2.1, 2.1), PATH, ALL, **NEED)
     # Beyond the route's ends there may be none.
-    assert sampled(square(-2.1, 2.1), PATH, PATH[:, 1] > -2.0, **NEED).height(PATH[0]) == 0.0
+    assert sample_ground(square(-2.1, 2.1), PATH, PATH[:, 1] > -2.0, **NEED).height(PATH[0]) == 0.0
 
 
 def test_without_a_mesh_the_ground_is_as_high_as_the_route() -> None:
-    level = along_path(PATH + np.array([0, 0, 0.7]), reach=1.5, spacing=0.1, softness=0.3)
-    assert level == Plane(0.7)
+    level = ground_along_path(PATH + np.array([0, 0, 0.7]), reach=1.5, spacing=0.1, softness=0.3)
+    assert level == LevelGround(0.7)
     rising = PATH + np.array([0.0, 0.0, 0.2]) * -PATH[:, 1:2]
-    ground = along_path(rising, reach=1.5, spacing=0.1, softness=0.3)
+    ground = ground_along_path(rising, reach=1.5, spacing=0.1, softness=0.3)
     for side in (-1.0, 0.0, 1.0):
         at = np.array([side, -2.0])
         assert ground.height(at) == pytest.approx(0.4, abs=0.01)
@@ -150,7 +152,7 @@ def test_a_slope_is_the_same_ground_however_finely_it_is_cut(cells: int) -> None
     halves = [np.stack(each, axis=2).reshape(-1, 3, 3) for each in ((a, b, c), (a, c, d))]
     path = PATH - 0.2 * PATH[:, 1:2] * np.array([0.0, 0.0, 1.0])
 
-    ground = sampled(np.concatenate(halves), path, ALL, **NEED)
+    ground = sample_ground(np.concatenate(halves), path, ALL, **NEED)
 
     at = np.random.default_rng(0).uniform([-1.0, -4.0], [1.0, 0.0], (200, 2))
     np.testing.assert_allclose(ground.height(at), at @ [0.1, -0.2], atol=1e-12)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.arm_separation import Bulk, kept_apart
-from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure
+from octo_motion.core.locomotion.clearance.arm_separation import Bulk, separate_arms
+from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
 from octo_motion.core.locomotion.rig.arm_chains import body_frame
 from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, arm_frames
 from octo_motion.core.rotations import IDENTITY, Floats, from_axis_angle, multiply
@@ -58,12 +58,12 @@ def deepest(bulk: Bulk, rotations: Floats) -> float:
             zip(bulk.arms, bulk.radii, own(bulk.arms, rotations), strict=True)
         )
     ]
-    return float(measure(chains).depths.max())
+    return float(measure_overlap(chains).depths.max())
 
 
 def apart(bulk: Bulk, rotations: Floats) -> Floats | None:
     travel = np.zeros((FRAMES, 3)), np.tile(IDENTITY, (FRAMES, 1))
-    return kept_apart(
+    return separate_arms(
         bulk,
         rotations,
         np.zeros(rotations.shape[:2]),

@@ -7,11 +7,11 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from octo_motion.core.keyframes import reduce_keys
 from octo_motion.core.keyframes.curves import Curves
-from octo_motion.core.keyframes.linear_model import Model
+from octo_motion.core.keyframes.linear_model import LinearModel
 from octo_motion.core.keyframes.playback import values_at
-from octo_motion.core.keyframes.reduction import reduce_keys
-from octo_motion.core.keyframes.residuals import Errors
+from octo_motion.core.keyframes.residuals import Residuals
 from octo_motion.core.keyframes.search import Search
 from octo_motion.core.keyframes.subframes import Fine, looked_at, with_halves
 from octo_motion.core.keyframes.tracks import SCALE, Limb, Track
@@ -115,7 +115,7 @@ def test_joints_that_rest_stay_within_their_room_between_frames_too(
     limb = resting_arm(seed, 60, room=room, stretching=stretching)
     (keys,) = reduce_keys(times, [limb])
     fine = with_halves(times, limb)
-    own, joint = Errors(fine.limb).measure([values_at(each, fine.times) for each in keys])
+    own, joint = Residuals(fine.limb).measure([values_at(each, fine.times) for each in keys])
     # Single precision of values about 1, against the closest of these bounds.
     assert own.max() <= 1.001
     assert joint.max() <= 1.001
@@ -141,7 +141,7 @@ def test_the_model_tells_small_errors_as_they_are_measured(*, seed: int, stretch
     for place, track in enumerate(limb.tracks):
         width = track.values.shape[1]
         off[:width, place] = 1e-4 * random.normal(size=(width, 12))
-    model, errors = Model(limb), Errors(limb)
+    model, errors = LinearModel(limb), Residuals(limb)
     own, ends = (np.linalg.norm(each, axis=0) for each in model.errors(off.astype(np.float32)))
     moved = [
         track.values + off[: track.values.shape[1], place].T
@@ -158,7 +158,7 @@ def test_the_model_tells_small_errors_as_they_are_measured(*, seed: int, stretch
 @given(seed=seeds, stretching=st.booleans())
 def test_pulls_are_the_transpose_of_errors(*, seed: int, stretching: bool) -> None:
     random = np.random.default_rng(seed)
-    model = Model(resting_arm(seed, 12, room=2e-3, stretching=stretching))
+    model = LinearModel(resting_arm(seed, 12, room=2e-3, stretching=stretching))
     off = random.normal(size=model.targets.shape).astype(np.float32)
     errors = model.errors(off)
     pulls = [random.normal(size=each.shape).astype(np.float32) for each in errors]

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.keyframes.reduction import (
+from octo_motion.core.keyframes import (
     LOCATION,
     SCALE,
     BezierKeys,
-    Chain,
     Limb,
+    LimbChain,
     Track,
     chain_to_tip,
     reduce_keys,
@@ -88,7 +88,7 @@ def swing(frames: int, period: float, reach: float = 0.5) -> Floats:
     return from_axis_angle([1.0, 0.0, 0.0], turns)[:, None]
 
 
-def an_arm(random: np.random.Generator, joints: int = 7) -> tuple[Skeleton, list[str], Chain]:
+def an_arm(random: np.random.Generator, joints: int = 7) -> tuple[Skeleton, list[str], LimbChain]:
     skeleton, arms, _ = body_with_arms(arms=1, joints=joints, rolls=random)
     return skeleton, list(arms[0].bones), chain_to_tip(skeleton, arms[0].bones)
 

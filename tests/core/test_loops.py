@@ -8,9 +8,9 @@ import pytest
 
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.gait import table as gait
-from octo_motion.core.locomotion.gait.gait_poser import Arm, GaitSettings, Generator
+from octo_motion.core.locomotion.gait.gait_poser import Arm, GaitPoser, GaitSettings
 from octo_motion.core.locomotion.path.in_place import (
-    breaths,
+    breathing_scales,
     route_in_place,
     travel_in_place,
     whole_frames,
@@ -19,7 +19,7 @@ from octo_motion.core.locomotion.path.travel import TravelSettings, plan_travel
 from octo_motion.core.rotations import Floats, angle_between
 from tests.core.rigs import body_with_arms
 
-PRESETS = gait.presets()
+PRESETS = gait.gait_presets()
 every_preset = pytest.mark.parametrize("name", sorted(PRESETS))
 every_length = pytest.mark.parametrize("cycles", [1, 3])
 FRAMES = 48
@@ -33,7 +33,7 @@ def looped(name: str, cycles: int, shares: Floats) -> Floats:
         dataclasses.replace(arm, phase=0.37 * number) for number, arm in enumerate(arms)
     ]
     settings = GaitSettings(table, variation=(-0.2, 0.2), seed=5, period=cycles)
-    generator = Generator(skeleton, odd, body, settings)
+    generator = GaitPoser(skeleton, odd, body, settings)
     travel = travel_in_place(
         TravelSettings(
             manner="SWIM" if table.manner == "SWIM" else "WALK",
@@ -75,7 +75,7 @@ def test_the_seam_is_where_one_puts_it(name: str) -> None:
     # loop, sub-frames included.
     table = PRESETS[name]
     skeleton, arms, body = body_with_arms(8, 7)
-    generator = Generator(
+    generator = GaitPoser(
         skeleton, arms, body, GaitSettings(table, variation=(-0.2, 0.2), seed=3, period=2)
     )
     around = np.array([-1e-3, -1e-4, 0.0, 1e-4, 1e-3])
@@ -104,7 +104,7 @@ def test_a_loop_lasts_whole_frames() -> None:
 
 def test_a_breath_closes_with_the_loop_and_has_no_corner() -> None:
     times = np.linspace(0.0, 10.0, 4001)
-    scales = breaths(times, 0.2, breath=2.9, whole=10.0)
+    scales = breathing_scales(times, 0.2, breath=2.9, whole=10.0)
     np.testing.assert_allclose(scales[0], scales[-1], atol=1e-12)
     assert scales[:, 0].max() == pytest.approx(1.2, abs=1e-4)
     assert scales[:, 0].min() == pytest.approx(1.0, abs=1e-12)
@@ -123,4 +123,4 @@ def test_what_makes_no_loop_is_told() -> None:
     with pytest.raises(SettingsError, match="0 cycles"):
         route_in_place(1.0, 0)
     with pytest.raises(SettingsError, match="breath takes"):
-        breaths(np.zeros(2), 0.1, breath=0.0, whole=None)
+        breathing_scales(np.zeros(2), 0.1, breath=0.0, whole=None)

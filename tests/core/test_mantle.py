@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.rig.arm_chains import BodyFrame, body_frame
-from octo_motion.core.locomotion.rig.mantle import find_mantle, lies_back, stretched
+from octo_motion.core.locomotion.rig.mantle import find_mantle, lies_back, stretch_mantle
 from octo_motion.core.rotations import Floats, angle_between, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import body_with_arms, bone_matrix, skeleton_of
@@ -55,7 +55,7 @@ def test_fully_stretched_they_point_the_way_that_the_body_swims() -> None:
     skeleton, arms, body = octopus()
     mantle = find_mantle(skeleton, arms, body)
 
-    turns = stretched(skeleton, mantle, body, 1.0)
+    turns = stretch_mantle(skeleton, mantle, body, 1.0)
 
     assert np.allclose(posed_along(skeleton, mantle, turns), [0.0, 0.0, 1.0], atol=1e-9)
 
@@ -63,7 +63,7 @@ def test_fully_stretched_they_point_the_way_that_the_body_swims() -> None:
 def test_not_stretched_they_stay_at_rest() -> None:
     skeleton, arms, body = octopus()
 
-    turns = stretched(skeleton, find_mantle(skeleton, arms, body), body, 0.0)
+    turns = stretch_mantle(skeleton, find_mantle(skeleton, arms, body), body, 0.0)
 
     assert np.max(angle_between(turns, IDENTITY)) <= 1e-7
 
@@ -73,7 +73,7 @@ def test_the_more_is_asked_for_the_straighter_they_are() -> None:
     mantle = find_mantle(skeleton, arms, body)
 
     upright = [
-        posed_along(skeleton, mantle, stretched(skeleton, mantle, body, amount))[-1, 2]
+        posed_along(skeleton, mantle, stretch_mantle(skeleton, mantle, body, amount))[-1, 2]
         for amount in (0.0, 0.3, 0.6, 1.0)
     ]
 
@@ -157,7 +157,7 @@ def test_bones_without_length_that_importers_put_in_between_ride_along() -> None
     )
     mantle = find_mantle(imported, arms, body)
     assert mantle == ("head", "mantle")
-    turns = stretched(imported, mantle, body, 1.0)
+    turns = stretch_mantle(imported, mantle, body, 1.0)
     basis = np.tile(IDENTITY, (len(imported), 1))
     basis[[imported.index[name] for name in mantle]] = turns
     _, heads = imported.pose(basis)
@@ -195,4 +195,4 @@ def test_a_body_of_arms_alone_has_no_mantle() -> None:
     bones = [arm.bones for arm in arms]
 
     assert find_mantle(skeleton, bones, body) == ()
-    assert stretched(skeleton, (), body, 1.0).shape == (0, 4)
+    assert stretch_mantle(skeleton, (), body, 1.0).shape == (0, 4)

@@ -15,7 +15,7 @@ from octo_motion.core.locomotion.octopus.rig import (
     build_bones,
 )
 from octo_motion.core.locomotion.octopus.shape import OctopusShape
-from octo_motion.core.locomotion.octopus.surface import Material, OctopusMesh
+from octo_motion.core.locomotion.octopus.surface import OctopusMesh, SkinMaterial
 from octo_motion.core.rotations import Floats
 
 SHAPES = {
@@ -171,12 +171,12 @@ def test_faces_mirror_faces(mesh: OctopusMesh) -> None:
 
 
 def test_every_material_is_used(mesh: OctopusMesh) -> None:
-    np.testing.assert_array_equal(np.unique(mesh.materials), [int(each) for each in Material])
+    np.testing.assert_array_equal(np.unique(mesh.materials), [int(each) for each in SkinMaterial])
 
 
 def test_suckers_face_the_ground() -> None:
     mesh = build_mesh(OctopusShape())
-    suckers = mesh.quads[mesh.materials == Material.SUCKER]
+    suckers = mesh.quads[mesh.materials == SkinMaterial.SUCKER]
     a, b, c, d = (mesh.vertices[suckers[:, corner]] for corner in range(4))
     normals = 0.5 * np.cross(c - a, d - b)
     # Rims have walls and cups have slopes; together they look down by far.

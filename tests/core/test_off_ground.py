@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.clearance.subframe_clearance import ArmsOverGround
-from octo_motion.core.locomotion.clearance.swim_clearance import afloat, off_ground
-from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.clearance.swim_clearance import afloat, keep_off_ground
+from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.rig.arm_frames import arm_frames
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle
@@ -17,7 +17,7 @@ def hanging(frames: int) -> tuple[ArmsOverGround, Poses, list[Floats]]:
     """A body that comes down until half of each arm hangs into the ground, and radii."""
     walk = walker(GROUNDS["plane"])
     arms = [arm_frames(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
-    course = ArmsOverGround(arms, Plane(0.0), 1.0)
+    course = ArmsOverGround(arms, LevelGround(0.0), 1.0)
     bones = sum(len(arm.bones) for arm in arms)
     rotations = np.zeros((frames, bones, 4))
     rotations[..., 0] = 1.0
@@ -39,7 +39,7 @@ def test_arms_that_would_hang_into_the_ground_stay_above_it() -> None:
     assert before[0].min() > 0.1
     assert before[-1].max() < -0.2
     loose = np.ones((49, len(course.arms)))
-    rotations = off_ground(course, poses, radii, loose)
+    rotations = keep_off_ground(course, poses, radii, loose)
     after = Poses(rotations, poses.strains, poses.locations, poses.orientations)
     assert course.clear(course.joints(after)).min() > 0.0
     # High above nothing happens, and nothing happens at once.
@@ -51,7 +51,7 @@ def test_arms_that_are_not_loose_stay_as_they_are() -> None:
     course, poses, radii = hanging(5)
     loose = np.zeros((5, len(course.arms)))
     loose[:, 1] = 1.0
-    rotations = off_ground(course, poses, radii, loose)
+    rotations = keep_off_ground(course, poses, radii, loose)
     for number, own in enumerate(course.bones):
         same = np.array_equal(rotations[:, own], poses.rotations[:, own])
         assert same == (number != 1)

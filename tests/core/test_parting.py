@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure
+from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
 from octo_motion.core.locomotion.clearance.chain_solver import joints_of, turned_towards
 from octo_motion.core.locomotion.clearance.overlap_contacts import (
     GIVEN,
@@ -21,7 +21,7 @@ from octo_motion.core.locomotion.clearance.overlap_contacts import (
 )
 from octo_motion.core.locomotion.clearance.overlap_solver import parted
 from octo_motion.core.rotations import Floats
-from octo_motion.core.temporal_filter import blurred, covered, reach
+from octo_motion.core.temporal_filter import blur_reach, blurred, covered
 
 SEEDS = st.integers(0, 2**31)
 UP = np.array([0.0, 0.0, 1.0])
@@ -225,7 +225,7 @@ def depth(group: Crowd, joints: Floats) -> Floats:
         Capsules(str(k), joints[:, k], group.radii[k], group.at_rest[k])
         for k in range(joints.shape[1])
     ]
-    return measure(own).depths
+    return measure_overlap(own).depths
 
 
 def swinging(height: float = 0.1) -> Floats:
@@ -288,7 +288,7 @@ def test_arms_make_way_as_early_as_they_can_and_then_are_where_they_were() -> No
     moved = parted(group, (), floor=None, width=WIDTH)
     assert moved is not None
     met = np.flatnonzero(depth(group, group.joints) > 0.0)
-    early, late = met[0] - 5 * reach(WIDTH), met[-1] + 5 * reach(WIDTH)
+    early, late = met[0] - 5 * blur_reach(WIDTH), met[-1] + 5 * blur_reach(WIDTH)
     np.testing.assert_array_equal(moved[:early], group.joints[:early])
     np.testing.assert_array_equal(moved[late:], group.joints[late:])
 
@@ -378,7 +378,7 @@ def test_an_arm_stays_out_of_the_body() -> None:
     def deep(joints: Floats) -> float:
         own = Capsules("arm", joints, group.radii[0], group.at_rest[0])
         tiled = Capsules("body", np.tile(ends, (FRAMES, 1, 1)), body.radii, ends)
-        return float(measure([own], [tiled]).depths.max())
+        return float(measure_overlap([own], [tiled]).depths.max())
 
     assert deep(before.joints) > 1.0
     moved = parted(group, (body,), floor=None, width=WIDTH)

@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
+from octo_motion.core.keyframes import LOCATION, Limb, Track, reduce_keys
 from octo_motion.core.keyframes.playback import rotations_of, values_at
-from octo_motion.core.keyframes.reduction import LOCATION, Limb, Track, reduce_keys
 from octo_motion.core.rotations import from_euler
 
 FRAMES = np.arange(1.0, 61.0)

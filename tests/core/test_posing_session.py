@@ -8,7 +8,7 @@ import pytest
 
 from octo_motion.core.posing.picking import Hit
 from octo_motion.core.posing.puppet.figure import Figure, Pose
-from octo_motion.core.posing.session import COARSEST, Sample, Session, Told
+from octo_motion.core.posing.session import COARSEST, HandSample, Session, TickReport
 from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.core.rotations import IDENTITY, angle_between, from_axis_angle
 from tests.core.puppets import chain, posed, soft
@@ -40,7 +40,7 @@ def session_of(step: float = 4e-3, clock: Clock | None = None) -> Session:
     return Session(figure, posed(figure), settings, clock=clock)
 
 
-def ticks(session: Session, count: int, seconds: float = TICK) -> Told:
+def ticks(session: Session, count: int, seconds: float = TICK) -> TickReport:
     """The last of several ticks."""
     told = session.tick(seconds)
     for _ in range(count - 1):
@@ -59,7 +59,7 @@ def pull(session: Session, way: tuple[float, float, float], seconds: float = 1.0
     count = round(seconds / TICK)
     for number in range(count):
         target = hit.point + (number + 1) / count * np.array(way)
-        session.tick(TICK, Sample(target, IDENTITY))
+        session.tick(TICK, HandSample(target, IDENTITY))
 
 
 def same(first: Pose, second: Pose) -> bool:
@@ -174,7 +174,7 @@ def test_turn_of_the_hand_turns_the_limb() -> None:
     session.grab(hit)
     for number in range(60):
         turn = from_axis_angle([0.0, 1.0, 0.0], 0.02 * (number + 1))
-        session.tick(TICK, Sample(hit.point, turn))
+        session.tick(TICK, HandSample(hit.point, turn))
     assert angle_between(start, session.pose.orientations[-1]) > 0.3
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from octo_motion.core.posing import reference
 from octo_motion.core.posing.puppet import kinematics
-from octo_motion.core.posing.puppet.figure import Elements, Limits
+from octo_motion.core.posing.puppet.figure import Elements, JointRanges
 from octo_motion.core.posing.solver.constraint_rows import Holds, Rows
 from octo_motion.core.posing.solver.contact_detection import Contacts
 from octo_motion.core.posing.solver.newton import Start
@@ -45,7 +45,7 @@ def busy_world(seed: int) -> World:
     figure = tree(rng, count, elements)
     if seed % 2 == 0:
         ends = np.array([[-0.4, 0.2], [-0.3, 0.3], [-0.1, 0.4]])
-        figure = replace(figure, limits=Limits(np.tile(ends, (count, 1, 1))))
+        figure = replace(figure, limits=JointRanges(np.tile(ends, (count, 1, 1))))
     return World(
         figure,
         posed(figure, 0.5 * rng.normal(size=(count, 3)), (0.0, 0.0, 0.12)),

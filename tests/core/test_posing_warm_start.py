@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.puppet.figure import Figure, Limits
+from octo_motion.core.posing.puppet.figure import Figure, JointRanges
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.solver.hand_spring import Coupling, Grab
 from octo_motion.core.posing.solver.newton import Start
@@ -43,7 +43,7 @@ def dragged(world: World, grab: Grab, start: Floats, first: int, steps: int) -> 
 
 def limited(figure: Figure) -> Figure:
     ends = np.radians([[-10.0, 130.0], [-30.0, 60.0], [-40.0, 40.0]])
-    return replace(figure, limits=Limits(np.tile(ends, (len(figure), 1, 1))))
+    return replace(figure, limits=JointRanges(np.tile(ends, (len(figure), 1, 1))))
 
 
 @pytest.mark.parametrize("kind", ["doll", "octopus", "doll with limits"])

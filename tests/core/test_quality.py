@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.rotations import from_axis_angle
 
@@ -31,10 +31,10 @@ def test_depth_is_that_of_joints_or_of_the_skin_below_them() -> None:
     joints, _, _ = still()
     joints[6, 0, 1, 2] = -0.3
     joints[:, :, 0, 2] = -9.0
-    worst = quality.depth(joints, Plane(0.0), np.array([2.0, 1.0]))
+    worst = quality.depth(joints, LevelGround(0.0), np.array([2.0, 1.0]))
     assert worst == quality.Worst(0.15, 6, 0)
     radii = np.full((2, 3), 0.1)
-    assert quality.depth(joints, Plane(0.0), np.ones(2), radii).value == pytest.approx(0.4)
+    assert quality.depth(joints, LevelGround(0.0), np.ones(2), radii).value == pytest.approx(0.4)
 
 
 def test_change_is_the_angle_from_frame_to_frame() -> None:

@@ -9,7 +9,7 @@ import pytest
 from octo_motion.core.easing import least_jerk
 from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait
-from octo_motion.core.locomotion.gait.gait_poser import GaitSettings, Generator
+from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
 from octo_motion.core.locomotion.reaching.curl import curled
 from octo_motion.core.locomotion.reaching.grasp import Grasp, Mode, Places, Target, plan_grasp
 from octo_motion.core.locomotion.reaching.timeline import Timeline, first_place, front_width
@@ -47,7 +47,7 @@ class Case:
     arm: ArmFrames
     radii: Floats
     grasp: Grasp
-    otherwise: Generator
+    otherwise: GaitPoser
     column: slice
 
     def base(self, times: Floats) -> Floats:
@@ -77,7 +77,7 @@ def case(
     profile = profile_of(*(form or objects.rod()))
     target = Target(profile, places or still(times), "'Rod'")
     grasp = plan_grasp(arm, radii, target, TIMELINE, times, mode=mode, name="'Arm 1 L'")
-    generator = Generator(skeleton, arms, body, GaitSettings(gait.presets()["walk"]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(gait.gait_presets()["walk"]))
     return Case(arm, radii, grasp, generator, slice(0, joints))
 
 

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from octo_motion.core.locomotion.ground.body_height import body_line
 from octo_motion.core.locomotion.ground.contact_timing import (
-    Even,
+    EvenTiming,
     Tabled,
-    at_rest,
     crawling_in_place,
     free,
+    timing_at_rest,
 )
-from octo_motion.core.locomotion.ground.crawl_planner import CrawlSettings, Holds, plan_crawl
-from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.ground.crawl_planner import CrawlHolds, CrawlSettings, plan_crawl
+from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.path.in_place import route_in_place
 from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import from_axis_angle
@@ -28,13 +28,13 @@ MIDDLE, DUTY = np.radians(225.0), 0.55
 
 
 @functools.cache
-def crawl(seed: int = 0) -> tuple[Tabled, Holds]:
+def crawl(seed: int = 0) -> tuple[Tabled, CrawlHolds]:
     holds = plan_crawl(journey(facing=0.7), CrawlSettings(seed=seed))
     return free(holds, 8, middle=MIDDLE, duty=DUTY), holds
 
 
 def test_an_even_rhythm_is_one_cycle_per_stride() -> None:
-    rhythm = Even(0.8, np.array([0.0, 1.0]))
+    rhythm = EvenTiming(0.8, np.array([0.0, 1.0]))
     np.testing.assert_allclose(
         rhythm.phases(np.array([0.0, 0.8])), [[0, 1], [2 * np.pi, 1 + 2 * np.pi]]
     )
@@ -43,7 +43,7 @@ def test_an_even_rhythm_is_one_cycle_per_stride() -> None:
 @given(st.lists(st.floats(-5.0, 9.0), min_size=1, max_size=20), st.integers(0, 5))
 def test_distance_and_phase_are_each_others_inverse(at: list[float], seed: int) -> None:
     distance = np.array(at)
-    for rhythm in (Even(0.8, np.linspace(0.0, 5.0, 8)), crawl(seed)[0]):
+    for rhythm in (EvenTiming(0.8, np.linspace(0.0, 5.0, 8)), crawl(seed)[0]):
         phases = rhythm.phases(distance)
         back = rhythm.distances(range(8), phases.T / (2.0 * np.pi))
         # A table of eight steps between knots: good to where an arm is laid down.
@@ -88,9 +88,9 @@ def test_where_the_body_stands_all_arms_lie_down_and_none_goes_back(
     length: float, stride: float, seed: int, ends: tuple[bool, bool]
 ) -> None:
     start, end = ends
-    even = Even(stride, np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 8))
+    even = EvenTiming(stride, np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 8))
     for rhythm in (even, crawl(seed)[0]):
-        own = at_rest(rhythm, length, start=start, end=end, middle=MIDDLE, duty=DUTY)
+        own = timing_at_rest(rhythm, length, start=start, end=end, middle=MIDDLE, duty=DUTY)
         distance = np.linspace(0.0, length, 400)
         cycles = (own.phases(distance) - MIDDLE) / (2.0 * np.pi)
         assert np.all(np.diff(cycles, axis=0) >= -1e-12)
@@ -106,8 +106,8 @@ def test_where_the_body_stands_all_arms_lie_down_and_none_goes_back(
 
 
 def test_in_between_arms_that_start_and_end_at_rest_keep_their_rhythm() -> None:
-    even = Even(0.8, np.linspace(0.0, 5.5, 8))
-    own = at_rest(even, LENGTH, start=True, end=True, middle=MIDDLE, duty=DUTY)
+    even = EvenTiming(0.8, np.linspace(0.0, 5.5, 8))
+    own = timing_at_rest(even, LENGTH, start=True, end=True, middle=MIDDLE, duty=DUTY)
     distance = np.linspace(0.8, LENGTH - 0.8, 200)
     np.testing.assert_allclose(own.phases(distance), even.phases(distance), atol=0.03)
     steps = np.diff(own.phases(np.linspace(0.0, LENGTH, 2000)), axis=0) * 2000.0 / LENGTH
@@ -119,9 +119,9 @@ def test_in_between_arms_that_start_and_end_at_rest_keep_their_rhythm() -> None:
 def test_however_short_its_holds_a_walk_from_rest_to_rest_keeps_its_rhythm(
     duty: float, strides: float, seed: int
 ) -> None:
-    even = Even(0.8, np.random.default_rng(seed).uniform(-7.0, 7.0, 8))
+    even = EvenTiming(0.8, np.random.default_rng(seed).uniform(-7.0, 7.0, 8))
     length = 0.8 * strides
-    own = at_rest(even, length, start=True, end=True, middle=MIDDLE, duty=duty)
+    own = timing_at_rest(even, length, start=True, end=True, middle=MIDDLE, duty=duty)
     # An arm is as it would be a cycle and a half from where the body stands, and all the way on.
     distance = np.linspace(2.5 * 0.8, length - 2.5 * 0.8, 300)
     np.testing.assert_allclose(own.phases(distance), even.phases(distance), atol=1e-9)
@@ -138,7 +138,7 @@ def test_each_cycle_of_a_crawl_knows_where_its_hold_is() -> None:
         np.testing.assert_array_equal(away[arm, 1 : 1 + own.sum()], holds.away[own])
         assert np.isnan(away[arm, [0, -1]]).all()
     # A walk leaves it to each arm, straight ahead.
-    turns, away = Even(0.8, np.zeros(8)).aims([1, 3], np.arange(4))
+    turns, away = EvenTiming(0.8, np.zeros(8)).aims([1, 3], np.arange(4))
     assert not turns.any()
     assert np.isnan(away).all()
 
@@ -149,7 +149,7 @@ def test_a_crawl_that_is_planned_from_rest_to_rest_is_left_as_it_was_planned() -
         length = float(way.distance[-1])
         holds = plan_crawl(way, CrawlSettings(seed=seed))
         planned = free(holds, 8, middle=MIDDLE, duty=DUTY)
-        own = at_rest(planned, length, start=True, end=True, middle=MIDDLE, duty=DUTY)
+        own = timing_at_rest(planned, length, start=True, end=True, middle=MIDDLE, duty=DUTY)
         distance = np.linspace(0.0, length, 500)
         # But for how the phase rises through the first and the last hold: no arm is hurried.
         late = np.abs(own.phases(distance) - planned.phases(distance)) / (2.0 * np.pi)
@@ -166,7 +166,7 @@ def test_a_crawl_in_place_has_its_loop_however_long_its_pauses(
         route,
         travel,
         bearings_of(route, travel),
-        Plane(0.0),
+        LevelGround(0.0),
         clearance=0.2,
         reach=1.0,
         lean=0.0,

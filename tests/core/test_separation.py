@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure
+from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
 from octo_motion.core.locomotion.gait import table as gait
-from octo_motion.core.locomotion.gait.gait_poser import GaitSettings, Generator
+from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
 from octo_motion.core.locomotion.rig.arm_frames import arm_frames
 from octo_motion.core.rotations import Floats
 from tests.core.rigs import body_with_arms
@@ -42,7 +42,9 @@ def test_depth_is_what_is_missing_to_the_sum_of_radii(seed: int) -> None:
     if seed % 7 == 0:
         d = c  # no length
     radii = random.uniform(0.1, 1.0, 2)
-    found = measure([capsule("one", a, b, radii[0]), capsule("two", c, d, radii[1], rest=9.0)])
+    found = measure_overlap(
+        [capsule("one", a, b, radii[0]), capsule("two", c, d, radii[1], rest=9.0)]
+    )
     expected = max((radii.sum() - nearest(a, b, c, d)) / radii.min(), 0.0)
     assert found.depths[0] == pytest.approx(expected, abs=0.02 / radii.min())
 
@@ -60,7 +62,7 @@ def test_depth_does_not_hang_on_the_unit_of_length(seed: int, unit: float) -> No
             capsule("two", c, d, size * radii[1], rest=9.0),
         ]
         chains = [replace(each, at_rest=size * each.at_rest) for each in chains]
-        return float(measure(chains).depths[0])
+        return float(measure_overlap(chains).depths[0])
 
     assert deep(unit) == pytest.approx(deep(1.0), abs=1e-9)
 
@@ -71,7 +73,7 @@ def test_the_worst_frame_and_the_pair_are_named() -> None:
     zero = np.zeros((3, 3))
     lying = capsule("lying", zero, zero + ALONG, 0.3)
     body = capsule("body", zero + HIGH, zero + ALONG + HIGH, 0.3, rest=20.0)
-    found = measure([moving, lying], [body])
+    found = measure_overlap([moving, lying], [body])
     np.testing.assert_allclose(found.depths, [0.0, 1.0 / 3.0, 2.0 / 3.0], atol=1e-9)
     assert [(each.first, each.second, each.frame) for each in found.overlaps] == [
         ("moving", "body", 2),
@@ -84,20 +86,20 @@ def test_what_overlaps_at_rest_is_built_so() -> None:
     zero = np.zeros((2, 3))
     one = capsule("one", zero, zero + ALONG, 0.3)
     two = capsule("two", zero, zero + ALONG, 0.3)
-    found = measure([one, two])
+    found = measure_overlap([one, two])
     assert found.worst is None
     assert not found.depths.any()
 
 
 def test_nothing_is_nothing() -> None:
-    assert measure([]).worst is None
+    assert measure_overlap([]).worst is None
     one = capsule("one", np.zeros((4, 3)), np.ones((4, 3)), 0.1)
-    assert measure([one]).depths.shape == (4,)
+    assert measure_overlap([one]).depths.shape == (4,)
 
 
 def posed_arms(preset: str, frames: int = 96, radius: float = 0.05) -> list[Capsules]:
     skeleton, arms, body = body_with_arms(8, 12)
-    generator = Generator(skeleton, arms, body, GaitSettings(gait.presets()[preset]))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(gait.gait_presets()[preset]))
     phases = np.linspace(0.0, 2.0 * np.pi, frames, endpoint=False)
     rotations = generator.pose(phases, np.zeros((frames, 2))).rotations
     result = []
@@ -111,12 +113,12 @@ def posed_arms(preset: str, frames: int = 96, radius: float = 0.05) -> list[Caps
 
 @pytest.mark.parametrize("preset", ["walk", "walk_search", "swim"])
 def test_the_presets_keep_arms_apart(preset: str) -> None:
-    found = measure(posed_arms(preset))
+    found = measure_overlap(posed_arms(preset))
     assert found.worst is None or found.worst.depth <= 0.1
 
 
 def test_the_literal_walk_crosses_neighbouring_arms() -> None:
-    found = measure(posed_arms("walk_literal"))
+    found = measure_overlap(posed_arms("walk_literal"))
     assert found.worst is not None
     assert found.worst.depth > 1.0
 
@@ -124,7 +126,9 @@ def test_the_literal_walk_crosses_neighbouring_arms() -> None:
 def test_coarse_bounds_miss_nothing() -> None:
     arms = posed_arms("walk_literal", 8)
     shifted = [Capsules(each.name, each.joints + 1000.0, each.radii, each.at_rest) for each in arms]
-    np.testing.assert_allclose(measure(shifted).depths, measure(arms).depths, atol=1e-6)
+    np.testing.assert_allclose(
+        measure_overlap(shifted).depths, measure_overlap(arms).depths, atol=1e-6
+    )
 
 
 def test_next_to_what_is_built_together_there_is_no_room_to_keep() -> None:
@@ -137,8 +141,8 @@ def test_next_to_what_is_built_together_there_is_no_room_to_keep() -> None:
     one = Capsules("one", joints, np.full(3, 0.2), ends)
     two = Capsules("two", np.stack([mirrored, mirrored]), np.full(3, 0.2), mirrored)
 
-    assert measure([one, two]).worst is None
+    assert measure_overlap([one, two]).worst is None
     # The same bones that spring from nowhere near do count.
     apart = [Capsules(each.name, each.joints, each.radii, each.at_rest) for each in (one, two)]
     apart[1] = Capsules("two", two.joints, two.radii, mirrored - 3.0 * np.eye(3)[1])
-    assert measure(apart).depths[1] > 1.0
+    assert measure_overlap(apart).depths[1] > 1.0

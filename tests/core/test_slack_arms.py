@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.ground.arm_curves import bent, curve, drawn, opened, unit
+from octo_motion.core.locomotion.ground.arm_curves import bent, curve, drawn, spread_chain, unit
 from octo_motion.core.locomotion.ground.body_height import body_line
 from octo_motion.core.locomotion.ground.foothold_reach import easy_height
 from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
@@ -118,7 +118,7 @@ def arches(*, opening: bool) -> Floats:
     leaving[0], leaving[2] = np.cos(0.2), np.sin(0.2)
     arriving[0], arriving[2] = np.cos(0.25), -np.sin(0.25)
     if opening:
-        leaving, arriving = opened((leaving, arriving), chord, upward, ratio)
+        leaving, arriving = spread_chain((leaving, arriving), chord, upward, ratio)
     return curve(
         leaving=leaving,
         arriving=arriving,
@@ -143,7 +143,7 @@ def test_an_arm_that_leaves_far_from_the_way_to_its_foothold_is_left_as_it_is(
     leaving /= np.linalg.norm(leaving)
     arriving = leaving * np.array([[1.0], [1.0], [-1.0]])
     chord, upward = np.array([[1.0], [0.0], [0.0]]), np.array([[0.0], [0.0], [1.0]])
-    ends = opened((leaving, arriving), chord, upward, np.array([ratio]))
+    ends = spread_chain((leaving, arriving), chord, upward, np.array([ratio]))
     np.testing.assert_array_equal(ends, (leaving, arriving))
 
 
@@ -154,7 +154,7 @@ def test_what_is_opened_stays_of_length_one_and_turns_to_either_side_of_the_way(
     leaving = np.array([[np.cos(out)], [0.0], [np.sin(out)]])
     arriving = np.array([[np.cos(back)], [0.0], [-np.sin(back)]])
     chord, upward = np.array([[1.0], [0.0], [0.0]]), np.array([[0.0], [0.0], [1.0]])
-    wider, steeper = opened((leaving, arriving), chord, upward, np.array([ratio]))
+    wider, steeper = spread_chain((leaving, arriving), chord, upward, np.array([ratio]))
     assert np.linalg.norm([wider, steeper], axis=1) == pytest.approx(1.0)
     assert wider[2, 0] >= leaving[2, 0] - 1e-12
     assert steeper[2, 0] <= arriving[2, 0] + 1e-12

@@ -15,23 +15,28 @@ from octo_motion.core.rotations import (
     rotate,
     shortest_arc,
 )
-from octo_motion.core.splicing.transfer.limb_rotation import SOFT, Limb, joint_turn, reach
+from octo_motion.core.splicing.transfer.limb_rotation import (
+    SOFT,
+    LimbTriangle,
+    bend_to_reach,
+    joint_turn,
+)
 
 seeds = st.integers(0, 2**31)
 
 
-def bent_limb(random: np.random.Generator, bend: Floats) -> Limb:
+def bent_limb(random: np.random.Generator, bend: Floats) -> LimbTriangle:
     """Limbs of lengths 0.3 and 0.25, bent by these angles, anywhere."""
     count = len(bend)
     along = normalized(random.normal(size=(count, 3)))
     axis = normalized(np.cross(along, random.normal(size=(count, 3))))
     joint = random.normal(size=(count, 3))
     elbow = joint + 0.3 * along
-    return Limb(joint, elbow, elbow + 0.25 * rotate(from_axis_angle(axis, bend), along))
+    return LimbTriangle(joint, elbow, elbow + 0.25 * rotate(from_axis_angle(axis, bend), along))
 
 
-def turned(limb: Limb, turn: Floats) -> Limb:
-    return Limb(
+def turned(limb: LimbTriangle, turn: Floats) -> LimbTriangle:
+    return LimbTriangle(
         limb.joint,
         limb.joint + rotate(turn, limb.elbow - limb.joint),
         limb.joint + rotate(turn, limb.hand - limb.joint),
@@ -83,7 +88,9 @@ def test_nothing_pops_while_an_elbow_goes_through_straight(seed: int):
         along, across = np.eye(3)[0], np.eye(3)[2]
         zeros = np.zeros((len(bend), 3))
         elbow = zeros + 0.3 * along
-        limb = Limb(zeros, elbow, elbow + 0.25 * rotate(from_axis_angle(across, bend), elbow / 0.3))
+        limb = LimbTriangle(
+            zeros, elbow, elbow + 0.25 * rotate(from_axis_angle(across, bend), elbow / 0.3)
+        )
         wanted = turned(limb, from_axis_angle(normalized(fixed.normal(size=3)), 0.7))
         shifted = replace(wanted, hand=wanted.hand + 0.03 * fixed.normal(size=3))
         turns = joint_turn(limb, shifted)
@@ -103,7 +110,7 @@ def test_exact_reach_lands_on_every_point_within_reach(seed: int):
     distance = np.where((now > 0.53) & (distance > 0.51), 0.4, distance)
     target = limb.joint + distance * direction
     hinge = normalized(random.normal(size=(20, 3)))
-    upper, lower = reach(limb, target, hinge)
+    upper, lower = bend_to_reach(limb, target, hinge)
     elbow = limb.joint + rotate(upper, limb.elbow - limb.joint)
     hand = elbow + rotate(lower, limb.hand - limb.elbow)
     assert np.linalg.norm(hand - target, axis=-1).max() < 1e-9
@@ -115,7 +122,7 @@ def test_close_to_the_end_of_its_reach_a_limb_misses_by_little(seed: int):
     limb = bent_limb(random, random.uniform(0.0, 2.8, 20))
     direction = normalized(limb.hand - limb.joint)
     distance = random.uniform(0.55 * (1.0 - SOFT), 0.55, (20, 1))
-    upper, lower = reach(
+    upper, lower = bend_to_reach(
         limb, limb.joint + distance * direction, normalized(random.normal(size=(20, 3)))
     )
     hand = rotate(upper, limb.elbow - limb.joint) + rotate(lower, limb.hand - limb.elbow)
@@ -132,10 +139,12 @@ def test_elbows_open_and_close_at_a_bounded_speed_wherever_the_point_goes(
     for count in (2000, 8000):
         distance = start + 0.45 * np.sin(np.linspace(0.0, 2.0 * np.pi, count))
         one = bent_limb(np.random.default_rng(1), np.array([bend]))
-        limb = Limb(*(np.tile(each, (count, 1)) for each in (one.joint, one.elbow, one.hand)))
+        limb = LimbTriangle(
+            *(np.tile(each, (count, 1)) for each in (one.joint, one.elbow, one.hand))
+        )
         target = limb.joint + np.abs(distance[:, None]) * normalized(limb.hand - limb.joint)
         hinge = normalized(np.cross(limb.elbow - limb.joint, np.ones(3)))
-        upper, lower = reach(limb, target, hinge)
+        upper, lower = bend_to_reach(limb, target, hinge)
         first = rotate(upper, limb.elbow - limb.joint)
         second = rotate(lower, limb.hand - limb.elbow)
         sine = np.linalg.norm(np.cross(first, second), axis=-1)
@@ -151,7 +160,7 @@ def test_a_hand_that_is_there_already_does_not_move(seed: int):
     random = np.random.default_rng(seed)
     limb = bent_limb(random, np.concatenate([random.uniform(0.0, 3.0, 18), [0.0, 1e-5]]))
     hinge = normalized(random.normal(size=(20, 3)))
-    for turn in reach(limb, limb.hand, hinge):
+    for turn in bend_to_reach(limb, limb.hand, hinge):
         assert angle_between(turn, (1.0, 0.0, 0.0, 0.0)).max() < 1e-6
 
 
@@ -160,7 +169,7 @@ def test_a_limb_stretches_towards_what_is_out_of_reach(seed: int):
     random = np.random.default_rng(seed)
     limb = bent_limb(random, random.uniform(0.3, 2.8, 20))
     direction = normalized(limb.hand - limb.joint)
-    upper, lower = reach(limb, limb.joint + 2.0 * direction, np.eye(3)[[0] * 20])
+    upper, lower = bend_to_reach(limb, limb.joint + 2.0 * direction, np.eye(3)[[0] * 20])
     hand = rotate(upper, limb.elbow - limb.joint) + rotate(lower, limb.hand - limb.elbow)
     assert np.allclose(hand, 0.55 * direction, atol=1e-3)
 
@@ -171,7 +180,7 @@ def test_on_another_body_a_straight_limb_stays_straight(seed: int):
     limb = bent_limb(random, np.concatenate([np.zeros(10), random.uniform(0.7, 2.2, 10)]))
     target = limb.joint + 0.4 * normalized(limb.hand - limb.joint)
     hinge = normalized(random.normal(size=(20, 3)))
-    upper, lower = reach(limb, target, hinge, alike=False)
+    upper, lower = bend_to_reach(limb, target, hinge, alike=False)
     # Arc cosines lose half the digits at one.
     assert angle_between(upper, lower)[:10].max() < 1e-6
     hand = rotate(upper, limb.elbow - limb.joint) + rotate(lower, limb.hand - limb.elbow)

@@ -29,10 +29,10 @@ from octo_motion.core.splicing.transfer.parts import (
     RIGHT_ARM,
     TRUNK,
     Part,
-    chain,
+    chain_part,
     part_bones,
 )
-from octo_motion.core.splicing.transfer.splice import Reach, Splice, Splicer, build, spliced
+from octo_motion.core.splicing.transfer.splice import Reach, Splice, Splicer, build_splices, spliced
 from tests.core.rigs import skeleton_of
 from tests.core.splice_bodies import (
     LANDMARKS,
@@ -205,7 +205,7 @@ def test_trunk_and_head_take_the_whole_orientation():
     random = np.random.default_rng(5)
     skeleton = humanoid(random)
     base, clip = motion(random, skeleton), motion(random, skeleton)
-    result = build(
+    result = build_splices(
         base,
         LANDMARKS,
         [Splice(part, clip, FROM_START, LANDMARKS) for part in (TRUNK, HEAD, LEFT_ARM)],
@@ -220,13 +220,13 @@ def test_a_stack_is_rebuilt_retimed_reordered_and_muted_as_data():
     base, one, two = (motion(random, skeleton) for _ in range(3))
     right = Splice(RIGHT_ARM, one, FROM_START, LANDMARKS)
     left = Splice(LEFT_ARM, two, Timing(4.0, 1.0), LANDMARKS)
-    both = build(base, LANDMARKS, [right, left])
-    assert np.array_equal(both.rotations, build(base, LANDMARKS, [left, right]).rotations)
+    both = build_splices(base, LANDMARKS, [right, left])
+    assert np.array_equal(both.rotations, build_splices(base, LANDMARKS, [left, right]).rotations)
     step = spliced(spliced(base, LANDMARKS, right), LANDMARKS, left)
     assert np.array_equal(both.rotations, step.rotations)
-    muted = build(base, LANDMARKS, [replace(right, mute=True), left])
+    muted = build_splices(base, LANDMARKS, [replace(right, mute=True), left])
     assert np.array_equal(muted.rotations, spliced(base, LANDMARKS, left).rotations)
-    later = build(base, LANDMARKS, [right, replace(left, timing=Timing(6.0, 1.0))])
+    later = build_splices(base, LANDMARKS, [right, replace(left, timing=Timing(6.0, 1.0))])
     assert not np.array_equal(later.rotations, both.rotations)
 
 
@@ -278,13 +278,13 @@ def test_any_chain_can_be_spliced_also_onto_another_arm():
     random = np.random.default_rng(8)
     skeleton = tentacles({"a": 6, "b": 6, "c": 6})
     base, clip = motion(random, skeleton), motion(random, skeleton)
-    result = spliced(base, None, Splice(chain("b0", "a0"), clip, FROM_START))
+    result = spliced(base, None, Splice(chain_part("b0", "a0"), clip, FROM_START))
     chosen = [skeleton.index[f"b{place}"] for place in range(6)]
     source = [skeleton.index[f"a{place}"] for place in range(6)]
     # Arms that stand alike on their body do the same turns.
     error = angle_between(result.rotations[:, chosen], clip.rotations[:, source])
     assert error.max() < 1e-6
-    same = spliced(base, None, Splice(chain("a0"), clip, FROM_START))
+    same = spliced(base, None, Splice(chain_part("a0"), clip, FROM_START))
     assert angle_between(same.rotations[:, source], clip.rotations[:, source]).max() < 1e-6
 
 
@@ -297,7 +297,7 @@ def test_chains_of_unlike_numbers_of_bones_take_the_same_shape(counts: tuple[int
     rotations = from_rotation_vector(bend[..., None] * np.array([0.0, 0.0, 1.0]))
     clip = replace(clip, rotations=np.broadcast_to(rotations, clip.rotations.shape).copy())
     clip.rotations[:, 0] = base.rotations[:, 0] = (1.0, 0.0, 0.0, 0.0)
-    result = spliced(base, None, Splice(chain("a0", "x0"), clip, FROM_START))
+    result = spliced(base, None, Splice(chain_part("a0", "x0"), clip, FROM_START))
     tips = relative(result, f"a{counts[0] - 1}", "body")
     place = (counts[0] - 1) / counts[0] * counts[1]
     lower = relative(clip, f"x{min(int(place), counts[1] - 1)}", "body")
@@ -315,4 +315,4 @@ def test_what_is_missing_is_told():
     with pytest.raises(ClipError, match="no legs"):
         spliced(clip, LANDMARKS, Splice(HEAD, clip, FROM_START, LANDMARKS, travel=True))
     with pytest.raises(ClipError, match="no bone 'tail'"):
-        spliced(clip, None, Splice(chain("tail"), clip, FROM_START))
+        spliced(clip, None, Splice(chain_part("tail"), clip, FROM_START))

@@ -13,8 +13,8 @@ from octo_motion.core.splicing.clip.timing import After, Timing
 from octo_motion.core.splicing.transfer import preview as live
 from octo_motion.core.splicing.transfer import splice
 from octo_motion.core.splicing.transfer.parts import HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK, Part
-from octo_motion.core.splicing.transfer.preview import Live
-from octo_motion.core.splicing.transfer.splice import Splice, build
+from octo_motion.core.splicing.transfer.preview import SplicePreview
+from octo_motion.core.splicing.transfer.splice import Splice, build_splices
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
 
 
@@ -25,9 +25,9 @@ def clips(count: int, frames: int = 60) -> list[Clip]:
 
 
 def assert_same(stack: list[Splice], number: int, base: Clip, timing: Timing) -> None:
-    looked_at = Live(base, LANDMARKS, stack, number)
+    looked_at = SplicePreview(base, LANDMARKS, stack, number)
     retimed = [*stack[:number], replace(stack[number], timing=timing), *stack[number + 1 :]]
-    whole = build(base, LANDMARKS, retimed)
+    whole = build_splices(base, LANDMARKS, retimed)
     for row, frame in enumerate(base.frames):
         seen = looked_at.at(float(frame), timing)
         assert seen.frames == [frame]
@@ -66,7 +66,7 @@ def test_a_look_matches_no_bones_and_takes_few_frames(monkeypatch: pytest.Monkey
         Splice(LEGS, one, timing, LANDMARKS, travel=True),
         Splice(LEGS, two, Timing(500.0, 1.0), LANDMARKS, travel=True),
     ]
-    looked_at = Live(base, LANDMARKS, stack, 0)
+    looked_at = SplicePreview(base, LANDMARKS, stack, 0)
     widths: list[int] = []
     carry = splice.carry
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion.ground.footholds import Wish
+from octo_motion.core.locomotion.ground.footholds import ContactOverride
 from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
 from octo_motion.core.locomotion.ground.surface import normals
 from octo_motion.core.locomotion.metrics import measures as quality
@@ -226,7 +226,7 @@ def test_a_contact_that_was_moved_is_where_it_was_moved_to_and_the_others_stay()
     free = walking("bumps", stretch=True)
     old = holds(free, 2)[3]
     goal = old.position + np.array([0.05, -0.04, 9.0])
-    wish = Wish(2, 3, position=goal, heading=old.heading + 0.2)
+    wish = ContactOverride(2, 3, position=goal, heading=old.heading + 0.2)
     walk = walker(GROUNDS["bumps"], stretch=True, wishes=[wish])
     new = holds(walk, 2)[3]
     np.testing.assert_allclose(new.position[:2], goal[:2], atol=1e-12)
@@ -242,7 +242,7 @@ def test_a_contact_that_was_moved_is_where_it_was_moved_to_and_the_others_stay()
 
 
 def test_a_contact_that_was_deleted_is_gone_and_the_arm_stays_in_the_air() -> None:
-    walk = walker(GROUNDS["plane"], stretch=True, wishes=[Wish(2, 3, removed=True)])
+    walk = walker(GROUNDS["plane"], stretch=True, wishes=[ContactOverride(2, 3, removed=True)])
     assert 3 not in holds(walk, 2)
     poses = walk.pose(walk.times)
     place = walk.walk.builds[0].index(2)
@@ -253,7 +253,7 @@ def test_a_contact_that_was_deleted_is_gone_and_the_arm_stays_in_the_air() -> No
 def test_a_contact_can_come_later() -> None:
     free, walk = (
         walker(GROUNDS["plane"], stretch=True, wishes=wishes)
-        for wishes in ((), [Wish(2, 3, shift=0.1)])
+        for wishes in ((), [ContactOverride(2, 3, shift=0.1)])
     )
     old, new = holds(free, 2)[3], holds(walk, 2)[3]
     assert new.on - old.on == pytest.approx(0.1 * 2.0 * np.pi)
@@ -263,7 +263,7 @@ def test_a_contact_can_come_later() -> None:
 def test_a_contact_out_of_reach_is_told_and_nothing_breaks() -> None:
     far = holds(walking("plane"), 2)[3].position + np.array([0.0, 0.0, 0.0])
     far[:2] += 1.5
-    walk = walker(GROUNDS["plane"], wishes=[Wish(2, 3, position=far)])
+    walk = walker(GROUNDS["plane"], wishes=[ContactOverride(2, 3, position=far)])
     poses = walk.pose(walk.times)
     frame, arm = np.unravel_index(poses.misses.argmax(), poses.misses.shape)
     assert arm == 2

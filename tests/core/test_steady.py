@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitSettings
-from octo_motion.core.locomotion.ground.swing_smoothing import Steady, around
+from octo_motion.core.locomotion.ground.swing_smoothing import SwingSmoothing, frames_around
 from octo_motion.core.locomotion.ground.walk import GroundedPoses, Raise
 from octo_motion.core.rotations import Floats, continuous
 from tests.core.grounds import FRAMES, GROUNDS, Walker, walker
@@ -20,8 +20,8 @@ STEADY = 0.08
 """Cycles: what the panel proposes."""
 
 
-def over(cycles: float, frames: float) -> Steady:
-    steady = Steady.over(cycles, frames)
+def over(cycles: float, frames: float) -> SwingSmoothing:
+    steady = SwingSmoothing.over(cycles, frames)
     assert steady is not None
     return steady
 
@@ -44,28 +44,28 @@ def bend(directions: Floats) -> Floats:
 @pytest.mark.parametrize("name", ["walk", "swim", "hurry"])
 @pytest.mark.parametrize("steady", [0.01, STEADY, 0.25])
 def test_the_table_is_evened_out_by_the_mean_over_a_window(name: str, steady: float) -> None:
-    table = gait.presets()[name]
+    table = gait.gait_presets()[name]
     phases = np.linspace(-7.0, 14.0, 37)[:, None]
-    found = gait.evaluate(table, phases, (1,), steady=steady)
+    found = gait.gait_angles(table, phases, (1,), steady=steady)
     # The middles of many slices of the window, each weighing the less, the further off it is.
     slices = (np.arange(4000) + 0.5) / 2000.0 - 1.0
     weights = 1.0 - np.abs(slices)
     every = phases + slices * steady * gait.CYCLE
-    values = gait.evaluate(table, every, (1,) * 4000)
+    values = gait.gait_angles(table, every, (1,) * 4000)
     mean = np.einsum("w,fwla->fla", weights / weights.sum(), values)
     np.testing.assert_allclose(found[:, 0], mean, atol=1e-5)
 
 
 def test_without_it_the_table_keeps_its_corners() -> None:
-    table = gait.presets()["walk"]
+    table = gait.gait_presets()["walk"]
     phases = np.linspace(0.0, 9.0, 50)[:, None]
-    exact = gait.evaluate(table, phases, (1,))
-    assert np.array_equal(gait.evaluate(table, phases, (1,), steady=0.0), exact)
+    exact = gait.gait_angles(table, phases, (1,))
+    assert np.array_equal(gait.gait_angles(table, phases, (1,), steady=0.0), exact)
 
 
 @given(seed=st.integers(0, 99), period=st.sampled_from([0, 3]))
 def test_random_additions_have_no_corners_either(seed: int, period: int) -> None:
-    table = gait.presets()["walk"]
+    table = gait.gait_presets()["walk"]
     phases = np.linspace(-9.0, 20.0, 3001)[:, None] + np.array([0.0, 2.0])
 
     def varied(steady: float) -> Floats:
@@ -79,7 +79,7 @@ def test_random_additions_have_no_corners_either(seed: int, period: int) -> None
 
 @given(cycle=st.integers(-3, 3))
 def test_evened_random_additions_come_again_with_their_period(cycle: int) -> None:
-    table = gait.presets()["walk"]
+    table = gait.gait_presets()["walk"]
     phases = np.linspace(0.0, gait.CYCLE, 50)[:, None] + np.zeros(3)
     found = [
         gait.variation(table, each, (1, 2, 3), (0.0, 0.2), 5, period=2, steady=STEADY)
@@ -91,7 +91,7 @@ def test_evened_random_additions_come_again_with_their_period(cycle: int) -> Non
 @pytest.mark.parametrize("steady", [-0.01, 0.26, float("nan")])
 def test_a_window_that_makes_no_sense_is_told(steady: float) -> None:
     with pytest.raises(SettingsError):
-        GaitSettings(gait.presets()["walk"], steady=steady)
+        GaitSettings(gait.gait_presets()["walk"], steady=steady)
 
 
 # --- Over frames ---------------------------------------------------------------------------------
@@ -112,8 +112,8 @@ def test_it_is_as_wide_as_asked_for_at_any_frame_rate(frames: float, cycles: flo
 
 
 def test_nothing_to_even_out_over_is_no_window() -> None:
-    assert Steady.over(0.0, 48.0) is None
-    assert Steady.over(STEADY, 0.0) is None
+    assert SwingSmoothing.over(0.0, 48.0) is None
+    assert SwingSmoothing.over(STEADY, 0.0) is None
 
 
 @pytest.mark.parametrize("cyclic", [False, True])
@@ -128,7 +128,7 @@ def test_the_portions_in_which_a_motion_is_made_do_not_matter(
     parts = []
     for start in (0, 17, 50, 99):
         part = slice(start, {0: 17, 17: 50, 50: 99, 99: 101}[start])
-        frames, own = around(part, steady.reach, 101, cyclic=cyclic)
+        frames, own = frames_around(part, steady.reach, 101, cyclic=cyclic)
         parts.append(steady.evened(ways[:, :, frames], share[frames])[:, :, own])
     found = np.concatenate(parts, axis=2)
     if cyclic:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from octo_motion.core.posing.puppet.figure import Figure, Pose
 from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.client import Client, State
+from octo_motion.device.ipc.client import Client, ClientState
 from tests.core.puppets import chain, posed, soft
 
 OPTIONS = ("--simulate", "--no-haply", "--no-hid")
@@ -89,7 +89,7 @@ def kill_bridge_and_start_again() -> tuple[float, float]:
         assert last
         start = time.monotonic()
         os.kill(bridge, signal.SIGKILL)
-        wait_for(client, lambda: client.state is State.LOST, "the client notices")
+        wait_for(client, lambda: client.state is ClientState.LOST, "the client notices")
         noticed = time.monotonic() - start
         ended = seconds_to_end(hands)
         assert client.pose is not None
@@ -147,7 +147,7 @@ def kill_hands() -> float:
         os.kill(hands, signal.SIGKILL)
         wait_for(client, lambda: client.lost_devices, "the hand is gone")
         wait_for(client, lambda: client.devices, "the hand is back")
-        assert client.state is State.RUNNING
+        assert client.state is ClientState.RUNNING
         return time.monotonic() - start
     finally:
         client.stop()

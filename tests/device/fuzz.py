@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from octo_motion.device.hid import force_profile as profile
-from octo_motion.device.hid.descriptor import DescriptorError, parse
+from octo_motion.device.hid.descriptor import DescriptorError, parse_descriptor
 from octo_motion.device.hid.force_profile import ReportError
 from octo_motion.device.hid.multi_axis import MultiAxis
 from octo_motion.device.ipc import messages as say
@@ -59,12 +59,12 @@ def _message(data: bytes) -> None:
 
 
 def _descriptor(data: bytes) -> None:
-    mouse = MultiAxis(parse(data))
+    mouse = MultiAxis(parse_descriptor(data))
     mouse.feed(data[:32])
     assert all(-1.0 <= each <= 1.0 for each in mouse.push)
 
 
-_MICE = [MultiAxis(parse(each)) for each in (SPACE_MOUSE, COMBINED)]
+_MICE = [MultiAxis(parse_descriptor(each)) for each in (SPACE_MOUSE, COMBINED)]
 
 
 def _report(data: bytes) -> None:
@@ -114,12 +114,12 @@ TARGETS = [
     Target(
         "features of the profile",
         profile.parse_features,
-        [profile.pack_features(profile.Features(2, DYNAMICS))],
+        [profile.pack_features(profile.ForceFeatures(2, DYNAMICS))],
         ReportError,
     ),
     Target(
         "network packets",
-        lambda data: network.parse(data, KEY),
+        lambda data: network.parse_datagram(data, KEY),
         [network.pack(each, KEY) for each in (FEATURES, STATE, FORCE)],
         PacketError,
     ),

@@ -21,7 +21,7 @@ from octo_motion.core.posing.solver.obstacles import Plane
 from octo_motion.device import __main__ as program
 from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc import process
-from octo_motion.device.ipc.client import Client, State
+from octo_motion.device.ipc.client import Client, ClientState
 from tests.device.bridges import (
     FIGURE,
     OPTIONS,
@@ -109,7 +109,7 @@ def test_nonsense_is_answered_with_a_notice_and_nothing_breaks(client: Client) -
     assert "does not exist" in client.notices.pop().problem
     client.send(say.Settings(dead_zone=(2.0,) * 6))  # pyright: ignore[reportArgumentType]
     wait_for(client, lambda: client.notices, "the bridge complains")
-    assert client.state is State.RUNNING
+    assert client.state is ClientState.RUNNING
 
 
 def test_meshes_of_a_whole_scene_wait_for_a_bridge_that_is_still_starting(client: Client) -> None:
@@ -123,7 +123,7 @@ def test_meshes_of_a_whole_scene_wait_for_a_bridge_that_is_still_starting(client
         client.send(mesh)
     wait_for(client, lambda: client.devices, "the hand is there")
     wait_for(client, lambda: len(client.notices) == 6, "all have come")
-    assert client.state is State.RUNNING
+    assert client.state is ClientState.RUNNING
 
 
 def test_bridge_that_is_stopped_ends_at_once_and_is_not_lost(client: Client) -> None:
@@ -131,7 +131,7 @@ def test_bridge_that_is_stopped_ends_at_once_and_is_not_lost(client: Client) -> 
     process_id = client.process_id
     assert process_id
     client.stop()
-    assert client.state is State.OFF
+    assert client.state is ClientState.OFF
     assert client.process_id is None
     with pytest.raises(ProcessLookupError):
         os.kill(process_id, 0)

@@ -19,9 +19,9 @@ from octo_motion.device.bridge_process import Bridge
 from octo_motion.device.calibration import NONE, Phase
 from octo_motion.device.ipc import channel as line
 from octo_motion.device.ipc.channel import (
-    Channel,
     ChannelClosedError,
     Listener,
+    MessageChannel,
     connect,
     new_secret,
 )
@@ -44,17 +44,17 @@ SECRET = bytes(range(32))
 
 
 @pytest.fixture
-def accepted() -> Iterator[Callable[[], tuple[int, Callable[[], Channel | None]]]]:
+def accepted() -> Iterator[Callable[[], tuple[int, Callable[[], MessageChannel | None]]]]:
     """Begin to listen; the port, and a way to wait for who was let in."""
-    made: list[Channel] = []
+    made: list[MessageChannel] = []
 
-    def begin() -> tuple[int, Callable[[], Channel | None]]:
+    def begin() -> tuple[int, Callable[[], MessageChannel | None]]:
         listener = Listener(SECRET)
-        got: list[Channel | None] = []
+        got: list[MessageChannel | None] = []
         thread = threading.Thread(target=lambda: got.append(listener.accept(5.0)))
         thread.start()
 
-        def wait() -> Channel | None:
+        def wait() -> MessageChannel | None:
             thread.join()
             made.extend(each for each in got if each)
             return got[0]
@@ -66,10 +66,10 @@ def accepted() -> Iterator[Callable[[], tuple[int, Callable[[], Channel | None]]
         channel.close()
 
 
-Begin = Callable[[], tuple[int, Callable[[], Channel | None]]]
+Begin = Callable[[], tuple[int, Callable[[], MessageChannel | None]]]
 
 
-def pair(begin: Begin) -> tuple[Channel, Channel]:
+def pair(begin: Begin) -> tuple[MessageChannel, MessageChannel]:
     port, wait = begin()
     client = connect(port, SECRET)
     server = wait()
@@ -77,7 +77,7 @@ def pair(begin: Begin) -> tuple[Channel, Channel]:
     return client, server
 
 
-def received(channel: Channel, count: int) -> list[object]:
+def received(channel: MessageChannel, count: int) -> list[object]:
     got: list[object] = []
     end = time.monotonic() + 10.0
     while len(got) < count:
@@ -87,7 +87,7 @@ def received(channel: Channel, count: int) -> list[object]:
     return got
 
 
-def closes(channel: Channel) -> bool:
+def closes(channel: MessageChannel) -> bool:
     end = time.monotonic() + 5.0
     while time.monotonic() < end:
         try:

@@ -31,7 +31,7 @@ class Desk:
         self.forbidden: set[bytes] = set()
         self.looks = 0
         self.now = 100.0
-        monkeypatch.setattr(system, "fingerprint", lambda: None)
+        monkeypatch.setattr(system, "descriptor_fingerprint", lambda: None)
         monkeypatch.setattr(system, "list_devices", self._list)
         monkeypatch.setattr(finding, "_EVERY_COSTLY", 0.0)
         monkeypatch.setattr(finding.time, "monotonic", lambda: self.now)

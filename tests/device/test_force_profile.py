@@ -22,7 +22,7 @@ metres = st.floats(-1.0, 1.0)
 vectors = st.tuples(metres, metres, metres)
 
 
-def state(**changes: object) -> profile.State:
+def state(**changes: object) -> profile.ForceState:
     values: dict[str, object] = {
         "sequence": 7,
         "clock": 123456,
@@ -35,7 +35,7 @@ def state(**changes: object) -> profile.State:
         "velocity": (0.1, -0.2, 0.3),
         "angular_velocity": (1.0, -2.0, 3.0),
     }
-    return profile.State(**{**values, **changes})  # pyright: ignore[reportArgumentType]
+    return profile.ForceState(**{**values, **changes})  # pyright: ignore[reportArgumentType]
 
 
 @given(place=vectors, turn=vectors, velocity=vectors)
@@ -73,14 +73,14 @@ def test_force_that_is_no_number_is_never_sent(bad: float) -> None:
 
 
 def test_features_survive() -> None:
-    got = profile.parse_features(profile.pack_features(profile.Features(2, DYNAMICS)))
+    got = profile.parse_features(profile.pack_features(profile.ForceFeatures(2, DYNAMICS)))
     assert got.buttons == 2
     for name in DYNAMICS.__dataclass_fields__:
         assert getattr(got.dynamics, name) == pytest.approx(getattr(DYNAMICS, name), rel=1e-3)
 
 
 def test_device_stronger_than_a_command_can_say_is_used_as_far_as_that() -> None:
-    strong = profile.pack_features(profile.Features(2, Dynamics(60.0, 6.0, 0.5, 0.001)))
+    strong = profile.pack_features(profile.ForceFeatures(2, Dynamics(60.0, 6.0, 0.5, 0.001)))
     dynamics = profile.parse_features(strong).dynamics
     assert (dynamics.force, dynamics.torque) == pytest.approx((32.767, 3.2767))
     force, torque = (dynamics.force, 0.0, 0.0), (0.0, -dynamics.torque, 0.0)
@@ -91,7 +91,7 @@ def test_device_stronger_than_a_command_can_say_is_used_as_far_as_that() -> None
 
 
 def test_other_version_of_the_profile_is_refused() -> None:
-    report = bytearray(profile.pack_features(profile.Features(2, DYNAMICS)))
+    report = bytearray(profile.pack_features(profile.ForceFeatures(2, DYNAMICS)))
     report[1] = 2
     with pytest.raises(profile.ReportError, match="version 2"):
         profile.parse_features(bytes(report))
@@ -105,14 +105,16 @@ def test_any_bytes_are_a_report_or_are_refused(data: bytes, number: int) -> None
         got = parsers[number](bytes([number]) + data)
     except profile.ReportError:
         return
-    if isinstance(got, profile.State):
+    if isinstance(got, profile.ForceState):
         assert math.isclose(sum(each * each for each in got.orientation), 1.0, rel_tol=1e-9)
         assert all(map(math.isfinite, (*got.position, *got.velocity)))
 
 
 def opened() -> tuple[ForceDevice, FakeHandle]:
     handle = FakeHandle()
-    return ForceDevice(found(page=0xFF4F, usage=1), handle, profile.Features(2, DYNAMICS)), handle
+    return ForceDevice(
+        found(page=0xFF4F, usage=1), handle, profile.ForceFeatures(2, DYNAMICS)
+    ), handle
 
 
 def test_newest_whole_report_counts() -> None:

@@ -17,7 +17,7 @@ from octo_motion.device.driver import Description, Driver, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.channel import Channel, ChannelClosedError, Listener, connect
+from octo_motion.device.ipc.channel import ChannelClosedError, Listener, MessageChannel, connect
 from octo_motion.device.simulation import Simulation
 from octo_motion.device.spatial import IDENTITY
 from tests.core.puppets import chain, posed, soft
@@ -70,7 +70,7 @@ class Desk:
 
     def __init__(self) -> None:
         listener = Listener(SECRET)
-        got: list[Channel | None] = []
+        got: list[MessageChannel | None] = []
         thread = threading.Thread(target=lambda: got.append(listener.accept(10.0)))
         thread.start()
         self.there = connect(listener.port, SECRET)

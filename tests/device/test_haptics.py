@@ -15,7 +15,7 @@ from octo_motion.device.driver import FRESH_SECONDS, Dynamics
 from octo_motion.device.haptics.coupling import DAMPER_SHARE, SHARE, gains_for, stiffest, wrench
 from octo_motion.device.haptics.local_model import LocalModel
 from octo_motion.device.haptics.passivity import DAMPING, STORED, Observer
-from octo_motion.device.haptics.safety import FALL, RISE, Limits, Shaper, freshness
+from octo_motion.device.haptics.safety import FALL, RISE, ForceLimits, Shaper, freshness
 from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.haptics.timing import Histogram
 from octo_motion.device.held_body import Held, Pull
@@ -220,7 +220,7 @@ asks = st.tuples(*[st.floats(-1e6, 1e6)] * 3)
 def test_force_is_limited_in_size_and_change_and_gone_when_data_is_old(
     steps: list[tuple[Vector, Vector, bool, float]],
 ) -> None:
-    limits = Limits(force=8.0, torque=0.4)
+    limits = ForceLimits(force=8.0, torque=0.4)
     shaper = Shaper(limits)
     for force, torque, holding, age in steps:
         before, before_torque = shaper.force, shaper.torque
@@ -238,7 +238,7 @@ def test_force_is_limited_in_size_and_change_and_gone_when_data_is_old(
 
 
 def test_force_rises_gently_after_a_grab_and_is_gone_soon_after_letting_go() -> None:
-    shaper = Shaper(Limits(8.0, 0.4))
+    shaper = Shaper(ForceLimits(8.0, 0.4))
     sizes: list[float] = []
     for _ in range(round(1.5 * RISE / PERIOD)):
         shaper.shape((4.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.0)
@@ -255,7 +255,7 @@ def test_force_fades_before_data_counts_as_lost_so_that_nothing_jerks() -> None:
     assert freshness(0.0) == freshness(0.01) == 1.0
     assert freshness(0.015) == pytest.approx(0.5)
     assert freshness(FRESH_SECONDS) == freshness(1.0) == 0.0
-    shaper = Shaper(Limits(8.0, 0.4))
+    shaper = Shaper(ForceLimits(8.0, 0.4))
     for _ in range(300):
         shaper.shape((8.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.0)
     last, largest = shaper.force[0], 0.0
@@ -268,7 +268,7 @@ def test_force_fades_before_data_counts_as_lost_so_that_nothing_jerks() -> None:
 
 
 def test_after_a_stall_the_force_rises_anew() -> None:
-    shaper = Shaper(Limits(8.0, 0.4))
+    shaper = Shaper(ForceLimits(8.0, 0.4))
     for _ in range(300):
         shaper.shape((8.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.0)
     shaper.shape((8.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.05)
@@ -279,7 +279,7 @@ def test_after_a_stall_the_force_rises_anew() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e200])
 @pytest.mark.parametrize("which", ["force", "torque"])
 def test_what_is_no_number_becomes_no_force(bad: float, which: str) -> None:
-    shaper = Shaper(Limits(8.0, 0.4))
+    shaper = Shaper(ForceLimits(8.0, 0.4))
     good: Vector = (8.0, 0.0, 0.0)
     for _ in range(300):
         shaper.shape(good, good, PERIOD, holding=True, age=0.0)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.device.hid import descriptor
-from octo_motion.device.hid.descriptor import DescriptorError, Way, parse
+from octo_motion.device.hid.descriptor import DescriptorError, ReportField, parse_descriptor
 from octo_motion.device.hid.force_profile import report_descriptor
 from octo_motion.device.hid.models import MODELS, model_of
 from octo_motion.device.hid.multi_axis import MultiAxis, classic_layout
@@ -24,14 +24,14 @@ def axes(number: int, *values: int) -> bytes:
 
 
 def test_separate_reports_push_with_one_and_turn_with_two() -> None:
-    mouse = MultiAxis(parse(SPACE_MOUSE))
+    mouse = MultiAxis(parse_descriptor(SPACE_MOUSE))
     assert mouse.feed(axes(1, 350, 175, -350))
     assert mouse.feed(axes(2, 70, -350, 35))
     assert mouse.push == pytest.approx((1.0, -0.5, 1.0, 0.2, 1.0, -0.1))
 
 
 def test_combined_report_holds_all_six_axes() -> None:
-    mouse = MultiAxis(parse(COMBINED))
+    mouse = MultiAxis(parse_descriptor(COMBINED))
     assert mouse.feed(axes(1, 350, 175, -350, 70, -350, 35))
     assert mouse.push == pytest.approx((1.0, -0.5, 1.0, 0.2, 1.0, -0.1))
 
@@ -39,7 +39,7 @@ def test_combined_report_holds_all_six_axes() -> None:
 @pytest.mark.parametrize("descriptor", [SPACE_MOUSE, COMBINED], ids=["separate", "combined"])
 def test_layout_of_the_family_is_what_its_descriptors_say(descriptor: bytes) -> None:
     combined = descriptor is COMBINED
-    told = MultiAxis(parse(descriptor))
+    told = MultiAxis(parse_descriptor(descriptor))
     assumed = MultiAxis(classic_layout(combined=combined))
     reports = [axes(1, 100, -200, 300, 5, 6, 7)[: 13 if combined else 7], b"\x03\x02\0\0\0"]
     reports += [] if combined else [axes(2, 5, 6, 7)]
@@ -52,7 +52,7 @@ def test_layout_of_the_family_is_what_its_descriptors_say(descriptor: bytes) -> 
 
 def test_right_is_right_away_is_away_and_up_is_up() -> None:
     # The device's own axes: X right, Y towards the user, Z down.
-    mouse = MultiAxis(parse(SPACE_MOUSE))
+    mouse = MultiAxis(parse_descriptor(SPACE_MOUSE))
     mouse.feed(axes(1, 350, 0, 0))
     assert mouse.push[:3] == (1.0, 0.0, 0.0)
     mouse.feed(axes(1, 0, -350, 0))
@@ -62,7 +62,7 @@ def test_right_is_right_away_is_away_and_up_is_up() -> None:
 
 
 def test_buttons_are_bits_and_stay_until_they_are_let_go() -> None:
-    mouse = MultiAxis(parse(SPACE_MOUSE))
+    mouse = MultiAxis(parse_descriptor(SPACE_MOUSE))
     mouse.feed(b"\x03\x01\0\0\0")
     mouse.feed(axes(1, 1, 2, 3))
     assert mouse.buttons == 1
@@ -73,13 +73,13 @@ def test_buttons_are_bits_and_stay_until_they_are_let_go() -> None:
 
 
 def test_more_than_full_push_counts_as_full() -> None:
-    mouse = MultiAxis(parse(SPACE_MOUSE))
+    mouse = MultiAxis(parse_descriptor(SPACE_MOUSE))
     mouse.feed(axes(1, 500, -32768, 0))
     assert mouse.push[:2] == (1.0, 1.0)
 
 
 def test_short_and_strange_reports_change_nothing_they_do_not_hold() -> None:
-    mouse = MultiAxis(parse(SPACE_MOUSE))
+    mouse = MultiAxis(parse_descriptor(SPACE_MOUSE))
     mouse.feed(axes(1, 350, 0, 0))
     for report in (b"", b"\x01", b"\x17\x64", b"\x09" * 20):
         assert not mouse.feed(report)
@@ -92,7 +92,7 @@ def test_device_without_report_numbers_and_with_odd_widths_is_read() -> None:
         "05 01 09 08 a1 01 a1 00 05 09 19 01 29 03 15 00 25 01 95 03 75 01 81 02 05 01"
         "09 30 09 31 09 32 09 33 09 34 09 35 16 00 fe 26 00 02 75 0a 95 06 81 06 c0 c0"
     )
-    mouse = MultiAxis(parse(odd))
+    mouse = MultiAxis(parse_descriptor(odd))
     bits = 0b101 | (256 << 3) | ((-512 & 0x3FF) << 13)
     assert mouse.feed(bits.to_bytes(8, "little"))
     assert mouse.buttons == 0b101
@@ -110,7 +110,7 @@ def test_every_product_is_named_once() -> None:
 
 
 def test_force_profile_describes_itself() -> None:
-    layout = parse(report_descriptor())
+    layout = parse_descriptor(report_descriptor())
     assert layout.collections == ((0xFF4F, 1),)
     assert layout.numbered
     sizes = {
@@ -118,7 +118,7 @@ def test_force_profile_describes_itself() -> None:
         for each in layout.fields
     }
     assert sizes == {1: 8 * 52, 2: 8 * 16, 3: 8 * 20}
-    assert {each.way for each in layout.fields} == set(Way)
+    assert {each.way for each in layout.fields} == set(ReportField)
 
 
 @pytest.mark.parametrize(
@@ -137,14 +137,14 @@ def test_force_profile_describes_itself() -> None:
 )
 def test_broken_descriptor_is_refused(broken: bytes) -> None:
     with pytest.raises(DescriptorError):
-        parse(broken)
+        parse_descriptor(broken)
 
 
 @given(st.binary(max_size=300))
 @settings(max_examples=300)
 def test_any_bytes_are_a_descriptor_or_are_refused(data: bytes) -> None:
     try:
-        layout = parse(data)
+        layout = parse_descriptor(data)
     except DescriptorError:
         return
     mouse = MultiAxis(layout)
@@ -160,7 +160,7 @@ def test_descriptor_with_a_few_bytes_changed_is_read_or_refused(data: st.DataObj
     for _ in range(data.draw(st.integers(1, 6))):
         changed[data.draw(st.integers(0, len(changed) - 1))] = data.draw(st.integers(0, 255))
     try:
-        layout = parse(bytes(changed))
+        layout = parse_descriptor(bytes(changed))
     except DescriptorError:
         return
     assert len(layout.fields) <= 4096
@@ -180,4 +180,4 @@ def test_what_is_written_is_read_again(kind: str, value: int) -> None:
         return
     data = descriptor.item(kind, value)
     assert int.from_bytes(data[1:], "little", signed=signed) == value
-    parse(data)
+    parse_descriptor(data)

@@ -20,7 +20,14 @@ from octo_motion.core.errors import DeviceError
 from octo_motion.device.driver import DeviceLostError, Dynamics, Kind, Sample
 from octo_motion.device.sources import haply, network
 from octo_motion.device.sources.haply import Haply
-from octo_motion.device.sources.network import Features, Force, PacketError, Port, State, parse
+from octo_motion.device.sources.network import (
+    Force,
+    NetworkFeatures,
+    NetworkState,
+    PacketError,
+    Port,
+    parse_datagram,
+)
 from octo_motion.device.sources.websocket import (
     FrameReader,
     WebSocket,
@@ -32,8 +39,8 @@ from octo_motion.device.spatial import IDENTITY
 from tests.device.parts import HaplyService
 
 KEY = bytes(range(16))
-FEATURES = Features("My arm", 3, Dynamics(5.0, 0.2, 0.4))
-STATE = State(
+FEATURES = NetworkFeatures("My arm", 3, Dynamics(5.0, 0.2, 0.4))
+STATE = NetworkState(
     *(9, 2),
     held=True,
     position=(0.1, 0.2, 0.3),
@@ -60,8 +67,8 @@ def wait_for(what: Callable[[], object]) -> object:
 @pytest.mark.parametrize("packet", [FEATURES, STATE, FORCE])
 def test_packet_arrives_as_it_was_sent(packet: network.Packet) -> None:
     data = network.pack(packet, KEY)
-    assert parse(data, KEY) == packet
-    assert len(data) == {Features: 168, State: 144, Force: 88}[type(packet)]
+    assert parse_datagram(data, KEY) == packet
+    assert len(data) == {NetworkFeatures: 168, NetworkState: 144, Force: 88}[type(packet)]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +87,7 @@ def test_packet_arrives_as_it_was_sent(packet: network.Packet) -> None:
 )
 def test_packet_that_is_none_is_refused(data: bytes, said: str) -> None:
     with pytest.raises(PacketError, match=said):
-        parse(data, KEY)
+        parse_datagram(data, KEY)
 
 
 @given(st.sampled_from([FEATURES, STATE]), st.lists(st.tuples(st.integers(0), st.integers(0, 255))))
@@ -92,10 +99,10 @@ def test_packet_with_bytes_changed_is_read_or_refused(
     for at, value in changes:
         data[at % len(data)] = value
     try:
-        got = parse(bytes(data), KEY)
+        got = parse_datagram(bytes(data), KEY)
     except PacketError:
         return
-    if isinstance(got, State):
+    if isinstance(got, NetworkState):
         assert all(map(math.isfinite, (*got.position, *got.velocity)))
         assert math.isclose(sum(each**2 for each in got.orientation), 1.0, rel_tol=1e-9)
 
@@ -127,7 +134,7 @@ def test_program_is_a_device_once_it_says_what_it_can(port: tuple[Port, socket.s
     assert sample.position == STATE.position
     assert sample.buttons == 2
     device.send((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
-    got = parse(program.recv(2048), KEY)
+    got = parse_datagram(program.recv(2048), KEY)
     assert got == Force(1, 9, 20, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
 
 
@@ -204,7 +211,7 @@ def test_program_that_reads_slowly_gets_whole_packets() -> None:
             device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
             got += program.recv(1 << 20)
             while len(got) >= size:
-                packet = parse(got[:size], KEY)
+                packet = parse_datagram(got[:size], KEY)
                 assert isinstance(packet, Force)
                 assert packet.sequence > last
                 got, last = got[size:], packet.sequence

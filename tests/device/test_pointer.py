@@ -17,7 +17,7 @@ from octo_motion.device.driver import DeviceLostError, Kind, Sample
 from octo_motion.device.haptics.pointer import Pointer
 from octo_motion.device.held_body import Held, Pull
 from octo_motion.device.ipc.messages import DeviceMessage, Settings, Workspace
-from octo_motion.device.simulation import Hand as HandInWorld
+from octo_motion.device.simulation import SimulatedPointer as HandInWorld
 from octo_motion.device.simulation import Simulation
 from octo_motion.device.sources.simulated_hand import Hand, SimulatedHand
 from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector, length

@@ -23,8 +23,8 @@ from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.held_body import Pull
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.channel import Channel, Listener, connect
-from octo_motion.device.ipc.client import Client, State
+from octo_motion.device.ipc.channel import Listener, MessageChannel, connect
+from octo_motion.device.ipc.client import Client, ClientState
 from octo_motion.device.sources.discovery import Discovery, Sources
 from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector
 from tests.core.puppets import chain, posed, soft
@@ -69,7 +69,7 @@ def space_mouse(plug: Callable[..., uhid.VirtualDevice]) -> uhid.VirtualDevice:
 
 def force_device(plug: Callable[..., uhid.VirtualDevice]) -> uhid.VirtualDevice:
     def features(number: int) -> bytes:
-        described = profile.pack_features(profile.Features(2, DYNAMICS))
+        described = profile.pack_features(profile.ForceFeatures(2, DYNAMICS))
         return described if number == profile.FEATURES else b""
 
     return plug("Octo hand", 0x1209, 0x0001, profile.report_descriptor(), features=features)
@@ -101,7 +101,7 @@ def found_by(discovery: Discovery) -> Driver:
 
 def pose_report(position: Vector, buttons: int = 0, turn: Quaternion = IDENTITY) -> bytes:
     return profile.pack_state(
-        profile.State(
+        profile.ForceState(
             *(0, 0, 0, buttons),
             held=True,
             powered=True,
@@ -316,7 +316,7 @@ class Loop:
 
     def __init__(self) -> None:
         listener = Listener(SECRET)
-        got: list[Channel | None] = []
+        got: list[MessageChannel | None] = []
         thread = threading.Thread(target=lambda: got.append(listener.accept(PATIENCE)))
         thread.start()
         self.there = connect(listener.port, SECRET)
@@ -418,7 +418,7 @@ def test_force_device_bends_a_puppet_and_feels_it_until_it_is_unplugged_in_mid_g
     def polled(what: Callable[[], object]) -> Callable[[], object]:
         def look() -> object:
             client.poll()
-            assert client.state is State.RUNNING
+            assert client.state is ClientState.RUNNING
             return what()
 
         return look

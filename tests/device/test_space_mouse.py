@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from octo_motion.core.errors import DeviceError
 from octo_motion.device.driver import DeviceLostError, Kind
 from octo_motion.device.hid import space_mouse, system
-from octo_motion.device.hid.descriptor import parse
+from octo_motion.device.hid.descriptor import parse_descriptor
 from octo_motion.device.hid.space_mouse import SpaceMouse, is_space_mouse
 from octo_motion.device.response import Axes, Response
 from tests.device.parts import SPACE_MOUSE, FakeHandle, found
@@ -29,7 +29,7 @@ PROPORTIONAL = Response(dead_zone=six(0.0), curve=six(1.0))
 
 def plugged_in(response: Response = PROPORTIONAL) -> tuple[SpaceMouse, FakeHandle]:
     handle = FakeHandle()
-    return SpaceMouse(found(), handle, parse(SPACE_MOUSE), response), handle
+    return SpaceMouse(found(), handle, parse_descriptor(SPACE_MOUSE), response), handle
 
 
 def push(*values: int) -> bytes:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from octo_motion.command_line.fingerprint import fingerprint, version
-from octo_motion.command_line.job_file import Job, JobError, Known, load_gait_file, read_job
+from octo_motion.command_line.job_file import JobError, JobFile, Known, load_gait_file, read_job
 from octo_motion.command_line.setting_values import Setting, check_settings, parse_assignments
 from octo_motion.command_line.shot_request import NewRoute, ShotEntry, frame_rate
 from octo_motion.command_line.vocabulary import known
@@ -20,7 +20,7 @@ from octo_motion.core.locomotion.octopus.shape import OctopusShape
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 
 
-def read(folder: Path, text: str) -> Job:
+def read(folder: Path, text: str) -> JobFile:
     path = folder / "job.toml"
     path.write_text(text, encoding="utf-8")
     return read_job(path, known(), folder / "job.report.json")
@@ -47,7 +47,7 @@ def test_shot_has_what_its_table_says_with_paths_beside_the_job(tmp_path: Path) 
     assert (entry.name, entry.armature, entry.route, entry.fps) == ("walk", "Octopus", "Wall", 25.0)
     assert entry.file == tmp_path / "reef.blend"
     assert entry.outputs == (tmp_path / "out/walk.blend", tmp_path / "out/walk.glb")
-    assert gait.from_json(entry.gait).name == "swim"
+    assert gait.gait_from_json(entry.gait).name == "swim"
     assert entry.settings == {
         "seed": 3,
         "table.stride": 2.0,
@@ -154,10 +154,10 @@ def test_every_fault_of_a_list_is_told_with_its_place(tmp_path: Path) -> None:
 
 
 def test_gait_file_is_read_beside_the_job(tmp_path: Path) -> None:
-    table = gait.renamed(gait.presets()["swim"], "sneak")
-    (tmp_path / "sneak.json").write_text(gait.to_json(table), encoding="utf-8")
+    table = gait.renamed_gait(gait.gait_presets()["swim"], "sneak")
+    (tmp_path / "sneak.json").write_text(gait.gait_to_json(table), encoding="utf-8")
     (shot,) = read(tmp_path, WALK + 'gait = "sneak.json"\n').shots
-    assert gait.from_json(load_gait_file(shot).gait).name == "sneak"
+    assert gait.gait_from_json(load_gait_file(shot).gait).name == "sneak"
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_all_faults_are_told_at_once_with_their_shots(tmp_path: Path) -> None:
     assert "cycle_time" in told[0]
     assert told[1:] == (
         "shot 'b': octopus: Arms is 0. Choose a value from 1 to 64.",
-        "shot 'b': There is no gait 'hop'. Choose one of " + ", ".join(gait.presets()) + ".",
+        "shot 'b': There is no gait 'hop'. Choose one of " + ", ".join(gait.gait_presets()) + ".",
         "shot 'b': A new octopus has no route: give the route's points.",
     )
 
@@ -291,7 +291,7 @@ def test_fault_is_told(tmp_path: Path, text: str, fault: str) -> None:
 
 
 def test_job_that_cannot_be_read_is_told(tmp_path: Path) -> None:
-    known_names = Known({}, gait.presets().__getitem__)
+    known_names = Known({}, gait.gait_presets().__getitem__)
     with pytest.raises(JobError, match="It cannot be read: No such file"):
         read_job(tmp_path / "none.toml", known_names, tmp_path / "report.json")
     (tmp_path / "odd.toml").write_bytes(b"\xff")

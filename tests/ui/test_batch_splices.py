@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from octo_motion.command_line.job_file import Job, JobError, read_job
+from octo_motion.command_line.job_file import JobError, JobFile, read_job
 from octo_motion.command_line.motion_files import check_motion, files_within
 from octo_motion.command_line.shot_request import NewSplice, ShotEntry
 from octo_motion.command_line.splice_entries import parse_splice, read_splices
@@ -22,7 +22,7 @@ WALK = '[[shots]]\nname = "walk"\nkind = "splice"\nfile = "walk.bvh"\noutput = "
 ARM = 'splices = [{ part = "right_arm", clip = "throw.bvh" }]\n'
 
 
-def read(folder: Path, text: str) -> Job:
+def read(folder: Path, text: str) -> JobFile:
     path = folder / "job.toml"
     path.write_text(text, encoding="utf-8")
     return read_job(path, known(), folder / "job.report.json")

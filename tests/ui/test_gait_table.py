@@ -30,7 +30,7 @@ def settings() -> Any:
 
 
 def same(left: gait.GaitTable, right: gait.GaitTable) -> bool:
-    return gait.to_json(left) == gait.to_json(right)
+    return gait.gait_to_json(left) == gait.gait_to_json(right)
 
 
 def angles(settings: Any, phases: np.ndarray, pair: int = 1) -> np.ndarray:
@@ -42,16 +42,16 @@ PHASES = np.linspace(0.0, 2.0 * np.pi, 73)
 
 def test_a_new_armature_walks_with_the_preset(settings: Any) -> None:
     assert settings.gait == "walk"
-    assert same(read_gait(settings), gait.presets()["walk"])
+    assert same(read_gait(settings), gait.gait_presets()["walk"])
 
 
 @pytest.mark.parametrize("name", ["walk", "walk_literal", "swim"])
 def test_choosing_a_gait_loads_exactly_its_table(settings: Any, name: str) -> None:
     settings.gait = "swim" if name == "walk" else "walk"
     settings.gait = name
-    assert len(settings.table.curves) == len(gait.presets()[name].curves)
-    assert same(read_gait(settings), gait.presets()[name])
-    for pair, curve in gait.presets()[name].curves.items():
+    assert len(settings.table.curves) == len(gait.gait_presets()[name].curves)
+    assert same(read_gait(settings), gait.gait_presets()[name])
+    for pair, curve in gait.gait_presets()[name].curves.items():
         np.testing.assert_array_equal(read_gait(settings).curves[pair].angles, curve.angles)
         np.testing.assert_array_equal(read_gait(settings).curves[pair].phases, curve.phases)
 
@@ -60,7 +60,9 @@ def test_scripts_can_change_the_table_without_loading_it(settings: Any) -> None:
     settings.table.stride = 1.25
     table = read_gait(settings)
     assert table.stride == 1.25
-    np.testing.assert_array_equal(table.curves[0].angles, gait.presets()["walk"].curves[0].angles)
+    np.testing.assert_array_equal(
+        table.curves[0].angles, gait.gait_presets()["walk"].curves[0].angles
+    )
 
 
 def test_edits_in_the_table_count(settings: Any) -> None:
@@ -112,7 +114,7 @@ def test_a_name_that_is_no_gait_keeps_the_table_and_is_told(settings: Any) -> No
     with pytest.raises(GaitError, match="There is no gait 'swmi'"):
         read_gait(settings)
     settings.gait = "swim"
-    assert same(read_gait(settings), gait.presets()["swim"])
+    assert same(read_gait(settings), gait.gait_presets()["swim"])
 
 
 def test_reload_takes_edits_back(settings: Any) -> None:
@@ -120,10 +122,10 @@ def test_reload_takes_edits_back(settings: Any) -> None:
     settings.table.stride = 9.0
     settings.table.curves[0].knots[1].head[0] = 1.0
     assert click("gait_load") == {"FINISHED"}
-    assert same(read_gait(settings), gait.presets()["swim"])
+    assert same(read_gait(settings), gait.gait_presets()["swim"])
     click("gait_load", name="walk")
     assert settings.gait == "walk"
-    assert same(read_gait(settings), gait.presets()["walk"])
+    assert same(read_gait(settings), gait.gait_presets()["walk"])
 
 
 def test_a_gait_is_saved_under_a_name_and_found_in_the_next_file(settings: Any) -> None:
@@ -202,7 +204,7 @@ def test_files_that_are_no_gait_are_told_and_change_nothing(settings: Any, tmp_p
         click("gait_import")
     with pytest.raises(RuntimeError, match="cannot write"):
         click("gait_export", filepath=str(tmp_path / "missing" / "gait.json"))
-    assert same(read_gait(settings), gait.presets()["swim"])
+    assert same(read_gait(settings), gait.gait_presets()["swim"])
 
 
 def test_a_new_knot_changes_nothing_until_it_is_moved(settings: Any) -> None:
@@ -283,7 +285,7 @@ def test_single_arms_keep_a_phase_of_their_own(settings: Any) -> None:
 def test_every_step_can_be_undone(settings: Any, tmp_path: Path) -> None:
     name = settings.id_data.name
     path = tmp_path / "gait.json"
-    presets.write_gait(gait.presets()["swim"], path)
+    presets.write_gait(gait.gait_presets()["swim"], path)
     steps: list[tuple[str, dict[str, Any]]] = [
         ("gait_load", {"name": "swim"}),
         ("gait_save", {"name": "mine"}),
@@ -319,7 +321,7 @@ def test_gaits_of_a_linked_armature_are_read_only(tmp_path: Path) -> None:
             click(step)
     # It can be handed on.
     click("gait_export", filepath=str(tmp_path / "gait.json"))
-    assert same(presets.read_gait(tmp_path / "gait.json"), gait.presets()["walk"])
+    assert same(presets.read_gait_file(tmp_path / "gait.json"), gait.gait_presets()["walk"])
 
 
 @pytest.mark.parametrize("linked_pairs", [0, 3])
@@ -344,7 +346,7 @@ def test_a_library_override_keeps_its_own_gait(
     armature: Any = bpy.data.objects["Octopus"].override_create(remap_local_usages=True)
     bpy.context.view_layer.objects.active = armature
 
-    own = gait.renamed(gait.presets()["swim"], "own")
+    own = gait.renamed_gait(gait.gait_presets()["swim"], "own")
     curves = dict(own.curves)
     for pair in range(5, 5 + own_pairs):
         curves[pair] = gait.curve_from_degrees(
@@ -354,13 +356,15 @@ def test_a_library_override_keeps_its_own_gait(
 
     own = replace(own, curves=curves, offsets={(3, "RIGHT"): np.radians(10.0)})
     set_gait(locomotion_settings(armature), own)
-    expected = gait.to_json(read_gait(locomotion_settings(armature)))
-    assert expected == gait.to_json(own) or linked_pairs
+    expected = gait.gait_to_json(read_gait(locomotion_settings(armature)))
+    assert expected == gait.gait_to_json(own) or linked_pairs
 
     for _ in range(2):
         bpy.ops.wm.save_as_mainfile(filepath=shot)
         bpy.ops.wm.open_mainfile(filepath=shot)
         armature = next(each for each in bpy.data.objects if each.override_library)
         assert (
-            gait.to_json(read_gait(locomotion_settings(armature))) == expected == gait.to_json(own)
+            gait.gait_to_json(read_gait(locomotion_settings(armature)))
+            == expected
+            == gait.gait_to_json(own)
         )

@@ -10,15 +10,15 @@ import pytest
 
 from octo_motion.blender.scene.contact_markers import markers
 from octo_motion.core.errors import GroundError
-from octo_motion.core.locomotion.ground.surface import Plane
+from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
 from octo_motion.ui.locomotion.generate_motion import prepare
 from octo_motion.ui.locomotion.settings import ground as ground_properties
 from octo_motion.ui.locomotion.settings.contact_overrides import (
-    Wanted,
+    ContactEdit,
     changed_by_hand,
-    gathered,
+    read_overrides,
     store,
 )
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
@@ -80,7 +80,7 @@ def test_one_click_walks_on_a_plane_and_nothing_slides(octopus: Any) -> None:
     # Within a hundredth of the arm between frames, and what single precision leaves at them.
     assert quality.slip(joints, lying, cycles, length).value < 0.01
     assert quality.slip(joints[::2], lying[::2], cycles[::2], length).value < 1e-5
-    assert quality.depth(joints, Plane(0.0), length).value < 0.005
+    assert quality.depth(joints, LevelGround(0.0), length).value < 0.005
     assert lying.any(axis=-1).sum(axis=1).min() >= 2
 
 
@@ -115,7 +115,7 @@ def test_arms_hold_the_ground_where_a_posed_body_carries_them(octopus: Any) -> N
     length = prepare(octopus, bpy.context).generator.lengths
     joints, lying, cycles = arms_in_world(octopus, np.arange(20.0, 60.0, 1.0))
     assert quality.slip(joints, lying, cycles, length).value < 1e-5
-    assert quality.depth(joints, Plane(0.0), length).value < 0.005
+    assert quality.depth(joints, LevelGround(0.0), length).value < 0.005
     heights = joints[lying][:, 2]
     assert 0.0 < heights.min() < heights.max() < 0.03
 
@@ -161,7 +161,7 @@ def test_a_mesh_is_walked_on_where_it_is(octopus: Any) -> None:
     ground_of(octopus).object = ground
     bpy.context.view_layer.update()
     generate(octopus)
-    plane = Plane(0.4, (0.0, float(np.tan(np.radians(20.0)))))
+    plane = LevelGround(0.4, (0.0, float(np.tan(np.radians(20.0)))))
     length = prepare(octopus, bpy.context).generator.lengths
     joints, lying, cycles = arms_in_world(octopus, np.arange(20.0, 60.0, 1.0))
     assert quality.depth(joints, plane, length).value < 0.005
@@ -385,13 +385,13 @@ def test_contacts_and_reaches_follow_an_arm_that_is_called_otherwise(octopus: An
     reach.arm, reach.mute = name, True
     settings.arms[name].name = "Grabber"
     assert reach.arm == "Grabber"
-    wanted = gathered(settings.ground, octopus)
+    wanted = read_overrides(settings.ground, octopus)
     assert set(wanted) == {("Grabber", cycle)}
     assert wanted["Grabber", cycle].position is not None
     # Hidden or shown, the contact stays where it was put.
     click("contacts_hide")
     settings.arms["Grabber"].name = "Other"
-    assert set(gathered(settings.ground, octopus)) == {("Other", cycle)}
+    assert set(read_overrides(settings.ground, octopus)) == {("Other", cycle)}
     assert {each.arm for each in settings.ground.contacts} == {"Other"}
 
 
@@ -412,7 +412,7 @@ def test_an_override_keeps_contacts_of_its_own_and_lays_down_those_of_its_linked
     settings = octopus.octo_motion.locomotion
     arms = [item.name for item in settings.arms]
     frees = [(arms[0], 1), (arms[1], 1)]
-    store(settings.ground, {place: Wanted(removed=True) for place in frees})
+    store(settings.ground, {place: ContactEdit(removed=True) for place in frees})
     library = str(tmp_path / "rig.blend")
     bpy.ops.wm.save_as_mainfile(filepath=library)
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -424,25 +424,25 @@ def test_an_override_keeps_contacts_of_its_own_and_lays_down_those_of_its_linked
     armature.override_library.is_system_override = False
     bpy.context.view_layer.objects.active = armature
     give_route(armature, WAY)
-    kept = {(arms[0], 1): Wanted(shift=0.1), (arms[2], 2): Wanted(removed=True)}
+    kept = {(arms[0], 1): ContactEdit(shift=0.1), (arms[2], 2): ContactEdit(removed=True)}
     ground = armature.octo_motion.locomotion.ground
     for _ in range(2):
         store(ground, kept)
         generate(armature)
-        assert set(gathered(ground, armature)) == set(kept)
+        assert set(read_overrides(ground, armature)) == set(kept)
     assert changed_by_hand(ground) == 2
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
     again: Any = next(each for each in bpy.data.objects if each.override_library)
     ground = again.octo_motion.locomotion.ground
-    found = gathered(ground, again)
+    found = read_overrides(ground, again)
     assert {place: (each.removed, round(each.shift, 3)) for place, each in found.items()} == {
         (arms[0], 1): (False, 0.1),
         (arms[2], 2): (True, 0.0),
     }
     bpy.context.view_layer.objects.active = again
     click("contacts_clear")
-    assert gathered(ground, again) == {}
+    assert read_overrides(ground, again) == {}
     assert changed_by_hand(ground) == 0
 
 

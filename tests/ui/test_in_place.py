@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.animation.actions import is_edited
-from octo_motion.core.locomotion.gait.table import presets
+from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
 from octo_motion.ui.locomotion.generate_motion import prepare
@@ -36,7 +36,7 @@ def curves(action: Any) -> list[Any]:
     ]
 
 
-@pytest.mark.parametrize("gait", sorted(presets()))
+@pytest.mark.parametrize("gait", sorted(gait_presets()))
 @pytest.mark.parametrize("how", ["DENSE", "REDUCED"])
 def test_the_last_frame_meets_the_first(octopus: Any, gait: str, how: str) -> None:
     settings = octopus.octo_motion.locomotion

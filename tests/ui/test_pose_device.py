@@ -22,7 +22,7 @@ from octo_motion.blender.files.device_store import load_calibrations
 from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.driver import Kind
 from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.client import Client, State
+from octo_motion.device.ipc.client import Client, ClientState
 from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.controls import Outcome
 from octo_motion.ui.posing.device_hands import NOTHING_NEAR, DeviceHands, Room
@@ -248,7 +248,7 @@ def test_killed_bridge_leaves_pose_and_keys_and_can_be_started_again(hands: Devi
     hands.client.restart()
     hands.recentre()
     wait(hands, hands.shown, "the hand is back")
-    assert hands.client.state is State.RUNNING
+    assert hands.client.state is ClientState.RUNNING
 
 
 def test_bridge_that_is_started_again_knows_force_floor_and_calibration(

@@ -32,7 +32,7 @@ def settings() -> Any:
 
 def state(settings: Any) -> dict[str, Any]:
     values = {path: settings.path_resolve(path) for path in setups.governed()}
-    return {**values, "gait": gait.to_json(read_gait(settings))}
+    return {**values, "gait": gait.gait_to_json(read_gait(settings))}
 
 
 def test_there_are_ways_to_walk_run_sneak_crawl_rest_swim_and_flee() -> None:

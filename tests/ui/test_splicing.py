@@ -19,7 +19,7 @@ from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS
 from octo_motion.ui.splicing import splice_panels
 from octo_motion.ui.splicing.splice_drag import OCTO_MOTION_OT_splice_drag_timing
-from octo_motion.ui.splicing.stack import prepare
+from octo_motion.ui.splicing.stack import prepare_splices
 from octo_motion.ui.splicing.timing_drag import DragSession, TimingDrag
 from tests.core.humanoids import MIDDLE, PARENTS, humanoid
 from tests.ui.rig import click, generate, give_route, keys, make_octopus, scene_contents
@@ -570,7 +570,7 @@ def test_arms_that_stretch_go_on_stretching_and_bring_their_stretch_along() -> N
     assert other.pose.bones["Arm2_1.R"].scale.y == 1.0
     # And while it is dragged.
     shown = {bone.name: np.array(bone.matrix_basis) for bone in other.pose.bones}
-    session = DragSession(prepare(other), 0, scene)
+    session = DragSession(prepare_splices(other), 0, scene)
     session.show()
     assert_same_pose(shown, poses(other))
     session.tear_down()
@@ -718,7 +718,7 @@ def test_mouse_and_keys_do_what_the_status_bar_says() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()
     bpy.context.scene.frame_set(8)
-    session = DragSession(prepare(hero), 0, bpy.context.scene)
+    session = DragSession(prepare_splices(hero), 0, bpy.context.scene)
     take = OCTO_MOTION_OT_splice_drag_timing._take
     operator: Any = SimpleNamespace(_mouse=500.0)
 
@@ -761,7 +761,7 @@ def test_while_dragging_the_body_is_posed_as_it_will_be(part: str, travel: bool)
     stack_of(hero).splices[0].with_travel = travel
     OPERATORS.splice_add(part="HEAD")
     bpy.context.scene.frame_set(21)
-    session = DragSession(prepare(hero), 0, bpy.context.scene)
+    session = DragSession(prepare_splices(hero), 0, bpy.context.scene)
     session.drag.tick(52.0)
     session.show()
     shown = poses(hero)
@@ -782,7 +782,7 @@ def test_while_dragging_other_frames_can_be_looked_at() -> None:
     scene.frame_set(30)
     later = poses(hero)
     scene.frame_set(4)
-    session = DragSession(prepare(hero), 0, scene)
+    session = DragSession(prepare_splices(hero), 0, scene)
     session.drag.tick(60.0)
     session.show()
     session.step(26)
@@ -802,7 +802,7 @@ def test_a_drag_that_is_given_up_leaves_everything_as_it_was() -> None:
     OPERATORS.splice_add()
     hero.pose.bones["head"].rotation_quaternion = (0.9, 0.1, 0.3, 0.0)
     before = snapshot()
-    session = DragSession(prepare(hero), 0, bpy.context.scene)
+    session = DragSession(prepare_splices(hero), 0, bpy.context.scene)
     session.drag.tick(100.0)
     session.show()
     assert snapshot() != before
@@ -816,7 +816,7 @@ def test_a_drag_that_is_given_up_leaves_everything_as_it_was() -> None:
 def test_a_drag_whose_armature_is_gone_says_so_and_ends() -> None:
     hero, _ = hero_and_source()
     OPERATORS.splice_add()
-    session = DragSession(prepare(hero), 0, bpy.context.scene)
+    session = DragSession(prepare_splices(hero), 0, bpy.context.scene)
     bpy.data.objects.remove(hero)
     with pytest.raises(OctoMotionError, match="'Hero' is gone"):
         session.show()
@@ -1121,4 +1121,4 @@ def test_no_error_of_the_experiment_is_hidden(shared_data: SharedData) -> None:
     OPERATORS.splice_add()
     stack_of(walk).splices[0].action = None
     with pytest.raises(ClipError, match="is gone, or was never chosen"):
-        prepare(walk)
+        prepare_splices(walk)

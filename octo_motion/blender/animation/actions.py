@@ -18,8 +18,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RigError, WriteError
-from ...core.keyframes.channel import Channel
-from ...core.keyframes.reduction import BezierKeys
+from ...core.keyframes import BezierKeys, Channel
 from ...core.rotations import (
     Floats,
     conjugate,
@@ -32,7 +31,7 @@ from ...core.rotations import (
     normalized,
     to_euler,
 )
-from ..rig.armature import armature_data
+from ..rig import armature_data
 
 MARK: Final = "octo_motion_generated"
 """Custom property of an action made here: a group with the fields of ``_mark``."""

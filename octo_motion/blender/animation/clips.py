@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.errors import ClipError
-from ...core.keyframes.channel import Channel
+from ...core.keyframes import Channel
 from ...core.rotations import (
     IDENTITY,
     Floats,
@@ -24,11 +24,9 @@ from ...core.rotations import (
     to_matrix,
 )
 from ...core.skeleton import Skeleton
-from ...core.splicing.clip.clip import Clip
-from ...core.splicing.clip.scaled_pose import without_scale
-from ...core.splicing.clip.unpose import orientations_of, unposed
-from ...core.splicing.transfer.parts import beneath
-from ..rig.armature import armature_data, read_skeleton, world_matrix
+from ...core.splicing.clip import Clip, orientations_of, unposed, without_scale
+from ...core.splicing.transfer import bones_beneath
+from ..rig import armature_data, read_skeleton, world_matrix
 from .actions import (
     delta_rotation,
     location_channel,
@@ -39,7 +37,7 @@ from .actions import (
     writable_armature,
     write_action,
 )
-from .fcurves import evaluate, is_shown, key_range
+from .fcurves import evaluate_fcurve, is_shown, key_range
 from .scene_poses import assigned, shown_poses
 from .unkeyed import AT_REST, UnkeyedPose, keep_unkeyed_pose, rotation_channel, unkeyed_pose
 
@@ -286,7 +284,7 @@ def scaled_channels(
     for number in np.flatnonzero(scaled & ~_stretches_apart(armature, skeleton, scaled)).tolist():
         if number in done:
             continue
-        carried = beneath(skeleton, [number])
+        carried = bones_beneath(skeleton, [number])
         done.update(carried)
         names = [skeleton.names[each] for each in carried]
         if any(name in changed for name in names):
@@ -505,7 +503,7 @@ def _values(
     result = np.tile(np.array(otherwise, dtype=np.float64), (len(times), 1))
     for component, curve in curves.get((owner, channel), {}).items():
         if component < result.shape[1]:
-            result[:, component] = evaluate(curve, times)
+            result[:, component] = evaluate_fcurve(curve, times)
     return result
 
 
@@ -598,9 +596,9 @@ def _location_axes(skeleton: Skeleton, bone: int) -> Floats:
 
 def _check_inheritance(armature: bpy.types.Object, skeleton: Skeleton, scaled: np.ndarray) -> None:
     bones = armature_data(armature).bones
-    beneath = scaled.copy()
+    bones_beneath = scaled.copy()
     for number, parent in enumerate(skeleton.parents):
-        if parent < 0 or not beneath[parent]:
+        if parent < 0 or not bones_beneath[parent]:
             continue
         bone = bones[number]
         if bone.inherit_scale != "FULL" or not bone.use_inherit_rotation:
@@ -608,7 +606,7 @@ def _check_inheritance(armature: bpy.types.Object, skeleton: Skeleton, scaled: n
                 f"'{armature.name}' scales bones above '{bone.name}', which does not inherit it.",
                 "Turn on As Shown: the motion is then read as the scene shows it.",
             )
-        beneath[number] = True
+        bones_beneath[number] = True
 
 
 def _rotation_modes(armature: bpy.types.Object, skeleton: Skeleton) -> dict[str, str]:

@@ -11,7 +11,7 @@ import numpy as np
 from ...core.errors import ClipError
 from ...core.rotations import Floats
 from .actions import curves_of
-from .fcurves import evaluate, key_range
+from .fcurves import evaluate_fcurve, key_range
 
 _SAME: Final = 0.01
 """Frames by which keys may miss the first and last frame of an action."""
@@ -63,7 +63,7 @@ def _repeat(curve: bpy.types.FCurve, start: float, end: float) -> None:
 
 def _set_anew(curve: bpy.types.FCurve, frames: Floats) -> None:
     """Give a curve keys at these frames in place of its own."""
-    points = np.column_stack([frames, evaluate(curve, frames)]).astype(np.float32)
+    points = np.column_stack([frames, evaluate_fcurve(curve, frames)]).astype(np.float32)
     keys = curve.keyframe_points
     keys.clear()
     keys.add(len(frames))

@@ -14,7 +14,7 @@ _SAME_FRAME: Final = 1e-4
 """Frames by which Blender lets a time miss a key and still takes the key's value."""
 
 
-def evaluate(curve: bpy.types.FCurve, frames: Floats) -> Floats:
+def evaluate_fcurve(curve: bpy.types.FCurve, frames: Floats) -> Floats:
     """The values (frames,) of one F-curve at these frames, subframes included.
 
     Straight and stepped keys are read in bulk, and so are values that are asked for where a key is.

@@ -9,7 +9,7 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ...core.keyframes.reduction import BezierKeys
+from ...core.keyframes import BezierKeys
 
 _VECTORS: Final = ("co", "handle_left", "handle_right")
 _NUMBERS: Final = ("back", "amplitude", "period")

@@ -17,10 +17,9 @@ import bpy
 import numpy as np
 
 from ...core.errors import WriteError
-from ...core.keyframes.channel import Channel
-from ...core.keyframes.reduction import LOCATION, Limb, Track, reduce_keys
+from ...core.keyframes import LOCATION, Channel, Limb, Track, reduce_keys
 from ...core.rotations import Floats
-from ..rig.armature import carrying_axes
+from ..rig import carrying_axes
 from . import keying_settings as keying
 from .actions import location_channel, rotation_channels, writable_armature
 from .key_arrays import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys

@@ -9,7 +9,7 @@ import bpy
 from mathutils import Matrix, Quaternion, Vector
 
 from ...core.rotations import Floats
-from ..rig.armature import carrying_axes
+from ..rig import carrying_axes
 
 _CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 

@@ -15,9 +15,9 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ...core.keyframes.channel import Channel
+from ...core.keyframes import Channel
 from ...core.rotations import Floats
-from ..rig.armature import armature_data
+from ..rig import armature_data
 
 ALIGNED: Final = "ALIGNED"
 _APART: Final = {"NONE", "NONE_LEGACY"}

@@ -8,8 +8,13 @@ from pathlib import Path
 from typing import Final
 
 from ...core.errors import GaitError
-from ...core.locomotion.gait import table as gait
-from ...core.locomotion.gait.table import GaitTable
+from ...core.locomotion.gait import (
+    GaitTable,
+    gait_from_json,
+    gait_presets,
+    gait_to_json,
+    renamed_gait,
+)
 from .user_files import own_folder, unwritable, write_whole
 
 SUFFIX: Final = ".json"
@@ -32,17 +37,17 @@ def user_folder(*, create: bool = False) -> Path:
 
 def gait_names() -> list[str]:
     """Names of all gaits: those that come with the extension, then the user's."""
-    return [*gait.presets(), *user_gait_names()]
+    return [*gait_presets(), *user_gait_names()]
 
 
 def has_gait(name: str) -> bool:
     """Whether there is a gait of that name; quick enough to be asked while a panel is drawn."""
-    return name in gait.presets() or (bool(name) and _path_of(name).is_file())
+    return name in gait_presets() or (bool(name) and _path_of(name).is_file())
 
 
 def user_gait_names() -> list[str]:
     """Names of the user's own gaits, sorted."""
-    built_in = gait.presets()
+    built_in = gait_presets()
     names = (_name_of(path) for path in user_folder().glob(f"*{SUFFIX}"))
     return sorted((name for name in names if name not in built_in), key=str.casefold)
 
@@ -53,7 +58,7 @@ def load_gait(name: str) -> GaitTable:
     Raises:
         GaitError: there is none, or its file is damaged.
     """
-    built_in = gait.presets()
+    built_in = gait_presets()
     if not name:
         raise GaitError("No gait is chosen.", f"Choose one of {', '.join(gait_names())}.")
     if name in built_in:
@@ -61,7 +66,7 @@ def load_gait(name: str) -> GaitTable:
     path = _path_of(name)
     if not name or not path.is_file():
         raise GaitError(f"There is no gait '{name}'.", f"Choose one of {', '.join(gait_names())}.")
-    return gait.renamed(read_gait(path), name)
+    return renamed_gait(read_gait_file(path), name)
 
 
 def save_gait(table: GaitTable, *, overwrite: bool = False) -> Path:
@@ -76,7 +81,7 @@ def save_gait(table: GaitTable, *, overwrite: bool = False) -> Path:
         raise GaitError("The gait has no name.", "Give it one.")
     if len(name) > LONGEST_NAME:
         raise GaitError(f"The gait's name has {len(name)} letters.", f"Use {LONGEST_NAME} at most.")
-    if name in gait.presets():
+    if name in gait_presets():
         raise GaitError(f"The gait '{name}' comes with Octo Motion.", "Choose another name.")
     path = _path_of(name)
     if path.exists() and not overwrite:
@@ -93,7 +98,7 @@ def remove_gait(name: str) -> None:
         GaitError: there is none of that name, or it comes with the extension.
         WriteError: the file cannot be deleted.
     """
-    if name in gait.presets():
+    if name in gait_presets():
         raise GaitError(f"The gait '{name}' comes with Octo Motion.", "It cannot be removed.")
     path = _path_of(name)
     if not name or not path.is_file():
@@ -104,7 +109,7 @@ def remove_gait(name: str) -> None:
         raise unwritable(f"'{path}'", error) from error
 
 
-def read_gait(path: Path) -> GaitTable:
+def read_gait_file(path: Path) -> GaitTable:
     """The gait in a file.
 
     Raises:
@@ -117,7 +122,7 @@ def read_gait(path: Path) -> GaitTable:
         raise GaitError(
             f"'{path.name}' cannot be read: {reason}.", "Choose a gait file."
         ) from error
-    return gait.from_json(text, f"'{path.name}'")
+    return gait_from_json(text, f"'{path.name}'")
 
 
 def write_gait(table: GaitTable, path: Path) -> None:
@@ -126,7 +131,7 @@ def write_gait(table: GaitTable, path: Path) -> None:
     Raises:
         WriteError: it cannot be written.
     """
-    write_whole(path, gait.to_json(table))
+    write_whole(path, gait_to_json(table))
 
 
 def _path_of(name: str) -> Path:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core.content_cache import Remembered
+from ...core.content_cache import ContentCache
 from ...core.errors import RigError
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
@@ -18,7 +18,7 @@ from .. import versions
 SUCKER_PROPERTY = "octo_motion_sucker"
 """Custom property of a bone: the local axis its suckers face, such as "-Z"."""
 
-_known: Final[Remembered[Skeleton]] = Remembered(4)
+_known: Final[ContentCache[Skeleton]] = ContentCache(4)
 
 
 def active_armature(context: bpy.types.Context) -> bpy.types.Object:

@@ -13,10 +13,10 @@ import numpy as np
 from mathutils import Quaternion, Vector
 
 from ...core.errors import RigError
-from ...core.posing.puppet.figure import Figure, Pose
+from ...core.posing.puppet import Figure, Pose
 from ...core.rotations import Floats, conjugate, from_matrix, multiply, rotate
 from .armature import carrying_axes
-from .puppet_reading import Rig, even_scale, posed_bones, read_rig
+from .puppet_reading import PuppetRig, even_scale, posed_bones, read_rig
 
 _NOTHING = 1e-9
 _STILL = 1e-6
@@ -31,7 +31,7 @@ class Puppet:
         rig: what was read of it; read now if none is given.
     """
 
-    def __init__(self, armature: bpy.types.Object, rig: Rig | None = None) -> None:
+    def __init__(self, armature: bpy.types.Object, rig: PuppetRig | None = None) -> None:
         self.name = armature.name
         self._number = armature.session_uid
         self.rig = rig or read_rig(armature)

@@ -12,18 +12,24 @@ import bpy
 import numpy as np
 
 from ...core.errors import RigError, WriteError
-from ...core.posing.puppet.bone_roles import (
+from ...core.posing.puppet import (
     BODY,
+    DENSITY,
     FOLLOW,
+    FREE,
+    SIZE,
     SMALLEST,
+    Figure,
+    JointLimits,
+    Material,
+    Pose,
+    PosedBones,
     RigFacts,
     Roles,
+    build_figure,
     diagonal,
     find_roles,
 )
-from ...core.posing.puppet.build import DENSITY, FREE, SIZE, JointLimits, PosedBones, build_figure
-from ...core.posing.puppet.figure import Figure, Pose
-from ...core.posing.puppet.materials import Material
 from ...core.rotations import Floats, from_matrix
 from ...core.skeleton import Skeleton
 from .armature import armature_data, read_skeleton
@@ -50,7 +56,7 @@ _EVEN: Final = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class PuppetRig:
     """An armature taken for a puppet."""
 
     skeleton: Skeleton
@@ -79,7 +85,7 @@ class Rig:
 
 def read_rig(
     armature: bpy.types.Object, *, density: float = DENSITY, smallest: float = SMALLEST
-) -> Rig:
+) -> PuppetRig:
     """Make a figure of an armature as it stands now. Nothing in the file is changed.
 
     Args:
@@ -129,7 +135,7 @@ def read_rig(
         limits=joint_limits(armature),
         density=density,
     )
-    return Rig(skeleton, roles, figure, pose, unit)
+    return PuppetRig(skeleton, roles, figure, pose, unit)
 
 
 def _scaled(posed: PosedBones, unit: float) -> PosedBones:

@@ -9,7 +9,7 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ...core.content_cache import key_of
+from ...core.content_cache import content_key
 from ...core.rotations import Floats
 from .armature import deformed_meshes
 
@@ -112,7 +112,7 @@ def _volume(ends: Floats, radius: float) -> float:
 
 def skin_key(armature: bpy.types.Object) -> bytes:
     """What the radii hang on, as far as it can be read at once: not which bones points follow."""
-    return key_of([(names, points) for names, points in _skins(armature)])
+    return content_key([(names, points) for names, points in _skins(armature)])
 
 
 def _of_chain(

@@ -1,1 +1,54 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Curves, meshes, markers and importers."""
+
+from .contact_markers import Contact, markers, read_markers, remove_markers, write_markers
+from .curves import add_route_curve, read_route, suggested_control_points
+from .grasp_target import (
+    WITH_SURFACE,
+    can_be_carried,
+    carrying_note,
+    hangs_on,
+    home_of,
+    is_carried,
+    left_behind,
+    put_back,
+    read_form,
+    read_places,
+)
+from .ground import arm_skins, read_triangles
+from .imports import NOTE, SUFFIXES, ImportedClip, Up, import_clip, remove_clips
+from .obstacles import read_obstacle
+from .octopus import add_octopus
+from .world import is_enabled
+
+__all__ = [
+    "NOTE",
+    "SUFFIXES",
+    "WITH_SURFACE",
+    "Contact",
+    "ImportedClip",
+    "Up",
+    "add_octopus",
+    "add_route_curve",
+    "arm_skins",
+    "can_be_carried",
+    "carrying_note",
+    "hangs_on",
+    "home_of",
+    "import_clip",
+    "is_carried",
+    "is_enabled",
+    "left_behind",
+    "markers",
+    "put_back",
+    "read_form",
+    "read_markers",
+    "read_obstacle",
+    "read_places",
+    "read_route",
+    "read_triangles",
+    "remove_clips",
+    "remove_markers",
+    "suggested_control_points",
+    "write_markers",
+]

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.errors import RouteError
-from ...core.locomotion.path.route import Route, s_bend
+from ...core.locomotion.path import Route, s_bend
 from ...core.rotations import Floats, normalized
-from ..rig.armature import armature_data
+from ..rig import armature_data
 from .world import world_of
 
 LONGEST: Final = -1

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...core.errors import RigError
 from ...core.rotations import Floats, continuous, from_matrix
-from ..animation.actions import curves_of, is_generated, may_replace, note_of
-from ..animation.scene_playback import time_kept
+from ..animation import curves_of, is_generated, may_replace, note_of, time_kept
 from .world import world_of
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}

@@ -9,13 +9,12 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ...core.content_cache import Remembered, key_of
+from ...core.content_cache import ContentCache, content_key
 from ...core.errors import GroundError
-from ...core.locomotion.rig.arm_chains import joint_positions
-from ...core.locomotion.rig.skin_offset import ArmSkin, arm_skin, nearest_bones
+from ...core.locomotion.rig import ArmSkin, arm_skin, joint_positions, nearest_bones
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
-from ..rig.armature import deformed_meshes
+from ..rig import deformed_meshes
 from .world import world_of
 
 _MOST_POINTS: Final = 6000
@@ -35,9 +34,9 @@ _AT_LEAST: Final = 0.7
 """… but then this share lies nearer."""
 
 
-_skins_known: Final[Remembered[list[ArmSkin]]] = Remembered(4)
-_faces_known: Final[Remembered[Floats]] = Remembered(2)
-_corners_known: Final[Remembered[np.ndarray]] = Remembered(2)
+_skins_known: Final[ContentCache[list[ArmSkin]]] = ContentCache(4)
+_faces_known: Final[ContentCache[Floats]] = ContentCache(2)
+_corners_known: Final[ContentCache[np.ndarray]] = ContentCache(2)
 
 
 def read_triangles(
@@ -65,7 +64,7 @@ def read_triangles(
     finally:
         evaluated.to_mesh_clear()
     world = np.array(world_of(ground, depsgraph), dtype=np.float64)
-    key = key_of(content, world)
+    key = content_key(content, world)
 
     def placed() -> Floats:
         moved = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
@@ -92,7 +91,7 @@ def _corners(mesh: bpy.types.Mesh, points: np.ndarray) -> tuple[np.ndarray, byte
     mesh.polygons.foreach_get("loop_start", starts)
     vertices = np.empty(len(mesh.loops), dtype=np.int32)
     _read(mesh, ".corner_vert", "value", vertices)
-    content = key_of(points, starts, vertices)
+    content = content_key(points, starts, vertices)
     return _corners_known.get(content, read), content
 
 
@@ -113,7 +112,7 @@ def arm_skins(
     frames = [skeleton.rest_rotations[[skeleton.index[name] for name in bones]] for bones in arms]
     points = _skin(armature, float(np.ptp(np.concatenate(joints), axis=0).max()))
     return _skins_known.get(
-        key_of(points, joints, frames), lambda: _arm_skins(points, joints, frames)
+        content_key(points, joints, frames), lambda: _arm_skins(points, joints, frames)
     )
 
 

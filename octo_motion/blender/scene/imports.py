@@ -20,12 +20,10 @@ import numpy as np
 
 from ...core.errors import ClipError, WriteError
 from ...core.rotations import normalized
-from ...core.splicing.clip.bvh_check import check_bvh
-from ...core.splicing.humanoid.mapping import map_skeleton
-from ..animation.actions import channelbags_of
-from ..animation.clips import read_clip
-from ..animation.scene_playback import time_kept
-from ..rig.armature import read_skeleton
+from ...core.splicing.clip import check_bvh
+from ...core.splicing.humanoid import map_skeleton
+from ..animation import channelbags_of, read_clip, time_kept
+from ..rig import read_skeleton
 
 SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
 

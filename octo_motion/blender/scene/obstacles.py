@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import RigError
-from ...core.posing.solver.obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
+from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from ...core.rotations import Floats, from_matrix
 
 MOST_TRIANGLES: Final = 50_000

@@ -12,29 +12,30 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ...core.errors import WriteError
-from ...core.locomotion.octopus.mesh import build_mesh
-from ...core.locomotion.octopus.rig import (
+from ...core.locomotion.octopus import (
     ARM_COLLECTIONS,
     FIRST_ARM_BONE,
     SUCKER_AXIS,
     OctopusBones,
+    OctopusMesh,
+    OctopusShape,
+    SkinMaterial,
     build_bones,
+    build_mesh,
 )
-from ...core.locomotion.octopus.shape import OctopusShape
-from ...core.locomotion.octopus.surface import Material, OctopusMesh
-from ..animation.stretching import ALIGNED
-from ..rig.armature import SUCKER_PROPERTY
+from ..animation import ALIGNED
+from ..rig import SUCKER_PROPERTY
 
 _NAME: Final = "Octopus"
 _Colour = tuple[float, float, float]
 
-_MATERIALS: Final[dict[Material, tuple[str, _Colour, float]]] = {
-    Material.SKIN: ("Octopus Skin", (0.50, 0.13, 0.075), 0.45),
-    Material.UNDERSIDE: ("Octopus Underside", (0.78, 0.48, 0.36), 0.5),
-    Material.SUCKER: ("Octopus Sucker", (0.88, 0.72, 0.60), 0.35),
-    Material.EYE: ("Octopus Eye", (0.83, 0.62, 0.18), 0.1),
-    Material.PUPIL: ("Octopus Pupil", (0.01, 0.01, 0.012), 0.05),
-    Material.BEAK: ("Octopus Beak", (0.04, 0.022, 0.015), 0.3),
+_MATERIALS: Final[dict[SkinMaterial, tuple[str, _Colour, float]]] = {
+    SkinMaterial.SKIN: ("Octopus Skin", (0.50, 0.13, 0.075), 0.45),
+    SkinMaterial.UNDERSIDE: ("Octopus Underside", (0.78, 0.48, 0.36), 0.5),
+    SkinMaterial.SUCKER: ("Octopus Sucker", (0.88, 0.72, 0.60), 0.35),
+    SkinMaterial.EYE: ("Octopus Eye", (0.83, 0.62, 0.18), 0.1),
+    SkinMaterial.PUPIL: ("Octopus Pupil", (0.01, 0.01, 0.012), 0.05),
+    SkinMaterial.BEAK: ("Octopus Beak", (0.04, 0.022, 0.015), 0.3),
 }
 """Name, linear RGB and roughness of each slot."""
 
@@ -179,7 +180,7 @@ def _new_mesh(skin: OctopusMesh) -> bpy.types.Mesh:
     mesh.polygons.foreach_set("material_index", skin.materials.astype(np.int32))
     mesh.update(calc_edges=True)
     mesh.shade_smooth()
-    for slot in Material:
+    for slot in SkinMaterial:
         mesh.materials.append(_new_material(*_MATERIALS[slot]))
     return mesh
 

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .linear_model import Model
-from .residuals import Errors
+from .linear_model import LinearModel
+from .residuals import Residuals
 from .tracks import BezierKeys, Integers, Limb, bezier_keys
 
 _PULL: Final = 0.01
@@ -44,11 +44,11 @@ def dense_keys(times: Floats, limb: Limb, every: int, *, loops: bool = False) ->
     spans = _Spans(times, targets, at)
     slopes = spans.evened(np.gradient(targets, times, axis=2)[..., at])
     if loops:
-        met = ~Model(limb).turns_at_the_seam(at)
+        met = ~LinearModel(limb).turns_at_the_seam(at)
         slopes[:, met, 0] = slopes[:, met, -1] = 0.5 * (slopes[:, met, 0] + slopes[:, met, -1])
     out, into = slopes[..., :-1].copy(), slopes[..., 1:].copy()
     smooth = np.ones(slopes.shape[1:], dtype=bool)
-    own, joint = Errors(limb).measure(
+    own, joint = Residuals(limb).measure(
         [
             spans.played(out, into)[: track.values.shape[1], place].T
             for place, track in enumerate(limb.tracks)

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from .curves import Curves, Singles
-from .linear_model import Model
+from .linear_model import LinearModel
 
 _NEAR: Final = 0.9
 """Share of the bounds from which on an error counts."""
@@ -33,7 +33,9 @@ _RIDGE: Final = 1e-3
 """Share by which they are held for themselves: some hardly matter to any frame."""
 
 
-def fitted(curves: Curves, model: Model, off: Singles, steps: int, *, bounded: bool) -> Singles:
+def fitted(
+    curves: Curves, model: LinearModel, off: Singles, steps: int, *, bounded: bool
+) -> Singles:
     """By how much to change choices (4, size) to make errors smaller.
 
     Args:

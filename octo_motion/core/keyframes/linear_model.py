@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rotations import Floats, conjugate, multiply, to_matrix
-from .residuals import rotations_of, turns, walked
-from .tracks import SCALE, Booleans, Chain, Integers, Limb
+from .residuals import rotations_of_mode, turns, walked
+from .tracks import SCALE, Booleans, Integers, Limb, LimbChain
 
 Singles = NDArray[np.float32]
 
@@ -34,7 +34,7 @@ _APART: Final = 1e-5
 """Values that differ by less meet at the seam."""
 
 
-class Model:
+class LinearModel:
     """A limb near its motion.
 
     Args:
@@ -51,7 +51,7 @@ class Model:
             self.targets[: each.shape[1], place] = each.T
         self._own = np.zeros((3, 4, len(values), frames), dtype=np.float32)
         decoded = [
-            rotations_of(each, kind) if turns(kind) else each
+            rotations_of_mode(each, kind) if turns(kind) else each
             for each, kind in zip(values, kinds, strict=True)
         ]
         world: dict[int, Floats] = {}
@@ -145,7 +145,7 @@ class _Ends:
     Rows are those ends that have room of their own, the first of all the tip with its distance.
     """
 
-    def __init__(self, limb: Limb, chain: Chain, steps: Floats) -> None:
+    def __init__(self, limb: Limb, chain: LimbChain, steps: Floats) -> None:
         tracks, bones, frames = len(limb.tracks), len(steps), steps.shape[1]
         room = np.full((bones, frames), np.inf) if limb.room is None else limb.room.T
         (held,) = np.nonzero(np.isfinite(room).any(axis=1))
@@ -203,7 +203,7 @@ def _carried(moved: Sequence[int], on: Sequence[bool], tracks: int) -> Singles:
 
 def _turned(kind: str, values: Floats) -> Floats:
     """How values (frames, components) turn a bone in its own axes: (frames, 3, 4)."""
-    exact = rotations_of(values, kind)
+    exact = rotations_of_mode(values, kind)
     if kind == "QUATERNION":
         w, x, y, z = exact.T
         rows = ((-x, w, z, -y), (-y, -z, w, x), (-z, y, -x, w))
@@ -212,7 +212,7 @@ def _turned(kind: str, values: Floats) -> Floats:
     for component in range(values.shape[1]):
         moved = values.copy()
         moved[:, component] += _STEP
-        turned = multiply(conjugate(exact), rotations_of(moved, kind))
+        turned = multiply(conjugate(exact), rotations_of_mode(moved, kind))
         turned *= np.where(turned[:, :1] < 0.0, -1.0, 1.0)
         result[..., component] = 2.0 * turned[:, 1:] / _STEP
     return result

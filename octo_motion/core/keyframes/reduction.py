@@ -27,20 +27,7 @@ from .dense import dense_keys
 from .key_times import Choice
 from .search import Search
 from .subframes import looked_at
-from .tracks import LOCATION, SCALE, BezierKeys, Booleans, Chain, Limb, Track, chain_to_tip
-
-__all__ = [
-    "LOCATION",
-    "SCALE",
-    "BezierKeys",
-    "Chain",
-    "Limb",
-    "Track",
-    "chain_to_tip",
-    "check_bounds",
-    "reduce_keys",
-    "reducing",
-]
+from .tracks import LOCATION, SCALE, BezierKeys, Booleans, Limb, Track
 
 _SLACK: Final = 1.15
 """Bounds within which key frames are chosen: what fitting makes up for afterwards."""

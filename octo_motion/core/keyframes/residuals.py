@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..rotations import Floats, from_axis_angle, from_euler, multiply, normalized, rotate, to_matrix
-from .tracks import LOCATION, SCALE, Chain, Limb
+from .tracks import LOCATION, SCALE, Limb, LimbChain
 
 
-def rotations_of(values: Floats, kind: str) -> Floats:
+def rotations_of_mode(values: Floats, kind: str) -> Floats:
     """Unit quaternions (…, 4) of values (…, 3 or 4) of one of Blender's rotation modes."""
     if kind == "QUATERNION":
         return normalized(values)
@@ -28,7 +28,7 @@ def turns(kind: str) -> bool:
     return kind not in (LOCATION, SCALE)
 
 
-def walked(chain: Chain, decoded: Sequence[Floats]) -> tuple[Floats, Floats]:
+def walked(chain: LimbChain, decoded: Sequence[Floats]) -> tuple[Floats, Floats]:
     """A chain from its root to its tip.
 
     Args:
@@ -61,7 +61,7 @@ def walked(chain: Chain, decoded: Sequence[Floats]) -> tuple[Floats, Floats]:
     return np.stack(found), np.stack(steps)
 
 
-class Errors:
+class Residuals:
     """Errors of one limb."""
 
     def __init__(self, limb: Limb) -> None:
@@ -108,7 +108,7 @@ class Errors:
 
     def _decoded(self, values: Sequence[Floats]) -> list[Floats]:
         return [
-            rotations_of(each, kind) if turns(kind) else each
+            rotations_of_mode(each, kind) if turns(kind) else each
             for each, kind in zip(values, self._kinds, strict=True)
         ]
 

@@ -17,8 +17,8 @@ import numpy as np
 from ..rotations import Floats
 from .curves import Curves, Singles
 from .fit import fitted
-from .linear_model import Model
-from .residuals import Errors
+from .linear_model import LinearModel
+from .residuals import Residuals
 from .subframes import Fine
 from .tracks import BezierKeys, Booleans, Integers, bezier_keys
 
@@ -65,7 +65,7 @@ class Search:
         self._widths = [track.values.shape[1] for track in limb.tracks]
         self._pinned = np.zeros(corners.shape, dtype=bool)
         self._pinned[:, [0, -1]] = True
-        self._errors, self._model = Errors(limb), Model(limb)
+        self._errors, self._model = Residuals(limb), LinearModel(limb)
         self._chained = limb.chain is not None
         self._corners = corners
         if loops:

@@ -85,7 +85,7 @@ def joined(frames: NDArray[Any], halves: NDArray[Any]) -> NDArray[Any]:
     return result
 
 
-def half_way(values: Floats, slopes: Floats) -> Floats:
+def halfway_values(values: Floats, slopes: Floats) -> Floats:
     """What is played half way from each frame to the next (frames − 1, …).
 
     Args:
@@ -99,4 +99,4 @@ def _halves(values: Floats) -> Floats:
     """Half way from each frame's values (frames, components) to the next one's."""
     slopes = np.gradient(values, axis=0)
     slopes[[0, -1]] = 0.0
-    return half_way(values, slopes)
+    return halfway_values(values, slopes)

@@ -32,7 +32,7 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class LimbChain:
     """Forward kinematics from a limb's tracks to the position of its tip."""
 
     turned: tuple[int, ...]
@@ -63,7 +63,7 @@ class Limb:
     distance: float | Floats
     """In the units of the locations and of the chain; the same at all frames, or (frames,)."""
     lever: float = 0.0
-    chain: Chain | None = None
+    chain: LimbChain | None = None
     columns: Sequence[int] | None = None
     """Of each track, which key frames it has: those of all with the same number. Without, all
     tracks have theirs in common. See :meth:`column_numbers`."""
@@ -139,7 +139,7 @@ def bezier_keys(
     )
 
 
-def chain_to_tip(skeleton: Skeleton, bones: Sequence[str]) -> Chain:
+def chain_to_tip(skeleton: Skeleton, bones: Sequence[str]) -> LimbChain:
     """The chain of an arm whose tracks are the rotations of its bones, root to tip.
 
     Bones in between that have no track ride along; what the first bone hangs on stays at rest.
@@ -150,7 +150,7 @@ def chain_to_tip(skeleton: Skeleton, bones: Sequence[str]) -> Chain:
         path.append(skeleton.parents[path[-1]])
     path.reverse()
     points = [*(skeleton.heads[bone] for bone in path), skeleton.tails[path[-1]]]
-    return Chain(
+    return LimbChain(
         turned=tuple(tracks.get(bone, -1) for bone in path),
         follows=tuple(skeleton.inherits_rotation[bone] for bone in path),
         rest_rotations=skeleton.rest_rotations[path],

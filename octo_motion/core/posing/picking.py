@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..rotations import Floats, conjugate, rotate
-from .puppet.figure import Figure, Pose
+from .puppet import Figure, Pose
 
 _TINY = 1e-12
 

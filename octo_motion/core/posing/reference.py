@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..rotations import Floats
-from .puppet.kinematics import skew
-from .solver.problem import Problem
+from .puppet import skew
+from .solver import Problem
 
 
 @dataclass(eq=False)

@@ -23,11 +23,8 @@ from ..rotations import (
     to_rotation_vector,
 )
 from .picking import Hit
-from .puppet.build import joints_of, turned_bodies
-from .puppet.figure import Elements, Figure, Pose
-from .solver.hand_spring import Coupling, Grab
-from .solver.obstacles import Obstacle
-from .solver.world import World, WorldSettings, WorldState
+from .puppet import Elements, Figure, Pose, joints_of, turned_bodies
+from .solver import Coupling, Grab, Obstacle, World, WorldSettings, WorldState
 
 COARSEST: Final = 4e-3
 """Seconds: longer steps would let a fast hand shake the puppet."""
@@ -51,7 +48,7 @@ GENTLE: Final = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class HandSample:
     """Where the hand is."""
 
     position: Floats
@@ -61,7 +58,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Told:
+class TickReport:
     """What one tick was like."""
 
     simulated: float
@@ -201,7 +198,7 @@ class Session:
 
     # --- Time -----------------------------------------------------------------------------------
 
-    def tick(self, seconds: float, sample: Sample | None = None) -> Told:
+    def tick(self, seconds: float, sample: HandSample | None = None) -> TickReport:
         """Simulate what has passed, with the hand on its way to where it is now.
 
         Args:
@@ -211,7 +208,7 @@ class Session:
         step = self.world.settings.step
         if self.grip is None and self._calm >= REST_TIME:
             self._left, self._ratio = 0.0, 1.0
-            return Told(0.0, 0, 1.0, step, resting=True)
+            return TickReport(0.0, 0, 1.0, step, resting=True)
         self._left += min(max(seconds, 0.0), LONGEST_TICK)
         count = int(self._left / step + 1e-9)
         self._left -= count * step
@@ -222,9 +219,9 @@ class Session:
         self._run(count, sample)
         if self._clock and seconds > 0.0:
             self._keep_up(self._clock() - before, count * step, seconds)
-        return Told(count * step, count, self._ratio, self.world.settings.step, resting=False)
+        return TickReport(count * step, count, self._ratio, self.world.settings.step, resting=False)
 
-    def _run(self, count: int, sample: Sample | None) -> None:
+    def _run(self, count: int, sample: HandSample | None) -> None:
         world, grip = self.world, self.grip
         if grip is None:
             for _ in range(count):

@@ -16,13 +16,9 @@ from numpy.typing import NDArray
 
 from ..rotations import Floats, angle_between, conjugate, multiply, rotate
 from ..skeleton import Skeleton
-from .clip.clip import Clip
-from .clip.posture import Posture, posture_of, sampled, sampled_world
-from .clip.timing import Window, window
-from .humanoid.landmarks import Landmarks
-from .transfer.body_frames import BodyFrame, chest_frame, laid_over, pelvis_frame
-from .transfer.parts import landmark_bone
-from .transfer.splice import Splice
+from .clip import Clip, Posture, SpliceWindow, posture_of, sample_clip, sample_world, splice_window
+from .humanoid import Landmarks
+from .transfer import AnatomicalFrame, Splice, chest_frame, laid_over, landmark_bone, pelvis_frame
 
 Bools = NDArray[np.bool_]
 
@@ -121,10 +117,10 @@ class _SeenLimb:
 
 
 def _limbs(result: Clip, landmarks: Landmarks, splice: Splice) -> list[_SeenLimb]:
-    span = window(splice.timing, result, splice.clip)
+    span = splice_window(splice.timing, result, splice.clip)
     theirs = _landmarks(splice)
     base = _posture(result, span.frames)
-    other = sampled(splice.clip, span.splice_frames)
+    other = sample_clip(splice.clip, span.splice_frames)
     found: list[_SeenLimb] = []
     for piece in splice.part.pieces:
         if piece not in LIMBS:
@@ -164,7 +160,7 @@ def turn_error(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
     span, whole = _whole(result, splice)
     sides = (
         (result.skeleton, landmarks, _posture(result, span.frames)),
-        (splice.clip.skeleton, _landmarks(splice), sampled(splice.clip, span.splice_frames)),
+        (splice.clip.skeleton, _landmarks(splice), sample_clip(splice.clip, span.splice_frames)),
     )
     errors = []
     for piece in splice.part.pieces:
@@ -221,7 +217,7 @@ def seams(result: Clip, base: Clip, landmarks: Landmarks, splice: Splice) -> lis
         landmarks: of both.
         splice: what was spliced.
     """
-    span = window(splice.timing, base, splice.clip)
+    span = splice_window(splice.timing, base, splice.clip)
     theirs = _landmarks(splice)
     found: list[Seam] = []
     for frames in _seam_frames(span, len(base)):
@@ -234,7 +230,7 @@ def seams(result: Clip, base: Clip, landmarks: Landmarks, splice: Splice) -> lis
             paths = (
                 _end(_posture(result, frames), ours, landmarks, piece),
                 _end(_posture(base, frames), ours, landmarks, piece),
-                _end(sampled(splice.clip, moments), other, theirs, piece),
+                _end(sample_clip(splice.clip, moments), other, theirs, piece),
             )
             length = limb_length(base.skeleton, landmarks, piece)
             speed = np.linalg.norm(np.diff(paths[0], axis=0), axis=-1).max() * base.rate / length
@@ -302,9 +298,9 @@ def _landmarks(splice: Splice) -> Landmarks:
     return splice.landmarks
 
 
-def _whole(result: Clip, splice: Splice) -> tuple[Window, Bools]:
+def _whole(result: Clip, splice: Splice) -> tuple[SpliceWindow, Bools]:
     """The splice's window, and which of its frames it is fully in, (window,) bool."""
-    span = window(splice.timing, result, splice.clip)
+    span = splice_window(splice.timing, result, splice.clip)
     return span, span.weights >= 1.0
 
 
@@ -314,19 +310,19 @@ def _posture(clip: Clip, frames: slice) -> Posture:
 
 def _seen_from(
     piece: str, ours: tuple[Skeleton, Landmarks], theirs: tuple[Skeleton, Landmarks]
-) -> tuple[BodyFrame, BodyFrame]:
+) -> tuple[AnatomicalFrame, AnatomicalFrame]:
     frame = chest_frame if piece.startswith("arm") else pelvis_frame
     base = frame(*ours)
     return base, laid_over(frame(*theirs), base)
 
 
-def _joint(posture: Posture, frame: BodyFrame, landmarks: Landmarks, landmark: str) -> Floats:
+def _joint(posture: Posture, frame: AnatomicalFrame, landmarks: Landmarks, landmark: str) -> Floats:
     """A landmark's joint in a body's frame, (frames, 3)."""
     bone = landmark_bone(posture.skeleton, landmarks, landmark)
     return rotate(conjugate(frame.orientation(posture)), posture.head(bone) - frame.place(posture))
 
 
-def _end(posture: Posture, frame: BodyFrame, landmarks: Landmarks, piece: str) -> Floats:
+def _end(posture: Posture, frame: AnatomicalFrame, landmarks: Landmarks, piece: str) -> Floats:
     """Hand or foot in a body's frame, (frames, 3)."""
     return _joint(posture, frame, landmarks, LIMBS[piece][-1])
 
@@ -344,7 +340,7 @@ def _head_turn(skeleton: Skeleton, landmarks: Landmarks, posture: Posture) -> Fl
     return multiply(now, conjugate(at_rest))
 
 
-def _seam_frames(span: Window, count: int) -> list[slice]:
+def _seam_frames(span: SpliceWindow, count: int) -> list[slice]:
     """Frames of the base around each ease; a hard cut has some too."""
     weights = np.zeros(count)
     weights[span.frames] = span.weights
@@ -360,7 +356,7 @@ def _seam_frames(span: Window, count: int) -> list[slice]:
     return [each for each in slices if each.stop - each.start >= 5]
 
 
-def _moments(span: Window, splice: Splice, base: Clip, frames: slice) -> Floats:
+def _moments(span: SpliceWindow, splice: Splice, base: Clip, frames: slice) -> Floats:
     """The splice clip's moments for frames of the base, also just outside of the splice."""
     step = splice.timing.rate * splice.clip.rate / base.rate
     start, stop = span.frames.start, span.frames.stop
@@ -375,8 +371,8 @@ def _foot_points(clip: Clip, landmarks: Landmarks, times: Floats) -> Floats:
     names = ["foot.L", "foot.R"]
     if all(landmarks.get(f"toe.{side}") for side in "LR"):
         names += ["toe.L", "toe.R"]
-    posture = sampled(clip, times)
-    turns, places, scale = sampled_world(clip, times)
+    posture = sample_clip(clip, times)
+    turns, places, scale = sample_world(clip, times)
     heads = (posture.head(landmark_bone(clip.skeleton, landmarks, name)) for name in names)
     return np.stack([places + scale * rotate(turns, head) for head in heads], axis=1)
 

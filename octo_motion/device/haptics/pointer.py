@@ -10,8 +10,8 @@ from typing import Final
 from ..calibration import NONE, Calibration, Calibrator
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..held_body import Held
-from ..hid.space_mouse import SpaceMouse
-from ..ipc.messages import HandMessage, Settings, Workspace
+from ..hid import SpaceMouse
+from ..ipc import HandMessage, Settings, Workspace
 from ..spatial import (
     IDENTITY,
     ZERO,
@@ -32,7 +32,7 @@ from ..spatial import (
 from .coupling import Gains, gains_for, wrench
 from .local_model import LocalModel
 from .passivity import DAMPING, STORED, Observer
-from .safety import Limits, Shaper
+from .safety import ForceLimits, Shaper
 
 _FULL_PUSH: Final = 0.1
 """s: a rate device that has not been read for so long stands still."""
@@ -77,7 +77,7 @@ class Pointer:
         """Choose the coupling for the device."""
         device = self.driver.description.dynamics
         self.gains = gains_for(device, self.period) if device else Gains(0.0, 0.0, 0.0, 0.0)
-        self._limits = Limits(device.force, device.torque) if device else Limits(0.0, 0.0)
+        self._limits = ForceLimits(device.force, device.torque) if device else ForceLimits(0.0, 0.0)
         self._shaper = Shaper(self._limits)
         self._push = _observer(device, turning=False)
         self._turn = _observer(device, turning=True)

@@ -19,7 +19,7 @@ _FULL: Final = 0.5
 
 
 @dataclass(frozen=True)
-class Limits:
+class ForceLimits:
     """The most that a hand is ever given."""
 
     force: float
@@ -42,7 +42,7 @@ def freshness(age: float) -> float:
 class Shaper:
     """Turns what the coupling asks for into what the hand gets."""
 
-    limits: Limits
+    limits: ForceLimits
     share: float = 0.0
     """Of the asked force: rises after a grab, falls after letting go."""
     force: Vector = ZERO

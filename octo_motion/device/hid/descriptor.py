@@ -23,7 +23,7 @@ class DescriptorError(ValueError):
     """The bytes are no report descriptor."""
 
 
-class Way(IntEnum):
+class ReportField(IntEnum):
     """Which way a report goes; the values are the descriptor's own tags."""
 
     INPUT = 0x8
@@ -35,7 +35,7 @@ class Way(IntEnum):
 class Field:
     """One number within a report."""
 
-    way: Way
+    way: ReportField
     report: int
     """Report number, 0 where the device does not number its reports."""
     page: int
@@ -62,7 +62,7 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ReportLayout:
     """All that a descriptor says of a device's reports."""
 
     collections: tuple[tuple[int, int], ...]
@@ -71,7 +71,7 @@ class Layout:
     numbered: bool
     """Whether each report starts with its number."""
 
-    def of(self, way: Way) -> Iterator[Field]:
+    def of(self, way: ReportField) -> Iterator[Field]:
         """The fields of the reports that go one way."""
         return (each for each in self.fields if each.way == way)
 
@@ -109,12 +109,14 @@ class _Parser:
     depth: int = 0
     fields: list[Field] = field(default_factory=list[Field])
     collections: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
-    lengths: dict[tuple[Way, int], int] = field(default_factory=dict[tuple[Way, int], int])
+    lengths: dict[tuple[ReportField, int], int] = field(
+        default_factory=dict[tuple[ReportField, int], int]
+    )
     numbered: bool = False
 
     def main(self, tag: int, value: int) -> None:
-        if tag in (Way.INPUT, Way.OUTPUT, Way.FEATURE):
-            self.add_fields(Way(tag), value)
+        if tag in (ReportField.INPUT, ReportField.OUTPUT, ReportField.FEATURE):
+            self.add_fields(ReportField(tag), value)
         elif tag == 0xA:
             self.depth += 1
             if self.depth > _MOST_DEPTH:
@@ -129,7 +131,7 @@ class _Parser:
             raise DescriptorError(f"main item {tag:#x} is unknown")
         self.local = _Local()
 
-    def add_fields(self, way: Way, flags: int) -> None:
+    def add_fields(self, way: ReportField, flags: int) -> None:
         state = self.state
         start = self.lengths.get((way, state.report), 0)
         end = start + state.bits * state.count
@@ -198,7 +200,7 @@ def _full_usage(page: int, usage: int) -> tuple[int, int]:
     return (usage >> 16 or page, usage & 0xFFFF)
 
 
-def parse(descriptor: bytes) -> Layout:
+def parse_descriptor(descriptor: bytes) -> ReportLayout:
     """Fields and application collections of a report descriptor.
 
     Raises:
@@ -233,7 +235,7 @@ def parse(descriptor: bytes) -> Layout:
                 raise DescriptorError("an item of the reserved type")
     if parser.depth:
         raise DescriptorError("a collection never ends")
-    return Layout(tuple(parser.collections), tuple(parser.fields), parser.numbered)
+    return ReportLayout(tuple(parser.collections), tuple(parser.fields), parser.numbered)
 
 
 # --- Writing one ---------------------------------------------------------------------------------

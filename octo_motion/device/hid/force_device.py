@@ -11,7 +11,7 @@ from ...core.errors import DeviceError
 from ..driver import Description, DeviceLostError, Kind, Sample
 from ..spatial import ZERO, Vector
 from . import force_profile as profile
-from .system import Found, Handle, Line, claim, open_device
+from .system import Found, Handle, HidLine, claim, open_device
 
 
 def is_force_device(found: Found) -> bool:
@@ -26,7 +26,7 @@ class ForceDevice:
         self,
         found: Found,
         handle: Handle,
-        features: profile.Features,
+        features: profile.ForceFeatures,
         set_free: Callable[[], None] = lambda: None,
     ) -> None:
         self._sequence = 0
@@ -39,7 +39,7 @@ class ForceDevice:
             buttons=tuple(f"Button {index + 1}" for index in range(features.buttons)),
             dynamics=features.dynamics,
         )
-        self._line = Line(handle, self._description.name)
+        self._line = HidLine(handle, self._description.name)
 
     @classmethod
     def open(cls, found: Found) -> ForceDevice:

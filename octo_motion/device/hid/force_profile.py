@@ -117,7 +117,7 @@ class ReportError(ValueError):
 
 
 @dataclass(frozen=True)
-class State:
+class ForceState:
     """Input report: what the hand does."""
 
     sequence: int
@@ -147,7 +147,7 @@ class Command:
 
 
 @dataclass(frozen=True)
-class Features:
+class ForceFeatures:
     """Feature report: what the device can do."""
 
     buttons: int
@@ -183,7 +183,7 @@ def _unpack(number: int, report: bytes) -> tuple[int, ...]:
     return layout.unpack_from(report)[1:]
 
 
-def parse_state(report: bytes) -> State:
+def parse_state(report: bytes) -> ForceState:
     """Read an input report, its number included.
 
     Raises:
@@ -198,7 +198,7 @@ def parse_state(report: bytes) -> State:
     orientation = unit((float(w), float(x), float(y), float(z)))
     if orientation is None or not 0.9 < size < 1.1:
         raise ReportError("the orientation is no unit quaternion")
-    return State(
+    return ForceState(
         *(sequence, clock, answered, buttons, bool(flags & 1), bool(flags & 2)),
         *(position, orientation),
         _scaled(rest[7:10], _VELOCITY),
@@ -206,7 +206,7 @@ def parse_state(report: bytes) -> State:
     )
 
 
-def pack_state(state: State) -> bytes:
+def pack_state(state: ForceState) -> bytes:
     """Write an input report: what firmware does; here for tests and stand-ins."""
     return _STRUCTS[STATE].pack(
         STATE,
@@ -246,7 +246,7 @@ def pack_command(command: Command) -> bytes:
     )
 
 
-def parse_features(report: bytes) -> Features:
+def parse_features(report: bytes) -> ForceFeatures:
     """Read the feature report.
 
     Raises:
@@ -262,7 +262,7 @@ def parse_features(report: bytes) -> Features:
     # No command carries more; one cut along some axes would push another way than it was meant.
     force, torque = min(force, _LIMITS["h"][1]), min(torque, _LIMITS["h"][1])
     b, angular_b, friction, angular_friction, step, angular_step, delay = rest
-    return Features(
+    return ForceFeatures(
         buttons,
         Dynamics(
             *(force * _FORCE, torque * _TORQUE, b * 1e-3, angular_b * 1e-6),
@@ -272,7 +272,7 @@ def parse_features(report: bytes) -> Features:
     )
 
 
-def pack_features(features: Features) -> bytes:
+def pack_features(features: ForceFeatures) -> bytes:
     """Write the feature report: what firmware does; here for tests and stand-ins."""
     it = features.dynamics
     values = [

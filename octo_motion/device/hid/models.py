@@ -26,7 +26,7 @@ RANGE: Final = 350
 
 
 @dataclass(frozen=True)
-class Model:
+class DeviceModel:
     """What one product is called, and what stands on its buttons."""
 
     vendor: int
@@ -61,33 +61,35 @@ _PILOT: Final = _bits(
 )
 
 MODELS: Final = (
-    Model(LOGITECH, 0xC603, "SpaceMouse Plus XT"),
-    Model(LOGITECH, 0xC605, "CadMan"),
-    Model(LOGITECH, 0xC606, "SpaceMouse Classic"),
-    Model(LOGITECH, 0xC621, "SpaceBall 5000"),
-    Model(LOGITECH, 0xC623, "SpaceTraveler"),
-    Model(LOGITECH, 0xC625, "SpacePilot", buttons=_PILOT),
-    Model(LOGITECH, 0xC626, "SpaceNavigator", buttons=_TWO),
-    Model(LOGITECH, 0xC627, "SpaceExplorer", buttons=_EXPLORER),
-    Model(LOGITECH, 0xC628, "SpaceNavigator for Notebooks", buttons=_TWO),
-    Model(LOGITECH, 0xC629, "SpacePilot Pro", buttons=_PILOT_PRO),
-    Model(LOGITECH, 0xC62B, "SpaceMouse Pro", buttons=_PRO),
-    Model(CONNEXION, 0xC62E, "SpaceMouse Wireless", combined=True, buttons=_TWO),
-    Model(CONNEXION, 0xC62F, "SpaceMouse Wireless Receiver", combined=True, buttons=_TWO),
-    Model(CONNEXION, 0xC631, "SpaceMouse Pro Wireless", combined=True, buttons=_PRO),
-    Model(CONNEXION, 0xC632, "SpaceMouse Pro Wireless Receiver", combined=True, buttons=_PRO),
-    Model(CONNEXION, 0xC633, "SpaceMouse Enterprise", combined=True, buttons=_ENTERPRISE),
-    Model(CONNEXION, 0xC635, "SpaceMouse Compact", buttons=_TWO),
-    Model(CONNEXION, 0xC636, "SpaceMouse Module"),
-    Model(CONNEXION, 0xC638, "SpaceMouse Pro Wireless Bluetooth", combined=True, buttons=_PRO),
-    Model(CONNEXION, 0xC63A, "SpaceMouse Wireless Bluetooth", combined=True, buttons=_TWO),
-    Model(CONNEXION, 0xC641, "SpaceMouse USB"),
-    Model(CONNEXION, 0xC652, "Universal Receiver", combined=True, buttons=_PRO),
+    DeviceModel(LOGITECH, 0xC603, "SpaceMouse Plus XT"),
+    DeviceModel(LOGITECH, 0xC605, "CadMan"),
+    DeviceModel(LOGITECH, 0xC606, "SpaceMouse Classic"),
+    DeviceModel(LOGITECH, 0xC621, "SpaceBall 5000"),
+    DeviceModel(LOGITECH, 0xC623, "SpaceTraveler"),
+    DeviceModel(LOGITECH, 0xC625, "SpacePilot", buttons=_PILOT),
+    DeviceModel(LOGITECH, 0xC626, "SpaceNavigator", buttons=_TWO),
+    DeviceModel(LOGITECH, 0xC627, "SpaceExplorer", buttons=_EXPLORER),
+    DeviceModel(LOGITECH, 0xC628, "SpaceNavigator for Notebooks", buttons=_TWO),
+    DeviceModel(LOGITECH, 0xC629, "SpacePilot Pro", buttons=_PILOT_PRO),
+    DeviceModel(LOGITECH, 0xC62B, "SpaceMouse Pro", buttons=_PRO),
+    DeviceModel(CONNEXION, 0xC62E, "SpaceMouse Wireless", combined=True, buttons=_TWO),
+    DeviceModel(CONNEXION, 0xC62F, "SpaceMouse Wireless Receiver", combined=True, buttons=_TWO),
+    DeviceModel(CONNEXION, 0xC631, "SpaceMouse Pro Wireless", combined=True, buttons=_PRO),
+    DeviceModel(CONNEXION, 0xC632, "SpaceMouse Pro Wireless Receiver", combined=True, buttons=_PRO),
+    DeviceModel(CONNEXION, 0xC633, "SpaceMouse Enterprise", combined=True, buttons=_ENTERPRISE),
+    DeviceModel(CONNEXION, 0xC635, "SpaceMouse Compact", buttons=_TWO),
+    DeviceModel(CONNEXION, 0xC636, "SpaceMouse Module"),
+    DeviceModel(
+        CONNEXION, 0xC638, "SpaceMouse Pro Wireless Bluetooth", combined=True, buttons=_PRO
+    ),
+    DeviceModel(CONNEXION, 0xC63A, "SpaceMouse Wireless Bluetooth", combined=True, buttons=_TWO),
+    DeviceModel(CONNEXION, 0xC641, "SpaceMouse USB"),
+    DeviceModel(CONNEXION, 0xC652, "Universal Receiver", combined=True, buttons=_PRO),
 )
 
 _BY_ID: Final = {(model.vendor, model.product): model for model in MODELS}
 
 
-def model_of(vendor: int, product: int) -> Model | None:
+def model_of(vendor: int, product: int) -> DeviceModel | None:
     """What is known of a product."""
     return _BY_ID.get((vendor, product))

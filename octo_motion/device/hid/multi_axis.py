@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Final
 
 from ..response import Axes
-from .descriptor import Field, Layout, Way
+from .descriptor import Field, ReportField, ReportLayout
 from .models import RANGE
 
 _DESKTOP: Final = 0x01
@@ -22,32 +22,33 @@ _MOST_BUTTONS: Final = 64
 _REST: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def classic_layout(*, combined: bool) -> Layout:
+def classic_layout(*, combined: bool) -> ReportLayout:
     """Layout of the 3Dconnexion family, for systems that do not tell a device's descriptor.
 
     Report 1 pushes and report 2 turns, or report 1 does both; 16 bits an axis. Report 3: buttons.
     """
     axes = [
         Field(
-            *(Way.INPUT, 1 if combined or axis < 3 else 2, _DESKTOP, _FIRST_AXIS + axis),
+            *(ReportField.INPUT, 1 if combined or axis < 3 else 2, _DESKTOP, _FIRST_AXIS + axis),
             *(16 * (axis if combined else axis % 3), 16, -RANGE, RANGE, True),
         )
         for axis in range(6)
     ]
     buttons = [
-        Field(Way.INPUT, 3, _BUTTONS, bit + 1, bit, 1, 0, 1, relative=False) for bit in range(32)
+        Field(ReportField.INPUT, 3, _BUTTONS, bit + 1, bit, 1, 0, 1, relative=False)
+        for bit in range(32)
     ]
-    return Layout(((1, 8),), (*axes, *buttons), numbered=True)
+    return ReportLayout(((1, 8),), (*axes, *buttons), numbered=True)
 
 
 class MultiAxis:
     """Six axes and buttons, kept up to date by the reports as they come."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: ReportLayout) -> None:
         self._numbered = layout.numbered
         self._axes: dict[int, list[tuple[int, Field, float]]] = {}
         self._buttons: dict[int, list[tuple[int, Field]]] = {}
-        for each in layout.of(Way.INPUT):
+        for each in layout.of(ReportField.INPUT):
             if each.page == _DESKTOP and 0 <= each.usage - _FIRST_AXIS < 6:
                 axis = each.usage - _FIRST_AXIS
                 full = max(abs(each.least), abs(each.most))

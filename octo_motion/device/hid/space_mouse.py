@@ -10,10 +10,10 @@ from ..calibration import NONE
 from ..driver import Description, Kind, Sample
 from ..response import Axes, Response
 from ..spatial import Vector
-from .descriptor import DescriptorError, Layout, parse
+from .descriptor import DescriptorError, ReportLayout, parse_descriptor
 from .models import USAGE, USAGE_PAGE, model_of
 from .multi_axis import MultiAxis, classic_layout
-from .system import Found, Handle, Line, descriptor_of, open_device
+from .system import Found, Handle, HidLine, descriptor_of, open_device
 
 _STILL: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _SILENCE: Final = 0.5
@@ -33,7 +33,9 @@ def is_space_mouse(found: Found) -> bool:
 class SpaceMouse:
     """One space mouse."""
 
-    def __init__(self, found: Found, handle: Handle, layout: Layout, response: Response) -> None:
+    def __init__(
+        self, found: Found, handle: Handle, layout: ReportLayout, response: Response
+    ) -> None:
         model = model_of(found.vendor, found.product)
         names = model.buttons if model else {}
         self._axes = MultiAxis(layout)
@@ -51,7 +53,7 @@ class SpaceMouse:
                 names.get(bit, f"Button {bit + 1}") for bit in range(max(names, default=1) + 1)
             ),
         )
-        self._line = Line(handle, self._description.name)
+        self._line = HidLine(handle, self._description.name)
 
     @classmethod
     def open(cls, found: Found, response: Response | None = None) -> SpaceMouse:
@@ -65,7 +67,7 @@ class SpaceMouse:
         descriptor = descriptor_of(handle)
         if descriptor:
             try:
-                layout = parse(descriptor)
+                layout = parse_descriptor(descriptor)
             except DescriptorError:
                 layout = None  # as if the system had not told it
         if layout is None or not MultiAxis(layout).useful:

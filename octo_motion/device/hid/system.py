@@ -111,7 +111,7 @@ def _text(value: object) -> str:
     return "".join(each for each in str(value or "") if each.isprintable())[:64].strip()
 
 
-def fingerprint() -> object:
+def descriptor_fingerprint() -> object:
     """Something cheap that changes whenever a device comes or goes; None where there is no such.
 
     Listing devices takes milliseconds, too long beside a loop of 1 kHz.
@@ -202,7 +202,7 @@ def descriptor_of(device: Any) -> bytes | None:
         return None
 
 
-class Line:
+class HidLine:
     """What a driver hears of an open device and says to it, until it is closed or pulled out."""
 
     def __init__(self, handle: Handle, name: str) -> None:

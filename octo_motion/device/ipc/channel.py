@@ -49,7 +49,7 @@ def _proof(secret: bytes, side: bytes, first: bytes, second: bytes) -> bytes:
     ).digest()
 
 
-class Channel:
+class MessageChannel:
     """Messages to and from one peer, never waiting."""
 
     def __init__(self, connection: socket.socket) -> None:
@@ -173,7 +173,7 @@ class Listener:
         self._socket.listen(4)
         self.port: int = self._socket.getsockname()[1]
 
-    def accept(self, seconds: float) -> Channel | None:
+    def accept(self, seconds: float) -> MessageChannel | None:
         """Take the right peer and stop listening; None when nobody right came in time."""
         deadline = time.monotonic() + seconds
         try:
@@ -184,7 +184,7 @@ class Listener:
                 except OSError:
                     return None
                 if self._proves_itself(connection):
-                    return Channel(connection)
+                    return MessageChannel(connection)
                 log.warning("Connection from port %d refused", address[1])
                 connection.close()
             return None
@@ -213,7 +213,7 @@ class Listener:
         return True
 
 
-def connect(port: int, secret: bytes) -> Channel:
+def connect(port: int, secret: bytes) -> MessageChannel:
     """The line to a listener that knows the same secret.
 
     Raises:
@@ -232,7 +232,7 @@ def connect(port: int, secret: bytes) -> Channel:
     except ChannelClosedError:
         connection.close()
         raise
-    return Channel(connection)
+    return MessageChannel(connection)
 
 
 def _introduce(connection: socket.socket, secret: bytes) -> None:

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import IO, Final
 
 from ...core.errors import DeviceError
-from ...core.posing.puppet.figure import Figure, Pose
-from ...core.posing.solver.obstacles import Obstacle
+from ...core.posing.puppet import Figure, Pose
+from ...core.posing.solver import Obstacle
 from ..calibration import Phase
 from .channel import ChannelClosedError
 from .messages import (
@@ -48,7 +48,7 @@ _SILENT: Final = 5.0
 """s; it speaks once a second at least."""
 
 
-class State(Enum):
+class ClientState(Enum):
     """Whether there is a bridge."""
 
     OFF = "off"
@@ -61,7 +61,7 @@ class State(Enum):
 class Client:
     """The bridge as Blender sees it; what it says is kept here, the newest of each kind."""
 
-    state: State = State.OFF
+    state: ClientState = ClientState.OFF
     pose: Pose | None = None
     """The newest; stays when the bridge is lost."""
     steps: int = 0
@@ -114,7 +114,7 @@ class Client:
         self.lost_devices = self._placed = 0
         self._child = Child.start(("bridge", *arguments), python, log_to)
         self._child.channel.most_waiting = _MOST_WAITING
-        self.state = State.RUNNING
+        self.state = ClientState.RUNNING
         self.heard = time.monotonic()
 
     def restart(self) -> None:
@@ -126,7 +126,7 @@ class Client:
         try:
             self.start(self._arguments, self._python)
         except DeviceError:
-            self.state = State.LOST
+            self.state = ClientState.LOST
             raise
         if self._figure is not None:
             figure, pose = self._figure
@@ -141,7 +141,7 @@ class Client:
                 with contextlib.suppress(ChannelClosedError):
                     child.channel.send(Goodbye())
             child.stop()
-        self.state = State.OFF
+        self.state = ClientState.OFF
 
     def send(self, message: Message) -> None:
         """Say something to the bridge; without one, nothing happens."""
@@ -248,7 +248,7 @@ class Client:
         child, self._child = self._child, None
         if child is not None:
             child.stop(0.0)
-        self.state = State.LOST
+        self.state = ClientState.LOST
         self._forget_devices()
         self.notices.append(
             Notice(
@@ -260,7 +260,7 @@ class Client:
     @property
     def silent(self) -> bool:
         """Whether a bridge that runs has not said a word for long: it hangs, or gave up."""
-        return self.state is State.RUNNING and time.monotonic() - self.heard > _SILENT
+        return self.state is ClientState.RUNNING and time.monotonic() - self.heard > _SILENT
 
     @property
     def process_id(self) -> int | None:

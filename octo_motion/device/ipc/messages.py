@@ -15,9 +15,8 @@ from typing import Annotated, ClassVar, Final, Self, TypedDict, get_args, get_ty
 import numpy as np
 
 from ...core.errors import DeviceError, OctoMotionError
-from ...core.posing.puppet.figure import Elements, Figure, Limits
-from ...core.posing.solver.obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
-from ...core.posing.solver.world import WorldSettings
+from ...core.posing.puppet import Elements, Figure, JointRanges
+from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
 from ...core.rotations import Floats
 from ..calibration import Calibration, Phase
 from ..held_body import Held, Pull
@@ -126,7 +125,7 @@ class FigureMessage(Message):
         return Figure(
             *(self.names, self.parents, self.anchors, self.rest, self.lengths, self.masses),
             *(self.centres, self.inertias, self.capsules, self.radii),
-            Limits(self.limits),
+            JointRanges(self.limits),
             Elements(self.stiffness, self.damping, self.flow, self.yield_torque),
         )
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, Final, NoReturn
 
 from ...core.errors import DeviceError
-from .channel import Channel, ChannelClosedError, connect, new_secret
+from .channel import ChannelClosedError, MessageChannel, connect, new_secret
 
 log = logging.getLogger(__name__)
 
@@ -72,7 +72,7 @@ def library_folders() -> list[str]:
 class Child:
     """A process of ours that was started, and the line to it."""
 
-    def __init__(self, process: subprocess.Popen[bytes], channel: Channel) -> None:
+    def __init__(self, process: subprocess.Popen[bytes], channel: MessageChannel) -> None:
         self._process = process
         self.channel = channel
 

@@ -20,9 +20,15 @@ from typing import Final
 
 from ...core.errors import DeviceError
 from ..driver import DeviceLostError, Driver
-from ..hid import system
-from ..hid.force_device import ForceDevice, is_force_device
-from ..hid.space_mouse import SpaceMouse, is_space_mouse
+from ..hid import (
+    ForceDevice,
+    Found,
+    SpaceMouse,
+    descriptor_fingerprint,
+    is_force_device,
+    is_space_mouse,
+    list_devices,
+)
 from ..response import Response
 from .haply import PORT as HAPLY_PORT
 from .haply import Haply
@@ -171,7 +177,7 @@ class _Search:
             self._found("haply", b"", device)
 
     def _look_for_hid(self, now: float) -> None:
-        cheap = system.fingerprint()
+        cheap = descriptor_fingerprint()
         if now - self._looked < (_EVERY_COSTLY if cheap is None else _EVERY):
             return
         self._looked = now
@@ -179,7 +185,7 @@ class _Search:
             return
         self._seen = cheap
         try:
-            listed = system.list_devices()
+            listed = list_devices()
         except DeviceError as error:
             self._refuse("hidapi", error, now, at_once=True)
             return
@@ -202,7 +208,7 @@ class _Search:
             if driver is not None:
                 self._found(found.identity, found.path, driver)
 
-    def _open(self, found: system.Found, now: float) -> Driver | None:
+    def _open(self, found: Found, now: float) -> Driver | None:
         try:
             if is_force_device(found):
                 return ForceDevice.open(found)

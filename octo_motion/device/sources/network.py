@@ -48,7 +48,7 @@ class PacketError(ValueError):
 
 
 @dataclass(frozen=True)
-class Features:
+class NetworkFeatures:
     """What the program's device can do."""
 
     name: str
@@ -57,7 +57,7 @@ class Features:
 
 
 @dataclass(frozen=True)
-class State:
+class NetworkState:
     """What its hand does."""
 
     sequence: int
@@ -82,16 +82,16 @@ class Force:
     torque: Vector
 
 
-Packet = Features | State | Force
+Packet = NetworkFeatures | NetworkState | Force
 
 
 def pack(packet: Packet, key: bytes) -> bytes:
     """Bytes of a packet."""
     match packet:
-        case Features():
+        case NetworkFeatures():
             name = packet.name.encode()[:64].decode(errors="ignore").encode()
             kind, values = FEATURES, (packet.buttons, *astuple(packet.dynamics), name)
-        case State():
+        case NetworkState():
             kind, values = (
                 STATE,
                 (
@@ -129,7 +129,7 @@ def size_of(data: bytes, key: bytes) -> int:
     return SIZES[kind]
 
 
-def parse(data: bytes, key: bytes) -> Packet:
+def parse_datagram(data: bytes, key: bytes) -> Packet:
     """The packet that these bytes are.
 
     Raises:
@@ -151,13 +151,13 @@ def parse(data: bytes, key: bytes) -> Packet:
     fastest = max(map(abs, rest[7:13]))
     if max(map(abs, position)) > _FARTHEST or orientation is None or fastest > _FASTEST:
         raise PacketError("a pose that cannot be")
-    return State(
+    return NetworkState(
         *(sequence, buttons, bool(held), position, orientation),
         *(_vector(rest[7:10]), _vector(rest[10:13])),
     )
 
 
-def _features(values: tuple[object, ...]) -> Features:
+def _features(values: tuple[object, ...]) -> NetworkFeatures:
     buttons, *numbers, name = values
     assert isinstance(buttons, int)
     assert isinstance(name, bytes)
@@ -166,7 +166,7 @@ def _features(values: tuple[object, ...]) -> Features:
     if buttons > 32 or dynamics.force <= 0.0 or min(said) < 0.0 or max(said) > _MOST:
         raise PacketError("a device that cannot be")
     text = name.rstrip(b"\0").decode(errors="replace")
-    return Features("".join(each for each in text if each.isprintable()), buttons, dynamics)
+    return NetworkFeatures("".join(each for each in text if each.isprintable()), buttons, dynamics)
 
 
 def _vector(numbers: list[float]) -> Vector:
@@ -177,7 +177,7 @@ def _vector(numbers: list[float]) -> Vector:
 class NetworkDevice:
     """A program that has said what its device can do."""
 
-    def __init__(self, port: Port, features: Features) -> None:
+    def __init__(self, port: Port, features: NetworkFeatures) -> None:
         self._port = port
         self._sequence = 0
         self._description = Description(
@@ -239,9 +239,9 @@ class Port:
         self._peer: socket.socket | None = None
         self._address: tuple[str, int] | None = None
         self._got = self._unsent = b""
-        self._known: Features | None = None
-        self._features: Features | None = None
-        self._state: State | None = None
+        self._known: NetworkFeatures | None = None
+        self._features: NetworkFeatures | None = None
+        self._state: NetworkState | None = None
         self._answered = 0
         self._heard = 0.0
         self._complained = ""
@@ -260,7 +260,7 @@ class Port:
         """Whether nothing has come for long."""
         return time.perf_counter() - self._heard > _SILENCE
 
-    def newest(self) -> State | None:
+    def newest(self) -> NetworkState | None:
         """The newest pose since the last call."""
         self._fill()
         state, self._state = self._state, None
@@ -313,7 +313,7 @@ class Port:
             except OSError:
                 return
             try:
-                packet = parse(data, self._key)
+                packet = parse_datagram(data, self._key)
                 self._take(packet)
             except PacketError as error:
                 self._complain(error)
@@ -341,7 +341,7 @@ class Port:
             size = size_of(self._got, self._key)
             if len(self._got) < size:
                 return
-            packet, self._got = parse(self._got[:size], self._key), self._got[size:]
+            packet, self._got = parse_datagram(self._got[:size], self._key), self._got[size:]
             self._take(packet)
 
     def _accept(self) -> None:
@@ -356,10 +356,10 @@ class Port:
 
     def _take(self, packet: Packet) -> None:
         self._heard = time.perf_counter()
-        if isinstance(packet, Features):
+        if isinstance(packet, NetworkFeatures):
             if packet != self._known:  # some say it again and again, for it may get lost
                 self._features = packet
-        elif isinstance(packet, State):
+        elif isinstance(packet, NetworkState):
             self._state, self._answered = packet, packet.sequence
         else:
             raise PacketError("a force, which is ours to send")

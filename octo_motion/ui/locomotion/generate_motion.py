@@ -17,50 +17,48 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ...blender.animation import actions
-from ...blender.animation.leftover_poses import as_posed
-from ...blender.files import presets
-from ...blender.rig.armature import read_skeleton, world_matrix
-from ...blender.scene.curves import read_route
+from ...blender.animation import as_posed, writable_armature
+from ...blender.files import load_gait
+from ...blender.rig import read_skeleton, world_matrix
+from ...blender.scene import read_route
 from ...core.errors import RouteError
-from ...core.locomotion.gait.gait_poser import Generator
-from ...core.locomotion.gait.table import GaitTable
-from ...core.locomotion.ground.footholds import Wish
-from ...core.locomotion.path.in_place import route_in_place
-from ...core.locomotion.path.travel import unhurried
-from ...core.locomotion.rig.mantle import find_mantle, lies_back, stretched
+from ...core.locomotion.gait import GaitPoser, GaitTable
+from ...core.locomotion.ground import ContactOverride
+from ...core.locomotion.path import route_in_place, unhurried
+from ...core.locomotion.rig import find_mantle, lies_back, stretch_mantle
 from ..plain import plain
-from .reading.changes import Way, gaits_of, read_changes
-from .reading.changes import plan as plan_changes
-from .reading.gait import (
+from .reading import (
+    GaitSegment,
+    chosen_root_bone,
     gait_settings,
+    gaits_of,
     generator_of,
     height_of,
-    timing,
-    tolerances_of,
-    travel_settings,
-)
-from .reading.ground import read_standing, resting
-from .reading.pace import pace_of, too_few_frames
-from .reading.reaches import read_reaches
-from .reading.rig import (
-    chosen_root_bone,
     keyed_anew,
     listed_arms,
     listed_body,
+    pace_of,
     posed_carriers,
-    told_of_constraints,
-    told_of_driven,
-    told_of_poses,
-    told_of_showing,
+    read_apart,
+    read_changes,
+    read_reaches,
+    read_standing,
+    resting,
+    timing,
+    tolerances_of,
+    too_few_frames,
+    travel_settings,
     uniform_scale,
+    warnings_for_constraints,
+    warnings_for_display,
+    warnings_for_driven,
+    warnings_for_poses,
 )
-from .reading.skin import read_apart
-from .settings.contact_overrides import as_wishes, gathered
+from .reading import plan_transitions as plan_changes
+from .settings.contact_overrides import overrides_for_core, read_overrides
 from .settings.in_place import breathing_channels
 from .settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings, read_gait
-from .writing.summary import Summary
-from .writing.write_motion import Shot
+from .writing import Shot, Summary
 
 RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
 """What is no setting, though it is kept with them."""
@@ -94,7 +92,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         OctoMotionError: something is wrong that the user can put right.
     """
     settings = locomotion_settings(armature)
-    actions.writable_armature(armature)
+    writable_armature(armature)
     in_place = settings.travel_on == "NONE"
     if settings.route is None and not in_place:
         raise RouteError(
@@ -144,14 +142,16 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         travel = unhurried(travel, route.length, start=slow * rest[0], end=slow * rest[1])
     seconds, frames, times = timing(settings, route, travel, scene.render)
     breath = breathing_channels(armature, settings, head[-1] if head else "", times * seconds)
-    wanted = gathered(settings.ground, armature)
-    wishes = as_wishes(wanted, arms)
+    wanted = read_overrides(settings.ground, armature)
+    wishes = overrides_for_core(wanted, arms)
     reach = generator.arm_length * scale
     plane = None
     if settings.change.by == "HEIGHT":
         plane = float(route.position(np.linspace(0.0, 1.0, _ROUTE_SAMPLES))[:, 2].min())
 
-    def read_way(table: GaitTable, own: Generator, wished: Sequence[Wish]) -> Way:
+    def read_way(
+        table: GaitTable, own: GaitPoser, wished: Sequence[ContactOverride]
+    ) -> GaitSegment:
         """One way of moving along this route."""
         going = travel_settings(settings, table, table.stride * own.arm_length * scale, lean)
         holding = None
@@ -175,11 +175,13 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
                 alike=in_place,
                 rest=rest,
             )
-        return Way(table, own, going, holding, height_of(settings, table, own.clearance * scale))
+        return GaitSegment(
+            table, own, going, holding, height_of(settings, table, own.clearance * scale)
+        )
 
-    def read_gait_of(name: str) -> Way:
+    def read_gait_of(name: str) -> GaitSegment:
         """One of the ways that the gait changes to."""
-        table = presets.load_gait(name)
+        table = load_gait(name)
         own = generator_of(skeleton, arms, body, gait_settings(settings, table, lean))
         return read_way(table, own, ())
 
@@ -228,7 +230,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         seconds=seconds,
         root_bone=root_bone,
         mantle=mantle,
-        mantle_rotations=stretched(skeleton, mantle, body, settings.streamline),
+        mantle_rotations=stretch_mantle(skeleton, mantle, body, settings.streamline),
         tolerances=None if live else tolerances_of(settings, generator.arm_length),
         # What is reached for is known on frames alone.
         hasty=grounded and pace.hasty and reaching is None and (soon or not live),
@@ -248,10 +250,10 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         note=settings_note(settings),
         # Detection has looked for constraints itself.
         warnings=[
-            *(detection.notes if detection else told_of_driven(skeleton, arms)),
-            *told_of_constraints(settings, armature, skeleton, root_bone),
-            *told_of_showing(armature, scene.render),
-            *told_of_poses(settings, armature, arms, carriers),
+            *(detection.notes if detection else warnings_for_driven(skeleton, arms)),
+            *warnings_for_constraints(settings, armature, skeleton, root_bone),
+            *warnings_for_display(armature, scene.render),
+            *warnings_for_poses(settings, armature, arms, carriers),
             *(standing.warnings if standing else ()),
             *(too_few_frames(settings, pace, scene.render) if grounded else ()),
         ],

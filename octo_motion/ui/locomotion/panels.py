@@ -7,8 +7,8 @@ from typing import Any, Final, cast
 
 import bpy
 
-from ...blender.animation.actions import key_counts
-from ...blender.files.weight_curve import NODE, curve_node
+from ...blender.animation import key_counts
+from ...blender.files import NODE, curve_node
 from ..panel_base import ArmaturePanel, ItemRows, TabPanel, armature_in, draw_sentence
 from .operators.add_octopus import OCTO_MOTION_OT_add_octopus
 from .operators.add_route import OCTO_MOTION_OT_add_route

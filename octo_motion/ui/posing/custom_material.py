@@ -9,12 +9,17 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ...blender.rig.armature import armature_data
-from ...blender.rig.puppet_reading import bone_materials, set_bone_material
+from ...blender.rig import armature_data, bone_materials, set_bone_material
 from ...core.errors import RigError
-from ...core.posing.puppet.figure import Figure
-from ...core.posing.puppet.material_fit import Bend, Measured, measure_bend
-from ...core.posing.puppet.materials import Material, joint_loads, material_of
+from ...core.posing.puppet import (
+    Bend,
+    Figure,
+    Material,
+    MeasuredBend,
+    joint_loads,
+    material_of,
+    measure_bend,
+)
 from .properties import posing_settings
 
 CUSTOM: Final = "CUSTOM"
@@ -44,7 +49,7 @@ def chosen_material(settings: Any) -> str | Material:
 
 def measured_joint(
     figure: Figure, body: int, strength: float, bend: Bend
-) -> tuple[Measured, Material]:
+) -> tuple[MeasuredBend, Material]:
     """Coefficients of a joint that does what a bend says, and the material that has them.
 
     Args:
@@ -111,7 +116,7 @@ def kept_before(
     return put_back
 
 
-def coefficients(bone: str, measured: Measured) -> str:
+def coefficients(bone: str, measured: MeasuredBend) -> str:
     """The coefficients, for people."""
     text = f"{bone}: K_f {measured.stiffness:.3g} N·m/rad, D_f {measured.damping:.3g} N·m·s/rad"
     if not np.isfinite(measured.yield_torque):

@@ -12,20 +12,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...blender.files.device_store import load_calibrations, save_calibrations
+from ...blender.files import load_calibrations, save_calibrations
 from ...core.errors import SettingsError, WriteError
 from ...core.posing.picking import Hit
-from ...core.posing.puppet.figure import Pose
+from ...core.posing.puppet import Pose
 from ...core.posing.session import MOST_STEPS_BACK
-from ...core.posing.solver.obstacles import Obstacle
+from ...core.posing.solver import Obstacle
 from ...core.rotations import Floats, from_matrix
 from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
-from ...device.ipc.client import Client, State
-from ...device.ipc.messages import (
+from ...device.ipc import (
     Button,
     Buzz,
     CalibrationMessage,
+    Client,
+    ClientState,
     DeviceMessage,
     Grab,
     Notice,
@@ -34,7 +35,7 @@ from ...device.ipc.messages import (
     Workspace,
     WorldMessage,
 )
-from ...device.ipc.messages import Settings as DeviceSettings
+from ...device.ipc import Settings as DeviceSettings
 from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25
@@ -127,7 +128,7 @@ class DeviceHands:
     @property
     def lost(self) -> bool:
         """Whether the bridge has ended by itself."""
-        return self.client.state is State.LOST
+        return self.client.state is ClientState.LOST
 
     @property
     def holding(self) -> bool:

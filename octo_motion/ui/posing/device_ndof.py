@@ -15,9 +15,8 @@ import numpy as np
 from ...blender.versions import ndof_sensitivities
 from ...core.posing.picking import Hit
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
-from ...device.ipc.client import Client
-from ...device.ipc.messages import Button, Notice
-from ...device.ipc.messages import Settings as DeviceSettings
+from ...device.ipc import Button, Client, Notice
+from ...device.ipc import Settings as DeviceSettings
 from ...device.simulation import nearest_body
 from .device_hands import NOTHING_NEAR, RATE_WIDTH, Room, Shown
 from .puppet_session import PuppetSession

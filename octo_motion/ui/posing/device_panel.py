@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import bpy
 
-from ...device.ipc.client import State
+from ...device.ipc import ClientState
 from .device_calibrate import draw_calibration
 from .device_ndof import NAME, NdofHands
 from .device_pose import Hands, OCTO_MOTION_OT_device_test, OCTO_MOTION_OT_pose_device, active_hands
@@ -49,7 +49,7 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
     def _devices(layout: Any, hands: Hands) -> None:
         box = layout.box()
         client = hands.client
-        if client.state is State.LOST:
+        if client.state is ClientState.LOST:
             box.alert = True
             box.label(text="The program has ended", icon="ERROR")
             box.label(text="B over the viewport starts it again")

@@ -12,8 +12,7 @@ from bpy.props import IntProperty
 from ...core.errors import DeviceError, SettingsError
 from ...core.rotations import Floats
 from ...device.driver import Kind
-from ...device.ipc.client import Client, State
-from ...device.ipc.messages import Notice
+from ...device.ipc import Client, ClientState, Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room
@@ -283,7 +282,7 @@ def line(hands: Hands) -> str:
     """One line about devices, for the header."""
     parts = [f"Posing {hands.session.puppet.name}"]
     shown = hands.shown()
-    if hands.client.state is State.LOST:
+    if hands.client.state is ClientState.LOST:
         parts.append("The device's program has ended: B starts it again")
     elif hands.client.silent:
         parts.append("The device's program does not answer: B starts it again")

@@ -8,9 +8,8 @@ from typing import Any, Final
 import bpy
 from bpy.props import EnumProperty
 
-from ...blender.animation.actions import writable_armature
-from ...blender.rig.armature import active_armature, selected_bones
-from ...blender.rig.puppet_reading import mark_bones
+from ...blender.animation import writable_armature
+from ...blender.rig import active_armature, mark_bones, selected_bones
 from ...core.errors import RigError, WriteError
 from ..armature_operator import ArmatureOperator
 from ..operator_base import OctoOperator

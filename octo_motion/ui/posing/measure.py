@@ -9,12 +9,16 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
-from ...blender.animation.actions import writable_armature
-from ...blender.rig.armature import active_armature, selected_bones
-from ...blender.rig.puppet_reading import bone_materials, read_rig, set_bone_material
+from ...blender.animation import writable_armature
+from ...blender.rig import (
+    active_armature,
+    bone_materials,
+    read_rig,
+    selected_bones,
+    set_bone_material,
+)
 from ...core.errors import RigError
-from ...core.posing.puppet.figure import Figure
-from ...core.posing.puppet.material_fit import Bend
+from ...core.posing.puppet import Bend, Figure
 from ..armature_operator import ArmatureOperator
 from .custom_material import coefficients, keep_material, measured_joint
 from .measuring_hand import BEARS

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 
 from ...core.errors import RigError
-from ...core.posing.puppet.figure import Figure, Pose
-from ...core.posing.puppet.material_fit import Bend, measure_shown
+from ...core.posing.puppet import Bend, Figure, Pose, measure_shown
 from ...core.rotations import (
     IDENTITY,
     Floats,

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from bpy.props import StringProperty
 
-from ...blender.rig.armature import active_armature
+from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
 from ...core.posing.pose_script import PoseScript, Step, parse_script
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply

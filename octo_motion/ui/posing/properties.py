@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 
-from ...blender.rig.armature import armature_data
-from ...core.posing.puppet.bone_roles import SMALLEST
+from ...blender.rig import armature_data
+from ...core.posing.puppet import SMALLEST
 from ..override_flags import OVERRIDE
 from ..override_groups import make_overridable
 

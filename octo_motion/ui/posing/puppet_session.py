@@ -15,21 +15,21 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ...blender.animation.actions import writable_armature
-from ...blender.animation.pose_keys import Keyed, PoseKeys
-from ...blender.animation.preview_pose import PoseValues, pose_values, restore_pose
-from ...blender.rig.puppet import Puppet
-from ...blender.rig.puppet_reading import bone_materials, is_part_of, read_rig
-from ...blender.scene.obstacles import read_obstacle
+from ...blender.animation import (
+    Keyed,
+    PoseKeys,
+    PoseValues,
+    pose_values,
+    restore_pose,
+    writable_armature,
+)
+from ...blender.rig import Puppet, bone_materials, is_part_of, read_rig
+from ...blender.scene import read_obstacle
 from ...core.errors import OctoMotionError, RigError, SettingsError
 from ...core.posing.picking import Hit, capsules_in_world, pick
-from ...core.posing.puppet.build import turned_bodies
-from ...core.posing.puppet.figure import Figure, Pose
-from ...core.posing.puppet.materials import Material, elements_for, joint_loads
-from ...core.posing.session import TOUCHED, Sample, Session, Told, hand_for
-from ...core.posing.solver.blas_threads import OneThread
-from ...core.posing.solver.obstacles import Obstacle, Plane
-from ...core.posing.solver.world import WorldSettings
+from ...core.posing.puppet import Figure, Material, Pose, elements_for, joint_loads, turned_bodies
+from ...core.posing.session import TOUCHED, HandSample, Session, TickReport, hand_for
+from ...core.posing.solver import Obstacle, OneThread, Plane, WorldSettings
 from ...core.rotations import IDENTITY, Floats
 from .custom_material import (
     chosen_material,
@@ -168,7 +168,7 @@ class PuppetSession:
         self._own: PoseValues = {}
         """Of the bones, when a recording was begun."""
         self._down = False
-        self.told: Told | None = None
+        self.told: TickReport | None = None
         self.warning = ""
         """What is wrong with the scene, and keeps nobody from posing."""
         self._trouble: OctoMotionError | None = None
@@ -298,7 +298,7 @@ class PuppetSession:
 
     def tick(
         self, seconds: float, position: Floats | None = None, turn: Floats | None = None
-    ) -> Told:
+    ) -> TickReport:
         """Simulate, and pose the armature.
 
         Args:
@@ -327,10 +327,10 @@ class PuppetSession:
                 self.measuring.tick(seconds, position * self.unit)
             self.puppet.write(self.measuring.pose())
             # Time stands still meanwhile.
-            self.told = Told(0.0, 0, 1.0, self.core.world.settings.step, resting=False)
+            self.told = TickReport(0.0, 0, 1.0, self.core.world.settings.step, resting=False)
             return self.told
         if position is not None:
-            sample = Sample(position * self.unit, IDENTITY if turn is None else turn)
+            sample = HandSample(position * self.unit, IDENTITY if turn is None else turn)
         self.told = self.core.tick(seconds, sample)
         if not self.told.resting:
             self.puppet.write(self.core.pose)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
 
-from ...blender.rig.armature import active_armature
+from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError
 from .. import at_work
 from ..armature_operator import ArmatureOperator

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringProperty
 
-from ...blender.scene.imports import SUFFIXES
+from ...blender.scene import SUFFIXES
 from ...core.errors import OctoMotionError
 from ..modal_job import ModalJob
 from .import_session import ImportSession

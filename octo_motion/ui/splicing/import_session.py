@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ...blender.scene.imports import ImportedClip, Up, import_clip, remove_clips
+from ...blender.scene import ImportedClip, Up, import_clip, remove_clips
 from ...core.errors import ClipError
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import bpy
 from bpy.props import StringProperty
 
-from ...core.splicing.humanoid.landmarks import LANDMARKS, Landmarks
+from ...core.splicing.humanoid import LANDMARKS, Landmarks
 
 
 def _bone(name: str, description: str) -> Any:

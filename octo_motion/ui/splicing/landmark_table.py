@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ...blender.animation.actions import writable_armature
-from ...blender.rig.armature import active_armature, armature_data, read_skeleton
+from ...blender.animation import writable_armature
+from ...blender.rig import active_armature, armature_data, read_skeleton
 from ...core.errors import RigError
-from ...core.splicing.humanoid.bone_names import mirrored
-from ...core.splicing.humanoid.landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED
-from ...core.splicing.humanoid.mapping import map_skeleton
+from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
 from ..armature_operator import ArmatureOperator
 from ..armature_preset import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in

@@ -8,7 +8,7 @@ from typing import Final, cast
 import bpy
 from bpy.props import PointerProperty
 
-from ...blender.rig.armature import armature_data
+from ...blender.rig import armature_data
 from ..override_groups import make_overridable
 from .landmark_properties import OCTO_MOTION_PG_landmarks
 from .splice_properties import SpliceStack

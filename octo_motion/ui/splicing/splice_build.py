@@ -8,10 +8,10 @@ from typing import Any, Final
 import bpy
 from bpy.props import IntProperty
 
-from ...core.splicing.transfer.timing_suggestions import Suggestion
-from ..locomotion.reading.arm_items import assign
+from ...core.splicing.transfer import Suggestion
+from ..locomotion.reading import assign
 from .splice_list import SpliceOperator, StackOperator
-from .stack import Stack, Summary, prepare, suggestions, write
+from .stack import SpliceSummary, Stack, prepare_splices, suggestions, write
 
 MOST_SUGGESTIONS: Final = 5
 
@@ -37,7 +37,7 @@ class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
         armature: bpy.types.Object,
         settings: Any,  # noqa: ARG002
     ) -> None:
-        stack = prepare(armature)
+        stack = prepare_splices(armature)
         tell(self, write(stack, stack.compute()))
 
 
@@ -74,7 +74,7 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
         settings: Any,
     ) -> None:
         number = settings.active_splice
-        stack = prepare(armature)
+        stack = prepare_splices(armature)
         found = suggestions(stack, number, MOST_SUGGESTIONS)
         chosen = found[min(self.choice, len(found)) - 1]
         stack = stack.retimed(number, chosen.base_start, chosen.splice_start)
@@ -97,19 +97,19 @@ def build_retimed(
     number: int,
     starts: tuple[float, float],
     prepared: Stack | None = None,
-) -> Summary:
+) -> SpliceSummary:
     """Set where a splice begins, on base and clip, and build.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right; nothing has changed.
     """
-    stack = (prepared or prepare(armature)).retimed(number, *starts)
+    stack = (prepared or prepare_splices(armature)).retimed(number, *starts)
     clip = stack.compute()
     set_timing(settings.splices[number], *starts)
     return write(stack, clip)
 
 
-def tell(operator: bpy.types.Operator, made: Summary, message: str = "") -> None:
+def tell(operator: bpy.types.Operator, made: SpliceSummary, message: str = "") -> None:
     """Report what was made, and then, to stay on screen, what is to be looked at."""
     operator.report({"INFO"}, message or made.message)
     for each in made.warnings:

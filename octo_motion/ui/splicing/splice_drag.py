@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import bpy
 from bpy.props import FloatProperty
 
-from ...blender.animation.actions import writable_armature
-from ...blender.rig.armature import active_armature
+from ...blender.animation import writable_armature
+from ...blender.rig import active_armature
 from ...core.errors import ClipError, OctoMotionError
 from .. import at_work
 from .properties import splicing_settings
 from .splice_build import build_retimed, tell
 from .splice_list import SpliceOperator, active_splice
-from .stack import local_object, prepare
+from .stack import local_object, prepare_splices
 from .timing_drag import DragSession
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         try:
             writable_armature(armature)
             _check_shown(active_splice(settings))
-            self._session = DragSession(prepare(armature), settings.active_splice, scene)
+            self._session = DragSession(prepare_splices(armature), settings.active_splice, scene)
             self._session.show()
         except OctoMotionError as error:
             return self._fail(context, error)

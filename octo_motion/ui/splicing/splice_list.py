@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ...blender.animation.actions import writable_armature
-from ...blender.rig.armature import active_armature
+from ...blender.animation import writable_armature
+from ...blender.rig import active_armature
 from ...core.errors import ClipError
 from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ..panel_base import ItemRows
 from .properties import splicing_settings
 from .splice_properties import PARTS
-from .stack import Reader
+from .stack import ClipReader
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -124,7 +124,7 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
         source = self._source(context, armature)
         action, slot = self._action(source, armature)
         bone = self._bone(context, armature)
-        reader = Reader()
+        reader = ClipReader()
         visual = settings.visual and settings.base is not None
         begins = reader.source(armature, base, base_slot, visual=visual).clip.frames[0]
         clip = reader.source(source, action, slot, visual=False).clip

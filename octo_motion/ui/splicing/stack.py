@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A stack of splices from settings to keys: read → plain arrays → compute → write.
 
-:func:`prepare` reads everything and finds everything that is wrong; a :class:`Stack` computes on
-plain arrays alone; :func:`write` changes the file.
+:func:`prepare_splices` reads everything and finds everything that is wrong; a :class:`Stack`
+computes on plain arrays alone; :func:`write` changes the file.
 """
 
 from __future__ import annotations
@@ -15,18 +15,32 @@ from typing import Any, Final, cast
 import bpy
 import numpy as np
 
-from ...blender.animation import actions
-from ...blender.animation.clips import further_channels, read_clip, scaled_channels, write_clip
-from ...blender.rig.armature import armature_data, read_skeleton
+from ...blender.animation import (
+    Channel,
+    further_channels,
+    read_clip,
+    scaled_channels,
+    writable_armature,
+    write_clip,
+)
+from ...blender.rig import armature_data, read_skeleton
 from ...core.errors import ClipError, WriteError
-from ...core.splicing.clip.clip import Clip
-from ...core.splicing.clip.timing import After, Timing, window
-from ...core.splicing.humanoid.landmarks import LANDMARKS, OPTIONAL, Landmarks
-from ...core.splicing.humanoid.mapping import map_skeleton
-from ...core.splicing.transfer.carry import Side, carriers
-from ...core.splicing.transfer.parts import PARTS, Part, chain, part_bones
-from ...core.splicing.transfer.splice import Reach, SeenFrom, Splice, build
-from ...core.splicing.transfer.timing_suggestions import Suggestion, suggest_timings
+from ...core.splicing.clip import After, Clip, Timing, splice_window
+from ...core.splicing.humanoid import LANDMARKS, OPTIONAL, Landmarks, map_skeleton
+from ...core.splicing.transfer import (
+    PARTS,
+    Part,
+    Reach,
+    SeenFrom,
+    Side,
+    Splice,
+    Suggestion,
+    build_splices,
+    carriers,
+    chain_part,
+    part_bones,
+    suggest_timings,
+)
 from ..plain import plain
 from .landmark_properties import read_landmarks, write_landmarks
 from .properties import OCTO_MOTION_PG_splicing, splicing_settings
@@ -58,7 +72,7 @@ class Source:
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """A base and all that goes onto it, as plain data; see :func:`prepare`."""
+    """A base and all that goes onto it, as plain data; see :func:`prepare_splices`."""
 
     armature: str
     """Name of the object: references to Blender's data do not outlive a modal operator's tick."""
@@ -73,7 +87,7 @@ class Stack:
             ClipError: a bone or landmark is missing, or a timing makes no sense.
         """
         acting = [splice for splice in self.splices if splice is not None]
-        return build(self.base.clip, self.base.landmarks, acting)
+        return build_splices(self.base.clip, self.base.landmarks, acting)
 
     def retimed(self, number: int, base_start: float, splice_start: float) -> Stack:
         """The same with another start of one splice."""
@@ -86,7 +100,7 @@ class Stack:
 
 
 @dataclass(frozen=True)
-class Summary:
+class SpliceSummary:
     """What was made, for people and for reports."""
 
     action: str
@@ -108,7 +122,7 @@ class Summary:
 # --- Reading -------------------------------------------------------------------------------------
 
 
-def prepare(armature: bpy.types.Object) -> Stack:
+def prepare_splices(armature: bpy.types.Object) -> Stack:
     """Read all that the stack of an armature needs. Nothing is changed.
 
     Raises:
@@ -116,18 +130,18 @@ def prepare(armature: bpy.types.Object) -> Stack:
     """
     settings = splicing_settings(armature)
     stack = cast("Any", settings)
-    actions.writable_armature(armature)
+    writable_armature(armature)
     if len(stack.splices) == 0:
         raise ClipError(
             f"'{armature.name}' has no splices.", "Add one in the panel Splicing (Add Splice)."
         )
-    reader = Reader()
+    reader = ClipReader()
     base = reader.base(armature)
     splices = [None if item.mute else _splice(reader, item, base) for item in stack.splices]
     return Stack(armature.name, base, tuple(splices))
 
 
-class Reader:
+class ClipReader:
     """Reads clips, each of them once."""
 
     def __init__(self) -> None:
@@ -240,7 +254,7 @@ def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, 
     return Landmarks(dict(found.landmarks.bones) | bones), "", not bones
 
 
-def _splice(reader: Reader, item: Any, base: Source) -> Splice:
+def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
     source = reader.item(item)
     part = _part(item, base, source)
     how = _How(
@@ -301,7 +315,7 @@ def _part(item: Any, base: Source, source: Source) -> Part:
             f"The chain of splice '{item.name}' has no first bone.",
             "Choose it in the panel Splicing.",
         )
-    part = chain(item.bone, item.source_bone)
+    part = chain_part(item.bone, item.source_bone)
     for each, bone in ((base, part.root), (source, part.splice_root)):
         if bone not in each.clip.skeleton.index:
             raise ClipError(
@@ -366,14 +380,14 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
 # --- Writing -------------------------------------------------------------------------------------
 
 
-def write(stack: Stack, clip: Clip) -> Summary:
+def write(stack: Stack, clip: Clip) -> SpliceSummary:
     """Give the armature the result, in place of the one that was built before.
 
     Raises:
         WriteError: the object is gone, or has become read-only.
     """
     armature = local_object(stack.armature)
-    actions.writable_armature(armature)
+    writable_armature(armature)
     settings = splicing_settings(armature)
     group = cast("Any", settings)
     previous = group.result
@@ -403,7 +417,7 @@ def write(stack: Stack, clip: Clip) -> Summary:
     if lost:
         verbs = "is scaled and loses its" if len(lost) == 1 else "are scaled and lose their"
         warnings.append(f"{_listed(lost)} {verbs} size: of what they carry a part is spliced.")
-    return Summary(action.name, len(clip), acting, tuple(warnings))
+    return SpliceSummary(action.name, len(clip), acting, tuple(warnings))
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -418,7 +432,7 @@ def _warnings(stack: Stack, items: Any) -> Iterator[str]:
         if splice is None:
             continue
         timing, clip = splice.timing, splice.clip
-        if not window(timing, base, clip).weights.any():
+        if not splice_window(timing, base, clip).weights.any():
             told, start, frames = "", timing.base_start, base.frames
             if timing.after == "stop" and timing.splice_start >= clip.frames[-1]:
                 told, start, frames = " of its clip, which", timing.splice_start, clip.frames
@@ -448,7 +462,7 @@ def _held(base: Source, splice: Splice) -> list[str]:
 
 def _besides(
     armature: bpy.types.Object, stack: Stack, clip: Clip
-) -> tuple[list[actions.Channel], list[str]]:
+) -> tuple[list[Channel], list[str]]:
     """What the base moves besides the body, as it does; and bones that lose their size."""
     group = cast("Any", splicing_settings(armature))
     if group.base is None:

@@ -9,9 +9,9 @@ from typing import Final, Literal
 
 import bpy
 
-from ...blender.animation.preview_pose import pose_values, restore_pose, show_pose
+from ...blender.animation import pose_values, restore_pose, show_pose
 from ...core.errors import OctoMotionError, WriteError
-from ...core.splicing.transfer.preview import Live
+from ...core.splicing.transfer import SplicePreview
 from .stack import Stack, local_object
 
 PER_PIXEL: Final = 0.1
@@ -114,7 +114,7 @@ class DragSession:
         self._timing = splice.timing
         beneath = [each for each in stack.splices[:number] if each is not None]
         above = [each for each in stack.splices[number + 1 :] if each is not None]
-        self._live = Live(
+        self._live = SplicePreview(
             stack.base.clip, stack.base.landmarks, [*beneath, splice, *above], len(beneath)
         )
         self._pose = pose_values(local_object(stack.armature))

@@ -15,9 +15,8 @@ import numpy as np
 
 from ...batched import product
 from ...rotations import Floats, conjugate, normalized, rotate, shortest_arc
-from ..ground.surface import Ground
-from ..rig.arm_batches import ArmsTogether, alike
-from ..rig.arm_frames import ArmFrames
+from ..ground import Ground
+from ..rig import ArmFrames, ArmsTogether, alike
 from .capsule_overlap import Capsules
 from .overlap_contacts import Crowd, Opened
 from .overlap_solver import parted
@@ -75,7 +74,7 @@ def width_of(frames_per_cycle: float) -> int:
     return int(np.clip(np.rint(frames_per_cycle / _WIDTH), 1, _MOST_WIDTH))
 
 
-def kept_apart(
+def separate_arms(
     bulk: Bulk,
     rotations: Floats,
     strains: Floats,

@@ -61,7 +61,7 @@ class Overlap:
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """What :func:`measure` finds."""
+    """What :func:`measure_overlap` finds."""
 
     depths: Floats
     """(frames,) deepest overlap at each frame, as a share of the smaller radius; 0 for none."""
@@ -74,7 +74,7 @@ class Separation:
         return self.overlaps[0] if self.overlaps else None
 
 
-def measure(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) -> Separation:
+def measure_overlap(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) -> Separation:
     """How far chains pass through each other and through parts of the body.
 
     Neighbouring capsules of one chain are joined; a chain is not measured against itself.

@@ -20,8 +20,8 @@ import numpy as np
 from ...batched import dot
 from ...easing import smooth_step
 from ...rotations import Floats
-from ...temporal_filter import blurred, covered, reach, widened
-from ..ground.arm_curves import drawn
+from ...temporal_filter import blur_reach, blurred, covered, widened
+from ..ground import drawn
 from .capsule_overlap import Capsules
 from .chain_solver import joints_of, turned_towards
 from .overlap_contacts import Crowd, Touches, Touching, aside
@@ -104,7 +104,7 @@ def parted(
     if not deep.any():
         return None
     # Who makes way may be in the way of others then, but not for ever.
-    around = widened(deep, _AROUND * reach(width), cyclic=cyclic) > 0.0
+    around = widened(deep, _AROUND * blur_reach(width), cyclic=cyclic) > 0.0
     touching.look_at(around, own_form)
     return _Parting(crowd, touching, np.flatnonzero(around), floor, width, cyclic=cyclic).run()
 

@@ -20,10 +20,8 @@ import numpy as np
 from ...batched import turned
 from ...rotations import Floats, rotate
 from ...temporal_filter import covered
-from ..ground.surface import Ground
-from ..rig.arm_batches import ArmsTogether, alike
-from ..rig.arm_frames import ArmFrames
-from ..rig.poses import Poses, automatic
+from ..ground import Ground
+from ..rig import ArmFrames, ArmsTogether, Poses, alike, halfway_automatic
 
 _TOLERATED: Final = 0.002
 """Arm lengths that a joint may be below the ground half way between frames …"""
@@ -113,7 +111,7 @@ class ArmsOverGround:
             moment, arm = np.nonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + _TOLERATED)
             if not len(moment):
                 continue
-            half = automatic(
+            half = halfway_automatic(
                 Poses(rotations, poses.strains[:, bones], poses.locations, poses.orientations),
                 cyclic=self.cyclic,
             )
@@ -140,7 +138,7 @@ def _bends(values: Floats) -> Floats:
     return np.sqrt(w * w + x * x + y * y + z * z)
 
 
-def raised_between(
+def raise_between_frames(
     course: ArmsOverGround,
     poses: Poses,
     joints: Sequence[Floats],

@@ -15,8 +15,8 @@ import numpy as np
 
 from ...easing import smooth_step
 from ...rotations import Floats, conjugate, multiply, rotate, shortest_arc
-from ..ground.arm_curves import raised
-from ..rig.poses import Poses
+from ..ground import raise_over_ground
+from ..rig import Poses
 from .subframe_clearance import ArmsOverGround
 
 _OVER: Final = 0.03
@@ -49,7 +49,7 @@ def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
     return result
 
 
-def off_ground(
+def keep_off_ground(
     course: ArmsOverGround, poses: Poses, radii: Sequence[Floats], loose: Floats
 ) -> Floats:
     """Rotations (frames, bones, 4) of the same arms off the ground.
@@ -73,7 +73,7 @@ def off_ground(
         reach = np.concatenate([np.zeros((len(chosen), 1)), np.cumsum(lengths, axis=1)], axis=1)
         needed = radii[number] + _OVER * reach[:, -1:]
         out = smooth_step(reach / (_OUT * reach[:, -1:])) * loose[chosen, number, None]
-        turned = raised(
+        turned = raise_over_ground(
             np.ascontiguousarray(np.moveaxis(directions, 0, -1)),
             np.ascontiguousarray(lengths.T),
             free=np.ones_like(lengths.T),

@@ -1,1 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The free arm: gait table → pseudo-targets → weighted CCD."""
+
+from .ccd import close_group
+from .gait_poser import MOST_STEADY, Arm, Build, GaitPoser, GaitSettings, bone_twists
+from .joint_groups import diameters
+from .table import (
+    ANGLES,
+    CYCLE,
+    LINKS,
+    GaitCurve,
+    GaitError,
+    GaitTable,
+    check_gait,
+    gait_from_json,
+    gait_presets,
+    gait_to_json,
+    renamed_gait,
+)
+
+__all__ = [
+    "ANGLES",
+    "CYCLE",
+    "LINKS",
+    "MOST_STEADY",
+    "Arm",
+    "Build",
+    "GaitCurve",
+    "GaitError",
+    "GaitPoser",
+    "GaitSettings",
+    "GaitTable",
+    "bone_twists",
+    "check_gait",
+    "close_group",
+    "diameters",
+    "gait_from_json",
+    "gait_presets",
+    "gait_to_json",
+    "renamed_gait",
+]

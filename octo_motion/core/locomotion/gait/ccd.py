@@ -57,7 +57,7 @@ _HARDLY: Final = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class JointChain:
     """What arms of one build have in common, lengths in any unit."""
 
     lengths: Floats
@@ -87,8 +87,8 @@ class Chain:
         return tuple(group for group, size in each if size == _PAIR and self.pairs_as_asked)
 
 
-def solve(
-    chain: Chain,
+def solve_ccd(
+    chain: JointChain,
     shape: Floats,
     links: Floats,
     targets: Floats,
@@ -117,7 +117,7 @@ def solve(
         own = aimed(turned(links[group], shape[segments]), lengths, goal)
         for _ in range(SWEEPS if len(own) > 1 else 0):
             own = swept(own, lengths, chain.weights[segments], goal)
-        directions[segments] = closed(own, lengths, goal, give=give)
+        directions[segments] = close_group(own, lengths, goal, give=give)
         root = root + chord(directions[segments], lengths)
     rounds = SOFTENINGS if softness > 0.0 or floor is not None else 0
     for number in range(1, rounds + 1):
@@ -133,12 +133,14 @@ def solve(
         root = np.zeros_like(root)
         for group, segments in enumerate(chain.groups):
             lengths, goal = chain.lengths[segments], targets[group + 1] - root
-            directions[segments] = closed(directions[segments], lengths, goal, steps, give=give)
+            directions[segments] = close_group(
+                directions[segments], lengths, goal, steps, give=give
+            )
             root = root + chord(directions[segments], lengths)
     return directions
 
 
-def asked_shape(chain: Chain, angles: Floats, sway: Floats) -> Floats:
+def asked_shape(chain: JointChain, angles: Floats, sway: Floats) -> Floats:
     """The shape that the gait asks for, (segments, 3, batch), each group seen from its link.
 
     Along each group the direction turns from halfway back to the link before to halfway on to
@@ -250,7 +252,7 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
     return result
 
 
-def closed(
+def close_group(
     directions: Floats,
     lengths: Floats,
     goal: Floats,
@@ -281,7 +283,7 @@ def closed(
 
 
 def overreach(chords: Floats, whole: Floats, give: float) -> Floats:
-    """How far beyond goals so far away groups of these lengths reach (see :func:`closed`)."""
+    """How far beyond goals so far away groups of these lengths reach (see :func:`close_group`)."""
     slack = np.clip(1.0 - chords / whole, _TINY, 1.0)
     return whole * slack * give / (slack + give)
 
@@ -302,7 +304,7 @@ def softened(directions: Floats, amount: float) -> Floats:
     return _made_unit(mean)
 
 
-def raised(heights: Floats, floor: Floats) -> Floats:
+def clamp_to_floor(heights: Floats, floor: Floats) -> Floats:
     """Heights (…, batch) that are never below the floor (batch,), with a smooth passage.
 
     Differences never grow: what is within reach of each other stays so.

@@ -16,17 +16,25 @@ from typing import Final
 import numpy as np
 
 from ...batched import running, turned
-from ...content_cache import Remembered, key_of
+from ...content_cache import ContentCache, content_key
 from ...errors import RigError, SettingsError
 from ...rotations import Floats, from_axis_angle, from_matrix, less_whole_turns, multiply, rotate
 from ...skeleton import Skeleton
-from ..rig.arm_chains import BodyFrame, Side, arm_azimuths, chain_of, joint_positions
-from ..rig.bone_rotations import ArmRest, arm_rest, bone_rotations
-from .ccd import Chain, asked_shape, overreach, raised, solve
+from ..rig import (
+    ArmRest,
+    BodyFrame,
+    Side,
+    arm_azimuths,
+    arm_rest,
+    bone_rotations,
+    chain_of,
+    joint_positions,
+)
+from .ccd import JointChain, asked_shape, clamp_to_floor, overreach, solve_ccd
 from .joint_groups import GROUPS, group_lengths, split_groups
 from .pseudo_targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
-from .swim_spread import opened
-from .table import GaitCurve, GaitTable, evaluate, variation
+from .swim_spread import swim_azimuths
+from .table import GaitCurve, GaitTable, gait_angles, variation
 
 MOST_STEADY: Final = 0.25
 """Cycles over which movement may be evened out: more, and it is no longer there."""
@@ -155,12 +163,12 @@ class Build:
     """Arms whose segments have the same proportions, solved together."""
 
     arms: tuple[int, ...]
-    chain: Chain
+    chain: JointChain
     widths: Floats
     """(links,) rest lengths H_g, in arm lengths."""
 
 
-class Generator:
+class GaitPoser:
     """Moves the arms of one body.
 
     Raises:
@@ -185,7 +193,7 @@ class Generator:
         # From an arm's own frame to the body's: azimuth counts from the front, −Y.
         bones = [arm.bones for arm in self._arms]
         lean = 0.0 if gait.on_ground else settings.lean
-        find = partial(opened, lean=lean) if lean else arm_azimuths
+        find = partial(swim_azimuths, lean=lean) if lean else arm_azimuths
         azimuths = find(skeleton, bones, body)
         # The same to a body whose +Z is the way that it swims along.
         self._round = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
@@ -209,7 +217,7 @@ class Generator:
         self._sway = settings.sway * sway
         self._builds = self._group(segments)
         self._floor = -np.inf
-        self._few: Remembered[tuple[Floats, Floats]] = Remembered()
+        self._few: ContentCache[tuple[Floats, Floats]] = ContentCache()
         if settings.stand and gait.on_ground:
             floor = float(np.quantile(self._whole_cycle()[0], _STANDING))
             if floor < -_LEAST_DEPTH * self.arm_length:
@@ -259,7 +267,7 @@ class Generator:
             part = Build(tuple(chosen), build.chain, build.widths)
             own = np.repeat(phases[:, None], len(chosen), axis=1)
             pairs = tuple(self._pairs[arm] for arm in chosen)
-            angles = evaluate(gait, own, pairs, steady=self._settings.steady)
+            angles = gait_angles(gait, own, pairs, steady=self._settings.steady)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
             directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
@@ -325,7 +333,7 @@ class Generator:
         """
         settings = self._settings
         steady = settings.steady
-        angles = evaluate(settings.gait, phases, self._pairs, steady=steady) + variation(
+        angles = gait_angles(settings.gait, phases, self._pairs, steady=steady) + variation(
             settings.gait,
             phases,
             self._pairs,
@@ -441,7 +449,7 @@ class Generator:
             posed = bone_rotations(
                 [self._rests[arm] for arm in columns],
                 in_armature.reshape(directions.shape),
-                twist(build, own),
+                bone_twists(build, own),
             )
             for place, arm in enumerate(columns):
                 rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
@@ -458,7 +466,7 @@ class Generator:
         if angles.shape[0] * angles.shape[1] > _FEW:
             return self._shapes(build, angles, steering)
         # What is asked again and again, about a gait as such.
-        key = key_of(build.arms, angles, steering)
+        key = content_key(build.arms, angles, steering)
         return self._few.get(key, lambda: self._shapes(build, angles, steering))
 
     def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
@@ -478,10 +486,10 @@ class Generator:
             columns = list(build.arms)
             own = (self._floor - self._roots[columns, 2]) / self._lengths[columns]
             floor = np.tile(own, frames)
-            targets[1:, 2] = raised(targets[1:, 2], floor)
+            targets[1:, 2] = clamp_to_floor(targets[1:, 2], floor)
         sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
         shape = asked_shape(build.chain, _batch_last(steered[..., [HEAD, PITCH]], batch), sway.T)
-        directions = solve(
+        directions = solve_ccd(
             build.chain,
             shape,
             _batch_last(links, batch),
@@ -519,12 +527,12 @@ class Generator:
             along = np.cumsum(shares) - shares
             sampled = np.interp(along, np.linspace(0.0, 1.0, len(weights)), weights)
             afloat = not self._settings.gait.on_ground
-            chain = Chain(shares, sizes, sampled, pairs_as_asked=afloat)
+            chain = JointChain(shares, sizes, sampled, pairs_as_asked=afloat)
             builds.append(Build(tuple(arms), chain, group_lengths(shares, sizes)))
         return tuple(builds)
 
 
-def twist(build: Build, angles: Floats) -> Floats:
+def bone_twists(build: Build, angles: Floats) -> Floats:
     """Radians (segments, frames, arms) by which each bone is twisted against the one before.
 
     Args:

@@ -20,7 +20,7 @@ import numpy as np
 from ...easing import smooth_step
 from ...rotations import Floats, from_axis_angle, less_whole_turns, to_matrix
 from ...skeleton import Skeleton
-from ..rig.arm_chains import BodyFrame, arm_azimuths
+from ..rig import BodyFrame, arm_azimuths
 
 _OPEN: Final = np.radians(45.0)
 """Lean from which on arms have opened all the way."""
@@ -29,7 +29,7 @@ _WIDEST: Final = np.radians(140.0)
 _SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
 
 
-def opened(
+def swim_azimuths(
     skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFrame, lean: float
 ) -> Floats:
     """Where each arm opens to (arms,), seen along the way: radians from the front, left positive.

@@ -146,7 +146,7 @@ class GaitTable:
         )
 
 
-def evaluate(
+def gait_angles(
     table: GaitTable, phases: Floats, pairs: tuple[int, ...], *, steady: float = 0.0
 ) -> Floats:
     """Angles of all arms.
@@ -197,7 +197,7 @@ def variation(
         limits: j and k, radians.
         seed: any whole number ≥ 0.
         period: cycles after which the numbers come again, 0 for never; or each arm's own.
-        steady: as of :func:`evaluate`.
+        steady: as of :func:`gait_angles`.
 
     Returns:
         (frames, arms, links, angles) radians.
@@ -281,7 +281,7 @@ def curve_from_degrees(phases: list[float], **angles: list[list[float]]) -> Gait
     return GaitCurve(np.radians(knots), np.radians(table))
 
 
-def check(table: GaitTable) -> GaitTable:
+def check_gait(table: GaitTable) -> GaitTable:
     """The table, if it can be used.
 
     Raises:
@@ -322,7 +322,7 @@ def check(table: GaitTable) -> GaitTable:
     return table
 
 
-def to_json(table: GaitTable) -> str:
+def gait_to_json(table: GaitTable) -> str:
     """The table as a text that people can edit: degrees, one list for each angle and link."""
     curves = {}
     for pair, curve in sorted(table.curves.items()):
@@ -360,15 +360,15 @@ def _rounded(values: Any) -> list[float]:
     return [float(f"{value:.12g}") for value in values]
 
 
-def from_json(text: str, source: str = "The gait file") -> GaitTable:
-    """The table in a text made by ``to_json`` or by hand.
+def gait_from_json(text: str, source: str = "The gait file") -> GaitTable:
+    """The table in a text made by ``gait_to_json`` or by hand.
 
     Args:
         text: JSON.
         source: what error messages call it, such as the file's name.
 
     Raises:
-        GaitError: no JSON, not a gait, from a newer version, or damaged (see ``check``).
+        GaitError: no JSON, not a gait, from a newer version, or damaged (see ``check_gait``).
     """
     try:
         content = json.loads(text)
@@ -420,7 +420,7 @@ def from_json(text: str, source: str = "The gait file") -> GaitTable:
         ) from error
     if manner not in MANNERS:
         raise GaitError(f"{source} has the manner {manner!r}.", "It must be walk, crawl or swim.")
-    return check(table)
+    return check_gait(table)
 
 
 def _arm_of(key: str) -> tuple[int, str]:
@@ -431,7 +431,7 @@ def _arm_of(key: str) -> tuple[int, str]:
     return int(pair), side
 
 
-def presets() -> dict[str, GaitTable]:
+def gait_presets() -> dict[str, GaitTable]:
     """The gaits that come with the extension, by name."""
     return dict(_shipped())
 
@@ -439,12 +439,12 @@ def presets() -> dict[str, GaitTable]:
 @cache
 def _shipped() -> dict[str, GaitTable]:
     tables = (
-        from_json(path.read_text(encoding="utf-8"), path.name)
+        gait_from_json(path.read_text(encoding="utf-8"), path.name)
         for path in sorted((Path(__file__).parent / "presets").glob("*.json"))
     )
     return {table.name: table for table in tables}
 
 
-def renamed(table: GaitTable, name: str) -> GaitTable:
+def renamed_gait(table: GaitTable, name: str) -> GaitTable:
     """The same table under another name."""
     return replace(table, name=name)

@@ -42,7 +42,7 @@ _MANY: Final = 0.5
 _TINY: Final = 1e-12
 
 
-def opened(
+def spread_chain(
     ways: tuple[Floats, Floats], chord: Floats, upward: Floats, ratio: Floats
 ) -> tuple[Floats, Floats]:
     """Ways in which a curve leaves and arrives, far enough from its chord for how long it is.
@@ -170,7 +170,7 @@ def bent(directions: Floats, parts: Floats, chord: Floats, share: Floats) -> Flo
     return ahead[:, None] * along + size[:, None] * unit(across)
 
 
-def blended(outward: Floats, start: Floats, end: Floats, share: Floats) -> Floats:
+def lerp_bends(outward: Floats, start: Floats, end: Floats, share: Floats) -> Floats:
     """Shapes (segments, 3, batch) between two others, by the angles at their joints.
 
     Directions themselves would have no middle where they are opposite. What an arm's shape
@@ -251,7 +251,7 @@ def evened(directions: Floats, share: Floats) -> Floats:
     return unit(result)
 
 
-def raised(
+def raise_over_ground(
     directions: Floats,
     lengths: Floats,
     *,
@@ -298,7 +298,7 @@ def raised(
             if len(low) < _MANY * len(below[0]):
                 # Those that are high enough stay as they are, in all rounds.
                 result = directions.copy()
-                result[..., low] = raised(
+                result[..., low] = raise_over_ground(
                     directions[..., low],
                     lengths[:, low],
                     free=free[:, low],

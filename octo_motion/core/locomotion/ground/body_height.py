@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...rotations import Floats, continuous, multiply, normalized, rotate, shortest_arc
-from ..path.heading import Bearings
-from ..path.route import Route
-from ..path.travel import TravelSettings, walked_at
+from ..path import Bearings, Route, TravelSettings, walked_at
 from .surface import Ground
 
 _PER_REACH: Final = 24

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats, multiply, normalized, rotate
-from ..gait.table import CYCLE
+from ..gait import CYCLE
 from .body_height import BodyLine
-from .crawl_planner import CrawlSettings, Holds, Journey, plan_crawl
+from .crawl_planner import CrawlHolds, CrawlPath, CrawlSettings, plan_crawl
 
 _PER_REACH: Final = 32
 """Samples of a journey to the length of an arm."""
@@ -70,7 +70,7 @@ class Rhythm(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Even:
+class EvenTiming:
     """One cycle per stride."""
 
     stride: float
@@ -98,7 +98,7 @@ class Even:
 class Tabled:
     """Each arm by a table of its own."""
 
-    tables: Sequence[Table]
+    tables: Sequence[ContactTable]
     middle: float
     """Phase of the gait, radians, half way through a hold."""
     rounds: Sequence[int] | None = None
@@ -122,7 +122,7 @@ class Tabled:
         return found[..., 0], found[..., 1]
 
 
-def free(holds: Holds, arms: int, *, middle: float, duty: float) -> Tabled:
+def free(holds: CrawlHolds, arms: int, *, middle: float, duty: float) -> Tabled:
     """The rhythm of arms whose cycles begin and end with their own holds.
 
     Args:
@@ -134,8 +134,8 @@ def free(holds: Holds, arms: int, *, middle: float, duty: float) -> Tabled:
     return Tabled([_table(holds, arm, duty) for arm in range(arms)], middle)
 
 
-def at_rest(
-    rhythm: Even | Tabled,
+def timing_at_rest(
+    rhythm: EvenTiming | Tabled,
     length: float,
     *,
     start: bool,
@@ -156,9 +156,9 @@ def at_rest(
         middle: phase of the gait half way through a hold, radians.
         duty: share of a cycle that a hold takes.
     """
-    if isinstance(rhythm, Even):
+    if isinstance(rhythm, EvenTiming):
         ends = (rhythm.phases(np.array([0.0, length])) - middle) / CYCLE
-        tables: Sequence[Table] = [
+        tables: Sequence[ContactTable] = [
             _even_table(first, last, rhythm.stride, duty) for first, last in ends.T.tolist()
         ]
     else:
@@ -253,7 +253,7 @@ def _journey(
     *,
     reach: float,
     stands: tuple[bool, bool] = (False, False),
-) -> Journey:
+) -> CrawlPath:
     """What a crawl is planned from.
 
     Args:
@@ -267,7 +267,7 @@ def _journey(
     centres, rotations = way
     directions = rotate(multiply(rotations[:, None], outward), np.array([1.0, 0.0, 0.0]))
     places = centres[:, None] + rotate(rotations[:, None], roots)
-    return Journey(
+    return CrawlPath(
         distance=distance,
         roots=places[..., :2],
         outward=normalized(directions[..., :2]),
@@ -277,7 +277,7 @@ def _journey(
     )
 
 
-def _cut(holds: Holds, arm: int, loop: float, start: float) -> tuple[Floats, Floats, Floats]:
+def _cut(holds: CrawlHolds, arm: int, loop: float, start: float) -> tuple[Floats, Floats, Floats]:
     """Starts, ends and aims of an arm's holds in a loop that is cut at a distance."""
     own = np.flatnonzero(holds.arm == arm)
     own = own[np.searchsorted(holds.start[own], start) :]
@@ -293,7 +293,7 @@ def _cut(holds: Holds, arm: int, loop: float, start: float) -> tuple[Floats, Flo
     )
 
 
-def _aims(holds: Holds, chosen: NDArray[Any]) -> Floats:
+def _aims(holds: CrawlHolds, chosen: NDArray[Any]) -> Floats:
     """Angles and distances of some holds (…, 2)."""
     return np.stack([holds.turn[chosen], holds.away[chosen]], axis=-1)
 
@@ -308,18 +308,18 @@ def _support(arms: Sequence[tuple[Floats, Floats, Floats]], loop: float) -> tupl
     return int(holding.min()), int(holding.sum())
 
 
-def _looped(start: Floats, end: Floats, aims: Floats, loop: float, duty: float) -> Table:
+def _looped(start: Floats, end: Floats, aims: Floats, loop: float, duty: float) -> ContactTable:
     """The table of an arm whose holds come again after a loop."""
     many = len(start)
     turns = np.arange(-_LOOPS, _LOOPS + 2)
     at = (loop * turns[:, None, None] + np.stack([start, end], axis=1)).ravel()
     number = many * turns[:, None] + np.arange(many, dtype=np.float64)
     values = (number[..., None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
-    return Table(at, values, _monotone(at, values), aims=aims, repeats=True)
+    return ContactTable(at, values, _monotone(at, values), aims=aims, repeats=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ContactTable:
     """How far one arm is in its cycles: a rising curve through knots, straight on beyond them."""
 
     at: Floats
@@ -390,7 +390,7 @@ class Table:
         return np.where(low, before, np.where(high, after, inside))
 
 
-def _even_table(first: float, last: float, stride: float, duty: float) -> Table:
+def _even_table(first: float, last: float, stride: float, duty: float) -> ContactTable:
     """The table of an arm that has the same cycle all the way, its knots where holds begin and end.
 
     Two knots would do for it. But what is changed next to one of them changes all that lies between
@@ -404,10 +404,10 @@ def _even_table(first: float, last: float, stride: float, duty: float) -> Table:
     """
     holds = np.arange(np.floor(first) - 1.0, np.ceil(last) + 2.0)
     values = (holds[:, None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
-    return Table(stride * (values - first), values, np.full(len(values), 1.0 / stride))
+    return ContactTable(stride * (values - first), values, np.full(len(values), 1.0 / stride))
 
 
-def _table(holds: Holds, arm: int, duty: float) -> Table:
+def _table(holds: CrawlHolds, arm: int, duty: float) -> ContactTable:
     own: NDArray[np.bool_] = holds.arm == arm
     start, end = holds.start[own], holds.end[own]
     number = np.arange(len(start), dtype=np.float64)
@@ -424,10 +424,12 @@ def _table(holds: Holds, arm: int, duty: float) -> Table:
     values = np.concatenate(
         [values[0] - np.array([1.0, swing]), values, values[-1] + np.array([swing, 1.0])]
     )
-    return Table(at, values, _monotone(at, values), aims=_aims(holds, own))
+    return ContactTable(at, values, _monotone(at, values), aims=_aims(holds, own))
 
 
-def _rested(table: Table, length: float, duty: float, *, start: bool, end: bool) -> Table:
+def _rested(
+    table: ContactTable, length: float, duty: float, *, start: bool, end: bool
+) -> ContactTable:
     """The table of an arm that lies on the ground where the body stands."""
     first, low = _going(table, duty) if start else (0.0, -np.inf)
     last, high = _stopping(table, length, duty) if end else (0.0, np.inf)
@@ -459,7 +461,7 @@ def _rested(table: Table, length: float, duty: float, *, start: bool, end: bool)
     return replace(table, at=at, values=values, slopes=slopes, starts=start, stops=end)
 
 
-def _going(table: Table, duty: float) -> tuple[float, float]:
+def _going(table: ContactTable, duty: float) -> tuple[float, float]:
     """Where in its cycles an arm is at the start, and the distance at which it is as it would be.
 
     It either swings at once, and then lands as it would, or later, and then lets go as it would.
@@ -472,7 +474,7 @@ def _going(table: Table, duty: float) -> tuple[float, float]:
     return first, float(table.distances(np.array([joint]))[0])
 
 
-def _stopping(table: Table, length: float, duty: float) -> tuple[float, float]:
+def _stopping(table: ContactTable, length: float, duty: float) -> tuple[float, float]:
     """Where in its cycles an arm is at the end, and the distance up to which it is as it would be.
 
     It either takes no more step, or takes its last one in time.

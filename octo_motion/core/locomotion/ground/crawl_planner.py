@@ -101,7 +101,7 @@ class CrawlSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Journey:
+class CrawlPath:
     """The body at samples along its way, as crawling needs it. World, metres, seen from above."""
 
     distance: Floats
@@ -119,7 +119,7 @@ class Journey:
 
 
 @dataclass(frozen=True, eq=False)
-class Holds:
+class CrawlHolds:
     """Holds of all arms, sorted by arm and start."""
 
     arm: NDArray[np.intp]
@@ -142,7 +142,7 @@ class Holds:
         return len(self.arm)
 
 
-def plan_crawl(journey: Journey, settings: CrawlSettings) -> Holds:
+def plan_crawl(journey: CrawlPath, settings: CrawlSettings) -> CrawlHolds:
     """Where the arms hold on along a journey.
 
     An arm's next hold depends on the holds before it, but all of them on the journey alone: any
@@ -175,7 +175,7 @@ class _Hold:
 class _Crawl:
     """One journey, hold by hold in the order in which they begin."""
 
-    def __init__(self, journey: Journey, settings: CrawlSettings) -> None:
+    def __init__(self, journey: CrawlPath, settings: CrawlSettings) -> None:
         self._journey = journey
         self._settings = settings
         self._unit = journey.length
@@ -196,7 +196,7 @@ class _Crawl:
         self._last = last if stops else np.inf
         """Where the body stands."""
 
-    def run(self) -> Holds:
+    def run(self) -> CrawlHolds:
         distance, unit = self._journey.distance, self._unit
         first, last = float(distance[0]), float(distance[-1])
         if np.isfinite(self._first):
@@ -385,9 +385,9 @@ class _Crawl:
             root += beyond[:, None] * journey.ahead[np.where(beyond < 0.0, 0, -1)]
         return root, normalized(outward)
 
-    def _sorted(self) -> Holds:
+    def _sorted(self) -> CrawlHolds:
         holds = sorted(self._holds, key=lambda each: (each.arm, each.start))
-        return Holds(
+        return CrawlHolds(
             arm=np.array([each.arm for each in holds], dtype=np.intp),
             start=np.array([each.start for each in holds]),
             end=np.array([each.end for each in holds]),

@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, rotate, rotate_in_plane
-from ..gait.table import CYCLE
-from ..path.course import Line
+from ..gait import CYCLE
+from ..path import Line
 from .contact_curve import laid
 from .contact_timing import Rhythm
 from .foothold_reach import PEELING, Passing, hold_times, peeled_to, spots
@@ -34,7 +34,7 @@ _EARLIEST: Final = 0.46
 
 
 @dataclass(frozen=True, eq=False)
-class Wish:
+class ContactOverride:
     """What an artist wants of one foothold."""
 
     arm: int
@@ -111,7 +111,7 @@ def lay(
     *,
     middle: float,
     cycles: tuple[int, int],
-    wishes: Sequence[Wish] = (),
+    wishes: Sequence[ContactOverride] = (),
     seed: int = 0,
     alike: bool = False,
 ) -> Footholds:
@@ -222,7 +222,9 @@ class _Wanted:
     headings: Floats
 
 
-def _wanted(limbs: Limbs, shape: tuple[int, int], first: int, wishes: Sequence[Wish]) -> _Wanted:
+def _wanted(
+    limbs: Limbs, shape: tuple[int, int], first: int, wishes: Sequence[ContactOverride]
+) -> _Wanted:
     present, moved, turned = np.ones(shape, dtype=bool), *np.zeros((2, *shape), dtype=bool)
     places, (shift, headings) = np.zeros((*shape, 3)), np.zeros((2, *shape))
     if limbs.free is not None:

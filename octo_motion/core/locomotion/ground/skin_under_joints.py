@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, conjugate, rotate
-from ..rig.skin_offset import ArmSkin
+from ..rig import ArmSkin
 from .surface import Ground
 
 _ALONG: Final = np.linspace(0.5, 1.0, 5)

@@ -21,7 +21,16 @@ import numpy as np
 from ...batched import dot
 from ...easing import least_jerk, smooth_step
 from ...rotations import Floats
-from .arm_curves import bent, blended, curve, drawn, evened, opened, raised, unit
+from .arm_curves import (
+    bent,
+    curve,
+    drawn,
+    evened,
+    lerp_bends,
+    raise_over_ground,
+    spread_chain,
+    unit,
+)
 from .foothold_reach import PEELING
 from .footholds import UNROLLING, Footholds
 from .stance_settings import Limbs, StanceSettings
@@ -253,7 +262,7 @@ def pulled(
         settings: how arms hold on.
     """
     strains, standing = _held(batch, shapes, held, ground, settings)
-    return strains, blended(batch.outward, standing, shapes, 1.0 - held.weight)
+    return strains, lerp_bends(batch.outward, standing, shapes, 1.0 - held.weight)
 
 
 def unheld(held: Hold) -> Floats:
@@ -296,7 +305,7 @@ def stand(
         most = np.max(part.radii, axis=0) + rising
         soft = _SOFT * (part.radii + let_go * (most - part.radii)) + _TINY
         directions = directions.copy()
-        directions[..., swinging] = raised(
+        directions[..., swinging] = raise_over_ground(
             directions[..., swinging],
             lengths[:, swinging],
             free=free + (1.0 - free) * at_once,
@@ -356,7 +365,7 @@ def _held(
     for number, steps in enumerate(_STEPS):
         # The last time it only has to meet its goal.
         softer = evened(own, _EVENED * free) if number < len(_STEPS) - 1 else own
-        own = raised(
+        own = raise_over_ground(
             softer,
             lengths,
             free=free,
@@ -381,7 +390,7 @@ def _held(
     beyond = (1.0 - to_goal) * smooth_step((batch.reach[1:] - held.lies_to) / batch.lengths)
     skins = np.concatenate([batch.radii[: held.touching], held.skins])
     soft = _SOFT * skins + _TINY
-    own = raised(
+    own = raise_over_ground(
         own,
         lengths,
         free=beyond,
@@ -534,7 +543,9 @@ def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Flo
     falling = _FALLING * slack
     arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
     leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
-    leaving, arriving = opened((leaving, arriving), chord, batch.upward, ratio / (1.0 + strain))
+    leaving, arriving = spread_chain(
+        (leaving, arriving), chord, batch.upward, ratio / (1.0 + strain)
+    )
     size = held.lies_from * (1.0 + strain)
     middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
     parts = np.clip(held.lies_from - reach[:-1], 0.0, lengths)

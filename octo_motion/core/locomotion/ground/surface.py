@@ -14,7 +14,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from ...content_cache import Remembered, key_of
+from ...content_cache import ContentCache, content_key
 from ...errors import GroundError
 from ...rotations import Floats
 
@@ -33,8 +33,8 @@ _MOST_SAMPLES: Final = 4_000_000
 _ONE: Final = 1e-4
 """Share of a sample's width within which faces are at one height."""
 
-_single_known: Final[Remembered[HeightField | None]] = Remembered(3)
-_extents: Final[Remembered[tuple[Floats, Floats]]] = Remembered(3)
+_single_known: Final[ContentCache[HeightField | None]] = ContentCache(3)
+_extents: Final[ContentCache[tuple[Floats, Floats]]] = ContentCache(3)
 
 
 class Ground(Protocol):
@@ -57,7 +57,7 @@ def normals(ground: Ground, points: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Plane:
+class LevelGround:
     """A level or sloping plane."""
 
     z: float
@@ -131,7 +131,7 @@ def _along(heights: Floats, first: np.ndarray, share: Floats) -> Floats:
     return rise
 
 
-def sampled(
+def sample_ground(
     triangles: Floats,
     path: Floats,
     needed: np.ndarray,
@@ -169,8 +169,8 @@ def sampled(
     shape = tuple(int(each) + 1 for each in np.rint((high - low) / spacing))
     grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
     if content is None:
-        content = key_of(triangles)
-    key = key_of(content, grid.origin, spacing, shape)
+        content = content_key(triangles)
+    key = content_key(content, grid.origin, spacing, shape)
     lowest, highest = _extents.get(key, lambda: _extent(triangles, grid))
     single = _single_known.get(key, lambda: _single(grid, lowest, highest))
     if single is not None:
@@ -190,7 +190,7 @@ def sampled(
     return single or HeightField(grid.origin, spacing, _filled(heights))
 
 
-def along_path(path: Floats, *, reach: float, spacing: float, softness: float) -> Ground:
+def ground_along_path(path: Floats, *, reach: float, spacing: float, softness: float) -> Ground:
     """The ground that a route itself describes: as high as the route where that is nearest.
 
     Args:
@@ -200,7 +200,7 @@ def along_path(path: Floats, *, reach: float, spacing: float, softness: float) -
         softness: metres over which the heights of neighbouring stretches pass into each other.
     """
     if np.ptp(path[:, 2]) <= 1e-6 * max(reach, 1e-9):
-        return Plane(float(path[:, 2].mean()))
+        return LevelGround(float(path[:, 2].mean()))
     low, high = path[:, :2].min(axis=0) - reach, path[:, :2].max(axis=0) + reach
     spacing = max(spacing, float(np.sqrt(np.prod(high - low) * len(path) / _MOST_SAMPLES / 4.0)))
     x, y = (

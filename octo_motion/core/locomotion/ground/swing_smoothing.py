@@ -23,7 +23,7 @@ _TINY: Final = 1e-12
 
 
 @dataclass(frozen=True)
-class Steady:
+class SwingSmoothing:
     """Means over time: of so many frames, in part of one frame more to either side."""
 
     frames: int
@@ -32,7 +32,7 @@ class Steady:
     """Share of the mean of one frame more, 0…1."""
 
     @classmethod
-    def over(cls, cycles: float, frames_per_cycle: float) -> Steady | None:
+    def over(cls, cycles: float, frames_per_cycle: float) -> SwingSmoothing | None:
         """Means over so many cycles before and after each frame; none where that is nothing.
 
         Weights that fall off evenly to nothing within h have a variance of h² / 6, as has the
@@ -80,17 +80,17 @@ class Steady:
     def _mean(self, values: Floats) -> Floats:
         """Means (segments, 3, frames, arms) over the frames round each."""
         most, count = self.frames + 1, values.shape[2]
-        around = values[:, :, np.clip(np.arange(-most, count + most), 0, count - 1)]
+        frames_around = values[:, :, np.clip(np.arange(-most, count + most), 0, count - 1)]
         weights = np.full(2 * most + 1, (1.0 - self.more) / (2 * most - 1))
         weights[[0, -1]] = 0.0
         weights += self.more / (2 * most + 1)
-        result = weights[0] * around[:, :, :count]
+        result = weights[0] * frames_around[:, :, :count]
         for step, weight in enumerate(weights[1:].tolist(), start=1):
-            result += weight * around[:, :, step : step + count]
+            result += weight * frames_around[:, :, step : step + count]
         return result
 
 
-def around(part: slice, reach: int, count: int, *, cyclic: bool) -> tuple[np.ndarray, slice]:
+def frames_around(part: slice, reach: int, count: int, *, cyclic: bool) -> tuple[np.ndarray, slice]:
     """Numbers of some frames and of those round them, and where among these the frames are.
 
     Args:

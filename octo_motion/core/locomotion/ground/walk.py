@@ -12,20 +12,17 @@ import numpy as np
 from ...batched import turned
 from ...rotations import Floats, conjugate, from_matrix, multiply, rotate
 from ...skeleton import Skeleton
-from ..gait.gait_poser import Build, Generator, twist
-from ..gait.table import CYCLE
-from ..path.course import Line
-from ..rig.arm_chains import BodyFrame
-from ..rig.bone_rotations import Facing, bone_rotations, carried_to, sucker_sides
-from ..rig.skin_offset import ArmSkin
+from ..gait import CYCLE, Build, GaitPoser, bone_twists
+from ..path import Line
+from ..rig import ArmSkin, BodyFrame, Facing, bone_rotations, carried_to, sucker_sides
 from .arm_curves import unit
-from .contact_timing import Even, Rhythm
-from .footholds import Footholds, Wish, cycles_at, lay, relaid
+from .contact_timing import EvenTiming, Rhythm
+from .footholds import ContactOverride, Footholds, cycles_at, lay, relaid
 from .skin_under_joints import Seen, skin_below
 from .stance_settings import Limbs, StanceSettings
 from .stance_swing import Batch, Hold, Stood, hold, pulled, stand, unheld
 from .surface import Ground
-from .swing_smoothing import Steady
+from .swing_smoothing import SwingSmoothing
 
 _ASKEW: Final = np.radians(35.0)
 """How far from straight outward a foothold may lie, and an arm from there."""
@@ -136,7 +133,7 @@ class GroundedWalk:
     def __init__(  # noqa: PLR0917 - what it is made of, in the order in which it is made
         self,
         skeleton: Skeleton,
-        generator: Generator,
+        generator: GaitPoser,
         body: BodyFrame,
         line: Line,
         ground: Ground,
@@ -146,7 +143,7 @@ class GroundedWalk:
         radii: Sequence[Floats],
         may_stretch: Sequence[bool],
         phases: tuple[float, float],
-        wishes: Sequence[Wish] = (),
+        wishes: Sequence[ContactOverride] = (),
         rhythm: Rhythm | None = None,
         alike: bool = False,
         skins: Sequence[ArmSkin] = (),
@@ -156,7 +153,7 @@ class GroundedWalk:
         self._middle = generator.settings.gait.power_phase
         self._body_turn = from_matrix(body.rotation)
         self._stride = line.settings.stride
-        self._rhythm = rhythm or Even(self._stride, generator.offsets)
+        self._rhythm = rhythm or EvenTiming(self._stride, generator.offsets)
         ends, _ = cycles_at(self.arm_phases(np.array(phases)), self._middle)
         first, last = ends
         self._cycles = int(first.min()), int(last.max())
@@ -266,7 +263,7 @@ class GroundedWalk:
         orientations: Floats,
         higher: Raise | None = None,
         *,
-        steady: Steady | None = None,
+        steady: SwingSmoothing | None = None,
     ) -> GroundedPoses:
         """The arms at some frames.
 
@@ -332,7 +329,7 @@ class GroundedWalk:
                 ways = steady.evened(ways.reshape(each_frame), share).reshape(ways.shape)
                 evened.append((ways - before).reshape(each_frame))
             stood = stand(arms, (longer, ways), held, self._ground, self._settings)
-            posed = self._rotations(columns, stood, held, to_armature, twist(build, own))
+            posed = self._rotations(columns, stood, held, to_armature, bone_twists(build, own))
             longer = stood.strains.reshape(segments, frames, many)
             for place, arm in enumerate(columns):
                 rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]

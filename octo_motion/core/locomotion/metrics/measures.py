@@ -13,7 +13,7 @@ import numpy as np
 
 from ...rotations import Floats, multiply
 from ...rotations import conjugate as inverse
-from ..ground.surface import Ground
+from ..ground import Ground
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,16 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ....blender.animation import actions
-from ....blender.animation.stretching import strains_of
-from ...keyframes.playback import rotations_of, values_at
+from ....blender.animation import Channel, object_places, rotation_path, strains_of
+from ...keyframes import rotations_of, values_at
 from ...rotations import Floats
 from ...skeleton import Skeleton
-from ..rig.placement import carried_by_root_bone
-from ..rig.poses import Poses, between
+from ..rig import Poses, carried_by_root_bone, halfway_linear
 from .report import Measured
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class KeyedRig:
     """Whose keys they are."""
 
     armature: bpy.types.Object
@@ -35,7 +33,7 @@ class Rig:
     """(4, 4) of the object, of uniform scale, where a bone travels."""
 
 
-def as_keyed(measured: Measured, rig: Rig, channels: Sequence[actions.Channel]) -> Measured:
+def measure_keyed(measured: Measured, rig: KeyedRig, channels: Sequence[Channel]) -> Measured:
     """What is measured of a motion, of what its keys play in place of what was computed.
 
     Whether arms overlap, and how far they are from their targets, stays as it was computed.
@@ -52,18 +50,18 @@ def as_keyed(measured: Measured, rig: Rig, channels: Sequence[actions.Channel]) 
     poses = _poses(measured.poses, rig, by_path, frames, frames)
     computed = measured.poses
     halfway = Poses(
-        between(computed.rotations, turns=True),
-        between(computed.strains),
-        between(computed.locations),
-        between(computed.orientations, turns=True),
+        halfway_linear(computed.rotations, turns=True),
+        halfway_linear(computed.strains),
+        halfway_linear(computed.locations),
+        halfway_linear(computed.orientations, turns=True),
     )
     return replace(measured, poses=poses, halfway=_poses(halfway, rig, by_path, frames, halves))
 
 
 def _poses(
     computed: Poses,
-    rig: Rig,
-    channels: Mapping[str, actions.Channel],
+    rig: KeyedRig,
+    channels: Mapping[str, Channel],
     frames: Floats,
     times: Floats,
 ) -> Poses:
@@ -84,7 +82,7 @@ def _poses(
     alongs: dict[str, Floats] = {}
     for place, name in enumerate(bones):
         bone = rig.armature.pose.bones[name]
-        turned = played(actions.rotation_path(bone))
+        turned = played(rotation_path(bone))
         if turned is not None:
             rotations[:, place] = rotations_of(turned, bone.rotation_mode)
         scaled = played(bone.path_from_id("scale"))
@@ -95,12 +93,12 @@ def _poses(
         return Poses(rotations, strains, computed.locations, computed.orientations)
     carrier = rig.armature.pose.bones[rig.root_bone] if rig.root_bone else rig.armature
     moved = played(carrier.path_from_id("location") if rig.root_bone else "location")
-    turned = played(actions.rotation_path(carrier))
+    turned = played(rotation_path(carrier))
     if moved is None or turned is None:
         return Poses(rotations, strains, computed.locations, computed.orientations)
     turns = rotations_of(turned, carrier.rotation_mode)
     if rig.root_bone:
         places = carried_by_root_bone(rig.skeleton, rig.root_bone, rig.world, moved, turns)
     else:
-        places = actions.object_places(rig.armature, moved, turns)
+        places = object_places(rig.armature, moved, turns)
     return Poses(rotations, strains, *places)

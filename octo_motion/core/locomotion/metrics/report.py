@@ -14,10 +14,9 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, rotate
-from ..clearance.capsule_overlap import Separation
-from ..ground.surface import Ground
-from ..rig.arm_frames import ArmFrames
-from ..rig.poses import Poses, between
+from ..clearance import Separation
+from ..ground import Ground
+from ..rig import ArmFrames, Poses, halfway_linear
 from . import measures as quality
 from .measures import Worst
 
@@ -137,7 +136,7 @@ def _halved(values: Floats, half: Floats | None, *, turns: bool = False) -> Floa
         half: those half way, none for straight on from one frame to the next.
         turns: whether they are unit quaternions.
     """
-    return _joined(values, between(values, turns=turns) if half is None else half)
+    return _joined(values, halfway_linear(values, turns=turns) if half is None else half)
 
 
 def _joined(values: np.ndarray, half: np.ndarray) -> np.ndarray:

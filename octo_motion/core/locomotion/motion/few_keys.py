@@ -10,24 +10,23 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ....blender.animation import actions
-from ....blender.animation.stretching import hands_on
-from ...keyframes.playback import values_at
-from ...keyframes.reduction import (
+from ....blender.animation import Channel, channel_unit, hands_on
+from ...keyframes import (
     LOCATION,
     SCALE,
     BezierKeys,
-    Chain,
     Limb,
+    LimbChain,
+    Residuals,
     Track,
     chain_to_tip,
     reduce_keys,
     reducing,
+    values_at,
 )
-from ...keyframes.residuals import Errors
 from ...rotations import Floats
 from ...skeleton import Skeleton
-from ..gait.gait_poser import Arm
+from ..gait import Arm
 
 MANTLE_GROUP: Final = "Mantle"
 
@@ -73,17 +72,17 @@ class Body:
 class Motion:
     """All channels of one shot, by what an animator moves as one."""
 
-    travel: Sequence[actions.Channel]
+    travel: Sequence[Channel]
     """A location and a rotation, of the object or of a bone; none in place."""
-    arms: Sequence[actions.Channel]
+    arms: Sequence[Channel]
     """Rotations of the arms' bones, one arm after the other."""
-    mantle: Sequence[actions.Channel]
-    stretch: Sequence[actions.Channel] = ()
+    mantle: Sequence[Channel]
+    stretch: Sequence[Channel] = ()
     """Scales of the arms' bones that stretch."""
     lying: Sequence[np.ndarray] = ()
     """For each arm (moments, joints) which rest on the ground, none where nothing does."""
 
-    def all(self) -> list[actions.Channel]:
+    def all(self) -> list[Channel]:
         """Every channel, as one key per frame."""
         return [*self.travel, *self.arms, *self.mantle, *self.stretch]
 
@@ -97,7 +96,7 @@ def reduced(
     every: int = 1,
     dense: bool = False,
     loops: bool = False,
-) -> Generator[float, None, list[actions.Channel]]:
+) -> Generator[float, None, list[Channel]]:
     """The channels with few keys, grouped by arm, in steps that yield the share that is done.
 
     Args:
@@ -112,7 +111,7 @@ def reduced(
     Raises:
         SettingsError: without tolerance, no key can be left out.
     """
-    parts: list[Sequence[actions.Channel]] = []
+    parts: list[Sequence[Channel]] = []
     limbs: list[Limb] = []
     found: list[list[BezierKeys]] = []
     distance: float | Floats = tolerances.distance
@@ -123,7 +122,7 @@ def reduced(
         parts.append(motion.travel)
         # What it does not take is left to the arms, frame by frame.
         played = [values_at(keys, frames) for keys in found[0]]
-        carried = Errors(travel).measure(played)[1] * travel.distance / unit
+        carried = Residuals(travel).measure(played)[1] * travel.distance / unit
         distance = distance - carried
     rest = iter(motion.arms)
     for number, arm in enumerate(body.arms):
@@ -157,7 +156,7 @@ def reduced(
     ]
 
 
-def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> Chain:
+def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> LimbChain:
     """An arm's chain, of which some bones stretch: their tracks come after those of all turns."""
     chain = chain_to_tip(body.skeleton, arm.bones)
     if not stretched:
@@ -170,7 +169,7 @@ def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> Chain:
     )
 
 
-def _room(chain: Chain, lying: np.ndarray, held: float | Floats) -> Floats:
+def _room(chain: LimbChain, lying: np.ndarray, held: float | Floats) -> Floats:
     """How far the ends of the bones of an arm may be off (moments, bones), as its joints rest."""
     (turned,) = np.nonzero(np.array(chain.turned) >= 0)
     result = np.full((len(lying), len(chain.turned)), np.inf)
@@ -184,7 +183,7 @@ def _length(skeleton: Skeleton, arm: Arm) -> float:
     return float(np.linalg.norm(chain_to_tip(skeleton, arm.bones).steps, axis=1).sum())
 
 
-def _tracks(channels: Sequence[actions.Channel], kinds: Sequence[str]) -> list[Track]:
+def _tracks(channels: Sequence[Channel], kinds: Sequence[str]) -> list[Track]:
     return [Track(channel.values, kind) for channel, kind in zip(channels, kinds, strict=True)]
 
 
@@ -198,7 +197,7 @@ def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> tuple[Limb, f
         mode = body.armature.rotation_mode
         pivot = np.zeros(3)
         # The armature's unit, as the object's location has it.
-        unit = body.scale / actions.channel_unit(body.armature)
+        unit = body.scale / channel_unit(body.armature)
     held = tolerances.held if motion.lying else np.inf
     limb = Limb(
         tracks=_tracks(motion.travel, [LOCATION, mode]),

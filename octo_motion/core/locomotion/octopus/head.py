@@ -13,7 +13,7 @@ from ...rotations import Floats, normalized
 from .body import EYE_ANGLE, EYE_STATION, MANTLE_WIDEST, SIPHON_STATION, BodyForm
 from .rig import EYE_LEFT, EYE_RIGHT, HEAD, SIPHON
 from .sheets import END_ROWS, HEAD_ROWS, Sheet
-from .surface import Material, Surface
+from .surface import SkinMaterial, Surface
 from .topology import Indices, cap_size, patch_border
 from .weights import Influences, mixed, rigid
 
@@ -145,8 +145,8 @@ def _add_eye(
     # The head's skin may bend towards the mantle; the lids must fit the ball.
     shares = np.array([*_SLOPE_STEPS, *np.ones(len(lids))])
     influences = _from_border(around, HEAD, shares)
-    last = surface.add_rings(loop, rings, influences, [Material.SKIN] * len(rings))
-    surface.add_cap(last, rings[-1], rigid(HEAD, (1, 1)), Material.SKIN, first_side=first_side)
+    last = surface.add_rings(loop, rings, influences, [SkinMaterial.SKIN] * len(rings))
+    surface.add_cap(last, rings[-1], rigid(HEAD, (1, 1)), SkinMaterial.SKIN, first_side=first_side)
     _add_eyeball(surface, form, bone)
 
 
@@ -186,12 +186,19 @@ def _add_eyeball(surface: Surface, form: BodyForm, bone: int) -> None:
     back = surface.add_vertices(rings[0], rigid(bone, (1,)))
     reverse = -np.arange(_EYEBALL_COLUMNS) + side
     surface.add_cap(
-        back[reverse], rings[0][reverse], influences, Material.EYE, first_side=side, onto=onto_ball
+        back[reverse],
+        rings[0][reverse],
+        influences,
+        SkinMaterial.EYE,
+        first_side=side,
+        onto=onto_ball,
     )
     eye_rings = len(rings) - 1 - _PUPIL_RINGS
-    materials = [Material.EYE] * eye_rings + [Material.PUPIL] * _PUPIL_RINGS
+    materials = [SkinMaterial.EYE] * eye_rings + [SkinMaterial.PUPIL] * _PUPIL_RINGS
     front = surface.add_rings(back, rings[1:], influences, materials)
-    surface.add_cap(front, rings[-1], influences, Material.PUPIL, first_side=side, onto=onto_ball)
+    surface.add_cap(
+        front, rings[-1], influences, SkinMaterial.PUPIL, first_side=side, onto=onto_ball
+    )
 
 
 def _add_siphon(
@@ -205,5 +212,7 @@ def _add_siphon(
     tube = root + along * axis + radius * outward
     rings = np.concatenate([_slope(around, tube[0]), tube])
     influences = _from_border(around, SIPHON, _SIPHON_SHARES)
-    last = surface.add_rings(loop, rings, influences, [Material.SKIN] * len(rings))
-    surface.add_cap(last, rings[-1], rigid(SIPHON, (1, 1)), Material.BEAK, first_side=first_side)
+    last = surface.add_rings(loop, rings, influences, [SkinMaterial.SKIN] * len(rings))
+    surface.add_cap(
+        last, rings[-1], rigid(SIPHON, (1, 1)), SkinMaterial.BEAK, first_side=first_side
+    )

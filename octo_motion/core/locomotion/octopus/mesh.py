@@ -17,7 +17,7 @@ from .rig import BODY, MANTLE
 from .shape import OctopusShape
 from .sheets import ARMS_BELOW, BEAK_ROWS, END_POLAR, Sheet, column_angles, lower_sheet, upper_sheet
 from .suckers import add_ventral_strips
-from .surface import Material, OctopusMesh, Surface
+from .surface import OctopusMesh, SkinMaterial, Surface
 from .topology import Indices, cap_size, closed, sheet_quads
 from .weights import along_arm, rigid
 
@@ -32,7 +32,7 @@ def build_mesh(shape: OctopusShape) -> OctopusMesh:
     below = surface.add_vertices(lower.points, lower.influences)
 
     wanted = add_head_details(surface, form, upper, above)
-    surface.add_quads(sheet_quads(closed(above))[wanted], Material.SKIN)
+    surface.add_quads(sheet_quads(closed(above))[wanted], SkinMaterial.SKIN)
     _add_mantle_end(surface, form, above[0])
     _add_mouth(surface, lower.points[0], below[0])
     _add_underside(surface, layout, lower, below)
@@ -62,7 +62,7 @@ def _add_mantle_end(surface: Surface, form: BodyForm, loop: Indices) -> None:
         np.roll(loop, shift),
         np.roll(border, shift, axis=0),
         rigid(MANTLE, (1, 1)),
-        Material.SKIN,
+        SkinMaterial.SKIN,
         first_side=first_side,
         onto=onto_mantle,
     )
@@ -74,7 +74,7 @@ def _add_mouth(surface: Surface, points: Floats, loop: Indices) -> None:
     # Seen from below the row runs clockwise.
     order = first_side // 2 - np.arange(len(loop))
     surface.add_cap(
-        loop[order], points[order], rigid(BODY, (1, 1)), Material.BEAK, first_side=first_side
+        loop[order], points[order], rigid(BODY, (1, 1)), SkinMaterial.BEAK, first_side=first_side
     )
 
 
@@ -84,8 +84,8 @@ def _add_underside(surface: Surface, layout: ArmLayout, lower: Sheet, below: Ind
     row, column = np.ogrid[: quads.shape[0], : quads.shape[1]]
     in_sector = column % lower.sector - lower.half_web
     in_strip = (in_sector >= 0) & (in_sector < layout.columns.ventral) & (row >= ARMS_BELOW)
-    surface.add_quads(quads[:BEAK_ROWS], Material.BEAK)
-    surface.add_quads(quads[BEAK_ROWS:][~in_strip[BEAK_ROWS:]], Material.UNDERSIDE)
+    surface.add_quads(quads[:BEAK_ROWS], SkinMaterial.BEAK)
+    surface.add_quads(quads[BEAK_ROWS:][~in_strip[BEAK_ROWS:]], SkinMaterial.UNDERSIDE)
 
 
 def _add_web_margin(surface: Surface, layout: ArmLayout, upper: Indices, lower: Indices) -> None:
@@ -97,7 +97,7 @@ def _add_web_margin(surface: Surface, layout: ArmLayout, upper: Indices, lower: 
         return np.concatenate([row[:, -half:], following[:, : half + 1]], axis=1)
 
     edges = np.stack([margin(upper), margin(lower)], axis=1)
-    surface.add_quads(sheet_quads(edges), Material.SKIN)
+    surface.add_quads(sheet_quads(edges), SkinMaterial.SKIN)
 
 
 def _add_arms(
@@ -121,8 +121,8 @@ def _add_arms(
     tube = np.concatenate([start, vertices], axis=1)
     faces = sheet_quads(closed(tube))
     first, last = dorsal + 1, dorsal + 1 + ventral
-    surface.add_quads(faces[:, :, :first], Material.SKIN)
-    surface.add_quads(faces[:, :, last:], Material.SKIN)
+    surface.add_quads(faces[:, :, :first], SkinMaterial.SKIN)
+    surface.add_quads(faces[:, :, last:], SkinMaterial.SKIN)
 
     sheet, below = lower
     under = _across_arms(sheet, below[ARMS_BELOW:])[..., ::-1]
@@ -168,6 +168,6 @@ def _add_tips(surface: Surface, layout: ArmLayout, loops: Indices, points: Float
         loops[:, order],
         points[:, order],
         along_arm(shape, arm, np.full(arm.shape, shape.arm_length)),
-        Material.SKIN,
+        SkinMaterial.SKIN,
         first_side=first_side,
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import SettingsError
 from ...rotations import Floats
-from ..gait.joint_groups import diameters
+from ..gait import diameters
 
 ARMS: Final = (1, 64)
 JOINTS: Final = (3, 200)

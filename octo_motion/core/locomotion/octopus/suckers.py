@@ -10,7 +10,7 @@ import numpy as np
 
 from ...rotations import Floats, normalized
 from .shape import OctopusShape
-from .surface import Material, Surface
+from .surface import SkinMaterial, Surface
 from .topology import Indices, patch_border, sheet_quads
 from .weights import Influences, along_arm
 
@@ -22,7 +22,12 @@ _FILL: Final = 0.45
 """Radius of a sucker in widths of its patch."""
 _RINGS: Final = np.array([(1.0, 0.04), (0.95, 0.42), (0.62, 0.46), (0.42, 0.12)])
 """From foot over rim into the cup: radius, height over the skin, in radii of the sucker."""
-_MATERIALS: Final = (Material.UNDERSIDE, Material.SUCKER, Material.SUCKER, Material.SUCKER)
+_MATERIALS: Final = (
+    SkinMaterial.UNDERSIDE,
+    SkinMaterial.SUCKER,
+    SkinMaterial.SUCKER,
+    SkinMaterial.SUCKER,
+)
 _DIRECTIONS: Final = np.radians(225.0 + 45.0 * np.arange(8))
 """Of the vertices round a patch, from the one at its corner (0, 0)."""
 
@@ -49,8 +54,8 @@ def add_ventral_strips(
     pair = np.arange(pairs)
     with_sucker = (pair < pairs - _BARE_TIP) & (pair % every == 0)
 
-    surface.add_quads(sheet_quads(patches[:, ~with_sucker]), Material.UNDERSIDE)
-    surface.add_quads(sheet_quads(strips[:, 2 * pairs :]), Material.UNDERSIDE)
+    surface.add_quads(sheet_quads(patches[:, ~with_sucker]), SkinMaterial.UNDERSIDE)
+    surface.add_quads(sheet_quads(strips[:, 2 * pairs :]), SkinMaterial.UNDERSIDE)
     _add_suckers(
         surface,
         patches[:, with_sucker],
@@ -92,4 +97,4 @@ def _add_suckers(
     )
     ringwise = Influences(influences.bones[..., None, :], influences.weights[..., None, :])
     loop = surface.add_rings(patch_border(patches), rings, ringwise, _MATERIALS)
-    surface.add_cap(loop, rings[..., -1, :, :], ringwise, Material.SUCKER, first_side=2)
+    surface.add_cap(loop, rings[..., -1, :, :], ringwise, SkinMaterial.SUCKER, first_side=2)

@@ -15,7 +15,7 @@ from .topology import Indices, cap_grid, cap_interior, ring_quads, sheet_quads
 from .weights import Influences, strongest
 
 
-class Material(IntEnum):
+class SkinMaterial(IntEnum):
     """Slots of the mesh's materials."""
 
     SKIN = 0
@@ -35,7 +35,7 @@ class OctopusMesh:
     quads: Indices
     """(faces, 4), anticlockwise seen from outside."""
     materials: Indices
-    """(faces,), a ``Material`` each."""
+    """(faces,), a ``SkinMaterial`` each."""
     bones: Indices
     """(vertices, 4), index of a bone for each influence."""
     weights: Floats
@@ -76,7 +76,7 @@ class Surface:
         self.count += len(indices)
         return indices.reshape(shape)
 
-    def add_quads(self, quads: Indices, material: Material | Indices) -> None:
+    def add_quads(self, quads: Indices, material: SkinMaterial | Indices) -> None:
         """New faces (…, 4), of one material or one each (…)."""
         if self._mirrored:
             quads = quads[..., ::-1]
@@ -89,7 +89,7 @@ class Surface:
         loop: Indices,
         border: Floats,
         influences: Influences,
-        material: Material,
+        material: SkinMaterial,
         *,
         first_side: int,
         onto: Callable[[Floats], Floats] | None = None,
@@ -113,7 +113,7 @@ class Surface:
         loop: Indices,
         rings: Floats,
         influences: Influences,
-        materials: Sequence[Material],
+        materials: Sequence[SkinMaterial],
     ) -> Indices:
         """Faces from loops through rings of new vertices; the last loops (…, n).
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...rotations import Floats
-from ..gait.table import CYCLE
+from ..gait import CYCLE
 
 _REACH: Final = 0.25 * np.pi
 """The push lasts from this phase before its middle to this phase after it: β₁ of the swim table

@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 
 from ...easing import least_jerk
 from ...rotations import Floats
-from ..gait.table import CYCLE
+from ..gait import CYCLE
 from .burst_glide import stroke_distance
-from .gait_changes import Change, between, sense_of
+from .gait_changes import GaitTransition, sense_of, slerp_rotations
 from .heading import Bearings
 from .route import Route
 from .travel import Travel, TravelSettings, travel_at, walked_at
@@ -114,7 +114,7 @@ class Course:
 
     lines: Sequence[Line]
     """One for each way."""
-    changes: Sequence[Change]
+    changes: Sequence[GaitTransition]
 
     @cached_property
     def _senses(self) -> list[Floats]:
@@ -140,7 +140,9 @@ class Course:
             place, bearing = self.lines[change.way].at(flat[later])
             share = over[later]
             positions[later] += share[:, None] * (place - positions[later])
-            rotations[later] = between(rotations[later], bearing, share, self._senses[number])
+            rotations[later] = slerp_rotations(
+                rotations[later], bearing, share, self._senses[number]
+            )
         return positions.reshape(*wanted.shape, 3), rotations.reshape(*wanted.shape, 4)
 
     def line(self, way: int) -> CourseLine:

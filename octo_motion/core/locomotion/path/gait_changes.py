@@ -34,7 +34,7 @@ the body turns too far for an arm to follow."""
 
 
 @dataclass(frozen=True)
-class Change:
+class GaitTransition:
     """Where one way of moving becomes another. Metres along the route."""
 
     start: float
@@ -62,7 +62,9 @@ class Windows:
     """For each arm, which holds of the way after."""
 
 
-def check_changes(changes: Sequence[Change], length: float) -> tuple[Change, ...]:
+def check_transitions(
+    changes: Sequence[GaitTransition], length: float
+) -> tuple[GaitTransition, ...]:
     """The changes in the order of the route.
 
     Raises:
@@ -84,9 +86,9 @@ def check_changes(changes: Sequence[Change], length: float) -> tuple[Change, ...
     return ordered
 
 
-def changes_by_height(
+def transitions_by_height(
     distance: Floats, height: Floats, *, take_off: float, length: float
-) -> tuple[Change, ...]:
+) -> tuple[GaitTransition, ...]:
     """Way 1 wherever the route is higher over the ground than so much, way 0 elsewhere.
 
     Args:
@@ -97,7 +99,7 @@ def changes_by_height(
     """
     above = height > take_off
     borders = np.flatnonzero(above[1:] != above[:-1])
-    found: list[Change] = [Change(-length, 0.0, 1)] if above[0] else []
+    found: list[GaitTransition] = [GaitTransition(-length, 0.0, 1)] if above[0] else []
     for border in borders:
         rise = height[border + 1] - height[border]
         share = (take_off - height[border]) / rise
@@ -107,11 +109,13 @@ def changes_by_height(
             # There and back within one change: neither is worth its while.
             found.pop()
             continue
-        found.append(Change(float(middle - 0.5 * length), float(middle + 0.5 * length), way))
+        found.append(
+            GaitTransition(float(middle - 0.5 * length), float(middle + 0.5 * length), way)
+        )
     return tuple(found)
 
 
-def way_weights(changes: Sequence[Change], ways: int, distance: Floats) -> Floats:
+def way_weights(changes: Sequence[GaitTransition], ways: int, distance: Floats) -> Floats:
     """How far the body goes each way (…, ways) at distances (…,); they sum to 1."""
     weights = np.zeros((*distance.shape, ways))
     weights[..., 0] = 1.0
@@ -122,8 +126,8 @@ def way_weights(changes: Sequence[Change], ways: int, distance: Floats) -> Float
     return weights
 
 
-def windows(
-    change: Change,
+def transition_windows(
+    change: GaitTransition,
     before: Sequence[tuple[Floats, Floats]],
     after: Sequence[tuple[Floats, Floats]],
 ) -> Windows:
@@ -156,7 +160,9 @@ def slowing(way: Floats, within: float) -> Floats:
     return inside - 0.5 * inside * inside / within
 
 
-def between(first: Floats, second: Floats, share: Floats, sense: Floats | None = None) -> Floats:
+def slerp_rotations(
+    first: Floats, second: Floats, share: Floats, sense: Floats | None = None
+) -> Floats:
     """Rotations (…, 4) a share (…,) of the way from one to the other.
 
     Args:
@@ -180,7 +186,7 @@ def sense_of(first: Floats, second: Floats) -> Floats:
     return to_rotation_vector(multiply(conjugate(first), second))
 
 
-def blended(first: Floats, second: Floats, share: Floats) -> Floats:
+def blend_motions(first: Floats, second: Floats, share: Floats) -> Floats:
     """Motions (frames, …, 4) a share (frames, …) of the way from one to the other.
 
     Half way each bone turns the shortest way, and before and after the same way round, however

@@ -49,7 +49,7 @@ def whole_frames(frames: float) -> float:
     return float(max(round(frames), 2))
 
 
-def breaths(times: Floats, amount: float, *, breath: float, whole: float | None) -> Floats:
+def breathing_scales(times: Floats, amount: float, *, breath: float, whole: float | None) -> Floats:
     """Scales (frames, 3) of a mantle that breathes: across, along the bone, across.
 
     It fills rather quickly and empties slowly, without a corner between the two.

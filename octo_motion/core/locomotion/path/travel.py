@@ -17,10 +17,10 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...content_cache import Remembered, key_of
+from ...content_cache import ContentCache, content_key
 from ...errors import SettingsError
 from ...rotations import Floats, from_axis_angle, multiply, rotate_in_plane
-from ..gait.table import CYCLE
+from ..gait import CYCLE
 from .burst_glide import phase_at_distance, stroke_distance
 from .heading import Bearings, bearings
 from .route import Route
@@ -38,7 +38,7 @@ _LAID_FORWARD: Final = np.array([0.0, 0.0, np.sqrt(0.5), -np.sqrt(0.5)])
 """From a body whose +Z travels and −Y faces up to one whose −Y travels and +Z faces up."""
 
 
-_tables: Final[Remembered[Bearings]] = Remembered(4)
+_tables: Final[ContentCache[Bearings]] = ContentCache(4)
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class Travel:
 def bearings_of(route: Route, settings: TravelSettings) -> Bearings:
     """The table of directions that the functions here ask; made once for several of them."""
     corner, settle = settings.corner * settings.stride, _SETTLE * settings.stride
-    return _tables.get(key_of(route, corner, settle), lambda: bearings(route, corner, settle))
+    return _tables.get(content_key(route, corner, settle), lambda: bearings(route, corner, settle))
 
 
 def plan_travel(

@@ -1,1 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms that reach, wind round something, carry it and let go."""
+
+from .curl import curled
+from .grasp import Mode, Places, Target, plan_grasp
+from .timeline import Timeline
+from .winding import Profile, profile_of
+
+__all__ = ["Mode", "Places", "Profile", "Target", "Timeline", "curled", "plan_grasp", "profile_of"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...easing import least_jerk
 from ...rotations import Floats
-from ..rig.arm_frames import ArmFrames, blended
+from ..rig import ArmFrames, lerp_rotation_vectors
 from .timeline import Timeline, folded
 
 _FREE: Final = 0.3
@@ -41,7 +41,7 @@ def curled(arm: ArmFrames, timeline: Timeline, times: Floats, otherwise: Floats)
     # A front before the arm's root: all of it is behind.
     spiral = folded(arm.lengths, np.full(len(times), -arm.length), bend=0.0, curl=_TIGHT)
     spiral[:, 0] = usual[:, 0]
-    shape = arm.shaped(blended(usual, spiral, share))
+    shape = arm.shaped(lerp_rotation_vectors(usual, spiral, share))
     result = otherwise.copy()
     moves = np.any(share > 0.0, axis=-1)
     result[moves] = arm.to_bones(shape)[moves]

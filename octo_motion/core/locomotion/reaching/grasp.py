@@ -29,10 +29,10 @@ from ...rotations import (
     rotate,
     shortest_arc,
 )
-from ..gait.ccd import closed
-from ..rig.arm_frames import ArmFrames, blended, frame_of, transported
+from ..gait import close_group
+from ..rig import ArmFrames, frame_of, lerp_rotation_vectors, transport_frames
 from .timeline import Timeline, first_place, folded, front_width, passed
-from .winding import Coil, Profile, Skins, Start, Winding, wind
+from .winding import Coil, Profile, Skins, Winding, WindingStart, wind
 
 Mode = Literal["TOUCH", "COIL"]
 
@@ -150,7 +150,7 @@ class Grasp:
         lengths = arm.lengths[:first]
         outward = rotate(arm.at_rest[0], _X)
         shape = _approach(lengths, goal, held, outward=outward, up=self.up)
-        shape = closed(np.ascontiguousarray(shape), lengths, goal.T, _CLOSING)
+        shape = close_group(np.ascontiguousarray(shape), lengths, goal.T, _CLOSING)
         near = np.arange(len(goal))
         for _ in range(_CLEARINGS):
             joints = arm.root + np.cumsum(
@@ -164,9 +164,9 @@ class Grasp:
             joints[:, :-1] += shifts[moves]
             pushed = np.diff(joints, axis=1, prepend=np.broadcast_to(arm.root, (len(near), 1, 3)))
             pushed = np.ascontiguousarray(np.moveaxis(normalized(pushed), 0, -1))
-            shape[..., near] = closed(pushed, lengths, goal[near].T, _CLOSING)
+            shape[..., near] = close_group(pushed, lengths, goal[near].T, _CLOSING)
         directions = np.moveaxis(shape, -1, 0)
-        frames = transported(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
+        frames = transport_frames(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
         twist = _twist(frames[:, -1], held)
         twist = self.twist + less_whole_turns(twist - self.twist)
         share = np.cumsum(lengths) / lengths.sum()
@@ -242,13 +242,13 @@ class Grasp:
         reached[:, last:] = 0.0
         fold = folded(lengths, front)
         fold[:, 0] = holding[:, 0]
-        reaching = blended(fold, holding, reached)
+        reaching = lerp_rotation_vectors(fold, holding, reached)
         # What holds is out of the way already.
         loose = 1.0 - least_jerk((front - touches + width) / width)
         cleared = self._cleared(arm.shaped(reaching), places[moves], loose)
         reaching = arm.shape(cleared)
         usual = arm.shape(arm.from_bones(otherwise[moves]))
-        shape = arm.shaped(blended(usual, reaching, weight[moves]))
+        shape = arm.shaped(lerp_rotation_vectors(usual, reaching, weight[moves]))
         result[moves] = arm.to_bones(shape)
         return result
 
@@ -320,7 +320,7 @@ def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coi
     last = min(max(last, 2), len(arm.bones) - 1)
 
     def wound(first: int) -> Coil:
-        return wind(skins, arm.lengths, Start(first, root), winding)
+        return wind(skins, arm.lengths, WindingStart(first, root), winding)
 
     def far(coil: Coil) -> float:
         return float(np.max(np.linalg.norm(places.seen(coil.joints[0]) - arm.root, axis=-1)))
@@ -406,7 +406,7 @@ def _approach(
 
 def _twist(before: Floats, after: Floats) -> Floats:
     """Angle (…) about the arm by which a frame is twisted against the one before it."""
-    carried = transported(rotate(after, _X)[..., None, :], before)[..., 0, :]
+    carried = transport_frames(rotate(after, _X)[..., None, :], before)[..., 0, :]
     turn = multiply(conjugate(carried), after)
     return 2.0 * np.arctan2(turn[..., 1], turn[..., 0])
 
@@ -414,5 +414,5 @@ def _twist(before: Floats, after: Floats) -> Floats:
 def _twist_without(arm: ArmFrames, frames: Floats, first: int) -> Floats:
     """Twist (…) that the free part has to take on, of an arm planned without any."""
     directions = rotate(frames[:first], _X)
-    plain = transported(directions, arm.at_rest[0])
+    plain = transport_frames(directions, arm.at_rest[0])
     return less_whole_turns(_twist(plain[-1], frames[first]))

@@ -24,7 +24,7 @@ import numpy as np
 from ...easing import least_jerk
 from ...errors import SettingsError
 from ...rotations import Floats
-from ..rig.arm_frames import bends
+from ..rig import bend_rotations
 
 FOLD: Final = np.radians(100.0)
 """Angle of the travelling bend."""
@@ -161,4 +161,4 @@ def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1
     fold = bend * FOLD * np.diff(so_far, axis=-1)
     angles = np.minimum(shy * (spiral + fold), _MOST_BENT)
     angles[..., 0] = 0.0
-    return bends(angles)
+    return bend_rotations(angles)

@@ -215,7 +215,7 @@ class Winding:
 
 
 @dataclass(frozen=True)
-class Start:
+class WindingStart:
     """Where a coil begins."""
 
     joint: int
@@ -264,7 +264,7 @@ class Skins:
         return float(np.min(outline[seen] / facing[seen]))
 
 
-def wind(skins: Skins, lengths: Floats, start: Start, winding: Winding) -> Coil:
+def wind(skins: Skins, lengths: Floats, start: WindingStart, winding: Winding) -> Coil:
     """Wind the segments from a joint on about an object.
 
     Where the arm comes from decides where it touches: on the line that only just passes the
@@ -305,7 +305,9 @@ def _lacking(skins: Skins, coil: Coil) -> Floats:
     return np.max(missing, axis=0) - 1e-3 * skin[0]
 
 
-def _wound(skins: Skins, lengths: Floats, start: Start, winding: Winding, lift: Floats) -> Coil:
+def _wound(
+    skins: Skins, lengths: Floats, start: WindingStart, winding: Winding, lift: Floats
+) -> Coil:
     first, root = start.joint, skins.profile.to_profile(start.root)
     segments = np.arange(first, len(lengths))
     profile, radii = skins.profile, skins.radii

@@ -1,1 +1,71 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Which bones are arms, and what leads from bones to joints and back."""
+
+from .arm_batches import ArmsTogether, alike
+from .arm_chains import (
+    ArmChain,
+    BodyFrame,
+    Side,
+    arm_azimuths,
+    body_frame,
+    chain_of,
+    is_driven,
+    joint_positions,
+    nearest_axis,
+    place_added,
+)
+from .arm_frames import (
+    ArmFrames,
+    arm_frames,
+    bend_rotations,
+    frame_of,
+    lerp_rotation_vectors,
+    transport_frames,
+)
+from .bone_rotations import ArmRest, Facing, arm_rest, bone_rotations, carried_to, sucker_sides
+from .detection import Detection, detect_arms
+from .mantle import find_mantle, lies_back, stretch_mantle
+from .placement import carried_by_root_bone, object_transforms, root_bone_transforms
+from .poses import Poses, halfway_automatic, halfway_linear
+from .skin_offset import ArmSkin, arm_skin, nearest_bones
+
+__all__ = [
+    "ArmChain",
+    "ArmFrames",
+    "ArmRest",
+    "ArmSkin",
+    "ArmsTogether",
+    "BodyFrame",
+    "Detection",
+    "Facing",
+    "Poses",
+    "Side",
+    "alike",
+    "arm_azimuths",
+    "arm_frames",
+    "arm_rest",
+    "arm_skin",
+    "bend_rotations",
+    "body_frame",
+    "bone_rotations",
+    "carried_by_root_bone",
+    "carried_to",
+    "chain_of",
+    "detect_arms",
+    "find_mantle",
+    "frame_of",
+    "halfway_automatic",
+    "halfway_linear",
+    "is_driven",
+    "joint_positions",
+    "lerp_rotation_vectors",
+    "lies_back",
+    "nearest_axis",
+    "nearest_bones",
+    "object_transforms",
+    "place_added",
+    "root_bone_transforms",
+    "stretch_mantle",
+    "sucker_sides",
+    "transport_frames",
+]

@@ -16,7 +16,7 @@ from ...errors import RigError
 from ...rotations import normalized
 from ...skeleton import Skeleton
 from .arm_chains import AXES, LEAST_BONES
-from .bone_tree import REMEDY, BoneTree, Chain
+from .bone_tree import REMEDY, BoneChain, BoneTree
 
 # Arms of one family differ at most by these factors in number of bones and in length.
 _ALIKE_IN_BONES: Final = 2.0
@@ -36,8 +36,8 @@ _LIMB_WORDS: Final = (
 
 
 def best_family(
-    skeleton: Skeleton, tree: BoneTree, chains: list[Chain], up: str
-) -> tuple[Chain, ...]:
+    skeleton: Skeleton, tree: BoneTree, chains: list[BoneChain], up: str
+) -> tuple[BoneChain, ...]:
     """The largest family of chains that passes for the arms of one body.
 
     Args:
@@ -56,7 +56,7 @@ def best_family(
         for family in _families([each for each in chains if each.attachment == attachment])
     ]
 
-    def rank(family: tuple[Chain, ...]) -> tuple[int, float]:
+    def rank(family: tuple[BoneChain, ...]) -> tuple[int, float]:
         return sum(map(len, family)), sum(chain.length for chain in family)
 
     for group in (across_rig, at_one_bone):
@@ -77,9 +77,9 @@ def best_family(
     )
 
 
-def _families(chains: list[Chain]) -> list[tuple[Chain, ...]]:
+def _families(chains: list[BoneChain]) -> list[tuple[BoneChain, ...]]:
     """Sets of chains that are alike in bones and length, one for each kind of chain."""
-    found: dict[tuple[Chain, ...], None] = {}
+    found: dict[tuple[BoneChain, ...], None] = {}
     for model in {(len(chain), f"{chain.length:.4g}"): chain for chain in chains}.values():
         family = tuple(
             chain
@@ -95,7 +95,9 @@ def _ratio(one: float, other: float) -> float:
     return max(one, other) / max(min(one, other), 1e-12)
 
 
-def _without_odd_one(skeleton: Skeleton, family: tuple[Chain, ...], up: str) -> tuple[Chain, ...]:
+def _without_odd_one(
+    skeleton: Skeleton, family: tuple[BoneChain, ...], up: str
+) -> tuple[BoneChain, ...]:
     """A family without the one short chain that stands up or hangs where all others do not.
 
     That is a mantle, a head or a siphon. Long chains are arms, however they are posed.
@@ -112,14 +114,14 @@ def _without_odd_one(skeleton: Skeleton, family: tuple[Chain, ...], up: str) -> 
     return family[: odd[0]] + family[odd[0] + 1 :]
 
 
-def _springs_from_one_place(skeleton: Skeleton, family: tuple[Chain, ...]) -> bool:
+def _springs_from_one_place(skeleton: Skeleton, family: tuple[BoneChain, ...]) -> bool:
     """Whether the roots lie together; fingers of two hands, toes of two feet do not."""
     roots = skeleton.heads[[chain.bones[0] for chain in family]]
     spread = np.linalg.norm(roots - roots.mean(axis=0), axis=1).mean()
     return bool(spread <= _WIDEST_BODY * _typical_length(family))
 
 
-def _is_large(skeleton: Skeleton, tree: BoneTree, family: tuple[Chain, ...]) -> bool:
+def _is_large(skeleton: Skeleton, tree: BoneTree, family: tuple[BoneChain, ...]) -> bool:
     """Whether the rest of the rig lies within reach; a hand's fingers are far from most of it."""
     own = {bone for chain in family for bone in chain.bones}
     others = [bone for bone in tree.members if bone not in own]
@@ -130,7 +132,7 @@ def _is_large(skeleton: Skeleton, tree: BoneTree, family: tuple[Chain, ...]) -> 
     return bool(distance <= _LARGEST_REST * _typical_length(family))
 
 
-def _stands_off_one_body(tree: BoneTree, family: tuple[Chain, ...]) -> bool:
+def _stands_off_one_body(tree: BoneTree, family: tuple[BoneChain, ...]) -> bool:
     """Whether no chain springs from further down the spine than another, or many of a kind do."""
     attachments = {chain.attachment for chain in family} - {-1}
     for attachment in attachments:
@@ -143,7 +145,7 @@ def _stands_off_one_body(tree: BoneTree, family: tuple[Chain, ...]) -> bool:
     return True
 
 
-def _paired(family: tuple[Chain, ...]) -> int:
+def _paired(family: tuple[BoneChain, ...]) -> int:
     """How many chains of a family share their bone with another: tails and necks stand alone."""
     counts: dict[int, int] = {}
     for chain in family:
@@ -151,7 +153,7 @@ def _paired(family: tuple[Chain, ...]) -> int:
     return sum(count for count in counts.values() if count > 1)
 
 
-def _has_other_limbs(tree: BoneTree, family: tuple[Chain, ...]) -> bool:
+def _has_other_limbs(tree: BoneTree, family: tuple[BoneChain, ...]) -> bool:
     """Whether a set of limbs of some size springs from a bone elsewhere: legs beside arms."""
     own = {bone for chain in family for bone in chain.bones}
     carrying = set(own)
@@ -178,11 +180,11 @@ def _has_other_limbs(tree: BoneTree, family: tuple[Chain, ...]) -> bool:
     return False
 
 
-def _is_named_like_a_body(skeleton: Skeleton, family: tuple[Chain, ...]) -> bool:
+def _is_named_like_a_body(skeleton: Skeleton, family: tuple[BoneChain, ...]) -> bool:
     """Whether one of the chains has a hand's bones and another has a foot's."""
     names = [" ".join(skeleton.names[bone].lower() for bone in chain.bones) for chain in family]
     return all(any(word in name for name in names for word in limb) for limb in _LIMB_WORDS)
 
 
-def _typical_length(family: tuple[Chain, ...]) -> float:
+def _typical_length(family: tuple[BoneChain, ...]) -> float:
     return float(np.median([chain.length for chain in family]))

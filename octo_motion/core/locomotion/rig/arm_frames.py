@@ -152,7 +152,7 @@ def frame_of(along: Floats, facing: Floats) -> Floats:
     return from_matrix(np.stack(np.broadcast_arrays(x, y, cross(x, y)), axis=-1))
 
 
-def blended(start: Floats, end: Floats, share: Floats) -> Floats:
+def lerp_rotation_vectors(start: Floats, end: Floats, share: Floats) -> Floats:
     """Between turns (…, 4) of joints, by a share (…), by way of their rotation vectors.
 
     The shortest way from one to the other changes sides where they are half a turn apart; an arm
@@ -164,12 +164,12 @@ def blended(start: Floats, end: Floats, share: Floats) -> Floats:
     )
 
 
-def bends(angles: Floats) -> Floats:
+def bend_rotations(angles: Floats) -> Floats:
     """Turns (…, 4) by angles (…) that bend an arm to its back, away from the suckers."""
     return from_axis_angle(np.array([0.0, 0.0, 1.0]), -angles)
 
 
-def transported(directions: Floats, first: Floats) -> Floats:
+def transport_frames(directions: Floats, first: Floats) -> Floats:
     """Frames (…, segments, 4) without twist along directions (…, segments, 3).
 
     Args:

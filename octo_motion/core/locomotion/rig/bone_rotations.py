@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 
 from ...batched import cross, dot, product, smallest_arc, turned
-from ...content_cache import Remembered, key_of
+from ...content_cache import ContentCache, content_key
 from ...rotations import Floats, conjugate, multiply, normalized, rotate
 from ...skeleton import Skeleton
 from .arm_chains import AXES, joint_positions
@@ -60,8 +60,8 @@ class ArmRest:
         return rotate(back, self.segments[bone - 1] if self.follows[bone] else self.outward)
 
 
-_rests: Final[Remembered[ArmRest]] = Remembered(_MOST_KNOWN)
-_sides: Final[Remembered[Floats]] = Remembered(_MOST_KNOWN)
+_rests: Final[ContentCache[ArmRest]] = ContentCache(_MOST_KNOWN)
+_sides: Final[ContentCache[Floats]] = ContentCache(_MOST_KNOWN)
 
 
 def arm_rest(skeleton: Skeleton, bones: Sequence[str]) -> ArmRest:
@@ -70,7 +70,7 @@ def arm_rest(skeleton: Skeleton, bones: Sequence[str]) -> ArmRest:
     Raises:
         RigError: a bone does not exist.
     """
-    key = key_of(skeleton, tuple(bones))
+    key = content_key(skeleton, tuple(bones))
     return _rests.get(key, lambda: _arm_rest(skeleton, bones))
 
 
@@ -112,7 +112,7 @@ def sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Floa
         bones: of an arm.
         down: (3,) armature space.
     """
-    key = key_of(skeleton, tuple(bones), down)
+    key = content_key(skeleton, tuple(bones), down)
     return _sides.get(key, lambda: _sucker_sides(skeleton, bones, down))
 
 

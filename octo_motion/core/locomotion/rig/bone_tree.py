@@ -33,7 +33,7 @@ class BoneTree:
 
 
 @dataclass(frozen=True)
-class Chain:
+class BoneChain:
     """Bones in a row, root to tip, by their numbers."""
 
     bones: tuple[int, ...]
@@ -47,7 +47,7 @@ class Chain:
         return len(self.bones)
 
 
-def candidate_chains(skeleton: Skeleton) -> tuple[BoneTree, list[Chain]]:
+def candidate_chains(skeleton: Skeleton) -> tuple[BoneTree, list[BoneChain]]:
     """The chains of the first kind of bones that has any: weighted, deforming, all.
 
     Raises:
@@ -96,10 +96,10 @@ def _tree_of(skeleton: Skeleton, members: set[int]) -> BoneTree:
     return BoneTree(tuple(parents), parents, children, heights)
 
 
-def _chains_of(skeleton: Skeleton, tree: BoneTree) -> list[Chain]:
+def _chains_of(skeleton: Skeleton, tree: BoneTree) -> list[BoneChain]:
     """All chains that end in a tip, of any number of bones, helpers left out."""
     following = {bone: _continuation(skeleton, tree, bone) for bone in tree.members}
-    chains: list[Chain] = []
+    chains: list[BoneChain] = []
     for start in tree.members:
         parent = tree.parents[start]
         if parent >= 0 and following[parent] == start:
@@ -114,7 +114,7 @@ def _chains_of(skeleton: Skeleton, tree: BoneTree) -> list[Chain]:
         bones = _without_offsets(skeleton, tree, bones)
         if bones:
             attachment = tree.parents[bones[0]]
-            chains.append(Chain(tuple(bones), attachment, _length(skeleton, bones)))
+            chains.append(BoneChain(tuple(bones), attachment, _length(skeleton, bones)))
     return chains
 
 
@@ -191,20 +191,20 @@ def _without_offsets(skeleton: Skeleton, tree: BoneTree, bones: list[int]) -> li
     return kept
 
 
-def _without_twins(skeleton: Skeleton, chains: list[Chain]) -> list[Chain]:
+def _without_twins(skeleton: Skeleton, chains: list[BoneChain]) -> list[BoneChain]:
     """Of chains lying over one another with different roles, those that best are the arm.
 
     Deform flags and weights have been used up by now. What is left to tell: keys have an effect
     on bones without constraints, and then the habits of control rigs' names. Chains of the same
     role all stay.
     """
-    layers: dict[tuple[int, ...], list[Chain]] = {}
+    layers: dict[tuple[int, ...], list[BoneChain]] = {}
     for chain in chains:
         ends = skeleton.heads[[chain.bones[0], chain.bones[-1]]] / max(chain.length, 1e-12)
         key = (len(chain), *np.round(ends * 1e3).astype(int).ravel().tolist())
         layers.setdefault(key, []).append(chain)
 
-    def role(chain: Chain) -> tuple[bool, int]:
+    def role(chain: BoneChain) -> tuple[bool, int]:
         name = skeleton.names[chain.bones[0]]
         rank = 0 if name.upper().startswith("DEF") else 2 if is_control_name(name) else 1
         return any(skeleton.constrained[bone] for bone in chain.bones), rank

@@ -38,7 +38,7 @@ from .arm_chains import (
     nearest_axis,
 )
 from .arm_family import best_family
-from .bone_tree import REMEDY, BoneTree, Chain, candidate_chains, is_control_name
+from .bone_tree import REMEDY, BoneChain, BoneTree, candidate_chains, is_control_name
 
 # Arm lengths: how far mirror images may lie apart, on average, for a rig to be symmetric.
 _SYMMETRIC: Final = 0.05
@@ -157,7 +157,7 @@ def control_chain(skeleton: Skeleton, bones: Sequence[str]) -> tuple[str, ...]:
     return tuple(skeleton.names[bone] for bone in best)
 
 
-def _root_bone(skeleton: Skeleton, tree: BoneTree, family: tuple[Chain, ...]) -> str:
+def _root_bone(skeleton: Skeleton, tree: BoneTree, family: tuple[BoneChain, ...]) -> str:
     """The topmost bone that carries all that deforms and that keys can move."""
     arms = {bone for chain in family for bone in chain.bones}
     carried = [0] * len(skeleton)

@@ -92,7 +92,9 @@ def lies_back(skeleton: Skeleton, mantle: Sequence[str], body: BodyFrame) -> flo
     return lean
 
 
-def stretched(skeleton: Skeleton, mantle: Sequence[str], body: BodyFrame, amount: float) -> Floats:
+def stretch_mantle(
+    skeleton: Skeleton, mantle: Sequence[str], body: BodyFrame, amount: float
+) -> Floats:
     """Rotations (bones, 4) in each bone's rest frame that stretch the mantle towards the body's +Z.
 
     Args:

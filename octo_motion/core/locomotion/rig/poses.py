@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...keyframes.subframes import half_way
+from ...keyframes import halfway_values
 from ...rotations import Floats, continuous, normalized
 
 
@@ -25,7 +25,7 @@ class Poses:
     """(moments, 4)"""
 
 
-def automatic(poses: Poses, *, cyclic: bool) -> Poses:
+def halfway_automatic(poses: Poses, *, cyclic: bool) -> Poses:
     """Half way between frames (frames − 1), as Blender plays keys with automatic handles.
 
     Args:
@@ -54,11 +54,11 @@ def _automatic(values: Floats, *, cyclic: bool, turns: bool = False) -> Floats:
         sign = np.where(same < 0.0, -1.0, 1.0) if turns else 1.0
         slopes[0] = 0.5 * (values[1] - values[0] + sign * (values[-1] - values[-2]))
         slopes[-1] = sign * slopes[0]
-    half = half_way(values, slopes)
+    half = halfway_values(values, slopes)
     return normalized(half) if turns else half
 
 
-def between(values: Floats, *, turns: bool = False) -> Floats:
+def halfway_linear(values: Floats, *, turns: bool = False) -> Floats:
     """Values (frames − 1, …) half way from each frame's (frames, …) straight on to the next one's.
 
     Args:

@@ -12,7 +12,7 @@ import numpy as np
 from ...rotations import Floats, conjugate, multiply, rotate, to_rotation_vector
 from ...skeleton import Skeleton
 from .bone_roles import Roles
-from .figure import Elements, Figure, Limits, Pose
+from .figure import Elements, Figure, JointRanges, Pose
 from .joint_limits import bends
 
 DENSITY: Final = 1000.0
@@ -262,7 +262,7 @@ def _from_rest(parents: np.ndarray, rest: Floats, rotations: Floats) -> Floats:
 
 def _limits(
     skeleton: Skeleton, bones: list[int], limits: Mapping[str, JointLimits], turns: Floats
-) -> Limits:
+) -> JointRanges:
     given = [limits.get(skeleton.names[bone], JointLimits()) for bone in bones]
     ranges = np.array([(each.x, each.twist, each.z) for each in given])
     ranges = np.clip(np.sort(ranges, axis=2), *FREE)
@@ -272,7 +272,7 @@ def _limits(
     most = np.where(held, -np.inf, ranges[..., 1])
     least = np.minimum(least, now - _SLACK)
     most = np.maximum(most, now + _SLACK)
-    return Limits(np.clip(np.stack([least, most], axis=2), *FREE))
+    return JointRanges(np.clip(np.stack([least, most], axis=2), *FREE))
 
 
 def joints_of(parents: Sequence[int], pose: Pose) -> Floats:

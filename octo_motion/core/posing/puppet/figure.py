@@ -39,7 +39,7 @@ class Figure:
     """(bodies, 2, 3) ends of the capsule's axis in the body's frame."""
     radii: Floats
     """(bodies,) of the capsules."""
-    limits: Limits
+    limits: JointRanges
     elements: Elements
 
     def __len__(self) -> int:
@@ -48,7 +48,7 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class JointRanges:
     """How far each joint turns from rest, see ``limits``."""
 
     ranges: Floats

@@ -53,7 +53,7 @@ _SETTLES: Final = 0.03
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredBend:
     """Coefficients of one joint about one axis."""
 
     stiffness: float
@@ -86,7 +86,7 @@ class Bend:
     """Seconds that springing back takes, D_f/K_f."""
 
 
-def measure_bend(bend: Bend) -> Measured:
+def measure_bend(bend: Bend) -> MeasuredBend:
     """The element that does what a bend says.
 
     Raises:
@@ -109,7 +109,7 @@ def measure_bend(bend: Bend) -> Measured:
     spring = max(bend.bends - bend.stays, _STIFFEST)
     reached = -np.expm1(-bend.seconds / bend.settles)
     stiffness = bend.torque * float(reached) / spring
-    return Measured(
+    return MeasuredBend(
         stiffness,
         stiffness * bend.settles,
         (bend.torque - bend.bears) * bend.seconds / bend.stays if yields else np.inf,
@@ -162,7 +162,7 @@ def measure_shown(
     return Bend(torque, bears, seconds, bends, stays, settles)
 
 
-def measure(times: Floats, torques: Floats, angles: Floats) -> Measured:
+def measure(times: Floats, torques: Floats, angles: Floats) -> MeasuredBend:
     """Fit an element to a recorded drag.
 
     Args:
@@ -199,7 +199,7 @@ def measure(times: Floats, torques: Floats, angles: Floats) -> Measured:
     if firm_error <= 1.03 * error or limit >= 0.999 * peak:
         error, (stiffness, damping) = firm_error, np.exp(firm[:2])
         flow = limit = np.inf
-    return Measured(float(stiffness), float(damping), float(flow), float(limit), error)
+    return MeasuredBend(float(stiffness), float(damping), float(flow), float(limit), error)
 
 
 def _first(item: tuple[float, Floats]) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 from ...errors import SettingsError
 from ...rotations import Floats
 from .figure import Elements, Figure
-from .material_fit import Measured
+from .material_fit import MeasuredBend
 
 GRAVITY: Final = 9.81
 """m/s², for the loads; whether the simulation has gravity is another matter."""
@@ -110,7 +110,7 @@ def _values(material: Material, load: float) -> tuple[float, float, float, float
     return stiffness, damping, flow, limit
 
 
-def material_of(measured: Measured, load: float) -> Material:
+def material_of(measured: MeasuredBend, load: float) -> Material:
     """The material of which a joint with a load has been measured.
 
     Args:

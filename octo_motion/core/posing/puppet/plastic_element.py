@@ -36,7 +36,7 @@ _INDEX = np.arange(3)
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class ElementResponse:
     """How the elements answer a relative angular velocity w over one step."""
 
     law: PlasticLaw
@@ -148,19 +148,19 @@ class PlasticLaw:
         """−K_f q_f (…, 3), the load at rest without flow."""
         return -self.stiffness * spring
 
-    def respond(self, spring: Floats, speed: Floats) -> Response:
+    def respond(self, spring: Floats, speed: Floats) -> ElementResponse:
         """Load, its slope and the flow, from q_f at the step's start and w at its end."""
         return self.answer(self.trial(spring, speed))
 
-    def answer(self, trial: Floats) -> Response:
+    def answer(self, trial: Floats) -> ElementResponse:
         """The same from λ_e (…, 3)."""
         if not self.can_flow:
-            return Response(self, trial, trial, _NONE, None)
+            return ElementResponse(self, trial, trial, _NONE, None)
         size = np.sqrt((trial * trial) @ _ONES)
         # With a threshold of 0 it flows even at rest: there its law is linear.
         flows = size >= self.yield_torque
         if not flows.any():
-            return Response(self, trial, trial, size, None)
+            return ElementResponse(self, trial, trial, size, None)
         if self.alike:
             which = flows.nonzero()[0]
             factor = self.shared_yield[:, 0].take(which) / (size.take(which) + _TINY)
@@ -170,7 +170,7 @@ class PlasticLaw:
         else:
             held = self.shared_yield * (trial / (size + _TINY)[..., None])
             load = np.where(flows[..., None], self.kept * trial + held, trial)
-        return Response(self, load, trial, size, flows)
+        return ElementResponse(self, load, trial, size, flows)
 
 
 _NONE = np.zeros(0)

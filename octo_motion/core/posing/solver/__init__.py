@@ -1,1 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""What moves a puppet: one step of a rigid-body world with plastic joints and contacts."""
+
+from .blas_threads import OneThread
+from .hand_spring import Coupling, Grab
+from .obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
+from .problem import Problem
+from .world import World, WorldSettings, WorldState
+
+__all__ = [
+    "Box",
+    "Capsule",
+    "Coupling",
+    "Grab",
+    "Hull",
+    "Mesh",
+    "Obstacle",
+    "OneThread",
+    "Plane",
+    "Problem",
+    "Sphere",
+    "World",
+    "WorldSettings",
+    "WorldState",
+]

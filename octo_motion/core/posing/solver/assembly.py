@@ -6,9 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...rotations import Floats
-from ..puppet.figure import Figure
-from ..puppet.kinematics import skew
-from ..puppet.plastic_element import PlasticLaw
+from ..puppet import Figure, PlasticLaw, skew
 from .bodies import Bodies
 from .constraint_rows import Rows
 from .joint_stops import JointStops

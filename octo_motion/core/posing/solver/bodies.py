@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats, normalized
-from ..puppet.figure import Figure, Pose
-from ..puppet.kinematics import (
+from ..puppet import (
+    Figure,
+    Pose,
     exponential,
     inverse_product,
     logarithm,

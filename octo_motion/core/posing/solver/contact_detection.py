@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats, cross, rotate, to_matrix
-from ..puppet.figure import Figure
-from ..puppet.kinematics import rest_pose
+from ..puppet import Figure, rest_pose
 from .obstacles import Obstacle, Plane
 
 Integers = NDArray[np.int64]

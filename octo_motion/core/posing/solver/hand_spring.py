@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats
-from ..puppet.figure import Figure
+from ..puppet import Figure
 
 _GRAVITY: Final = 9.81
 _FREQUENCY: Final = 8.0

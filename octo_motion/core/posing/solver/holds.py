@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
-from ..puppet.kinematics import logarithm, product, product_inverse
+from ..puppet import logarithm, product, product_inverse
 from .bodies import Bodies
 from .constraint_rows import Holds
 from .hand_spring import Coupling, Grab

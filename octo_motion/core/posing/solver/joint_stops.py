@@ -6,9 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...rotations import Floats
-from ..puppet.figure import Figure
-from ..puppet.joint_limits import _ONES, bends, slopes
-from ..puppet.kinematics import inverse_product, matrices
+from ..puppet import _ONES, Figure, bends, inverse_product, matrices, slopes
 from .problem import Stops
 
 _ENDLESS = np.pi - 1e-9

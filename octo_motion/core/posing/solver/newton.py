@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
-from ..puppet.plastic_element import Response
+from ..puppet import ElementResponse
 from .constraint_rows import Answer, Flags, Pattern, Rows, Tangent
 from .problem import SPATIAL, Problem, Stops
 from .tree import Tree
@@ -44,7 +44,7 @@ class Solution:
     moving: Floats | None
     """(slots, 3) u with which positions move, with corrections that are not kept; None where there
     are none."""
-    response: Response
+    response: ElementResponse
     """Loads and flow of the elements, in the problem's axes."""
     pressed: Flags | None
     """(stops,) which ends of ranges bear; None where none is near."""
@@ -69,7 +69,7 @@ class Start:
     """(slots, 3) u."""
     rows: Answer | None = None
     """What the rows did then, as they are now; None begins at ``speeds`` and nothing else."""
-    response: Response | None = None
+    response: ElementResponse | None = None
     """What the elements did then; None where none flowed, and then it begins as if none will."""
     pressed: Flags | None = None
     """(stops,) which ends of ranges bore; None begins with what they do at ``speeds``."""
@@ -87,7 +87,7 @@ class _Point:
     """(bodies, 3) relative angular velocities, world axes."""
     joint_impulses: Floats
     """(bodies, 3) of elements and stops, world axes."""
-    response: Response
+    response: ElementResponse
     pressed: Flags | None
     rows: Answer | None
 
@@ -209,7 +209,7 @@ class Newton:
         answer = rows.respond(rows.wanted(velocities)) if len(rows.bodies) else None
         return _Point(speeds, velocities, joint_speeds, impulses, response, pressed, answer)
 
-    def _elements(self, problem: Problem, speeds: Floats) -> tuple[Response, Floats]:
+    def _elements(self, problem: Problem, speeds: Floats) -> tuple[ElementResponse, Floats]:
         """Elements, and their impulses (bodies, 3), at relative turns of joints (bodies, 3)."""
         frames, law = problem.frames, problem.law
         if frames is None:
@@ -219,7 +219,9 @@ class Newton:
         response = law.answer(self._base - law.backward * seen)
         return response, problem.step * (frames @ response.load[:, :, None])[:, :, 0]
 
-    def _joints(self, problem: Problem, speeds: Floats) -> tuple[Response, Floats, Flags | None]:
+    def _joints(
+        self, problem: Problem, speeds: Floats
+    ) -> tuple[ElementResponse, Floats, Flags | None]:
         """The same with stops, and which of them bear."""
         response, impulses = self._elements(problem, speeds)
         if not problem.stops:
@@ -241,7 +243,7 @@ class Newton:
     def _bent(
         self,
         problem: Problem,
-        response: Response,
+        response: ElementResponse,
         speeds: Floats,
         pressed: Flags | None,
         rows: Tangent | None,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats
-from ..puppet.plastic_element import PlasticLaw
+from ..puppet import PlasticLaw
 from .constraint_rows import Rows
 
 Integers = NDArray[np.int64]

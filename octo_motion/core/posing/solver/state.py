@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import SettingsError
 from ...rotations import Floats
-from ..puppet.figure import Figure
+from ..puppet import Figure
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats
-from ..puppet.figure import Figure
-from ..puppet.kinematics import skew
+from ..puppet import Figure, skew
 
 Integers = NDArray[np.int64]
 

@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats, conjugate, multiply, normalized, rotate
-from ..puppet.figure import Elements, Figure, Pose
-from ..puppet.plastic_element import PlasticLaw, Response
+from ..puppet import ElementResponse, Elements, Figure, PlasticLaw, Pose
 from .assembly import Gathering, typical_size
 from .bodies import Bodies
 from .constraint_rows import Answer, Pattern, Rows
@@ -93,7 +92,7 @@ class World:
         self._pins: dict[int, Pin] = {}
         self._bodies = Bodies(figure, self._tree, pose)
         self._speeds = np.zeros((len(self._tree.layout.bodies), 3))
-        self._response: Response | None = None
+        self._response: ElementResponse | None = None
         self._pressed = _NOBODY
         self._loads = np.zeros((count, 3))
         self._use_elements(figure.elements)

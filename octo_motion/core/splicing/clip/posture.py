@@ -96,7 +96,7 @@ def posture_of(skeleton: Skeleton, rotations: Floats, locations: Floats) -> Post
     return Posture(skeleton, lambda bones: rotations[:, bones], lambda bone: locations[:, bone])
 
 
-def sampled(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
+def sample_clip(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
     """A clip at any times, in its own frame numbers; beyond its ends it stands still.
 
     Args:
@@ -133,8 +133,8 @@ def sampled(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
     return Posture(clip.skeleton, rotations, location)
 
 
-def sampled_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[int]) -> Floats:
-    """Scales (frames, bones, 3) of some bones of a clip at any times, like :func:`sampled`."""
+def sample_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[int]) -> Floats:
+    """Scales (frames, bones, 3) of some bones of a clip at any times, like :func:`sample_clip`."""
     if clip.scales is None:
         return np.ones((len(frames), len(bones), 3))
     before, after, share = _between(clip, frames)
@@ -144,7 +144,7 @@ def sampled_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[in
     return values + seams[:, None, None] * (clip.scales[0, own] - clip.scales[-1, own])
 
 
-def sampled_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
+def sample_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
     """The armature object at any times: rotations (frames, 4), places (frames, 3), and scale."""
     before, after, share = _between(clip, frames)
     first, second = clip.world[before], clip.world[after]

@@ -42,7 +42,7 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False)
-class Window:
+class SpliceWindow:
     """What a timing means for the frames of a base."""
 
     frames: slice
@@ -66,14 +66,14 @@ class Window:
             return range(row, row)
         leaving = self.weights < self.entering
         same = np.flatnonzero((self.weights < 1.0) & (leaving == leaving[number]))
-        center = int(same[middle(self.weights[same])]) + self.frames.start
+        center = int(same[window_middle(self.weights[same])]) + self.frames.start
         return range(min(row, center), max(row, center) + 1)
 
-    def taken(self, rows: Integers) -> Window:
+    def taken(self, rows: Integers) -> SpliceWindow:
         """Of some of the base's frames, ascending, as if the base had no others."""
         start, stop = np.searchsorted(rows, (self.frames.start, self.frames.stop))
         chosen = rows[start:stop] - self.frames.start
-        return Window(
+        return SpliceWindow(
             slice(int(start), int(stop)),
             self.weights[chosen],
             self.entering[chosen],
@@ -83,7 +83,7 @@ class Window:
         )
 
 
-def window(timing: Timing, base: Clip, splice: Clip) -> Window:
+def splice_window(timing: Timing, base: Clip, splice: Clip) -> SpliceWindow:
     """Frames, weights and moments of a splice.
 
     Raises:
@@ -114,7 +114,7 @@ def window(timing: Timing, base: Clip, splice: Clip) -> Window:
         moments, rounds, seams = _looped(moments, times, eases)
     elif timing.after == "hold":
         moments = _held(moments, times, eases[1])
-    return Window(frames, weights, entering, moments, rounds, seams)
+    return SpliceWindow(frames, weights, entering, moments, rounds, seams)
 
 
 def _looped(
@@ -167,7 +167,7 @@ def _check(timing: Timing) -> None:
         raise ClipError(f"'{timing.after}' is no ending.", "Choose hold, loop or stop.")
 
 
-def middle(weights: Floats) -> int:
+def window_middle(weights: Floats) -> int:
     """Where base and splice are about equally strong."""
     return int(np.argmin(np.abs(weights - 0.5)))
 

@@ -1,1 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""Which bone of a skeleton is which landmark of a body."""
+
+from .bone_names import mirrored
+from .correspondence import (
+    Correspondence,
+    chain_length,
+    correspondence,
+    matched_bones,
+    matched_chains,
+)
+from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks
+from .mapping import map_skeleton
+
+__all__ = [
+    "LANDMARKS",
+    "MIDDLE",
+    "OPTIONAL",
+    "SIDED",
+    "Correspondence",
+    "Landmarks",
+    "chain_length",
+    "correspondence",
+    "map_skeleton",
+    "matched_bones",
+    "matched_chains",
+    "mirrored",
+]

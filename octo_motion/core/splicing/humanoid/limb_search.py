@@ -22,7 +22,7 @@ _LEAST_WEIGHT: Final = 0.12
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class BodyProportions:
     """A skeleton with what its names say, and its mid plane as far as names tell."""
 
     skeleton: Skeleton
@@ -64,7 +64,7 @@ class Body:
         return abs(float((self.skeleton.heads[bone] - self.middle) @ self.left)) / self.size
 
 
-def body_of(skeleton: Skeleton, names: tuple[BoneName, ...]) -> Body:
+def body_of(skeleton: Skeleton, names: tuple[BoneName, ...]) -> BodyProportions:
     """Size, sides and mid plane of a skeleton."""
     sides: list[str] = []
     for name, parent in zip(names, skeleton.parents, strict=True):
@@ -83,16 +83,18 @@ def body_of(skeleton: Skeleton, names: tuple[BoneName, ...]) -> Body:
         if side == "L" and ("R", stem) in stems
     ]
     if not pairs:
-        return Body(skeleton, names, tuple(sides), size, None, heads.mean(axis=0))
+        return BodyProportions(skeleton, names, tuple(sides), size, None, heads.mean(axis=0))
     left, right = skeleton.heads[np.array(pairs).T]
     across = (left - right).sum(axis=0)
     length = float(np.linalg.norm(across))
     axis = across / length if length > 1e-6 * size else None
-    return Body(skeleton, names, tuple(sides), size, axis, (0.5 * (left + right)).mean(axis=0))
+    return BodyProportions(
+        skeleton, names, tuple(sides), size, axis, (0.5 * (left + right)).mean(axis=0)
+    )
 
 
 def find_limb(
-    body: Body, parts: tuple[str, ...], side: str
+    body: BodyProportions, parts: tuple[str, ...], side: str
 ) -> tuple[dict[str, tuple[int, float]], dict[str, list[int]]]:
     """The bones of a limb by what their names say, each with the weight of its name.
 
@@ -124,7 +126,7 @@ def find_limb(
     return found, {part: others for part, others in rivals.items() if others}
 
 
-def _are_beside(body: Body, one: int, other: int) -> bool:
+def _are_beside(body: BodyProportions, one: int, other: int) -> bool:
     """Whether two bones hang on the same limb, but neither on the other."""
     return (
         one != other
@@ -135,7 +137,7 @@ def _are_beside(body: Body, one: int, other: int) -> bool:
     )
 
 
-def _straightest(body: Body, before: int, bones: Sequence[int]) -> int:
+def _straightest(body: BodyProportions, before: int, bones: Sequence[int]) -> int:
     """The bone whose far end deviates least from the one before it."""
     skeleton = body.skeleton
     along = skeleton.rest_matrices[before][:3, 1]
@@ -149,7 +151,7 @@ def _straightest(body: Body, before: int, bones: Sequence[int]) -> int:
     return min(bones, key=deviation)
 
 
-def _fit(body: Body, bone: int, part: str) -> float:
+def _fit(body: BodyProportions, bone: int, part: str) -> float:
     """Weight of a bone for a part by its own name and place."""
     weight = body.names[bone].weights.get(part, 0.0)
     if weight == 0.0:
@@ -170,7 +172,9 @@ def _fit(body: Body, bone: int, part: str) -> float:
     return weight
 
 
-def _best_sequence(body: Body, candidates: Mapping[str, Mapping[int, float]]) -> dict[str, int]:
+def _best_sequence(
+    body: BodyProportions, candidates: Mapping[str, Mapping[int, float]]
+) -> dict[str, int]:
     best: dict[tuple[str, int], tuple[float, dict[str, int]]] = {}
     for part, bones in candidates.items():
         following: dict[tuple[str, int], tuple[float, dict[str, int]]] = {}
@@ -199,7 +203,7 @@ def _left_out(before: str, part: str) -> float:
     return 0.5 * sum(each not in OPTIONAL_PARTS for each in between)
 
 
-def _follows(body: Body, before: int, bone: int, chain: Mapping[str, int]) -> float:
+def _follows(body: BodyProportions, before: int, bone: int, chain: Mapping[str, int]) -> float:
     """How well a bone follows the one before it in the limb; 0.2 at best."""
     skeleton = body.skeleton
     part = next(name for name, each in chain.items() if each == before)
@@ -220,7 +224,7 @@ def _follows(body: Body, before: int, bone: int, chain: Mapping[str, int]) -> fl
     return score - (0.5 if _continues(body, before, bone, chain) else 2.0)
 
 
-def _continues(body: Body, before: int, bone: int, chain: Mapping[str, int]) -> bool:
+def _continues(body: BodyProportions, before: int, bone: int, chain: Mapping[str, int]) -> bool:
     """Whether a bone lies where the lower part of a limb would end, about as long as the upper."""
     uppers = [chain[part] for part in ("upper_arm", "thigh") if part in chain]
     if not uppers or uppers[0] == before:
@@ -232,7 +236,7 @@ def _continues(body: Body, before: int, bone: int, chain: Mapping[str, int]) -> 
     return straight and 0.6 * lengths[0] < lengths[1] < 1.7 * lengths[0]
 
 
-def _unevenness(body: Body, before: int, chain: Mapping[str, int], gap: float) -> float:
+def _unevenness(body: BodyProportions, before: int, chain: Mapping[str, int], gap: float) -> float:
     """What it costs if the two long parts of a limb are of very different lengths."""
     uppers = [chain[part] for part in ("upper_arm", "thigh") if part in chain]
     if not uppers or uppers[0] == before:
@@ -243,7 +247,7 @@ def _unevenness(body: Body, before: int, chain: Mapping[str, int], gap: float) -
     return min(1.0, 0.3 * abs(float(np.log(max(gap, least) / max(upper, least)))))
 
 
-def _skipped(body: Body, before: int, bone: int, part: str, gap: float) -> float:
+def _skipped(body: BodyProportions, before: int, bone: int, part: str, gap: float) -> float:
     """What it costs to leave out the bones between two: the more, the longer they are."""
     heads = body.skeleton.heads
     cost = 0.0

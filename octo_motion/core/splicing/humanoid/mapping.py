@@ -19,7 +19,7 @@ from ...rotations import Floats
 from ...skeleton import Skeleton
 from .bone_names import read_names
 from .landmarks import LANDMARKS, OPTIONAL, Landmarks
-from .limb_search import ARM, LEG, OPTIONAL_PARTS, Body, body_of, find_limb
+from .limb_search import ARM, LEG, OPTIONAL_PARTS, BodyProportions, body_of, find_limb
 from .shape_match import Shape, shape_of
 from .trunk_search import find_trunk
 
@@ -90,7 +90,7 @@ def map_skeleton(skeleton: Skeleton) -> SkeletonMapping:
 
 
 def _named_limb(
-    body: Body, kind: str, side: str, notes: list[str], missing: dict[str, str]
+    body: BodyProportions, kind: str, side: str, notes: list[str], missing: dict[str, str]
 ) -> dict[str, tuple[int, float]]:
     """A limb by names; parts that several bones may be are told."""
     limb, rivals = find_limb(body, LIMBS[kind], side)
@@ -113,7 +113,7 @@ def _has_core(kind: str, limb: Mapping[str, object]) -> bool:
 
 
 def _complete_from_shape(
-    body: Body,
+    body: BodyProportions,
     limbs: dict[tuple[str, str], dict[str, tuple[int, float]]],
     notes: list[str],
     missing: dict[str, str],
@@ -149,7 +149,9 @@ def _complete_from_shape(
 
 
 def _sides_of_shape(
-    body: Body, shape: Shape, limbs: Mapping[tuple[str, str], Mapping[str, tuple[int, float]]]
+    body: BodyProportions,
+    shape: Shape,
+    limbs: Mapping[tuple[str, str], Mapping[str, tuple[int, float]]],
 ) -> tuple[str, str] | None:
     """Which side the first and the second limb of each pair of a shape are on."""
     named = 0
@@ -211,7 +213,9 @@ def _drop_crossed_sides(
             missing[name] = "The left arm is on the side of the right leg."
 
 
-def _trunk(body: Body, found: Mapping[str, tuple[int, float]]) -> dict[str, tuple[int, float]]:
+def _trunk(
+    body: BodyProportions, found: Mapping[str, tuple[int, float]]
+) -> dict[str, tuple[int, float]]:
     def pair(part: str) -> list[int]:
         return [found[f"{part}.{side}"][0] for side in "LR" if f"{part}.{side}" in found]
 
@@ -221,7 +225,9 @@ def _trunk(body: Body, found: Mapping[str, tuple[int, float]]) -> dict[str, tupl
     return find_trunk(body, pair("thigh"), pair("shin"), shoulders)
 
 
-def _with_mid_plane(body: Body, found: Mapping[str, tuple[int, float]]) -> Body:
+def _with_mid_plane(
+    body: BodyProportions, found: Mapping[str, tuple[int, float]]
+) -> BodyProportions:
     """The body with the mid plane between its limbs, where its names have told none."""
     if body.left is not None:
         return body

@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from .limb_search import Body
+from .limb_search import BodyProportions
 
 _NEAR_THE_LEGS: Final = 0.9
 """How far the hips may lie from the middle of the thighs' heads, in lengths of a thigh."""
 
 
 def find_trunk(
-    body: Body, thighs: Sequence[int], shins: Sequence[int], shoulders: Sequence[int]
+    body: BodyProportions, thighs: Sequence[int], shins: Sequence[int], shoulders: Sequence[int]
 ) -> dict[str, tuple[int, float]]:
     """The bones of the trunk, each with how sure it is, 0…1.
 
@@ -51,7 +51,7 @@ def find_trunk(
 
 
 def _hips(
-    body: Body, thighs: Sequence[int], shins: Sequence[int], upper: int
+    body: BodyProportions, thighs: Sequence[int], shins: Sequence[int], upper: int
 ) -> tuple[int, float] | None:
     """The bone that carries legs and trunk, if it is at the pelvis; else the one so named."""
     heads = body.skeleton.heads
@@ -74,7 +74,7 @@ def _hips(
     return None
 
 
-def _carrier(body: Body, bones: Sequence[int], part: str) -> tuple[int, float] | None:
+def _carrier(body: BodyProportions, bones: Sequence[int], part: str) -> tuple[int, float] | None:
     """The lowest bone that carries all of these and that keys can move."""
     shared = body.common_ancestor(bones)
     if shared is None:
@@ -89,7 +89,7 @@ def _carrier(body: Body, bones: Sequence[int], part: str) -> tuple[int, float] |
     return free[0], 1.0 if body.names[free[0]].weights.get(part, 0.0) >= 0.5 else 0.8
 
 
-def _is_free(body: Body, bone: int) -> bool:
+def _is_free(body: BodyProportions, bone: int) -> bool:
     """Whether an artist moves it: no machinery, nothing that follows another bone."""
     return not (
         body.names[bone].machinery
@@ -98,7 +98,7 @@ def _is_free(body: Body, bone: int) -> bool:
     )
 
 
-def _between(body: Body, lower: int, upper: int) -> list[int]:
+def _between(body: BodyProportions, lower: int, upper: int) -> list[int]:
     """The free bones between two, from the lower one up."""
     chain = body.ancestors(upper)
     if lower not in chain:
@@ -109,7 +109,7 @@ def _between(body: Body, lower: int, upper: int) -> list[int]:
     return free or between
 
 
-def _named(body: Body, part: str) -> tuple[int, float] | None:
+def _named(body: BodyProportions, part: str) -> tuple[int, float] | None:
     """The bone of the middle whose name says it is this part, the first one down the tree."""
     best: tuple[int, float] | None = None
     for bone, name in enumerate(body.names):
@@ -122,7 +122,7 @@ def _named(body: Body, part: str) -> tuple[int, float] | None:
 
 
 def _end_of_middle(
-    body: Body, thighs: Sequence[int], shoulders: Sequence[int]
+    body: BodyProportions, thighs: Sequence[int], shoulders: Sequence[int]
 ) -> tuple[int, float] | None:
     """The last bone of the row that goes up from between the shoulders, where none is named."""
     skeleton = body.skeleton

@@ -21,8 +21,8 @@ import numpy as np
 from ...errors import ClipError
 from ...rotations import Floats, conjugate, from_matrix, multiply, normalized, rotate
 from ...skeleton import Skeleton
-from ..clip.posture import Posture
-from ..humanoid.landmarks import Landmarks
+from ..clip import Posture
+from ..humanoid import Landmarks
 from .parts import landmark_bone
 
 _CHEST_JOINTS: Final = (
@@ -39,7 +39,7 @@ _FLAT: Final = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class BodyFrame:
+class AnatomicalFrame:
     """A frame that rides on a bone."""
 
     bone: int
@@ -70,7 +70,7 @@ class BodyFrame:
         return multiply(skeleton.rest_rotations[self.bone], self.turn)
 
 
-def chest_frame(skeleton: Skeleton, landmarks: Landmarks) -> BodyFrame:
+def chest_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
     """The chest's frame; its origin is midway between the shoulders.
 
     Raises:
@@ -97,7 +97,7 @@ def chest_frame(skeleton: Skeleton, landmarks: Landmarks) -> BodyFrame:
     )
 
 
-def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> BodyFrame:
+def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
     """The pelvis's frame; its origin is midway between the hip joints.
 
     Raises:
@@ -119,7 +119,7 @@ def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> BodyFrame:
     )
 
 
-def chain_frame(skeleton: Skeleton, bones: Sequence[int]) -> BodyFrame:
+def chain_frame(skeleton: Skeleton, bones: Sequence[int]) -> AnatomicalFrame:
     """The frame of a chain that is no limb of a humanoid: fixed to what the chain hangs on, with
     X along the chain at rest and Z up.
     """
@@ -133,13 +133,13 @@ def chain_frame(skeleton: Skeleton, bones: Sequence[int]) -> BodyFrame:
     y = normalized(y - np.dot(x, y) * x)
     turn = from_matrix(np.stack([x, y, np.cross(x, y)], axis=-1))
     if parent < 0:
-        return BodyFrame(-1, turn, skeleton.heads[root], {})
+        return AnatomicalFrame(-1, turn, skeleton.heads[root], {})
     back = conjugate(skeleton.rest_rotations[parent])
     offset = rotate(back, skeleton.heads[root] - skeleton.heads[parent])
-    return BodyFrame(parent, multiply(back, turn), offset, {})
+    return AnatomicalFrame(parent, multiply(back, turn), offset, {})
 
 
-def laid_over(splice: BodyFrame, base: BodyFrame) -> BodyFrame:
+def laid_over(splice: AnatomicalFrame, base: AnatomicalFrame) -> AnatomicalFrame:
     """The splice body's frame, made to agree with the base's where the two are the same body."""
     names = sorted(splice.joints.keys() & base.joints.keys())
     if splice.joints.keys() != base.joints.keys() or len(names) < 2:
@@ -161,7 +161,7 @@ def laid_over(splice: BodyFrame, base: BodyFrame) -> BodyFrame:
         return splice
     back = conjugate(from_matrix(turn))
     origin = their_middle + rotate(back, base.origin - our_middle) / scale
-    return BodyFrame(splice.bone, multiply(back, base.turn), origin, splice.joints)
+    return AnatomicalFrame(splice.bone, multiply(back, base.turn), origin, splice.joints)
 
 
 def _frame(
@@ -172,7 +172,7 @@ def _frame(
     axes: tuple[Floats, Floats],
     origin: Floats,
     joints: Sequence[str],
-) -> BodyFrame:
+) -> AnatomicalFrame:
     left, up = (normalized(axis) for axis in axes)
     up = up - np.dot(left, up) * left
     if np.linalg.norm(left) < 0.5 or np.linalg.norm(up) < 1e-3:
@@ -190,7 +190,7 @@ def _frame(
         for name in joints
         if (child := _child_towards(skeleton, landmarks, bone, name)) is not None
     }
-    return BodyFrame(
+    return AnatomicalFrame(
         bone, multiply(back, from_matrix(axes_matrix)), rotate(back, origin - head), places
     )
 

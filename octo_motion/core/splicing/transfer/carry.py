@@ -21,19 +21,18 @@ from ...rotations import (
     shortest_arc,
 )
 from ...skeleton import Skeleton
-from ..clip.clip import Clip
-from ..clip.posture import Posture, posture_of, sampled, slerp
-from ..humanoid.correspondence import (
+from ..clip import Clip, Posture, posture_of, sample_clip, slerp
+from ..humanoid import (
     Correspondence,
+    Landmarks,
     chain_length,
     correspondence,
     matched_bones,
     matched_chains,
 )
-from ..humanoid.landmarks import Landmarks
-from .body_frames import BodyFrame, chain_frame, chest_frame, laid_over, pelvis_frame
-from .limb_rotation import Limb, hinge_axis, joint_turn, reach
-from .parts import Part, beneath, bone_of, landmark_bone, piece_bones
+from .body_frames import AnatomicalFrame, chain_frame, chest_frame, laid_over, pelvis_frame
+from .limb_rotation import LimbTriangle, bend_to_reach, hinge_axis, joint_turn
+from .parts import Part, bone_of, bones_beneath, landmark_bone, piece_bones
 
 _LIMBS = {"arm": ("upper_arm", "forearm", "hand"), "leg": ("thigh", "shin", "foot")}
 
@@ -99,7 +98,7 @@ class Carrier:
     splice: Side
     bones: tuple[int, ...]
     """Of the base, parents first; the joint is the first one's."""
-    frames: tuple[BodyFrame, BodyFrame]
+    frames: tuple[AnatomicalFrame, AnatomicalFrame]
     """From which the piece is seen, on base and splice."""
     match: Correspondence
     limb: tuple[tuple[int, int, int], tuple[int, int, int]] | None
@@ -148,8 +147,8 @@ class Carrier:
         (joint, _, _), others = self.limb
         clip = self.splice.clip
         chosen = np.linspace(clip.frames[0], clip.frames[-1], min(len(clip), _HINGE_SAMPLES))
-        posture = sampled(clip, chosen)
-        limb = Limb(*(posture.head(bone) for bone in others))
+        posture = sample_clip(clip, chosen)
+        limb = LimbTriangle(*(posture.head(bone) for bone in others))
         axis = hinge_axis(limb, posture.orientation(others[0]))
         return rotate(conjugate(self.match.constants[joint]), axis)
 
@@ -203,24 +202,24 @@ def carry(
         return
     (joint, elbow, hand), (_, other_elbow, other_hand) = carrier.limb
     result = posture_of(base.skeleton, rotations, locations)
-    limb = Limb(result.head(joint), result.head(elbow), result.head(hand))
+    limb = LimbTriangle(result.head(joint), result.head(elbow), result.head(hand))
     our_place, their_place = ours.place(base), theirs.place(splice)
 
     def seen(bone: int) -> Floats:
         return our_place + carrier.ratio * rotate(between, splice.head(bone) - their_place)
 
-    wanted = Limb(limb.joint, seen(other_elbow), seen(other_hand))
+    wanted = LimbTriangle(limb.joint, seen(other_elbow), seen(other_hand))
     turn = joint_turn(limb, wanted)
     lower_turn = turn
     if exact:
-        turned = Limb(
+        turned = LimbTriangle(
             limb.joint,
             limb.joint + rotate(turn, limb.elbow - limb.joint),
             limb.joint + rotate(turn, limb.hand - limb.joint),
         )
         hinge = rotate(multiply(turn, result.orientation(joint)), carrier.hinge)
         alike = carrier.match.same_body
-        upper_bend, lower_bend = reach(turned, wanted.hand, hinge, alike=alike)
+        upper_bend, lower_bend = bend_to_reach(turned, wanted.hand, hinge, alike=alike)
         turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
     _turn_limb(result, rotations, (joint, turn), (elbow, lower_turn))
 
@@ -378,13 +377,13 @@ def _has_clavicle(skeleton: Skeleton, landmarks: Landmarks, side: str) -> bool:
     clavicle, upper = (
         landmark_bone(skeleton, landmarks, f"{name}.{side}") for name in ("clavicle", "upper_arm")
     )
-    return upper in beneath(skeleton, [clavicle])
+    return upper in bones_beneath(skeleton, [clavicle])
 
 
 def _three(skeleton: Skeleton, landmarks: Landmarks, names: Sequence[str]) -> tuple[int, int, int]:
     first, second, third = (landmark_bone(skeleton, landmarks, name) for name in names)
     for upper, lower in ((first, second), (second, third)):
-        if lower not in beneath(skeleton, [upper]):
+        if lower not in bones_beneath(skeleton, [upper]):
             raise ClipError(
                 f"'{skeleton.names[lower]}' does not hang on '{skeleton.names[upper]}'.",
                 "Such a limb follows controls: bake its motion onto its bones first.",
@@ -394,9 +393,11 @@ def _three(skeleton: Skeleton, landmarks: Landmarks, names: Sequence[str]) -> tu
 
 def _chain_carrier(part: Part, base: Side, splice: Side) -> Carrier:
     with base.told():
-        bones = beneath(base.skeleton, [bone_of(base.skeleton, part.root)])
+        bones = bones_beneath(base.skeleton, [bone_of(base.skeleton, part.root)])
     with splice.told():
-        others = beneath(splice.skeleton, [bone_of(splice.skeleton, part.splice_root or part.root)])
+        others = bones_beneath(
+            splice.skeleton, [bone_of(splice.skeleton, part.splice_root or part.root)]
+        )
     names = matched_bones(base.skeleton, bones, splice.skeleton, others, (None, None))
     pairs, spread = names, None
     if len(names) < len(bones) or names.get(bones[0]) != others[0]:

@@ -24,11 +24,9 @@ from ...rotations import (
     rotate,
     to_rotation_vector,
 )
-from ..clip.clip import Clip
-from ..clip.posture import Posture, sampled, sampled_world, slerp
-from ..clip.timing import Window
-from ..humanoid.correspondence import chain_length
-from .body_frames import BodyFrame
+from ..clip import Clip, Posture, SpliceWindow, sample_clip, sample_world, slerp
+from ..humanoid import chain_length
+from .body_frames import AnatomicalFrame
 from .carry import Carrier, Side
 from .parts import landmark_bone
 
@@ -47,7 +45,7 @@ class _Path:
     places: Floats
 
 
-class Travel:
+class LegTravel:
     """What of the way through the world does not hang on its timing.
 
     Args:
@@ -73,7 +71,7 @@ class Travel:
         self._ratio = _leg(ours) * ours.clip.scale / (_leg(theirs) * theirs.clip.scale)
 
     def move(
-        self, clip: Clip, span: Window, base: Posture, rotations: Floats, locations: Floats
+        self, clip: Clip, span: SpliceWindow, base: Posture, rotations: Floats, locations: Floats
     ) -> None:
         """Write rotation and location of the hips into the base's arrays.
 
@@ -109,14 +107,14 @@ class Travel:
         later.places[:count] = goal_places + weights[:, None] * (places - goal_places)
         _write_hips(clip, ours, base, later, (rotations, locations))
 
-    def _path(self, span: Window) -> _Path:
+    def _path(self, span: SpliceWindow) -> _Path:
         """The splice's pelvis through the world, round after round where it loops."""
         clip, frame = self._carrier.splice.clip, self._carrier.frames[1]
-        path = _path(clip, frame, sampled(clip, span.splice_frames), span.splice_frames)
+        path = _path(clip, frame, sample_clip(clip, span.splice_frames), span.splice_frames)
         if not (span.rounds.any() or span.seams.any()):
             return path
         ends = np.array([clip.frames[0], clip.frames[-1]])
-        ends = _path(clip, frame, sampled(clip, ends), ends)
+        ends = _path(clip, frame, sample_clip(clip, ends), ends)
         # Each round goes on from where the one before has led, and the way it faced then.
         turn = _heading(ends.orientations[1], ends.orientations[0])
         numbers = np.arange(span.rounds.max() + 1.0)
@@ -140,7 +138,7 @@ class Travel:
 
 def _write_hips(
     clip: Clip,
-    frame: BodyFrame,
+    frame: AnatomicalFrame,
     base: Posture,
     path: _Path,
     arrays: tuple[Floats, Floats],
@@ -149,7 +147,7 @@ def _write_hips(
     rotations, locations = arrays
     first = len(clip) - len(path.places)
     chosen = slice(first, None)
-    turns, shifts, scale = sampled_world(clip, clip.frames[chosen])
+    turns, shifts, scale = sample_world(clip, clip.frames[chosen])
     back = conjugate(turns)
     orientation = multiply(multiply(back, path.orientations), conjugate(frame.turn))
     place = rotate(back, path.places - shifts) / scale - rotate(orientation, frame.origin)
@@ -163,8 +161,8 @@ def _write_hips(
     locations[chosen, bone] = rotate(conjugate(part(base.location_axes(bone))), moved)
 
 
-def _path(clip: Clip, frame: BodyFrame, posture: Posture, frames: Floats) -> _Path:
-    turns, shifts, scale = sampled_world(clip, frames)
+def _path(clip: Clip, frame: AnatomicalFrame, posture: Posture, frames: Floats) -> _Path:
+    turns, shifts, scale = sample_world(clip, frames)
     return _Path(
         multiply(turns, frame.orientation(posture)),
         shifts + scale * rotate(turns, frame.place(posture)),
@@ -194,8 +192,8 @@ def ground_height(side: Side) -> float:
     clip, marks = side.clip, side.humanoid()
     count = min(len(clip), _GROUND_SAMPLES)
     chosen = clip.frames[np.linspace(0, len(clip) - 1, count).astype(np.intp)]
-    posture = sampled(clip, chosen)
-    turns, shifts, scale = sampled_world(clip, chosen)
+    posture = sample_clip(clip, chosen)
+    turns, shifts, scale = sample_world(clip, chosen)
     heights = [
         (shifts + scale * rotate(turns, posture.head(landmark_bone(clip.skeleton, marks, foot))))[
             :, 2

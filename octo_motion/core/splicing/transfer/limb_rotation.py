@@ -58,7 +58,7 @@ bound, and to stop at once."""
 
 
 @dataclass(frozen=True, eq=False)
-class Limb:
+class LimbTriangle:
     """Joints of a limb over time, (frames, 3) each."""
 
     joint: Floats
@@ -66,7 +66,7 @@ class Limb:
     hand: Floats
 
 
-def joint_turn(limb: Limb, wanted: Limb) -> Floats:
+def joint_turn(limb: LimbTriangle, wanted: LimbTriangle) -> Floats:
     """The rotation (frames, 4) about a limb's joint that brings it to the wanted one's shape.
 
     The hand points from the joint exactly where the wanted one does. About that direction the limb
@@ -90,8 +90,8 @@ def joint_turn(limb: Limb, wanted: Limb) -> Floats:
     return multiply(from_axis_angle(goal, angle * share), aimed)
 
 
-def reach(
-    limb: Limb, target: Floats, hinge: Floats, *, alike: bool = True
+def bend_to_reach(
+    limb: LimbTriangle, target: Floats, hinge: Floats, *, alike: bool = True
 ) -> tuple[Floats, Floats]:
     """Bend a limb so that its hand, which points at the target already, lands on it.
 
@@ -135,7 +135,9 @@ def reach(
     return _untwisted(upper_turn, first), _untwisted(lower_turn, second)
 
 
-def _wanted_bend(upper: Floats, lower: Floats, limb: Limb, target: Floats, now: Floats) -> Floats:
+def _wanted_bend(
+    upper: Floats, lower: Floats, limb: LimbTriangle, target: Floats, now: Floats
+) -> Floats:
     """The bend (frames,) with which a hand is as far from the joint as its target, softened.
 
     Args:
@@ -184,7 +186,7 @@ def _untwisted(turn: Floats, segment: Floats) -> Floats:
     return shortest_arc(start, rotate(turn, start))
 
 
-def hinge_axis(limb: Limb, orientation: Floats) -> Floats:
+def hinge_axis(limb: LimbTriangle, orientation: Floats) -> Floats:
     """The axis (3,) about which a limb bends over a clip, along the upper limb's own axes.
 
     Args:
@@ -200,7 +202,7 @@ def hinge_axis(limb: Limb, orientation: Floats) -> Floats:
     return normalized(np.cross(along, np.eye(3)[np.argmin(np.abs(along))]))
 
 
-def _bend(limb: Limb) -> Floats:
+def _bend(limb: LimbTriangle) -> Floats:
     """0 … 1: how much a limb's triangle says of its turn."""
     upper, lower = limb.elbow - limb.joint, limb.hand - limb.elbow
     sine = np.linalg.norm(cross(upper, lower), axis=-1)

@@ -9,7 +9,7 @@ from typing import Final
 
 from ...errors import ClipError
 from ...skeleton import Skeleton
-from ..humanoid.landmarks import Landmarks
+from ..humanoid import Landmarks
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ PARTS: Final = {
 }
 
 
-def chain(root: str, splice_root: str = "") -> Part:
+def chain_part(root: str, splice_root: str = "") -> Part:
     """A bone and all beneath it: a tail, an octopus arm."""
     return Part(root, (), root, splice_root or root)
 
@@ -69,7 +69,7 @@ def landmark_bone(skeleton: Skeleton, landmarks: Landmarks, *choices: str) -> in
     )
 
 
-def beneath(skeleton: Skeleton, roots: Iterable[int]) -> list[int]:
+def bones_beneath(skeleton: Skeleton, roots: Iterable[int]) -> list[int]:
     """Bones and all that hang on them, parents first."""
     inside: set[int] = set(roots)
     for bone, parent in enumerate(skeleton.parents):
@@ -110,7 +110,7 @@ def part_bones(
         assert landmarks is not None
         found |= set(piece_bones(piece, skeleton, landmarks, clavicle=clavicle))
     if part.root:
-        found |= set(beneath(skeleton, [bone_of(skeleton, part.root)]))
+        found |= set(bones_beneath(skeleton, [bone_of(skeleton, part.root)]))
     return tuple(skeleton.names[bone] for bone in sorted(found))
 
 
@@ -125,12 +125,12 @@ def piece_bones(
     kind, _, side = piece.partition(".")
     if kind == "arm":
         first = (f"clavicle.{side}",) if clavicle else ()
-        return beneath(skeleton, [bone(*first, f"upper_arm.{side}")])
+        return bones_beneath(skeleton, [bone(*first, f"upper_arm.{side}")])
     if kind == "leg":
-        return beneath(skeleton, [bone(f"thigh.{side}")])
+        return bones_beneath(skeleton, [bone(f"thigh.{side}")])
     if kind == "trunk":
         return path_down(skeleton, bone("hips"), bone("chest"), "trunk")
-    return beneath(skeleton, path_down(skeleton, bone("chest"), bone("head"), "head")[:1])
+    return bones_beneath(skeleton, path_down(skeleton, bone("chest"), bone("head"), "head")[:1])
 
 
 def _spoken(landmark: str) -> str:

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..clip.clip import Clip
-from ..clip.timing import Timing
-from ..humanoid.landmarks import Landmarks
-from .splice import Splice, build, splicers
+from ..clip import Clip, Timing
+from ..humanoid import Landmarks
+from .splice import Splice, build_splices, splicers
 
 
-class Live:
+class SplicePreview:
     """The result of a stack at single frames, while one of its splices is timed anew.
 
     What does not hang on that timing is computed once: all splices beneath it, which bones answer
@@ -33,7 +32,7 @@ class Live:
     def __init__(
         self, base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], number: int
     ) -> None:
-        self._base = build(base, landmarks, splices[:number])
+        self._base = build_splices(base, landmarks, splices[:number])
         # Made ready on the stack's own base: it tells the ground.
         self._levels = splicers(base, landmarks, splices[number:])
         self._above = [each.window(each.splice.timing) for each in self._levels[1:]]

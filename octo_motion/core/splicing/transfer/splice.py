@@ -25,12 +25,19 @@ from ...rotations import (
     multiply,
     to_rotation_vector,
 )
-from ..clip.clip import Clip
-from ..clip.posture import posture_of, sampled, sampled_scales
-from ..clip.timing import Timing, Window, middle, window
-from ..humanoid.landmarks import Landmarks
+from ..clip import (
+    Clip,
+    SpliceWindow,
+    Timing,
+    posture_of,
+    sample_clip,
+    sample_scales,
+    splice_window,
+    window_middle,
+)
+from ..humanoid import Landmarks
 from .carry import Carrier, Side, carriers, carry
-from .leg_travel import Travel, ground_height
+from .leg_travel import LegTravel, ground_height
 from .parts import Part
 
 Reach = Literal["direction", "exact"]
@@ -60,7 +67,7 @@ class Splice:
     mute: bool = False
 
 
-def build(base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice]) -> Clip:
+def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice]) -> Clip:
     """All splices of a stack, each onto the result of those before. Nothing given is changed.
 
     Raises:
@@ -116,15 +123,15 @@ class Splicer:
         self._bones = sorted({bone for piece in self._pieces for bone in piece.bones})
         self._travel = None
         if splice.travel:
-            self._travel = Travel(self._pieces[0], ground_height(sides[0]))
+            self._travel = LegTravel(self._pieces[0], ground_height(sides[0]))
 
-    def window(self, timing: Timing) -> Window:
+    def window(self, timing: Timing) -> SpliceWindow:
         """What a timing means for the base.
 
         Raises:
             ClipError: the timing makes no sense.
         """
-        return window(timing, self._base, self.splice.clip)
+        return splice_window(timing, self._base, self.splice.clip)
 
     def at(self, timing: Timing, rows: Iterable[int] | None = None) -> Clip:
         """The base with the part spliced on at this timing, all of it or some of its frames.
@@ -144,7 +151,7 @@ class Splicer:
         few = self.onto(self._base.taken(needed), span.taken(np.asarray(needed, dtype=np.intp)))
         return few.taken(np.searchsorted(needed, wanted))
 
-    def needed(self, span: Window, rows: Iterable[int]) -> list[int]:
+    def needed(self, span: SpliceWindow, rows: Iterable[int]) -> list[int]:
         """Frames on which the result at these hangs, themselves included, ascending."""
         needed = set(rows)
         for row in tuple(needed):
@@ -153,7 +160,7 @@ class Splicer:
             needed |= {span.frames.start, span.frames.stop - 1} if len(span.weights) else set()
         return sorted(needed)
 
-    def onto(self, base: Clip, span: Window) -> Clip:
+    def onto(self, base: Clip, span: SpliceWindow) -> Clip:
         """Put the part onto a clip of the base's skeleton.
 
         Args:
@@ -164,7 +171,7 @@ class Splicer:
             return base
         rotations, locations = base.rotations.copy(), base.locations.copy()
         before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
-        moment = sampled(self.splice.clip, span.splice_frames, span.seams)
+        moment = sample_clip(self.splice.clip, span.splice_frames, span.seams)
         # Views: what is written here is written into the whole.
         turned, moved = rotations[span.frames], locations[span.frames]
         exact = self.splice.reach == "exact"
@@ -179,7 +186,9 @@ class Splicer:
         return replace(base, rotations=rotations, locations=locations, scales=scales)
 
 
-def _scaled(base: Clip, splice: Clip, span: Window, pieces: Sequence[Carrier]) -> Floats | None:
+def _scaled(
+    base: Clip, splice: Clip, span: SpliceWindow, pieces: Sequence[Carrier]
+) -> Floats | None:
     """The base's scales with those of the part, which only mean something on the same bones."""
     if base.scales is None and splice.scales is None:
         return None
@@ -193,14 +202,14 @@ def _scaled(base: Clip, splice: Clip, span: Window, pieces: Sequence[Carrier]) -
         bones = [bone for bone in piece.bones if bone in pairs]
         others = [pairs[bone] for bone in bones]
         rest = [bone for bone in piece.bones if bone not in pairs]
-        there = sampled_scales(splice, span.splice_frames, span.seams, others)
+        there = sample_scales(splice, span.splice_frames, span.seams, others)
         acting[:, bones] += weights * (there - acting[:, bones])
         acting[:, rest] += weights * (1.0 - acting[:, rest])
     return scales
 
 
 def _ease(
-    base: Clip, span: Window, bones: Sequence[int], rotations: Floats, locations: Floats
+    base: Clip, span: SpliceWindow, bones: Sequence[int], rotations: Floats, locations: Floats
 ) -> None:
     """Mix the base back in where the splice comes and goes."""
     leaving = span.weights < span.entering
@@ -213,7 +222,7 @@ def _ease(
         # The way round is chosen once, where the two are about equally strong, and kept: the short
         # way frame by frame would jump where they are half a turn apart.
         between = continuous(multiply(conjugate(own), rotations[chosen][:, bones]))
-        center = middle(weights[:, 0])
+        center = window_middle(weights[:, 0])
         between = np.where(between[center, :, :1] < 0.0, -between, between)
         mixed = multiply(own, _power(between, weights))
         # Where the splice has no weight yet, the very values of the base.

@@ -14,10 +14,8 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, conjugate, rotate
-from ..clip.clip import Clip
-from ..clip.posture import sampled
-from ..humanoid.correspondence import chain_length
-from ..humanoid.landmarks import Landmarks
+from ..clip import Clip, sample_clip
+from ..humanoid import Landmarks, chain_length
 from .body_frames import laid_over, pelvis_frame
 from .carry import Side
 from .parts import landmark_bone
@@ -112,7 +110,7 @@ def _legs(side: Side, base: Side, frames: Floats, pace: float) -> Floats:
     skeleton = side.skeleton
     reference = pelvis_frame(base.skeleton, base.humanoid())
     frame = laid_over(pelvis_frame(skeleton, marks), reference)
-    posture = sampled(side.clip, frames)
+    posture = sample_clip(side.clip, frames)
     back, place = conjugate(frame.orientation(posture)), frame.place(posture)
     positions = []
     for left in "LR":

@@ -10,8 +10,8 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty
 from bpy_extras.object_utils import AddObjectHelper, add_object_align_init
 from mathutils import Matrix
 
-from ....blender.scene.octopus import add_octopus
-from ....core.locomotion.octopus.shape import ARMS, JOINTS, OctopusShape
+from ....blender.scene import add_octopus
+from ....core.locomotion.octopus import ARMS, JOINTS, OctopusShape
 from ...local_view import show_in_local_view
 from ...operator_base import OctoOperator
 

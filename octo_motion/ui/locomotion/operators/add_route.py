@@ -7,9 +7,9 @@ import bpy
 import numpy as np
 from bpy.props import FloatVectorProperty
 
-from ....blender.scene.curves import add_route_curve, suggested_control_points
+from ....blender.scene import add_route_curve, suggested_control_points
 from ....core.errors import WriteError
-from ....core.locomotion.path.route import Route
+from ....core.locomotion.path import Route
 from ...local_view import show_in_local_view
 from ...operator_base import OctoOperator
 from ...panel_base import armature_in

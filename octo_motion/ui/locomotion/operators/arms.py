@@ -10,14 +10,21 @@ from typing import Any, Final, cast
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ....blender.rig.armature import active_armature, armature_data, read_skeleton, selected_bones
-from ....blender.rig.arms import hidden_bones, require_editable, select_pose_bones, world_directions
+from ....blender.rig import (
+    active_armature,
+    armature_data,
+    hidden_bones,
+    read_skeleton,
+    require_editable,
+    select_pose_bones,
+    selected_bones,
+    world_directions,
+)
 from ....core.errors import RigError
-from ....core.locomotion.rig.arm_chains import ArmChain, body_frame, chain_of, place_added
-from ....core.locomotion.rig.detection import detect_arms
+from ....core.locomotion.rig import ArmChain, body_frame, chain_of, detect_arms, place_added
 from ...list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ...panel_base import ItemRows
-from ..reading.arm_items import (
+from ..reading import (
     active_arm,
     add_item,
     assign,

@@ -8,8 +8,8 @@ from typing import Any, Final, cast
 import bpy
 from bpy.props import FloatProperty, StringProperty
 
-from ....blender.animation.actions import writable_armature
-from ....blender.files import presets
+from ....blender.animation import writable_armature
+from ....blender.files import gait_names, has_gait, load_gait
 from ...list_operators import ListKind, ListOperator, RemoveOperator
 from ...panel_base import ItemRows
 from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
@@ -34,7 +34,7 @@ class OCTO_MOTION_UL_changes(ItemRows, bpy.types.UIList):
 
     def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
         row = layout.row(align=True)
-        row.alert = not presets.has_gait(item.gait)
+        row.alert = not has_gait(item.gait)
         row.label(text=item.gait, icon="ANIM")
         row.prop(item, "position", text="", emboss=False)
 
@@ -51,7 +51,7 @@ class OCTO_MOTION_OT_change_add(ListOperator, bpy.types.Operator):
         name="Gait",
         description="The gait from there on",
         default="swim",
-        search=lambda _operator, _context, _text: presets.gait_names(),
+        search=lambda _operator, _context, _text: gait_names(),
     )
     position: FloatProperty(
         name="Position",
@@ -68,7 +68,7 @@ class OCTO_MOTION_OT_change_add(ListOperator, bpy.types.Operator):
         armature: bpy.types.Object,  # noqa: ARG002
         settings: Any,
     ) -> None:
-        presets.load_gait(self.gait)
+        load_gait(self.gait)
         item = settings.places.add()
         # Library overrides tell items apart by name.
         taken = {each.name for each in settings.places}

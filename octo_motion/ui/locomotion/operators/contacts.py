@@ -8,18 +8,17 @@ from typing import Any, Final
 import bpy
 from bpy.props import FloatProperty
 
-from ....blender.rig.armature import active_armature
-from ....blender.rig.arms import require_editable
-from ....blender.scene.contact_markers import markers, remove_markers
+from ....blender.rig import active_armature, require_editable
+from ....blender.scene import markers, remove_markers
 from ....core.errors import OctoMotionError, SettingsError
 from ...armature_operator import ArmatureOperator
 from ...local_view import show_in_local_view
 from ...operator_base import OctoOperator
 from ..generate_motion import prepare
-from ..reading.ground import resting
-from ..settings.contact_overrides import changed_by_hand, gathered, once_called, store
+from ..reading import resting
+from ..settings.contact_overrides import changed_by_hand, once_called, read_overrides, store
 from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from ..writing.write_motion import show_contacts
+from ..writing import show_contacts
 
 
 class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
@@ -54,7 +53,7 @@ class OCTO_MOTION_OT_contacts_hide(ArmatureOperator, bpy.types.Operator):
         armature = active_armature(context)
         require_editable(armature)
         settings = locomotion_settings(armature).ground
-        store(settings, gathered(settings, armature))
+        store(settings, read_overrides(settings, armature))
         _take_away(context, armature)
 
 

@@ -11,17 +11,24 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ....blender.animation.actions import writable_armature
-from ....blender.files import presets
-from ....blender.rig.armature import active_armature
+from ....blender.animation import writable_armature
+from ....blender.files import (
+    SUFFIX,
+    gait_names,
+    read_gait_file,
+    remove_gait,
+    save_gait,
+    user_gait_names,
+    write_gait,
+)
+from ....blender.rig import active_armature
 from ....core.errors import GaitError
-from ....core.locomotion.gait import table as gait
-from ....core.locomotion.gait.table import CYCLE
+from ....core.locomotion.gait import CYCLE, GaitCurve, renamed_gait
 from ...armature_operator import ArmatureOperator
 from ..settings.gait import SIDES, fill_curve, fill_offsets, fill_table, used
 from ..settings.properties import (
     OCTO_MOTION_PG_locomotion,
-    load_gait,
+    fill_gait_table,
     locomotion_settings,
     read_gait,
     set_gait,
@@ -56,7 +63,7 @@ def _active(collection: Any, index: int, what: str) -> Any:
     return collection[index]
 
 
-def _chosen_curve(settings: OCTO_MOTION_PG_locomotion) -> tuple[int, gait.GaitCurve]:
+def _chosen_curve(settings: OCTO_MOTION_PG_locomotion) -> tuple[int, GaitCurve]:
     """The pair that is chosen in the list, 0 for all, and its angles.
 
     Raises:
@@ -85,13 +92,13 @@ class OCTO_MOTION_OT_gait_load(ArmatureOperator, bpy.types.Operator):
     name: StringProperty(
         name="Name",
         description="Gait to load; without a name the current one is loaded afresh",
-        search=lambda _operator, _context, _text: presets.gait_names(),
+        search=lambda _operator, _context, _text: gait_names(),
         options={"SKIP_SAVE"},
     )
 
     def run(self, context: bpy.types.Context) -> None:
         settings = _settings(context)
-        load_gait(settings, self.name or settings.gait)
+        fill_gait_table(settings, self.name or settings.gait)
 
 
 class OCTO_MOTION_OT_gait_save(ArmatureOperator, bpy.types.Operator):
@@ -116,7 +123,7 @@ class OCTO_MOTION_OT_gait_save(ArmatureOperator, bpy.types.Operator):
     ) -> set[OperatorReturnItems]:
         """Ask for the name."""
         current = locomotion_settings(active_armature(context)).gait
-        own = current in presets.user_gait_names()
+        own = current in user_gait_names()
         self.name = current if own else f"my {current}"
         self.overwrite = own
         assert context.window_manager is not None
@@ -124,8 +131,8 @@ class OCTO_MOTION_OT_gait_save(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         settings = _settings(context)
-        table = gait.renamed(read_gait(settings), self.name.strip())
-        presets.save_gait(table, overwrite=self.overwrite)
+        table = renamed_gait(read_gait(settings), self.name.strip())
+        save_gait(table, overwrite=self.overwrite)
         set_gait(settings, table)
         self.report({"INFO"}, f"Saved the gait '{table.name}'.")
 
@@ -154,14 +161,14 @@ class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         name = self.name or _settings(context).gait
-        presets.remove_gait(name)
+        remove_gait(name)
         self.report({"INFO"}, f"Removed the gait '{name}'.")
 
 
 class _FileOperator(ArmatureOperator):
     """Asks for a file."""
 
-    filename_ext: Final = presets.SUFFIX
+    filename_ext: Final = SUFFIX
 
     filepath: StringProperty(
         name="File",
@@ -169,7 +176,7 @@ class _FileOperator(ArmatureOperator):
         subtype="FILE_PATH",
         options={"SKIP_SAVE", "PATH_SUPPORTS_BLEND_RELATIVE"},
     )
-    filter_glob: StringProperty(default=f"*{presets.SUFFIX}", options={"HIDDEN"})
+    filter_glob: StringProperty(default=f"*{SUFFIX}", options={"HIDDEN"})
 
     def invoke(
         self,
@@ -202,12 +209,12 @@ class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
         """Propose the gait's name, in the file browser."""
         if not self.filepath:
             name = bpy.path.clean_name(locomotion_settings(active_armature(context)).gait)
-            self.filepath = f"{name}{presets.SUFFIX}"
+            self.filepath = f"{name}{SUFFIX}"
         return super().invoke(context, event)
 
     def check(self, context: bpy.types.Context) -> bool:  # noqa: ARG002
         """Keep the file's ending."""
-        proper = bpy.path.ensure_ext(self.filepath, presets.SUFFIX)
+        proper = bpy.path.ensure_ext(self.filepath, SUFFIX)
         if proper == self.filepath:
             return False
         self.filepath = proper
@@ -217,7 +224,7 @@ class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
         # Of a linked armature as well.
         table = read_gait(locomotion_settings(active_armature(context)))
         path = self._path()
-        presets.write_gait(table, path)
+        write_gait(table, path)
         self.report({"INFO"}, f"Wrote the gait '{table.name}' to '{path.name}'.")
 
 
@@ -228,7 +235,7 @@ class OCTO_MOTION_OT_gait_import(_FileOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def run(self, context: bpy.types.Context) -> None:
-        set_gait(_settings(context), presets.read_gait(self._path()))
+        set_gait(_settings(context), read_gait_file(self._path()))
 
 
 # --- The table -----------------------------------------------------------------------------------
@@ -315,7 +322,7 @@ class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
         # Sorted, and with a knot at 0 if there was none: the same motion, in good order.
         fill_curve(
             curve,
-            gait.GaitCurve(
+            GaitCurve(
                 np.insert(shape.phases, gap + 1, middle),
                 np.insert(shape.angles, gap + 1, angles, axis=0),
                 free=shape.free,
@@ -347,7 +354,7 @@ class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
             raise GaitError(f"There is no row {knot}.", "Choose a knot of the table.")
         if knot == 0:
             raise GaitError("A cycle cannot do without its first knot.", "Change its angles.")
-        shape = gait.GaitCurve(
+        shape = GaitCurve(
             np.delete(shape.phases, knot), np.delete(shape.angles, knot, axis=0), free=shape.free
         )
         fill_curve(_curve_of(_editable(settings), pair), shape)

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Final
 
 import bpy
 
-from ....blender.rig.armature import active_armature
+from ....blender.rig import active_armature
 from ....core.errors import OctoMotionError
 from ...armature_operator import ArmatureOperator
 from ...modal_job import ModalJob
 from ..generate_motion import generate, prepare
-from ..writing.summary import Summary
-from ..writing.write_motion import Shot
+from ..writing import Shot, Summary
 from . import live
 
 if TYPE_CHECKING:

@@ -20,16 +20,16 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ....blender.animation import actions
-from ....blender.rig.armature import deformed_meshes, read_skeleton
+from ....blender.animation import is_edited, may_replace
+from ....blender.rig import deformed_meshes, read_skeleton
 from ....core import content_cache as remembered
-from ....core.content_cache import key_of
+from ....core.content_cache import content_key
 from ....core.errors import OctoMotionError, RigError
 from ...plain import plain
 from ..generate_motion import RESULTS, prepare
-from ..reading.previous_action import playing_action, previous_action
+from ..reading import playing_action, previous_action
 from ..settings import live as live_properties
-from ..settings.contact_overrides import gathered, once_called
+from ..settings.contact_overrides import once_called, read_overrides
 from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 
 _SOON: Final = 0.01
@@ -79,7 +79,7 @@ def unregister() -> None:
     """Listen no more, and drop what was about to be made."""
     _drop()
     _state.clear()
-    remembered.forget()
+    remembered.clear_caches()
     for handlers, function in _handlers():
         if function in handlers:
             handlers.remove(function)
@@ -306,7 +306,7 @@ def _after_undo(*_: object) -> None:
 def _before_loading(*_: object) -> None:
     _drop()
     _state.clear()
-    remembered.forget()
+    remembered.clear_caches()
 
 
 @persistent
@@ -402,9 +402,9 @@ def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> s
     previous, playing = previous_action(armature, settings), playing_action(armature)
     if playing is not None and playing != previous:
         return f"Live is off: '{playing.name}' is not what was generated."
-    if previous is None or actions.may_replace(previous, armature):
+    if previous is None or may_replace(previous, armature):
         return ""
-    if actions.is_edited(previous):
+    if is_edited(previous):
         return f"Live is off: '{previous.name}' was edited and is yours."
     return f"Live is off: '{previous.name}' has other users too."
 
@@ -413,11 +413,11 @@ def _made_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) 
     """All that a motion is made from and that belongs to the armature object itself, as text."""
     wishes = [
         (place, each.removed, each.shift, each.heading, np.asarray(each.position).tolist())
-        for place, each in sorted(gathered(settings.ground, armature).items())
+        for place, each in sorted(read_overrides(settings.ground, armature).items())
     ]
     bones = armature.pose.bones if armature.pose is not None else ()
     try:
-        rest = key_of(read_skeleton(armature)).hex()
+        rest = content_key(read_skeleton(armature)).hex()
     except RigError:
         # Generating says what is wrong with it.
         rest = ""

@@ -8,14 +8,13 @@ from typing import Any, Final
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ....blender.rig.armature import active_armature
-from ....blender.rig.arms import require_editable
-from ....blender.scene.grasp_target import WITH_SURFACE
+from ....blender.rig import active_armature, require_editable
+from ....blender.scene import WITH_SURFACE
 from ....core.errors import RigError, SettingsError
 from ...armature_operator import ArmatureOperator
 from ...list_operators import ListKind, RemoveOperator
 from ...panel_base import ItemRows
-from ..reading.arm_items import bones_of
+from ..reading import bones_of
 from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
 from ..settings.reaches import MODES
 

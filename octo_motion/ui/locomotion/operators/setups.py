@@ -16,9 +16,9 @@ import bpy.utils.previews
 from bl_ui.utils import PresetPanel
 from bpy.props import StringProperty
 
-from ....blender.animation.actions import writable_armature
-from ....blender.files.presets import load_gait
-from ....blender.rig.armature import active_armature
+from ....blender.animation import writable_armature
+from ....blender.files import load_gait
+from ....blender.rig import active_armature
 from ....core.errors import SettingsError
 from ...armature_operator import ArmatureOperator
 from ...armature_preset import ARMATURE, ArmaturePresetAdd

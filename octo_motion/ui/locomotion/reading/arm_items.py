@@ -10,10 +10,8 @@ from typing import Any, Final, cast
 import bpy
 
 from ....blender.overrides import linked_names
-from ....blender.rig.armature import armature_data
-from ....blender.rig.arms import world_directions
-from ....core.locomotion.rig.arm_chains import ArmChain, Side, nearest_axis
-from ....core.locomotion.rig.detection import Detection
+from ....blender.rig import armature_data, world_directions
+from ....core.locomotion.rig import ArmChain, Detection, Side, nearest_axis
 from ....core.skeleton import Skeleton
 from ..settings.properties import OCTO_MOTION_PG_locomotion
 

@@ -13,26 +13,35 @@ import numpy as np
 
 from ....core.easing import least_jerk
 from ....core.errors import SettingsError
-from ....core.locomotion.clearance.swim_clearance import afloat
-from ....core.locomotion.gait.gait_poser import Generator
-from ....core.locomotion.gait.table import CYCLE, GaitTable
-from ....core.locomotion.ground.body_height import BodyLine
-from ....core.locomotion.ground.footholds import Wish
-from ....core.locomotion.ground.swing_smoothing import Steady, around
-from ....core.locomotion.ground.walk import GroundedWalk, Raise
-from ....core.locomotion.path.course import Course, Line, SwumLine, WalkedLine
-from ....core.locomotion.path.gait_changes import (
-    Change,
-    Windows,
-    blended,
-    changes_by_height,
-    check_changes,
-    slowing,
-    way_weights,
-    windows,
+from ....core.locomotion.clearance import afloat
+from ....core.locomotion.gait import CYCLE, GaitPoser, GaitTable
+from ....core.locomotion.ground import (
+    BodyLine,
+    ContactOverride,
+    GroundedWalk,
+    Raise,
+    SwingSmoothing,
+    frames_around,
 )
-from ....core.locomotion.path.route import Route
-from ....core.locomotion.path.travel import Travel, TravelSettings, bearings_of, travel_at
+from ....core.locomotion.path import (
+    Course,
+    GaitTransition,
+    Line,
+    Route,
+    SwumLine,
+    Travel,
+    TravelSettings,
+    WalkedLine,
+    Windows,
+    bearings_of,
+    blend_motions,
+    check_transitions,
+    slowing,
+    transition_windows,
+    transitions_by_height,
+    travel_at,
+    way_weights,
+)
 from ....core.rotations import Floats
 from ..settings.changes import OCTO_MOTION_PG_change
 from .ground import Standing
@@ -49,11 +58,11 @@ _SETTLING: Final = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class GaitSegment:
     """One way of moving."""
 
     gait: GaitTable
-    generator: Generator
+    generator: GaitPoser
     travel: TravelSettings
     standing: Standing | None
     """What holds the ground, none for a swim."""
@@ -110,10 +119,10 @@ class Moved:
 
 
 @dataclass(frozen=True, eq=False)
-class Journey:
+class SegmentedMotion:
     """The arms on all legs of a journey, one for each way along it."""
 
-    changing: Changing
+    changing: GaitTransitionPlan
     distance: Floats
     """(frames,) metres along the route."""
     places: tuple[Floats, Floats]
@@ -143,11 +152,11 @@ class Journey:
 
 
 @dataclass(frozen=True, eq=False)
-class Changing:
+class GaitTransitionPlan:
     """A journey with several ways of moving, ready to be computed."""
 
-    ways: Sequence[Way]
-    changes: Sequence[Change]
+    ways: Sequence[GaitSegment]
+    changes: Sequence[GaitTransition]
     windows: Sequence[Windows]
     course: Course
     walks: Sequence[GroundedWalk | None]
@@ -166,7 +175,7 @@ class Changing:
         places: tuple[Floats, Floats],
         step: int,
         frames_per_metre: float,
-    ) -> Iterator[Journey | float]:
+    ) -> Iterator[SegmentedMotion | float]:
         """Yield the share that is done, and in the end the arms.
 
         Args:
@@ -182,14 +191,14 @@ class Changing:
             moved = Moved.still(len(distance), self.bones)
             way = self.ways[self._way(leg)]
             cycle = frames_per_metre * way.travel.stride
-            steady = Steady.over(way.generator.settings.steady, cycle)
+            steady = SwingSmoothing.over(way.generator.settings.steady, cycle)
             for start in range(0, len(part), step):
                 chosen = slice(start, min(start + step, len(part)))
                 self._pose(leg, distance, places, moved, frames=part, part=chosen, steady=steady)
                 yield 0.9 * (leg + start / max(len(part), 1)) / count
             self._calm(leg, distance, np.arange(len(distance)), moved)
             legs.append(moved)
-        yield Journey(self, distance, places, tuple(legs))
+        yield SegmentedMotion(self, distance, places, tuple(legs))
 
     def _way(self, leg: int) -> int:
         """The way before the first change, and then the one after each."""
@@ -267,7 +276,7 @@ class Changing:
                 moved.strains[chosen, bones[arm]] = stood.strains[part, bones[arm]][again]
                 moved.late[chosen, arm] = 0.0
 
-    def again(self, leg: int, journey: Journey, chosen: np.ndarray, lift: Floats) -> Moved:
+    def again(self, leg: int, journey: SegmentedMotion, chosen: np.ndarray, lift: Floats) -> Moved:
         """The arms on one leg of a journey, higher at some frames.
 
         Args:
@@ -342,13 +351,15 @@ class Changing:
         *,
         frames: np.ndarray,
         part: slice,
-        steady: Steady | None,
+        steady: SwingSmoothing | None,
     ) -> None:
         """Pose the arms at a part of the frames of a leg."""
         number = self._way(leg)
         way, walk, chosen = self.ways[number], self.walks[number], frames[part]
         if walk is not None:
-            inside, own = around(part, steady.reach if steady else 0, len(frames), cyclic=False)
+            inside, own = frames_around(
+                part, steady.reach if steady else 0, len(frames), cyclic=False
+            )
             wide = frames[inside]
             travel = self._travel(number, distance[wide])
             where = places[0][wide], places[1][wide]
@@ -379,7 +390,9 @@ class Changing:
         part = np.flatnonzero(np.any(going, axis=1))
         if len(part):
             inside = slice(int(part[0]), int(part[-1]) + 1)
-            turned = blended(first.rotations[inside], second.rotations[inside], per_bone[inside])
+            turned = blend_motions(
+                first.rotations[inside], second.rotations[inside], per_bone[inside]
+            )
             rotations[inside] = np.where(going[inside][..., None], turned, rotations[inside])
         # On the way from one to the other an arm has no place of its own to be at.
         late, misses = (
@@ -402,8 +415,12 @@ class Changing:
 
 
 def read_changes(
-    settings: OCTO_MOTION_PG_change, ways: dict[str, int], route: Route, reach: float, ground: Way
-) -> tuple[Change, ...]:
+    settings: OCTO_MOTION_PG_change,
+    ways: dict[str, int],
+    route: Route,
+    reach: float,
+    ground: GaitSegment,
+) -> tuple[GaitTransition, ...]:
     """Where the gait changes.
 
     Args:
@@ -423,20 +440,20 @@ def read_changes(
         floor = np.full(count, places[:, 2].min())
         if ground.standing is not None:
             floor = ground.standing.ground.height(places[:, :2])
-        found = changes_by_height(
+        found = transitions_by_height(
             distance,
             places[:, 2] - floor,
             take_off=settings.height * reach,
             length=settings.length * reach,
         )
         above = ways[settings.gait]
-        found = [Change(each.start, each.end, above * each.way) for each in found]
+        found = [GaitTransition(each.start, each.end, above * each.way) for each in found]
         # One that is done before the route begins is no place of it.
         done = [each for each in found if each.middle < 0.0]
-        return (*done, *check_changes(found[len(done) :], route.length))
-    return check_changes(
+        return (*done, *check_transitions(found[len(done) :], route.length))
+    return check_transitions(
         [
-            Change(
+            GaitTransition(
                 item.position * route.length - 0.5 * item.length * reach,
                 item.position * route.length + 0.5 * item.length * reach,
                 ways[item.gait],
@@ -447,18 +464,20 @@ def read_changes(
     )
 
 
-def plan(
-    ways: Sequence[Way],
-    changes: Sequence[Change],
+def plan_transitions(
+    ways: Sequence[GaitSegment],
+    changes: Sequence[GaitTransition],
     route: Route,
-    wishes: Sequence[Wish],
+    wishes: Sequence[ContactOverride],
     bones: Sequence[int],
-) -> Changing:
+) -> GaitTransitionPlan:
     """Lay all footholds of a journey, and find when each arm goes over."""
     floor = next((way.standing.line for way in ways if way.standing is not None), None)
     lines = [_line(way, number, changes, route, floor) for number, way in enumerate(ways)]
     course = Course(lines, changes)
-    asked: list[list[Wish]] = [list(wishes) if number == 0 else [] for number in range(len(ways))]
+    asked: list[list[ContactOverride]] = [
+        list(wishes) if number == 0 else [] for number in range(len(ways))
+    ]
     walks = _walks(ways, course, asked)
     found = []
     for number, change in enumerate(changes):
@@ -468,7 +487,7 @@ def plan(
         holds = [
             _holds(walks[way], ways[way], len(bones), first, last) for way in (before, change.way)
         ]
-        window = windows(change, *([each[0] for each in arms] for arms in holds))
+        window = transition_windows(change, *([each[0] for each in arms] for arms in holds))
         for way, arms, dropped in zip(
             (before, change.way),
             holds,
@@ -477,13 +496,19 @@ def plan(
         ):
             for arm, (_, cycles) in enumerate(arms):
                 left_out = cycles[dropped[arm]]
-                asked[way].extend(Wish(arm, int(cycle), removed=True) for cycle in left_out)
+                asked[way].extend(
+                    ContactOverride(arm, int(cycle), removed=True) for cycle in left_out
+                )
         found.append(window)
-    return Changing(ways, changes, found, course, _walks(ways, course, asked), bones)
+    return GaitTransitionPlan(ways, changes, found, course, _walks(ways, course, asked), bones)
 
 
 def _line(
-    way: Way, number: int, changes: Sequence[Change], route: Route, floor: BodyLine | None
+    way: GaitSegment,
+    number: int,
+    changes: Sequence[GaitTransition],
+    route: Route,
+    floor: BodyLine | None,
 ) -> Line:
     if way.standing is not None:
         return way.standing.line
@@ -506,7 +531,7 @@ def _line(
 
 
 def _walks(
-    ways: Sequence[Way], course: Course, wishes: Sequence[Sequence[Wish]]
+    ways: Sequence[GaitSegment], course: Course, wishes: Sequence[Sequence[ContactOverride]]
 ) -> list[GroundedWalk | None]:
     return [
         way.standing.build(course.line(number), wishes[number]) if way.standing else None
@@ -515,7 +540,7 @@ def _walks(
 
 
 def _holds(
-    walk: GroundedWalk | None, way: Way, arms: int, first: float, last: float
+    walk: GroundedWalk | None, way: GaitSegment, arms: int, first: float, last: float
 ) -> list[tuple[tuple[Floats, Floats], np.ndarray]]:
     """For each arm, where its holds begin and end between two places, and their cycles."""
     found: list[list[tuple[float, float, int]]] = [[] for _ in range(arms)]

@@ -9,18 +9,21 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ....blender.files.weight_curve import sample_weight_curve
-from ....core.content_cache import Remembered, key_of
+from ....blender.files import sample_weight_curve
+from ....core.content_cache import ContentCache, content_key
 from ....core.errors import SettingsError
-from ....core.keyframes.reduction import check_bounds
-from ....core.locomotion.gait.gait_poser import Arm, GaitSettings, Generator
-from ....core.locomotion.gait.table import GaitTable
-from ....core.locomotion.motion.few_keys import Tolerances
-from ....core.locomotion.path.in_place import travel_in_place, whole_frames
-from ....core.locomotion.path.route import Route
-from ....core.locomotion.path.travel import TravelSettings, duration, strides
-from ....core.locomotion.rig.arm_chains import BodyFrame
-from ....core.locomotion.rig.arm_frames import ArmFrames, arm_frames
+from ....core.keyframes import check_bounds
+from ....core.locomotion.gait import Arm, GaitPoser, GaitSettings, GaitTable
+from ....core.locomotion.motion import Tolerances
+from ....core.locomotion.path import (
+    Route,
+    TravelSettings,
+    duration,
+    strides,
+    travel_in_place,
+    whole_frames,
+)
+from ....core.locomotion.rig import ArmFrames, BodyFrame, arm_frames
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
 from ..settings.properties import OCTO_MOTION_PG_locomotion
@@ -37,25 +40,25 @@ _WEIGHT_SAMPLES: Final = 33
 _HEADING_STEP: Final = 0.2
 """Radians: no arm that stands half way between two others is a matter of rounding."""
 
-_generators: Final[Remembered[Generator]] = Remembered(12)
-_frames_known: Final[Remembered[list[ArmFrames]]] = Remembered(4)
+_generators: Final[ContentCache[GaitPoser]] = ContentCache(12)
+_frames_known: Final[ContentCache[list[ArmFrames]]] = ContentCache(4)
 
 
 def frames_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -> list[ArmFrames]:
     """What leads from bones of each arm to its joints."""
     bones = [arm.bones for arm in arms]
     return _frames_known.get(
-        key_of(skeleton, bones, body),
+        content_key(skeleton, bones, body),
         lambda: [arm_frames(skeleton, each, body) for each in bones],
     )
 
 
 def generator_of(
     skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame, settings: GaitSettings
-) -> Generator:
+) -> GaitPoser:
     """What moves these arms, the same as before while nothing of it has changed."""
-    key = key_of(skeleton, arms, body, settings)
-    return _generators.get(key, lambda: Generator(skeleton, arms, body, settings))
+    key = content_key(skeleton, arms, body, settings)
+    return _generators.get(key, lambda: GaitPoser(skeleton, arms, body, settings))
 
 
 def gait_settings(

@@ -11,31 +11,45 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ....blender.animation.stretching import may_stretch
-from ....blender.scene.ground import arm_skins, read_triangles
-from ....blender.scene.world import is_enabled
-from ....core.content_cache import Remembered, key_of
-from ....core.locomotion.gait.gait_poser import Arm, Generator
-from ....core.locomotion.ground.body_height import BodyLine, body_line, leaning
-from ....core.locomotion.ground.contact_timing import Even, at_rest, crawling, crawling_in_place
-from ....core.locomotion.ground.crawl_planner import CrawlSettings
-from ....core.locomotion.ground.foothold_reach import easy_height, span
-from ....core.locomotion.ground.footholds import Wish
-from ....core.locomotion.ground.stance_settings import StanceSettings
-from ....core.locomotion.ground.surface import (
+from ....blender.animation import may_stretch
+from ....blender.scene import arm_skins, is_enabled, read_triangles
+from ....core.content_cache import ContentCache, content_key
+from ....core.locomotion.gait import Arm, GaitPoser
+from ....core.locomotion.ground import (
+    BodyLine,
+    ContactOverride,
+    CrawlSettings,
+    EvenTiming,
     Ground,
-    Plane,
-    along_path,
+    GroundedPoses,
+    GroundedWalk,
+    LevelGround,
+    Raise,
+    StanceSettings,
+    SwingSmoothing,
+    body_line,
+    crawling,
+    crawling_in_place,
+    easy_height,
+    frames_around,
+    ground_along_path,
+    leaning,
     passes_over_itself,
-    sampled,
+    sample_ground,
+    span,
+    timing_at_rest,
 )
-from ....core.locomotion.ground.swing_smoothing import Steady, around
-from ....core.locomotion.ground.walk import GroundedPoses, GroundedWalk, Raise
-from ....core.locomotion.path.course import Line
-from ....core.locomotion.path.heading import Bearings
-from ....core.locomotion.path.route import Route
-from ....core.locomotion.path.travel import Travel, TravelSettings, bearings_of, strides, walked_at
-from ....core.locomotion.rig.arm_chains import BodyFrame
+from ....core.locomotion.path import (
+    Bearings,
+    Line,
+    Route,
+    Travel,
+    TravelSettings,
+    bearings_of,
+    strides,
+    walked_at,
+)
+from ....core.locomotion.rig import BodyFrame
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
 from ..settings.ground import OCTO_MOTION_PG_ground, stance_settings
@@ -65,7 +79,7 @@ _BARE: Final = (
     "with its eye in the outliner instead."
 )
 
-_grounds: Final[Remembered[Ground]] = Remembered(2)
+_grounds: Final[ContentCache[Ground]] = ContentCache(2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +91,7 @@ class Standing:
     bearings: Bearings
     stretching: bool
     """Whether any bones may stretch."""
-    build: Callable[[Line, Sequence[Wish]], GroundedWalk]
+    build: Callable[[Line, Sequence[ContactOverride]], GroundedWalk]
     """The same walk along another line, with other wishes."""
     ground: Ground
     warnings: tuple[str, ...] = ()
@@ -111,7 +125,7 @@ class Standing:
         travel: Travel,
         part: slice,
         places: tuple[Floats, Floats],
-        steady: Steady | None,
+        steady: SwingSmoothing | None,
         *,
         cyclic: bool,
     ) -> GroundedPoses:
@@ -127,7 +141,7 @@ class Standing:
         if steady is None:
             return self.pose(travel, part, places)
         centres, orientations = places
-        frames, own = around(part, steady.reach, len(centres), cyclic=cyclic)
+        frames, own = frames_around(part, steady.reach, len(centres), cyclic=cyclic)
         phase, turn = travel.phase[frames], travel.turn[frames]
         stood = self.walk.pose(phase, turn, centres[frames], orientations[frames], steady=steady)
         return stood.part(own)
@@ -152,13 +166,13 @@ def read_standing(
     skeleton: Skeleton,
     skin: Skeleton,
     arms: Sequence[Arm],
-    generator: Generator,
+    generator: GaitPoser,
     body: BodyFrame,
     route: Route,
     travel: TravelSettings,
     scale: float,
     height: float | None,
-    wishes: Sequence[Wish],
+    wishes: Sequence[ContactOverride],
     plane: float | None = None,
     alike: bool = False,
     rest: tuple[bool, bool] = (False, False),
@@ -190,9 +204,9 @@ def read_standing(
     reach = generator.arm_length * scale
     bearings = bearings_of(route, travel)
     if alike:
-        ground, warnings = Plane(0.0), ()
+        ground, warnings = LevelGround(0.0), ()
     elif settings.object is None and plane is not None:
-        ground, warnings = Plane(plane), ()
+        ground, warnings = LevelGround(plane), ()
     else:
         ground, warnings = _ground(
             settings, depsgraph, route=route, travel=travel, bearings=bearings, reach=reach
@@ -233,8 +247,8 @@ def read_standing(
             duty=stance.duty,
         )
     if any(rest):
-        rhythm = at_rest(
-            rhythm or Even(travel.stride, generator.offsets),
+        rhythm = timing_at_rest(
+            rhythm or EvenTiming(travel.stride, generator.offsets),
             route.length,
             start=rest[0],
             end=rest[1],
@@ -242,7 +256,7 @@ def read_standing(
             duty=stance.duty,
         )
 
-    def build(along: Line, wished: Sequence[Wish]) -> GroundedWalk:
+    def build(along: Line, wished: Sequence[ContactOverride]) -> GroundedWalk:
         return GroundedWalk(
             skeleton,
             generator,
@@ -264,14 +278,14 @@ def read_standing(
     return Standing(walk, line, bearings, any(stretch), build, ground, warnings)
 
 
-def _under(generator: Generator, radii: Sequence[Floats]) -> float:
+def _under(generator: GaitPoser, radii: Sequence[Floats]) -> float:
     """How far a body's skin reaches below its centre where its arms begin, armature units."""
     skins = [radius[0] - root[2] for radius, root in zip(radii, generator.roots, strict=True)]
     return float(max(skins))
 
 
 def _within_reach(
-    generator: Generator, radii: Sequence[Floats], stretches: Sequence[bool], stance: StanceSettings
+    generator: GaitPoser, radii: Sequence[Floats], stretches: Sequence[bool], stance: StanceSettings
 ) -> float:
     """Greatest height at which all arms hold the ground with ease, armature units.
 
@@ -306,16 +320,16 @@ def _ground(
         warnings = ()
         if passes_over_itself(path, 0.5 * reach, 0.5 * reach):
             warnings = (_OVER_ITSELF,)
-        around = _AROUND * reach
+        frames_around = _AROUND * reach
         spacing = _COARSE * reach
-        ground = along_path(path, reach=around, spacing=spacing, softness=0.3 * reach)
+        ground = ground_along_path(path, reach=frames_around, spacing=spacing, softness=0.3 * reach)
         return ground, warnings
     inside = (distance >= 0.0) & (distance <= route.length)
     triangles, content = read_triangles(settings.object, depsgraph)
     sizes = {"reach": _AROUND * reach, "spacing": _FINE * reach, "headroom": _HEADROOM * reach}
     ground = _grounds.get(
-        key_of(content, path, inside, sizes),
-        lambda: sampled(triangles, path, inside, **sizes, content=content),
+        content_key(content, path, inside, sizes),
+        lambda: sample_ground(triangles, path, inside, **sizes, content=content),
     )
     if len(settings.object.modifiers) > 0 and not is_enabled(settings.object, depsgraph):
         return ground, (_BARE.format(name=settings.object.name),)

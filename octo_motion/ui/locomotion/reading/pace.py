@@ -9,8 +9,7 @@ from typing import Final
 
 import bpy
 
-from ....core.locomotion.path.route import Route
-from ....core.locomotion.path.travel import TravelSettings, duration, strides
+from ....core.locomotion.path import Route, TravelSettings, duration, strides
 from ..settings.properties import OCTO_MOTION_PG_locomotion
 
 _HASTY: Final = 40.0

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import bpy
 
-from ....blender.animation import actions
+from ....blender.animation import is_generated
 from ..settings.properties import OCTO_MOTION_PG_locomotion
 
 
@@ -23,6 +23,6 @@ def previous_action(
     """The action to make anew: the one that plays if it was generated, else the last result."""
     spliced = cast("Any", armature).octo_motion.splicing.result
     playing = playing_action(armature)
-    if playing is not None and playing != spliced and actions.is_generated(playing):
+    if playing is not None and playing != spliced and is_generated(playing):
         return playing
     return settings.result

@@ -10,10 +10,9 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ....blender.animation import actions
-from ....blender.animation.leftover_poses import standing_of
-from ....blender.rig.skin_radii import skin_radii
-from ....blender.scene.grasp_target import (
+from ....blender.animation import object_channels, standing_of, writable_object, write_action
+from ....blender.rig import skin_radii
+from ....blender.scene import (
     can_be_carried,
     carrying_note,
     hangs_on,
@@ -25,13 +24,18 @@ from ....blender.scene.grasp_target import (
     read_places,
 )
 from ....core.errors import RigError, SettingsError
-from ....core.locomotion.gait.gait_poser import Arm
-from ....core.locomotion.reaching.curl import curled
-from ....core.locomotion.reaching.grasp import Mode, Places, Target, plan_grasp
-from ....core.locomotion.reaching.timeline import Timeline
-from ....core.locomotion.reaching.winding import Profile, profile_of
-from ....core.locomotion.rig.arm_chains import BodyFrame
-from ....core.locomotion.rig.arm_frames import ArmFrames, arm_frames
+from ....core.locomotion.gait import Arm
+from ....core.locomotion.reaching import (
+    Mode,
+    Places,
+    Profile,
+    Target,
+    Timeline,
+    curled,
+    plan_grasp,
+    profile_of,
+)
+from ....core.locomotion.rig import ArmFrames, BodyFrame, arm_frames
 from ....core.rotations import Floats, conjugate, multiply, rotate
 from ....core.skeleton import Skeleton
 
@@ -232,11 +236,11 @@ def write_carried(armature: bpy.types.Object, carried: Sequence[Carried]) -> Non
         if target is None:
             continue
         data = target.animation_data
-        actions.write_action(
+        write_action(
             target,
             f"{target.name} Carried",
             each.frames,
-            actions.object_channels(target, each.positions, each.rotations),
+            object_channels(target, each.positions, each.rotations),
             previous=data.action if data is not None else None,
             settings_note=carrying_note(armature.name),
         )
@@ -311,7 +315,7 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
         )
     carry = item.carry and item.mode == "COIL"
     if carry:
-        actions.writable_object(item.target)
+        writable_object(item.target)
         if not can_be_carried(item.target):
             raise SettingsError(
                 f"'{item.target.name}' moves by itself and cannot be carried.",

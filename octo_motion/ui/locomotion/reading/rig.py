@@ -9,13 +9,19 @@ from typing import Final, cast
 import bpy
 import numpy as np
 
-from ....blender.animation.leftover_poses import SCALE, animated_bones, displaced_bones
-from ....blender.rig.armature import armature_data, is_driven_object
-from ....blender.rig.arms import world_directions
+from ....blender.animation import SCALE, animated_bones, displaced_bones
+from ....blender.rig import armature_data, is_driven_object, world_directions
 from ....core.errors import RigError
-from ....core.locomotion.gait.gait_poser import Arm
-from ....core.locomotion.rig.arm_chains import BodyFrame, Side, body_frame, chain_of, is_driven
-from ....core.locomotion.rig.detection import Detection, detect_arms
+from ....core.locomotion.gait import Arm
+from ....core.locomotion.rig import (
+    BodyFrame,
+    Detection,
+    Side,
+    body_frame,
+    chain_of,
+    detect_arms,
+    is_driven,
+)
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
 from ..settings.properties import OCTO_MOTION_PG_locomotion
@@ -130,7 +136,7 @@ def chosen_root_bone(
     return name
 
 
-def told_of_driven(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
+def warnings_for_driven(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
     """What there is to say of arms that constraints or drivers move."""
     bones = [bone for arm in arms for bone in arm.bones if is_driven(skeleton, [bone])]
     if not bones:
@@ -143,7 +149,7 @@ def told_of_driven(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
     return [told]
 
 
-def told_of_constraints(
+def warnings_for_constraints(
     settings: OCTO_MOTION_PG_locomotion,
     armature: bpy.types.Object,
     skeleton: Skeleton,
@@ -165,9 +171,9 @@ def told_of_constraints(
     return told
 
 
-def told_of_showing(armature: bpy.types.Object, render: bpy.types.RenderSettings) -> list[str]:
+def warnings_for_display(armature: bpy.types.Object, render: bpy.types.RenderSettings) -> list[str]:
     """What there is to say of a motion that is there, but is not shown as it is."""
-    told = told_of_layers(armature)
+    told = warnings_for_layers(armature)
     if armature_data(armature).pose_position == "REST":
         told.append(
             f"'{armature.name}' is shown in its rest position: its arms do not move. Choose Pose "
@@ -182,7 +188,7 @@ def told_of_showing(armature: bpy.types.Object, render: bpy.types.RenderSettings
     return told
 
 
-def told_of_layers(armature: bpy.types.Object) -> list[str]:
+def warnings_for_layers(armature: bpy.types.Object) -> list[str]:
     """What there is to say of NLA tracks that do not let the motion through as it is."""
     data = armature.animation_data
     tracks = data.nla_tracks if data is not None and data.use_nla else ()
@@ -233,7 +239,7 @@ def posed_carriers(
     return displaced_bones(armature, (), sorted(own))
 
 
-def told_of_poses(
+def warnings_for_poses(
     settings: OCTO_MOTION_PG_locomotion,
     armature: bpy.types.Object,
     arms: tuple[Arm, ...],

@@ -9,14 +9,19 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ....blender.rig.skin_radii import skin_key, skin_parts, skin_radii
-from ....core.content_cache import Remembered, key_of
-from ....core.locomotion.clearance.arm_separation import MOST_CAPSULES, Bulk, joints_that_count
-from ....core.locomotion.clearance.capsule_overlap import Capsules, Separation, measure
-from ....core.locomotion.gait.gait_poser import Arm
-from ....core.locomotion.metrics.report import TOLD
-from ....core.locomotion.rig.arm_chains import BodyFrame
-from ....core.locomotion.rig.arm_frames import ArmFrames, arm_frames
+from ....blender.rig import skin_key, skin_parts, skin_radii
+from ....core.content_cache import ContentCache, content_key
+from ....core.locomotion.clearance import (
+    MOST_CAPSULES,
+    Bulk,
+    Capsules,
+    Separation,
+    joints_that_count,
+    measure_overlap,
+)
+from ....core.locomotion.gait import Arm
+from ....core.locomotion.metrics import TOLD
+from ....core.locomotion.rig import ArmFrames, BodyFrame, arm_frames
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
 
@@ -82,14 +87,14 @@ class Apart:
             Capsules(each.name, np.tile(each.joints, (len(looked), 1, 1)), each.radii, each.at_rest)
             for each in self.still
         ]
-        return measure(chains, still), every
+        return measure_overlap(chains, still), every
 
     @staticmethod
     def told(found: Separation, every: int, frames: Floats) -> tuple[str, ...]:
         """A sentence on the deepest overlap, none if arms keep apart.
 
         Args:
-            found: what :meth:`measure` says.
+            found: what :meth:`measure_overlap` says.
             every: at every how many frames it looked.
             frames: (frames,) their numbers in the scene.
         """
@@ -105,7 +110,7 @@ class Apart:
         return (told,)
 
 
-_known: Final[Remembered[Apart]] = Remembered(2)
+_known: Final[ContentCache[Apart]] = ContentCache(2)
 
 
 def read_apart(
@@ -128,7 +133,7 @@ def read_apart(
     """
     if not live:
         _known.clear()
-    key = key_of(skeleton, arms, body, skin_key(armature))
+    key = content_key(skeleton, arms, body, skin_key(armature))
     return _known.get(key, lambda: _read_apart(armature, skeleton, arms, body))
 
 

@@ -14,12 +14,12 @@ from bpy.props import (
     StringProperty,
 )
 
-from ....blender.files import presets
+from ....blender.files import gait_names
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 
 def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
-    return presets.gait_names()
+    return gait_names()
 
 
 def _length() -> Any:

@@ -12,9 +12,9 @@ import bpy
 import numpy as np
 
 from ....blender.overrides import linked_names
-from ....blender.scene.contact_markers import Contact, markers, read_markers
-from ....core.locomotion.gait.gait_poser import Arm
-from ....core.locomotion.ground.footholds import Wish
+from ....blender.scene import Contact, markers, read_markers
+from ....core.locomotion.gait import Arm
+from ....core.locomotion.ground import ContactOverride
 from ....core.rotations import Floats
 from .ground import OCTO_MOTION_PG_ground
 
@@ -23,7 +23,7 @@ Place = tuple[str, int]
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class ContactEdit:
     """What is wanted of one contact."""
 
     removed: bool = False
@@ -38,10 +38,12 @@ class Wanted:
         return self.removed or self.shift != 0.0 or self.position is not None
 
 
-def gathered(settings: OCTO_MOTION_PG_ground, armature: bpy.types.Object) -> dict[Place, Wanted]:
+def read_overrides(
+    settings: OCTO_MOTION_PG_ground, armature: bpy.types.Object
+) -> dict[Place, ContactEdit]:
     """All wishes: those in the settings, and what was done to the markers since."""
     wanted = {
-        (item.arm, item.cycle): Wanted(
+        (item.arm, item.cycle): ContactEdit(
             item.removed,
             item.shift,
             np.array(item.position, dtype=np.float64) if item.locked else None,
@@ -59,18 +61,20 @@ def gathered(settings: OCTO_MOTION_PG_ground, armature: bpy.types.Object) -> dic
         return wanted
     for place in places:
         if place not in found:
-            wanted[place] = replace(wanted.get(place, Wanted()), removed=True)
+            wanted[place] = replace(wanted.get(place, ContactEdit()), removed=True)
     for place, contact in found.items():
         position = contact.position if contact.locked else None
-        wanted[place] = Wanted(shift=contact.shift, position=position, heading=contact.heading)
+        wanted[place] = ContactEdit(shift=contact.shift, position=position, heading=contact.heading)
     return {place: each for place, each in wanted.items() if each.matters}
 
 
-def as_wishes(wanted: dict[Place, Wanted], arms: Sequence[Arm]) -> list[Wish]:
+def overrides_for_core(
+    wanted: dict[Place, ContactEdit], arms: Sequence[Arm]
+) -> list[ContactOverride]:
     """Wishes as core has them, of those arms that there are."""
     numbers = {arm.name: number for number, arm in enumerate(arms)}
     return [
-        Wish(
+        ContactOverride(
             numbers[arm],
             cycle,
             removed=each.removed,
@@ -83,7 +87,7 @@ def as_wishes(wanted: dict[Place, Wanted], arms: Sequence[Arm]) -> list[Wish]:
     ]
 
 
-def store(settings: OCTO_MOTION_PG_ground, wanted: dict[Place, Wanted]) -> None:
+def store(settings: OCTO_MOTION_PG_ground, wanted: dict[Place, ContactEdit]) -> None:
     """Keep wishes in the settings.
 
     What a library override has from its linked file can be changed, but not removed: there it says

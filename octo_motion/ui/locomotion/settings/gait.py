@@ -26,13 +26,22 @@ from bpy.props import (
 )
 
 from ....core.errors import GaitError
-from ....core.locomotion.gait import table as gait
-from ....core.locomotion.gait.table import ANGLES, CYCLE, LINKS, GaitCurve, GaitTable
+from ....core.locomotion.gait import (
+    ANGLES,
+    CYCLE,
+    LINKS,
+    GaitCurve,
+    GaitTable,
+    check_gait,
+    gait_from_json,
+    gait_presets,
+    gait_to_json,
+)
 from ....core.rotations import Floats
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 DEFAULT_GAIT: Final = "walk"
-_DEFAULT: Final = gait.presets()[DEFAULT_GAIT]
+_DEFAULT: Final = gait_presets()[DEFAULT_GAIT]
 
 SIDES: Final = (
     ("LEFT", "Left", "The arm on the left", 0),
@@ -57,14 +66,14 @@ def _unused() -> Any:
 
 def _text(group: OCTO_MOTION_PG_gait_table) -> str:
     try:
-        return gait.to_json(read_table(group, gait.presets().get(group.name)))
+        return gait_to_json(read_table(group, gait_presets().get(group.name)))
     except GaitError:
         return ""
 
 
 def _set_text(group: OCTO_MOTION_PG_gait_table, text: str) -> None:
     try:
-        table = gait.from_json(text, "text")
+        table = gait_from_json(text, "text")
     except GaitError:
         # Blender only prints what a property's setter raises. A name that is not the chosen
         # gait's makes everyone say so.
@@ -352,7 +361,7 @@ def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None
         description=description,
         notes=notes,
     )
-    return gait.check(table)
+    return check_gait(table)
 
 
 def read_curve(curve: OCTO_MOTION_PG_gait_curve) -> GaitCurve:

@@ -17,7 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ....core.locomotion.ground.stance_settings import StanceSettings
+from ....core.locomotion.ground import StanceSettings
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 

@@ -8,8 +8,8 @@ from typing import Any, Final
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from ....core.keyframes.channel import Channel
-from ....core.locomotion.path.in_place import breaths
+from ....core.keyframes import Channel
+from ....core.locomotion.path import breathing_scales
 from ....core.rotations import Floats
 from ...override_flags import OVERRIDE
 
@@ -82,7 +82,7 @@ def breathing_channels(
     if not mantle or settings.breathing <= 0.0:
         return []
     whole = float(times[-1]) if settings.travel_on == "NONE" else None
-    scales = breaths(times, settings.breathing, breath=settings.breath_time, whole=whole)
+    scales = breathing_scales(times, settings.breathing, breath=settings.breath_time, whole=whole)
     assert armature.pose is not None
     path = armature.pose.bones[mantle].path_from_id("scale")
     return [Channel(path, scales, mantle)]

@@ -20,7 +20,7 @@ def _tell(settings: Any, _context: bpy.types.Context) -> None:
     settings.id_data.update_tag(refresh={"OBJECT"})
 
 
-class Live:
+class LiveSettings:
     """Whether the motion follows its route and its settings by itself."""
 
     live: BoolProperty(

@@ -20,13 +20,11 @@ from bpy.props import (
     StringProperty,
 )
 
-from ....blender.files import presets
-from ....blender.files.weight_curve import curve_node, ensure_weight_curve
-from ....blender.rig.armature import armature_data
+from ....blender.files import curve_node, ensure_weight_curve, gait_names, load_gait
+from ....blender.rig import armature_data
 from ....core.errors import GaitError
-from ....core.locomotion.gait.gait_poser import MOST_STEADY, GaitSettings
-from ....core.locomotion.gait.table import GaitTable
-from ....core.locomotion.path.travel import TravelSettings
+from ....core.locomotion.gait import MOST_STEADY, GaitSettings, GaitTable
+from ....core.locomotion.path import TravelSettings
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 from ...override_groups import make_overridable
 from .arms import ArmItem
@@ -35,7 +33,7 @@ from .gait import DEFAULT_GAIT, OCTO_MOTION_PG_gait_table, fill_table, read_tabl
 from .ground import OCTO_MOTION_PG_ground
 from .in_place import TRAVEL_IN_PLACE, InPlace
 from .keep_apart import KeepingApart
-from .live import Live
+from .live import LiveSettings
 from .quality import QualityReport
 from .reaches import Reaches
 
@@ -58,14 +56,14 @@ def _is_weight_curve(_settings: Any, candidate: bpy.types.NodeTree) -> bool:
 
 
 def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
-    return presets.gait_names()
+    return gait_names()
 
 
 def _load_gait(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.Context) -> None:
     if used(settings.table.curves) and settings.table.name == settings.gait:
         return
     try:
-        load_gait(settings, settings.gait)
+        fill_gait_table(settings, settings.gait)
     except GaitError:
         # Generating says it, and the panel shows it: here is nobody to tell.
         return
@@ -79,7 +77,7 @@ def _make_weight_curve(settings: OCTO_MOTION_PG_locomotion, _context: bpy.types.
 
 
 class OCTO_MOTION_PG_locomotion(
-    QualityReport, Reaches, InPlace, KeepingApart, Live, bpy.types.PropertyGroup
+    QualityReport, Reaches, InPlace, KeepingApart, LiveSettings, bpy.types.PropertyGroup
 ):
     """How an armature walks or swims along a route."""
 
@@ -583,13 +581,13 @@ def locomotion_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion
     return cast("OCTO_MOTION_PG_locomotion", armature.octo_motion.locomotion)  # type: ignore[attr-defined]
 
 
-def load_gait(settings: OCTO_MOTION_PG_locomotion, name: str) -> None:
+def fill_gait_table(settings: OCTO_MOTION_PG_locomotion, name: str) -> None:
     """Fill the editable table with a gait of the extension or of the user's.
 
     Raises:
         GaitError: there is no such gait, or its file is damaged.
     """
-    set_gait(settings, presets.load_gait(name))
+    set_gait(settings, load_gait(name))
 
 
 def set_gait(settings: OCTO_MOTION_PG_locomotion, table: GaitTable) -> None:
@@ -607,7 +605,7 @@ def read_gait(settings: OCTO_MOTION_PG_locomotion) -> GaitTable:
     """
     if used(settings.table.curves) and settings.table.name == settings.gait:
         return read_table(settings.table)
-    preset = presets.load_gait(settings.gait)
+    preset = load_gait(settings.gait)
     if used(settings.table.curves):
         raise GaitError(
             f"The gait '{settings.gait}' is not loaded, '{settings.table.name}' is.",

@@ -18,9 +18,9 @@ from bpy.props import (
 )
 
 from ....blender.overrides import linked_names
-from ....blender.rig.armature import active_armature
+from ....blender.rig import active_armature
 from ....core.errors import RigError, SettingsError
-from ....core.locomotion.metrics.report import TOLD, Figure
+from ....core.locomotion.metrics import TOLD, Figure
 from ...armature_operator import ArmatureOperator
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 

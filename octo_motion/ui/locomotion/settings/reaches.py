@@ -16,7 +16,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ....blender.scene.grasp_target import WITH_SURFACE
+from ....blender.scene import WITH_SURFACE
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 MODES: Final = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ....core.locomotion.metrics.report import Figure
+from ....core.locomotion.metrics import Figure
 
 
 @dataclass(frozen=True)

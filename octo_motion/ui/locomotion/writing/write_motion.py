@@ -11,40 +11,60 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ....blender.animation import actions
-from ....blender.animation.leftover_poses import SCALE, animated_bones, rest_bones, unscale_bones
-from ....blender.animation.stretching import stretch_channels
-from ....blender.scene.contact_markers import Contact, write_markers
+from ....blender.animation import (
+    SCALE,
+    Channel,
+    animated_bones,
+    key_counts,
+    location_channel,
+    object_channels,
+    rest_bones,
+    rotation_channels,
+    stretch_channels,
+    unscale_bones,
+    writable_armature,
+    write_action,
+)
+from ....blender.scene import Contact, write_markers
 from ....core.errors import WriteError
-from ....core.locomotion.clearance.arm_separation import kept_apart
-from ....core.locomotion.clearance.overlap_contacts import Opened
-from ....core.locomotion.clearance.subframe_clearance import ArmsOverGround, raised_between
-from ....core.locomotion.clearance.swim_clearance import off_ground
-from ....core.locomotion.gait.gait_poser import Arm, Generator
-from ....core.locomotion.gait.table import GaitTable
-from ....core.locomotion.ground.surface import Ground
-from ....core.locomotion.ground.swing_smoothing import Steady
-from ....core.locomotion.ground.walk import Raise
-from ....core.locomotion.metrics.played_motion import Rig, as_keyed
-from ....core.locomotion.metrics.report import TOLD, Figure, Measured, figures
-from ....core.locomotion.motion.few_keys import Body, Motion, Tolerances, reduced
-from ....core.locomotion.path.gait_changes import between
-from ....core.locomotion.path.route import Route
-from ....core.locomotion.path.travel import Travel, TravelSettings, plan_travel
-from ....core.locomotion.rig.arm_chains import BodyFrame
-from ....core.locomotion.rig.detection import Detection
-from ....core.locomotion.rig.placement import object_transforms, root_bone_transforms
-from ....core.locomotion.rig.poses import Poses, automatic
+from ....core.locomotion.clearance import (
+    ArmsOverGround,
+    Opened,
+    keep_off_ground,
+    raise_between_frames,
+    separate_arms,
+)
+from ....core.locomotion.gait import Arm, GaitPoser, GaitTable
+from ....core.locomotion.ground import Ground, Raise, SwingSmoothing
+from ....core.locomotion.metrics import TOLD, Figure, KeyedRig, Measured, figures, measure_keyed
+from ....core.locomotion.motion import Body, Motion, Tolerances, reduced
+from ....core.locomotion.path import Route, Travel, TravelSettings, plan_travel, slerp_rotations
+from ....core.locomotion.rig import (
+    BodyFrame,
+    Detection,
+    Poses,
+    halfway_automatic,
+    object_transforms,
+    root_bone_transforms,
+)
 from ....core.rotations import IDENTITY, Floats, from_matrix, rotate
 from ....core.skeleton import Skeleton
-from ..reading.arm_items import bones_of, write_arms, write_body
-from ..reading.changes import Changing, Journey
-from ..reading.gait import frames_of_arms
-from ..reading.ground import Standing
-from ..reading.previous_action import previous_action
-from ..reading.reaches import Carried, Reaching, Travelling, write_carried
-from ..reading.skin import Apart
-from ..settings.contact_overrides import Place, Wanted, note_shown, once_called, store
+from ..reading import (
+    Apart,
+    Carried,
+    GaitTransitionPlan,
+    Reaching,
+    SegmentedMotion,
+    Standing,
+    Travelling,
+    bones_of,
+    frames_of_arms,
+    previous_action,
+    write_arms,
+    write_body,
+    write_carried,
+)
+from ..settings.contact_overrides import ContactEdit, Place, note_shown, once_called, store
 from ..settings.properties import locomotion_settings
 from ..settings.quality import write_figures
 from .summary import Summary
@@ -136,7 +156,7 @@ class Shot:
     """What was found, if the settings had no arms."""
     body: BodyFrame
     gait: GaitTable
-    generator: Generator
+    generator: GaitPoser
     route: Route
     travel: TravelSettings
     world: Floats
@@ -164,14 +184,14 @@ class Shot:
     """Whether nothing travels: the motion is a loop."""
     repeats: bool
     """Whether curves go on before the motion and after it."""
-    breath: Sequence[actions.Channel]
+    breath: Sequence[Channel]
     """Of the mantle."""
     extend_scene_range: bool
     standing: Standing | None
     """What holds the ground, none for a swim."""
-    changing: Changing | None
+    changing: GaitTransitionPlan | None
     """Where the gait changes, none for one gait all the way."""
-    wanted: dict[Place, Wanted]
+    wanted: dict[Place, ContactEdit]
     """What the artist wants of single contacts."""
     apart: Apart | None
     """What there is of the creature, where arms keep apart or overlaps are told."""
@@ -209,7 +229,7 @@ class Shot:
     figures: tuple[Figure, ...] = ()
     """The worst of each kind."""
     moving: _Moving | None = None
-    few: list[actions.Channel] | None = None
+    few: list[Channel] | None = None
     """The channels with keys of their own: few, or with handles of their own."""
 
     @property
@@ -302,7 +322,7 @@ class Shot:
 
     def _change(
         self,
-        changing: Changing,
+        changing: GaitTransitionPlan,
         travel: Travel,
         places: tuple[Floats, Floats],
         going: tuple[Floats, Floats],
@@ -311,10 +331,10 @@ class Shot:
         """Arms of a journey on which the gait changes, and that do not dip between frames."""
         step = next(self._portions(), slice(0, 1)).stop
         self.swimming = changing.swimming(travel.distance)
-        journey: Journey | None = None
+        journey: SegmentedMotion | None = None
         per_metre = self.every * self.cycle / self.travel.stride
         for done in changing.compute(travel.distance, places, step, per_metre):
-            if isinstance(done, Journey):
+            if isinstance(done, SegmentedMotion):
                 journey = done
             else:
                 yield done
@@ -329,7 +349,7 @@ class Shot:
 
         def kept_off(poses: Poses, loose: Floats) -> Poses:
             """The same with arms off the ground that know of none."""
-            return replace(poses, rotations=off_ground(course, poses, radii, loose))
+            return replace(poses, rotations=keep_off_ground(course, poses, radii, loose))
 
         def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
             """Some frames anew, with arms raised; others are left as they are."""
@@ -345,7 +365,7 @@ class Shot:
         # On a journey on which the gait never changes, one number stands for all.
         loose = np.broadcast_to(changing.afloat(travel.distance), posed.late.shape)
         whole = kept_off(Poses(posed.rotations, posed.strains, *going), loose)
-        raised = raised_between(course, whole, course.joints(whole), again)
+        raised = raise_between_frames(course, whole, course.joints(whole), again)
         posed.rotations, posed.strains = raised.rotations, raised.strains
 
     def _stand(
@@ -391,12 +411,12 @@ class Shot:
         course = ArmsOverGround(frames, standing.ground, self.scale, cyclic=self.in_place)
         together = [np.concatenate(each) for each in zip(*joints, strict=True)]
         whole = Poses(posed.rotations, posed.strains, *going)
-        raised = raised_between(course, whole, together, again)
+        raised = raise_between_frames(course, whole, together, again)
         posed.rotations, posed.strains = raised.rotations, raised.strains
 
-    def _steady(self) -> Steady | None:
+    def _steady(self) -> SwingSmoothing | None:
         """How arms in the air are evened out over time, if at all."""
-        return Steady.over(self.generator.settings.steady, self.every * self.cycle)
+        return SwingSmoothing.over(self.generator.settings.steady, self.every * self.cycle)
 
     def _reach(self, posed: _Posed) -> np.ndarray:
         """Let arms reach; which of them do (frames, arms)."""
@@ -418,7 +438,7 @@ class Shot:
         if too_many:
             self.warnings.append(too_many)
             return
-        moved = kept_apart(
+        moved = separate_arms(
             replace(self.apart.bulk, opened=self._opened()),
             posed.rotations,
             posed.strains,
@@ -465,7 +485,7 @@ class Shot:
             cycles=posed.cycles,
             separation=separation,
             every=every,
-            halfway=automatic(poses, cyclic=self.repeats),
+            halfway=halfway_automatic(poses, cyclic=self.repeats),
         )
 
     def _tell_quality(self) -> None:
@@ -473,7 +493,7 @@ class Shot:
         if self.measured is None:
             return
         if self.few is not None:
-            rig = Rig(
+            rig = KeyedRig(
                 armature=_local_object(self.armature),
                 skeleton=self.skeleton,
                 arms=[arm.bones for arm in self.arms],
@@ -481,7 +501,7 @@ class Shot:
                 root_bone=self.root_bone,
                 world=self.world,
             )
-            self.measured = as_keyed(self.measured, rig, self.few)
+            self.measured = measure_keyed(self.measured, rig, self.few)
         self.figures = figures(self.measured)
 
     def _reduce(self) -> Iterator[float]:
@@ -545,7 +565,7 @@ class Shot:
             WriteError: the object is gone, or has become read-only.
         """
         armature = _local_object(self.armature)
-        actions.writable_armature(armature)
+        writable_armature(armature)
         settings = locomotion_settings(armature)
         channels = self._channels(armature)
         previous = previous_action(armature, settings)
@@ -558,7 +578,7 @@ class Shot:
         # action from being purged.
         settings.result = None
         try:
-            action = actions.write_action(
+            action = write_action(
                 armature,
                 f"{armature.name} Locomotion",
                 self.frames,
@@ -586,7 +606,7 @@ class Shot:
         write_carried(armature, self.carried)
         write_figures(settings, self.figures)
         notes = self._extend_range()
-        keys, dense_keys = actions.key_counts(action)
+        keys, dense_keys = key_counts(action)
         assert self.misses is not None
         return Summary(
             gait=self.gait.name,
@@ -604,7 +624,7 @@ class Shot:
             notes=(*notes, *self.reached),
         )
 
-    def _channels(self, armature: bpy.types.Object) -> list[actions.Channel]:
+    def _channels(self, armature: bpy.types.Object) -> list[Channel]:
         few = self.few if self.few is not None else self._motion(armature).all()
         return [*few, *self.breath]
 
@@ -615,7 +635,9 @@ class Shot:
         held = np.tile(self.mantle_rotations, (len(self.moments), 1, 1))
         if moving.swimming is not None:
             rest = np.broadcast_to(IDENTITY, held.shape)
-            held = between(rest, held, np.repeat(moving.swimming[:, None], held.shape[1], axis=1))
+            held = slerp_rotations(
+                rest, held, np.repeat(moving.swimming[:, None], held.shape[1], axis=1)
+            )
         if self.in_place and not self.root_bone:
             travel = []
         elif self.root_bone:
@@ -623,15 +645,15 @@ class Shot:
                 self.skeleton, self.root_bone, self.world, moving.locations, moving.orientations
             )
             travel = [
-                actions.location_channel(armature, self.root_bone, locations),
-                *actions.rotation_channels(armature, [self.root_bone], rotations[:, None]),
+                location_channel(armature, self.root_bone, locations),
+                *rotation_channels(armature, [self.root_bone], rotations[:, None]),
             ]
         else:
-            travel = actions.object_channels(armature, moving.locations, moving.orientations)
+            travel = object_channels(armature, moving.locations, moving.orientations)
         return Motion(
             travel=travel,
-            arms=actions.rotation_channels(armature, self.generator.bones, moving.rotations),
-            mantle=actions.rotation_channels(armature, self.mantle, held),
+            arms=rotation_channels(armature, self.generator.bones, moving.rotations),
+            mantle=rotation_channels(armature, self.mantle, held),
             stretch=self._stretch(armature, moving.strains),
             lying=moving.lying if self._ground() is not None else (),
         )
@@ -649,7 +671,7 @@ class Shot:
         count = len(self.moments)
         return np.tile(location, (count, 1)), np.tile(orientation, (count, 1))
 
-    def _stretch(self, armature: bpy.types.Object, strains: Floats) -> list[actions.Channel]:
+    def _stretch(self, armature: bpy.types.Object, strains: Floats) -> list[Channel]:
         # A swim that becomes a walk stretches there.
         if not any(each.stretching for each in self._stands()):
             return []
@@ -711,7 +733,7 @@ def show_contacts(armature: bpy.types.Object, shot: Shot) -> int:
     contacts = []
     for each in shot.standing.walk.footholds():
         name = shot.arms[each.arm].name
-        wish = shot.wanted.get((name, each.cycle), Wanted())
+        wish = shot.wanted.get((name, each.cycle), ContactEdit())
         on, off = np.interp([each.on, each.off], phases, frames)
         contacts.append(
             Contact(
