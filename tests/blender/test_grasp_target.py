@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.rig.skin_radii import skin_radii
+from octo_motion.blender.rig.skin_radii import radii_of_skin
 from octo_motion.blender.scene.grasp_target import hangs_on, may_move, read_form, read_places
 from octo_motion.core.errors import RigError
 from octo_motion.core.locomotion.octopus.shape import OctopusShape
@@ -110,7 +110,7 @@ def test_arms_are_as_thick_as_their_skin() -> None:
     octopus: Any = bpy.context.object
     shape = OctopusShape()
     chain = [f"arm1.{number:02}.L" for number in range(1, shape.joints + 1)]
-    (radii,) = skin_radii(octopus, [chain])
+    (radii,) = radii_of_skin(octopus, [chain])
     # Beyond the web, with a sixth of a radius for suckers and what is not round.
     expected = 0.5 * shape.skin_diameter(shape.reach)
     np.testing.assert_allclose(radii[3:-1], expected[3:-1], rtol=0.2)
@@ -121,10 +121,10 @@ def test_a_mask_over_the_skin_does_not_make_its_arms_thinner() -> None:
     bpy.ops.octo_motion.add_octopus()
     octopus: Any = bpy.context.object
     chain = [f"arm1.{number:02}.L" for number in range(1, 13)]
-    (before,) = skin_radii(octopus, [chain])
+    (before,) = radii_of_skin(octopus, [chain])
     (skin,) = octopus.children
     skin.vertex_groups.new(name="Mask").add(range(len(skin.data.vertices)), 1.0, "REPLACE")
-    (after,) = skin_radii(octopus, [chain])
+    (after,) = radii_of_skin(octopus, [chain])
     np.testing.assert_array_equal(after, before)
 
 
@@ -133,7 +133,7 @@ def test_a_mesh_without_vertices_tells_nothing() -> None:
     octopus: Any = bpy.context.object
     empty: Any = bpy.data.objects.new("Empty", bpy.data.meshes.new("Empty"))
     empty.modifiers.new("Armature", "ARMATURE").object = octopus
-    (radii,) = skin_radii(octopus, [[f"arm1.{number:02}.L" for number in range(1, 13)]])
+    (radii,) = radii_of_skin(octopus, [[f"arm1.{number:02}.L" for number in range(1, 13)]])
     assert radii[0] == pytest.approx(0.036, rel=0.01)
 
 
@@ -141,6 +141,6 @@ def test_an_arm_without_skin_is_slender() -> None:
     bpy.ops.octo_motion.add_octopus(with_mesh=False)
     octopus: Any = bpy.context.object
     chain = [f"arm1.{number:02}.L" for number in range(1, 13)]
-    (radii,) = skin_radii(octopus, [chain])
+    (radii,) = radii_of_skin(octopus, [chain])
     assert radii[0] == pytest.approx(0.036, rel=0.01)
     assert radii[-1] == pytest.approx(0.0072, rel=0.01)

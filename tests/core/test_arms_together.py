@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.rig.arm_batches import alike
-from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, arm_frames
+from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import Floats, normalized
 from tests.core.rigs import body_with_arms
 
@@ -25,7 +25,7 @@ def arms(request: pytest.FixtureRequest) -> list[ArmFrames]:
             inherits = list(skeleton.inherits_rotation)
             inherits[skeleton.index["arm1.2"]] = False
             skeleton = replace(skeleton, inherits_rotation=tuple(inherits))
-        found += [arm_frames(skeleton, arm.bones, body) for arm in listed]
+        found += [frames_of_arm(skeleton, arm.bones, body) for arm in listed]
     return found[::2] + found[1::2]
 
 

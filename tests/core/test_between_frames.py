@@ -9,7 +9,7 @@ from octo_motion.core.locomotion.clearance.subframe_clearance import (
     raise_between_frames,
 )
 from octo_motion.core.locomotion.ground.walk import Raise
-from octo_motion.core.locomotion.rig.arm_frames import arm_frames
+from octo_motion.core.locomotion.rig.arm_frames import frames_of_arm
 from octo_motion.core.locomotion.rig.placement import object_transforms
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle, multiply, rotate
@@ -25,7 +25,7 @@ class Shot:
         self.times = np.linspace(0.0, 1.0, count)
         _, centres, orientations = walk.places(self.times)
         self.going = object_transforms(walk.body, 1.0, centres, orientations)
-        arms = [arm_frames(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
+        arms = [frames_of_arm(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
         self.course = ArmsOverGround(arms, walk.ground, 1.0)
         self.asked: list[np.ndarray] = []
         self.shapes: tuple[Floats, ...] = ()

@@ -9,7 +9,7 @@ import pytest
 from octo_motion.core.locomotion.clearance.arm_separation import Bulk, separate_arms
 from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
 from octo_motion.core.locomotion.rig.arm_chains import body_frame
-from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, arm_frames
+from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, from_axis_angle, multiply
 from tests.core.rigs import UP, bone_matrix, skeleton_of
 
@@ -33,7 +33,7 @@ def side_by_side(bones: Sequence[int]) -> Bulk:
         arms.append(arm)
     skeleton = skeleton_of(names, parents, matrices, lengths)
     body = body_frame(skeleton, arms, "Z", "-Y")
-    frames = [arm_frames(skeleton, arm, body) for arm in arms]
+    frames = [frames_of_arm(skeleton, arm, body) for arm in arms]
     return Bulk(frames, [np.full(count + 1, 0.05) for count in bones], [], UP)
 
 

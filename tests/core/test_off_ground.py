@@ -7,7 +7,7 @@ import pytest
 from octo_motion.core.locomotion.clearance.subframe_clearance import ArmsOverGround
 from octo_motion.core.locomotion.clearance.swim_clearance import afloat, keep_off_ground
 from octo_motion.core.locomotion.ground.surface import LevelGround
-from octo_motion.core.locomotion.rig.arm_frames import arm_frames
+from octo_motion.core.locomotion.rig.arm_frames import frames_of_arm
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.grounds import GROUNDS, largest_turn, walker
@@ -16,7 +16,7 @@ from tests.core.grounds import GROUNDS, largest_turn, walker
 def hanging(frames: int) -> tuple[ArmsOverGround, Poses, list[Floats]]:
     """A body that comes down until half of each arm hangs into the ground, and radii."""
     walk = walker(GROUNDS["plane"])
-    arms = [arm_frames(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
+    arms = [frames_of_arm(walk.skeleton, arm.bones, walk.body) for arm in walk.generator.arms]
     course = ArmsOverGround(arms, LevelGround(0.0), 1.0)
     bones = sum(len(arm.bones) for arm in arms)
     rotations = np.zeros((frames, bones, 4))

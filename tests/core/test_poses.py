@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.rig.bone_rotations import ArmRest, arm_rest, bone_rotations
+from octo_motion.core.locomotion.rig.bone_rotations import ArmRest, arm_rest, rotate_bones
 from octo_motion.core.rotations import Floats, angle_between, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import bone_matrix, skeleton_of
@@ -56,7 +56,7 @@ def posed_segments(skeleton: Skeleton, chain: list[str], rotations: Floats) -> F
 def rotations_of(rest: ArmRest, directions: Floats, bank: Floats) -> Floats:
     """Rotations (bones, frames, 4) of a single arm, from directions (bones, frames, 3)."""
     columns = np.moveaxis(directions, -1, 1)[..., None]
-    return np.moveaxis(bone_rotations([rest], columns, bank[..., None])[:, 0], 1, 0)
+    return np.moveaxis(rotate_bones([rest], columns, bank[..., None])[:, 0], 1, 0)
 
 
 def wanted_directions(random: np.random.Generator, count: int, frames: int = 5) -> Floats:

@@ -14,7 +14,7 @@ from octo_motion.core.locomotion.reaching.curl import curled
 from octo_motion.core.locomotion.reaching.grasp import Grasp, Mode, Places, Target, plan_grasp
 from octo_motion.core.locomotion.reaching.timeline import Timeline, first_place, front_width
 from octo_motion.core.locomotion.reaching.winding import profile_of
-from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, arm_frames
+from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle, rotate
 from tests.core import objects
 from tests.core.rigs import body_with_arms, posed_joints
@@ -71,7 +71,7 @@ def case(
 ) -> Case:
     random = np.random.default_rng(1) if rolls else None
     skeleton, arms, body = body_with_arms(8, joints, rolls=random)
-    arm = arm_frames(skeleton, arms[0].bones, body)
+    arm = frames_of_arm(skeleton, arms[0].bones, body)
     radii = np.interp(arm.reach, [0.0, 1.0], [0.05, 0.008])
     times = frames()
     profile = profile_of(*(form or objects.rod()))
@@ -88,7 +88,7 @@ def case(
 def test_bones_and_frames_along_the_arm_are_the_same_thing(joints: int) -> None:
     random = np.random.default_rng(joints)
     skeleton, arms, body = body_with_arms(3, joints, rolls=random)
-    arm = arm_frames(skeleton, arms[1].bones, body)
+    arm = frames_of_arm(skeleton, arms[1].bones, body)
     rotations = random.normal(size=(4, joints, 4))
     rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
     along = arm.from_bones(rotations)
@@ -101,7 +101,7 @@ def test_bones_and_frames_along_the_arm_are_the_same_thing(joints: int) -> None:
 def test_suckers_face_the_ground_where_the_rig_does_not_say() -> None:
     skeleton, arms, body = body_with_arms(8, 5, rolls=np.random.default_rng(2))
     for each in arms:
-        arm = arm_frames(skeleton, each.bones, body)
+        arm = frames_of_arm(skeleton, each.bones, body)
         facing = rotate(arm.at_rest, np.array([0.0, 1.0, 0.0]))
         np.testing.assert_allclose(facing, np.tile(-UP, (5, 1)), atol=1e-9)
 
@@ -267,7 +267,7 @@ def test_an_object_that_the_arm_starts_in_is_told() -> None:
 
 def test_a_reach_outside_of_the_motion_is_told() -> None:
     skeleton, arms, body = body_with_arms(2, 6)
-    arm = arm_frames(skeleton, arms[0].bones, body)
+    arm = frames_of_arm(skeleton, arms[0].bones, body)
     times = np.arange(5.0)
     target = Target(profile_of(*objects.rod()), still(times))
     with pytest.raises(SettingsError, match="outside of the motion"):
@@ -306,7 +306,7 @@ def test_the_way_of_least_jerk_starts_and_ends_at_rest() -> None:
 @every_build
 def test_a_curl_rolls_the_tip_up_and_stretches_it_again(joints: int) -> None:
     skeleton, arms, body = body_with_arms(4, joints)
-    arm = arm_frames(skeleton, arms[0].bones, body)
+    arm = frames_of_arm(skeleton, arms[0].bones, body)
     times = frames(0.5)
     rest = np.tile(IDENTITY, (len(times), joints, 1))
     result = curled(arm, TIMELINE, times, rest)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
-from octo_motion.core.locomotion.rig.arm_frames import arm_frames
+from octo_motion.core.locomotion.rig.arm_frames import frames_of_arm
 from octo_motion.core.rotations import Floats
 from tests.core.rigs import body_with_arms
 
@@ -104,7 +104,7 @@ def posed_arms(preset: str, frames: int = 96, radius: float = 0.05) -> list[Caps
     rotations = generator.pose(phases, np.zeros((frames, 2))).rotations
     result = []
     for number, each in enumerate(arms):
-        arm = arm_frames(skeleton, each.bones, body)
+        arm = frames_of_arm(skeleton, each.bones, body)
         joints = arm.joints(arm.from_bones(rotations[:, 12 * number : 12 * number + 12]))
         radii = np.interp(arm.reach, [0.0, 1.0], [radius, 0.1 * radius])
         result.append(Capsules(each.name, joints, radii, arm.joints(arm.at_rest)))

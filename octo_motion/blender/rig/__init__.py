@@ -15,7 +15,7 @@ from .armature import (
 from .arms import hidden_bones, require_editable, select_pose_bones, world_directions
 from .puppet import Puppet
 from .puppet_reading import bone_materials, is_part_of, mark_bones, read_rig, set_bone_material
-from .skin_radii import skin_key, skin_parts, skin_radii
+from .skin_radii import radii_of_skin, skin_key, skin_parts
 
 __all__ = [
     "SUCKER_PROPERTY",
@@ -29,6 +29,7 @@ __all__ = [
     "is_driven_object",
     "is_part_of",
     "mark_bones",
+    "radii_of_skin",
     "read_rig",
     "read_skeleton",
     "require_editable",
@@ -37,7 +38,6 @@ __all__ = [
     "set_bone_material",
     "skin_key",
     "skin_parts",
-    "skin_radii",
     "world_directions",
     "world_matrix",
 ]

@@ -29,7 +29,7 @@ _BONE_ROOT, _BONE_TIP = 0.06, 0.012
 """Radius in arm lengths at root and tip of an arm without skin."""
 
 
-def skin_radii(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> list[Floats]:
+def radii_of_skin(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> list[Floats]:
     """Radii (bones + 1,) of the skin at the joints of each chain, armature units.
 
     Within a bone's lie three quarters of the vertices that follow it more than any other bone, at

@@ -26,9 +26,9 @@ from ..rig import (
     Side,
     arm_azimuths,
     arm_rest,
-    bone_rotations,
     chain_of,
     joint_positions,
+    rotate_bones,
 )
 from .ccd import JointChain, asked_shape, clamp_to_floor, overreach, solve_ccd
 from .joint_groups import GROUPS, group_lengths, split_groups
@@ -446,7 +446,7 @@ class GaitPoser:
             count, size = len(directions), frames * len(columns)
             to_armature = np.tile(self._to_armature[columns].T, (1, frames))
             in_armature = turned(to_armature, directions.reshape(count, 3, size))
-            posed = bone_rotations(
+            posed = rotate_bones(
                 [self._rests[arm] for arm in columns],
                 in_armature.reshape(directions.shape),
                 bone_twists(build, own),

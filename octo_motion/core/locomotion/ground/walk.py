@@ -14,7 +14,7 @@ from ...rotations import Floats, conjugate, from_matrix, multiply, rotate
 from ...skeleton import Skeleton
 from ..gait import CYCLE, Build, GaitPoser, bone_twists
 from ..path import Line
-from ..rig import ArmSkin, BodyFrame, Facing, bone_rotations, carried_to, sucker_sides
+from ..rig import ArmSkin, BodyFrame, Facing, carried_to, rotate_bones, sucker_sides
 from .arm_curves import unit
 from .contact_timing import EvenTiming, Rhythm
 from .footholds import ContactOverride, Footholds, cycles_at, lay, relaid
@@ -367,7 +367,7 @@ class GroundedWalk:
         along = np.minimum(_FIRST_TURN + np.arange(segments) / 3.0, 1.0)
         most = min(_MOST_TURN, _TURN / segments) * along
         turns = most[:, None, None] * held.weight.reshape(shape[2:])
-        return bone_rotations(
+        return rotate_bones(
             [self._generator.rests[arm] for arm in columns],
             turned(back, stood.directions).reshape(shape),
             bank,

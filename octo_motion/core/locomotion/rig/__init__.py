@@ -16,13 +16,13 @@ from .arm_chains import (
 )
 from .arm_frames import (
     ArmFrames,
-    arm_frames,
     bend_rotations,
     frame_of,
+    frames_of_arm,
     lerp_rotation_vectors,
     transport_frames,
 )
-from .bone_rotations import ArmRest, Facing, arm_rest, bone_rotations, carried_to, sucker_sides
+from .bone_rotations import ArmRest, Facing, arm_rest, carried_to, rotate_bones, sucker_sides
 from .detection import Detection, detect_arms
 from .mantle import find_mantle, lies_back, stretch_mantle
 from .placement import carried_by_root_bone, object_transforms, root_bone_transforms
@@ -42,18 +42,17 @@ __all__ = [
     "Side",
     "alike",
     "arm_azimuths",
-    "arm_frames",
     "arm_rest",
     "arm_skin",
     "bend_rotations",
     "body_frame",
-    "bone_rotations",
     "carried_by_root_bone",
     "carried_to",
     "chain_of",
     "detect_arms",
     "find_mantle",
     "frame_of",
+    "frames_of_arm",
     "halfway_automatic",
     "halfway_linear",
     "is_driven",
@@ -65,6 +64,7 @@ __all__ = [
     "object_transforms",
     "place_added",
     "root_bone_transforms",
+    "rotate_bones",
     "stretch_mantle",
     "sucker_sides",
     "transport_frames",

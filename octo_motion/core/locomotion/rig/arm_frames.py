@@ -114,7 +114,7 @@ class ArmFrames:
         return np.concatenate([start, self.root + np.cumsum(steps, axis=-2)], axis=-2)
 
 
-def arm_frames(skeleton: Skeleton, bones: Sequence[str], body: BodyFrame) -> ArmFrames:
+def frames_of_arm(skeleton: Skeleton, bones: Sequence[str], body: BodyFrame) -> ArmFrames:
     """An arm as its rig has it.
 
     Suckers face the axis that the rig names, else the ground; where an arm at rest leads up or

@@ -130,7 +130,7 @@ def _sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Flo
     return np.where(size > _NO_SIDE, across / np.maximum(size, _NO_SIDE), 0.0)
 
 
-def bone_rotations(
+def rotate_bones(
     rests: Sequence[ArmRest], directions: Floats, bank: Floats, facing: Facing | None = None
 ) -> Floats:
     """Rotations (frames, arms, bones, 4) in each bone's rest frame (Blender's ``matrix_basis``).

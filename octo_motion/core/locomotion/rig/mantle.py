@@ -17,7 +17,7 @@ import numpy as np
 from ...rotations import Floats, normalized
 from ...skeleton import Skeleton
 from .arm_chains import BodyFrame, joint_positions
-from .bone_rotations import arm_rest, bone_rotations
+from .bone_rotations import arm_rest, rotate_bones
 
 _FARTHEST_LEAN: Final = np.radians(75.0)
 """A part that leans further than this is not built to be straightened: it would swallow the head
@@ -107,7 +107,7 @@ def stretch_mantle(
         return np.empty((0, 4))
     rest = _directions(skeleton, [skeleton.index[name] for name in mantle])
     towards = normalized((1.0 - amount) * rest + amount * body.rotation[:, 2])
-    turns = bone_rotations(
+    turns = rotate_bones(
         [arm_rest(skeleton, mantle)],
         towards[:, :, None, None],
         np.zeros((len(mantle), 1, 1)),

@@ -5,7 +5,7 @@ from .bone_names import mirrored
 from .correspondence import (
     Correspondence,
     chain_length,
-    correspondence,
+    find_correspondence,
     matched_bones,
     matched_chains,
 )
@@ -20,7 +20,7 @@ __all__ = [
     "Correspondence",
     "Landmarks",
     "chain_length",
-    "correspondence",
+    "find_correspondence",
     "map_skeleton",
     "matched_bones",
     "matched_chains",

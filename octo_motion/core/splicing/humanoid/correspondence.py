@@ -114,7 +114,7 @@ def matched_chains(
     return pairs
 
 
-def correspondence(
+def find_correspondence(
     base: Skeleton,
     splice: Skeleton,
     pairs: Mapping[int, int],

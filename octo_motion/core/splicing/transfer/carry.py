@@ -26,7 +26,7 @@ from ..humanoid import (
     Correspondence,
     Landmarks,
     chain_length,
-    correspondence,
+    find_correspondence,
     matched_bones,
     matched_chains,
 )
@@ -353,7 +353,7 @@ def _piece_carrier(
             angle_between(low.at_rest(each.skeleton), high.at_rest(each.skeleton)) > _UPRIGHT
             for low, high, each in sides
         )
-    match = correspondence(
+    match = find_correspondence(
         base.skeleton, splice.skeleton, pairs, rests, (ours, theirs), aim_all=bent
     )
     if kind == "trunk":
@@ -410,7 +410,9 @@ def _chain_carrier(part: Part, base: Side, splice: Side) -> Carrier:
             pairs, spread = {}, (tuple(bones), tuple(others))
     frames = chain_frame(base.skeleton, bones), chain_frame(splice.skeleton, others)
     rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
-    match = correspondence(base.skeleton, splice.skeleton, pairs, rests, (None, None), aim_all=True)
+    match = find_correspondence(
+        base.skeleton, splice.skeleton, pairs, rests, (None, None), aim_all=True
+    )
     return Carrier(base, splice, tuple(bones), frames, match, None, spread)
 
 

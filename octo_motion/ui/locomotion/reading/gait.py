@@ -23,7 +23,7 @@ from ....core.locomotion.path import (
     travel_in_place,
     whole_frames,
 )
-from ....core.locomotion.rig import ArmFrames, BodyFrame, arm_frames
+from ....core.locomotion.rig import ArmFrames, BodyFrame, frames_of_arm
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
 from ..settings.properties import OCTO_MOTION_PG_locomotion
@@ -49,7 +49,7 @@ def frames_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -
     bones = [arm.bones for arm in arms]
     return _frames_known.get(
         content_key(skeleton, bones, body),
-        lambda: [arm_frames(skeleton, each, body) for each in bones],
+        lambda: [frames_of_arm(skeleton, each, body) for each in bones],
     )
 
 

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ....blender.animation import object_channels, standing_of, writable_object, write_action
-from ....blender.rig import skin_radii
+from ....blender.rig import radii_of_skin
 from ....blender.scene import (
     can_be_carried,
     carrying_note,
@@ -35,7 +35,7 @@ from ....core.locomotion.reaching import (
     plan_grasp,
     profile_of,
 )
-from ....core.locomotion.rig import ArmFrames, BodyFrame, arm_frames
+from ....core.locomotion.rig import ArmFrames, BodyFrame, frames_of_arm
 from ....core.rotations import Floats, conjugate, multiply, rotate
 from ....core.skeleton import Skeleton
 
@@ -284,10 +284,10 @@ def read_reaches(
     items = [item for item in settings.reaches if not item.mute]
     if not items:
         return None
-    radii = skin_radii(armature, [arm.bones for arm in arms])
+    radii = radii_of_skin(armature, [arm.bones for arm in arms])
     return Reaching(
         arms=arms,
-        frames=tuple(arm_frames(skeleton, arm.bones, body) for arm in arms),
+        frames=tuple(frames_of_arm(skeleton, arm.bones, body) for arm in arms),
         radii=tuple(radii),
         standings=tuple(standing_of(armature, arm.bones[0], left_out=keyed_anew) for arm in arms),
         up=body.rotation[:, 2],

@@ -9,7 +9,7 @@ from typing import Final
 import bpy
 import numpy as np
 
-from ....blender.rig import skin_key, skin_parts, skin_radii
+from ....blender.rig import radii_of_skin, skin_key, skin_parts
 from ....core.content_cache import ContentCache, content_key
 from ....core.locomotion.clearance import (
     MOST_CAPSULES,
@@ -21,7 +21,7 @@ from ....core.locomotion.clearance import (
 )
 from ....core.locomotion.gait import Arm
 from ....core.locomotion.metrics import TOLD
-from ....core.locomotion.rig import ArmFrames, BodyFrame, arm_frames
+from ....core.locomotion.rig import ArmFrames, BodyFrame, frames_of_arm
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
 
@@ -148,12 +148,12 @@ def _read_apart(
         and skeleton.weighted[number]
         and not _hangs(skeleton, name, limbs)
     ]
-    radii = skin_radii(armature, [arm.bones for arm in arms])
+    radii = radii_of_skin(armature, [arm.bones for arm in arms])
     still = [
         Capsules(name, ends[None], thick, ends) for name, ends, thick in skin_parts(armature, parts)
     ]
     return Apart(
-        arms=tuple(arm_frames(skeleton, arm.bones, body) for arm in arms),
+        arms=tuple(frames_of_arm(skeleton, arm.bones, body) for arm in arms),
         names=tuple(arm.name for arm in arms),
         radii=tuple(radii),
         still=tuple(still),
