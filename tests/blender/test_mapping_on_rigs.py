@@ -276,8 +276,8 @@ def test_eight_rigify_tentacles_are_eight_limbs_and_not_their_copies(
 
 RIGIFY_HUMAN = """
 import bpy, addon_utils, json, os, sys
-from octo_motion.blender.armature import read_skeleton
-from octo_motion.core.splicing.mapping import map_skeleton
+from octo_motion.blender.rig.armature import read_skeleton
+from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
 addon_utils.enable("rigify", default_set=True)

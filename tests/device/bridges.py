@@ -107,7 +107,7 @@ def kill_bridge_and_start_again() -> tuple[float, float]:
 
 BLENDER = """
 import os, sys, time
-from octo_motion.device.client import Client
+from octo_motion.device.ipc.client import Client
 from tests.device.bridges import children_of, holding
 client = Client()
 holding(client)

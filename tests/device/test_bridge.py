@@ -33,6 +33,7 @@ from tests.device.bridges import (
     wait_for,
 )
 
+REPOSITORY = Path(__file__).resolve().parents[2]
 SOON = 5.0
 """s: on a machine that has other things to do; python -m tests.device.kill says how soon it is."""
 linux = pytest.mark.skipif(sys.platform != "linux", reason="finds processes through /proc")
@@ -220,11 +221,12 @@ def test_program_runs_from_where_blender_installs_it(tmp_path: Path) -> None:
     """Below bl_ext the package has another name, and beside it lie folders that must stay out."""
     installed = tmp_path / "extensions" / "user_default" / "octo_motion"
     installed.parent.mkdir(parents=True)
-    installed.symlink_to(process.LAUNCHER.parent.parent, target_is_directory=True)
+    installed.symlink_to(REPOSITORY / "octo_motion", target_is_directory=True)
     (installed.parent / "json").mkdir()
     (installed.parent / "json" / "__init__.py").write_text("raise SystemExit('the wrong json')")
+    launcher = process.LAUNCHER.relative_to(REPOSITORY / "octo_motion")
     run = subprocess.run(
-        [process.python_executable(), "-I", installed / "device" / "launch.py", "descriptor"],
+        [process.python_executable(), "-I", installed / launcher, "descriptor"],
         capture_output=True,
         text=True,
         check=True,

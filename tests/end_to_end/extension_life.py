@@ -57,8 +57,8 @@ def start_bridge() -> Iterator[str]:
     """Start the installed extension's bridge; what it says, and the extension's own libraries."""
     # The Python of these tests may have another hidapi, which Blender's would not.
     sys.path.sort(key=lambda path: ".local" not in path)
-    process = importlib.import_module(f"{NAME}.device.process")
-    client = importlib.import_module(f"{NAME}.device.client").Client()
+    process = importlib.import_module(f"{NAME}.device.ipc.process")
+    client = importlib.import_module(f"{NAME}.device.ipc.client").Client()
     client.start(("--simulate", "--no-haply"))
     end = time.monotonic() + 60.0
     while not (client.hello and client.devices) and time.monotonic() < end:

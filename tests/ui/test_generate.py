@@ -12,6 +12,7 @@ import pytest
 
 from octo_motion.blender.scene.curves import read_route
 from octo_motion.core.errors import OctoMotionError
+from octo_motion.core.locomotion.gait.gait_poser import GaitPoser
 from octo_motion.ui import at_work
 from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion.operators.generate import OCTO_MOTION_OT_generate_locomotion
@@ -958,7 +959,7 @@ def test_a_failure_in_the_middle_cleans_up(
     def fail(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr("octo_motion.core.locomotion.gait.table.gait_poser.Generator.shapes", fail)
+    monkeypatch.setattr(GaitPoser, "shapes", fail)
     with pytest.raises(ZeroDivisionError):
         operator.modal(window, Press("TIMER"))
     assert window.calls[-3:] == CLEAN

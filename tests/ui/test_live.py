@@ -529,7 +529,7 @@ def test_nothing_is_left_of_it_when_the_add_on_is_switched_off() -> None:
         "if isinstance(each := getattr(bpy.app.handlers, name), list)]\n"
         "before = [len(each) for each in known]\n"
         "octo_motion.register()\n"
-        "from octo_motion.ui.locomotion import live\n"
+        "from octo_motion.ui.locomotion.operators import live\n"
         "assert [len(each) for each in known] != before\n"
         "live._soon('nobody', certain=True)\n"
         "assert live.pending()\n"

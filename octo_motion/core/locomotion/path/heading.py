@@ -48,6 +48,9 @@ _MOST_CORNER: Final = 1.0 / 24.0
 """Corner radius as a share of the route, at most."""
 _TAIL: Final = 12.0
 """Corner radii after which a delay is forgotten: e⁻¹²."""
+_AT_JOINT: Final = 1e-12
+"""Share of the route's parameter within which a sample lies at a joint: far above rounding, some
+1e-15, and far below the table's intervals, 3e-5 and more."""
 
 # Sine of the angle between travel and the vertical: up holds fully above the one, not at all
 # below the other.
@@ -134,7 +137,8 @@ def bearings(route: Route, corner: float, settle: float) -> Bearings:
     count = int(np.clip(np.ceil(_PER_CORNER * route.length / corner), _FEWEST, _MOST))
     spacing = route.length / count
     corner = max(corner, 4.0 * spacing)
-    raw = route.tangent(route.parameter_at(np.linspace(0.0, route.length, count + 1)))
+    samples = route.parameter_at(np.linspace(0.0, route.length, count + 1))
+    raw = route.tangent(_past_joints(samples, route.breaks))
     travel = _rounded(raw, exp(-spacing / corner), int(_TAIL * corner / spacing), route.cyclic)
 
     carried = _carry(travel)
@@ -156,6 +160,16 @@ def bearings(route: Route, corner: float, settle: float) -> Bearings:
         np.arctan2(travel[:, 0], -travel[:, 1]), level, spacing / settle, 0.0, route.cyclic
     )
     return Bearings(route.length, route.cyclic, continuous(carried), roll, compass, bend, around)
+
+
+def _past_joints(samples: Floats, breaks: Floats) -> Floats:
+    """Parameters ``(n,)`` of which those at a joint of the route's segments are exactly there.
+
+    Directions jump at a corner, and a sample there has the one that follows. Rounding alone would
+    choose between the two, and the same route elsewhere would turn one sample earlier or later.
+    """
+    joint = breaks[np.searchsorted(breaks, samples - _AT_JOINT)]
+    return np.where(np.abs(samples - joint) <= _AT_JOINT, joint, samples)
 
 
 def _rounded(raw: Floats, keep: float, tail: int, cyclic: bool) -> Floats:  # noqa: FBT001
