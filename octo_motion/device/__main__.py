@@ -106,26 +106,21 @@ def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> So
 
 def _list() -> int:
     from ..core.errors import DeviceError  # noqa: PLC0415
-    from .hid import (  # noqa: PLC0415
-        is_force_device,
-        is_space_mouse,
-        list_devices,
-        model_of,
-        open_device,
-    )
+    from .hid import HID_DRIVERS, hid_driver_for, list_devices, model_of, open_device  # noqa: PLC0415
 
     try:
-        found = [each for each in list_devices() if is_space_mouse(each) or is_force_device(each)]
+        listed = [(each, hid_driver_for(each)) for each in list_devices()]
     except DeviceError as error:
         print(error, file=sys.stderr)
         return 1
+    found = [(each, kind) for each, kind in listed if kind]
     if not found:
-        print("No space mouse and no force device is plugged in.")
-    for each in found:
+        kinds = " and ".join(f"no {kind.name}" for kind in reversed(HID_DRIVERS))
+        print(f"{kinds.capitalize()} is plugged in.")
+    for each, kind in found:
         model = model_of(each.vendor, each.product)
-        kind = "space mouse" if is_space_mouse(each) else "force device"
         name = model.name if model else each.name or "unknown"
-        print(f"{each.vendor:04x}:{each.product:04x}  {name} ({kind})")
+        print(f"{each.vendor:04x}:{each.product:04x}  {name} ({kind.name})")
         try:
             open_device(each).close()
         except DeviceError as error:
@@ -150,7 +145,9 @@ def _descriptor(*, table: bool) -> int:
 
 
 def _watch(sources: Sources, seconds: float) -> int:
+    from .calibration import NONE, corrected  # noqa: PLC0415
     from .driver import DeviceLostError  # noqa: PLC0415
+    from .response import Response  # noqa: PLC0415
     from .sources import Discovery  # noqa: PLC0415
 
     discovery = Discovery(sources)
@@ -175,6 +172,7 @@ def _watch(sources: Sources, seconds: float) -> int:
                     discovery.lost(driver.description.identity)
                     continue
                 if sample is not None and tell:
+                    sample = corrected(sample, driver.description.kind, NONE, Response())
                     numbers = (*sample.position, *sample.velocity, *sample.angular_velocity)
                     shown = " ".join(f"{each:8.4f}" for each in numbers)
                     print(f"{driver.description.name}: {shown} buttons {sample.buttons:b}")

@@ -16,8 +16,9 @@ from math import isfinite
 from typing import Final
 
 from ..core.errors import DeviceError
-from .driver import Kind
-from .response import Axes
+from .driver import Axes, Kind, Sample
+from .response import Response
+from .spatial import subtract
 
 _NOTHING: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _FULL: Final[Axes] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
@@ -51,8 +52,8 @@ class Phase(IntEnum):
 class Calibration:
     """What a device says at rest, and at the ends of each axis.
 
-    Of space mice pushes as their drivers know them, −1…1 by the maker's range; of others the
-    position in metres, and zeros for turning.
+    Of rate devices pushes, −1…1 by the maker's range; of others the position in metres, and zeros
+    for turning.
 
     Raises:
         DeviceError: an axis has no range, or a number is not finite.
@@ -69,9 +70,9 @@ class Calibration:
         if not all(map(isfinite, numbers)) or not all(a <= b <= c for a, b, c in ends):
             raise DeviceError("The device's calibration is damaged.", "Calibrate it again.")
 
-    def push(self, told: Axes) -> Axes:
-        """−1…1 along each axis of a space mouse, 0 at its own rest and 1 at its own end."""
-        return _axes(map(_share, told, self.rest, self.least, self.most))
+    def push(self, raw: Axes) -> Axes:
+        """−1…1 along each axis of a rate device, 0 at its own rest and 1 at its own end."""
+        return _axes(map(_share, raw, self.rest, self.least, self.most))
 
     @property
     def width(self) -> float:
@@ -83,16 +84,27 @@ NONE: Final = Calibration()
 """Of a device that is as its maker says."""
 
 
-def _share(told: float, rest: float, least: float, most: float) -> float:
-    end = most - rest if told > rest else rest - least
-    return max(-1.0, min(1.0, (told - rest) / end)) if end > 0.0 else 0.0
+def corrected(sample: Sample, kind: Kind, calibration: Calibration, response: Response) -> Sample:
+    """What a device says, after its own zero and range; of a rate device also how fast it moves."""
+    if kind is Kind.POSE:
+        x, y, z = calibration.rest[:3]
+        return sample._replace(position=subtract(sample.position, (x, y, z)))
+    if sample.push is None:
+        return sample
+    x, y, z, a, b, c = response.speeds(calibration.push(sample.push))
+    return sample._replace(velocity=(x, y, z), angular_velocity=(a, b, c))
+
+
+def _share(raw: float, rest: float, least: float, most: float) -> float:
+    end = most - rest if raw > rest else rest - least
+    return max(-1.0, min(1.0, (raw - rest) / end)) if end > 0.0 else 0.0
 
 
 class Calibrator:
     """Learns a device's zero and range from what it says.
 
     Args:
-        kind: Of the device. A space mouse must first be left alone; of a device that tells where
+        kind: Of the device. A rate device must first be left alone; of a device that tells where
             the hand is, the middle of its way is the zero.
     """
 
@@ -104,25 +116,28 @@ class Calibrator:
         self._least: Axes | None = None
         self._most: Axes = _NOTHING
 
-    def feed(self, now: float, told: Axes) -> None:
-        """Take what the device says now: pushes of a space mouse, else position and zeros."""
+    def feed(self, now: float, sample: Sample) -> None:
+        """Take what the device says now."""
+        raw = (*sample.position, 0.0, 0.0, 0.0)
+        if self._kind is Kind.RATE:
+            raw = sample.push or _NOTHING
         if self.phase is Phase.REST:
-            self._wait(now, told)
+            self._wait(now, raw)
         elif self.phase is Phase.REACH:
             if self._least is None:
-                self._least = self._most = told
-            self._least = _each(min, self._least, told)
-            self._most = _each(max, self._most, told)
+                self._least = self._most = raw
+            self._least = _each(min, self._least, raw)
+            self._most = _each(max, self._most, raw)
 
-    def _wait(self, now: float, told: Axes) -> None:
+    def _wait(self, now: float, raw: Axes) -> None:
         quiet = self._quiet
         if quiet and now - quiet[-1][0] < _EVERY:
             return
-        quiet.append((now, told))
+        quiet.append((now, raw))
         values = [each for _, each in quiet]
         least, most = (tuple(map(end, zip(*values, strict=True))) for end in (min, max))
         if max(b - a for a, b in zip(least, most, strict=True)) > _TREMBLES or any(
-            abs(each) > _FARTHEST_REST for each in told
+            abs(each) > _FARTHEST_REST for each in raw
         ):
             quiet.clear()
             return

@@ -1,13 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What every device looks like to the haptic loop, whatever it is made of."""
+"""What every device looks like to the haptic loop, whatever it is made of.
+
+A driver says what its device says, in Blender's axes. What is the same for all devices is none of
+its business: the loop applies zero and range (``calibration``) and, for a rate device, the artist's
+response curve (``response``).
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 from .spatial import IDENTITY, ZERO, Quaternion, Vector
+
+Axes = tuple[float, float, float, float, float, float]
+"""Along X, Y, Z, then about X, Y, Z; Blender's axes."""
+
+FRESH_SECONDS: Final = 0.02
+"""Without fresh data for so long, in either direction, there is no force."""
+FARTHEST: Final = 10.0
+"""m: a hand is never farther from its device's middle."""
+FASTEST: Final = 1000.0
+"""m/s and rad/s: no hand is as fast."""
 
 
 class DeviceLostError(Exception):
@@ -32,13 +48,22 @@ class Sample(NamedTuple):
     """Metres from the middle of the workspace; zeros for a rate device."""
     orientation: Quaternion = IDENTITY
     velocity: Vector = ZERO
-    """m/s; of a rate device: wanted speed after its response curve."""
+    """m/s; of a rate device it follows from the push, see ``calibration.corrected``."""
     angular_velocity: Vector = ZERO
     """rad/s, seen from the world."""
     buttons: int = 0
     """Bit i is button i."""
     held: bool = True
     """False where a device with a sensor for it says that no hand holds it."""
+    push: Axes | None = None
+    """Of a rate device: −1…1 by the maker's range; None while it is silent, as it is at rest."""
+
+
+def is_possible(sample: Sample) -> bool:
+    """Whether a hand can be there and be as fast; no number that is not finite is possible."""
+    return all(-FARTHEST <= each <= FARTHEST for each in sample.position) and all(
+        -FASTEST <= each <= FASTEST for each in (*sample.velocity, *sample.angular_velocity)
+    )
 
 
 @dataclass(frozen=True)
@@ -82,34 +107,34 @@ class Description:
     devices of one model without serial numbers share it."""
 
 
-class Driver(Protocol):
+def numbered_buttons(count: int) -> tuple[str, ...]:
+    """Names of buttons that have none of their own."""
+    return tuple(f"Button {index + 1}" for index in range(count))
+
+
+class Driver(ABC):
     """One opened device. Nothing here may block: the loop calls it a thousand times a second."""
 
-    @property
-    def description(self) -> Description:
+    def __init__(self, description: Description) -> None:
+        self.description = description
         """Who it is."""
-        ...
 
+    @abstractmethod
     def read(self) -> Sample | None:
         """The newest sample since the last call, older ones dropped; None where nothing came.
 
         Raises:
             DeviceLostError: it is gone.
         """
-        ...
 
+    @abstractmethod
     def send(self, force: Vector, torque: Vector) -> None:
-        """Ask for a force on the hand until the next call.
+        """Ask for a force on the hand until the next call; nothing where there are no motors.
 
         Raises:
             DeviceLostError: it is gone.
         """
-        ...
 
+    @abstractmethod
     def close(self) -> None:
         """Take force away and let the device go; never raises, may be called twice."""
-        ...
-
-
-FRESH_SECONDS: Final = 0.02
-"""Without fresh data for so long, in either direction, there is no force."""

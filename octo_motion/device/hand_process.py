@@ -18,7 +18,6 @@ from ..core.errors import DeviceError
 from .calibration import Calibration, Phase
 from .driver import DeviceLostError, Driver
 from .haptics import Pointer, Schedule, make_real_time
-from .hid import SpaceMouse
 from .ipc import (
     Button,
     Buzz,
@@ -169,15 +168,13 @@ class HandLoop:
 
     def _take_settings(self, settings: Settings) -> None:
         try:
-            response = settings.response()
+            settings.response()
         except MessageError as error:
             self._channel.send(Notice(f"The device's settings were not taken: {error}", ""))
             return
         self._settings = settings
         for pointer in self.pointers:
             pointer.use(settings)
-            if isinstance(pointer.driver, SpaceMouse):
-                pointer.driver.response = response
 
     def _tell(self, now: float) -> None:
         due = now - self._told > _TELL_EVERY - 0.5 * self._period
@@ -220,9 +217,6 @@ class HandLoop:
         if number in self._pointers:  # the same program, and another device
             self._say_device(self._pointers[number], present=False)
         pointer = Pointer(number, driver, self._period, self._settings)
-        if isinstance(driver, SpaceMouse):
-            with contextlib.suppress(MessageError):
-                driver.response = self._settings.response()
         if number in self._corrections:
             pointer.correct(self._corrections[number])
         if number in self._workspaces:

@@ -8,9 +8,7 @@ from math import copysign, isfinite
 from typing import Final
 
 from ..core.errors import DeviceError
-
-Axes = tuple[float, float, float, float, float, float]
-"""Along X, Y, Z, then about X, Y, Z; Blender's axes."""
+from .driver import Axes
 
 _ONES: Final[Axes] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 

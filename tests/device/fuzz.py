@@ -23,6 +23,7 @@ from octo_motion.device.ipc.codec import MessageError
 from octo_motion.device.sources import haply, network
 from octo_motion.device.sources.network import PacketError
 from octo_motion.device.sources.websocket import FrameReader, WebSocketError, frame
+from tests.device import firmware
 from tests.device.parts import COMBINED, SPACE_MOUSE
 from tests.device.test_force_profile import DYNAMICS, state
 from tests.device.test_messages import EXAMPLES
@@ -109,18 +110,21 @@ TARGETS = [
     ),
     Target("reports of space mice", _report, [b"\x01" + bytes(12), b"\x03\x01\0\0\0"], None),
     Target(
-        "states of the profile", profile.parse_state, [profile.pack_state(state())], ReportError
+        "states of the profile",
+        lambda data: profile.parse_state(data, 0.0),
+        [firmware.pack_state(state())],
+        ReportError,
     ),
     Target(
         "features of the profile",
         profile.parse_features,
-        [profile.pack_features(profile.ForceFeatures(2, DYNAMICS))],
+        [firmware.pack_features(2, DYNAMICS)],
         ReportError,
     ),
     Target(
         "network packets",
         lambda data: network.parse_datagram(data, KEY),
-        [network.pack(each, KEY) for each in (FEATURES, STATE, FORCE)],
+        [*(firmware.pack_packet(each, KEY) for each in (FEATURES, STATE)), FORCE],
         PacketError,
     ),
     Target(

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from octo_motion.device.driver import Description, DeviceLostError, Dynamics, Kind, Sample
+from octo_motion.device.driver import Description, DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hid.system import Found
 from octo_motion.device.sources.websocket import accept_key, frame, masked
 from octo_motion.device.spatial import ZERO, Vector
@@ -66,7 +66,7 @@ class FakeHandle:
 
 
 @dataclass
-class FakeDriver:
+class FakeDriver(Driver):
     """A force device whose samples are put in by the test; a clock of its own."""
 
     dynamics: Dynamics | None = field(default_factory=lambda: Dynamics(8.0, 0.4, 0.5, 0.0012))
@@ -76,9 +76,11 @@ class FakeDriver:
     gone: bool = False
     closed: int = 0
 
-    @property
-    def description(self) -> Description:
-        return Description("Fake", "fake", self.kind, ("Grab", "Key"), self.dynamics)
+    def __post_init__(self) -> None:
+        self.name_it("Fake")
+
+    def name_it(self, name: str) -> None:
+        super().__init__(Description(name, name, self.kind, ("Grab", "Key"), self.dynamics))
 
     def read(self) -> Sample | None:
         if self.gone:

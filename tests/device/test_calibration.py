@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import struct
+import time
 
 import pytest
 from hypothesis import given
@@ -12,12 +13,13 @@ from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
 from octo_motion.device.calibration import NONE, Calibration, Calibrator, Phase, reached
-from octo_motion.device.driver import Kind
+from octo_motion.device.driver import Axes, Kind, Sample
+from octo_motion.device.haptics.pointer import Pointer
 from octo_motion.device.hid.multi_axis import classic_layout
 from octo_motion.device.hid.space_mouse import SpaceMouse
 from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.codec import MessageError
-from octo_motion.device.response import Axes, Response
+from octo_motion.device.ipc.messages import Settings
 from tests.device.parts import FakeHandle, found
 from tests.device.test_pointer import ROCK, Table
 
@@ -31,13 +33,17 @@ def learned(kind: Kind, *told: Axes, rest: Axes = WORN, seconds: float = 1.2) ->
     """A calibrator that has heard of a device at rest, then of it at these places."""
     calibrator = Calibrator(kind)
     now = 0.0
-    for _ in range(round(seconds / 0.01)):
+    for each in (*[rest] * round(seconds / 0.01), *told):
         now += 0.01
-        calibrator.feed(now, rest)
-    for each in told:
-        now += 0.01
-        calibrator.feed(now, each)
+        calibrator.feed(now, said(kind, now, each))
     return calibrator
+
+
+def said(kind: Kind, now: float, axes: Axes) -> Sample:
+    """A sample of a device whose axes say this."""
+    if kind is Kind.RATE:
+        return Sample(now, push=axes)
+    return Sample(now, position=axes[:3])
 
 
 def test_worn_cap_is_at_rest_where_it_rests_and_at_its_end_where_it_ends() -> None:
@@ -61,13 +67,15 @@ def test_axis_that_was_not_moved_goes_as_far_as_its_maker_says() -> None:
 def test_cap_that_is_touched_is_waited_for() -> None:
     calibrator = Calibrator(Kind.RATE)
     for tick in range(300):
-        calibrator.feed(0.01 * tick, (0.3 * math.sin(0.1 * tick), 0.0, 0.0, 0.0, 0.0, 0.0))
+        push = (0.3 * math.sin(0.1 * tick), 0.0, 0.0, 0.0, 0.0, 0.0)
+        calibrator.feed(0.01 * tick, said(Kind.RATE, 0.0, push))
     assert calibrator.phase is Phase.REST
     for tick in range(300):
-        calibrator.feed(3.0 + 0.01 * tick, (0.9, 0.0, 0.0, 0.0, 0.0, 0.0))
+        held = said(Kind.RATE, 0.0, (0.9, 0.0, 0.0, 0.0, 0.0, 0.0))
+        calibrator.feed(3.0 + 0.01 * tick, held)
     assert calibrator.phase is Phase.REST, "held at its end it is not left alone"
     for tick in range(110):
-        calibrator.feed(6.0 + 0.01 * tick, WORN)
+        calibrator.feed(6.0 + 0.01 * tick, said(Kind.RATE, 0.0, WORN))
     assert calibrator.phase is Phase.REACH
 
 
@@ -136,20 +144,18 @@ def test_message_that_carries_nonsense_is_refused() -> None:
 
 def test_space_mouse_no_longer_creeps_once_it_is_calibrated() -> None:
     handle = FakeHandle()
-    layout = classic_layout(combined=False)
-    response = Response(dead_zone=NOTHING, curve=FULL)
-    mouse = SpaceMouse(found(), handle, layout, response)
+    mouse = SpaceMouse(found(), handle, classic_layout(combined=False))
+    pointer = Pointer(0, mouse, 0.001, Settings(dead_zone=NOTHING, curve=FULL))
     creeping = struct.pack("<B3h", 1, 35, 0, 0)  # a tenth of the way, with nobody touching it
     handle.reports.append(creeping)
-    sample = mouse.read()
-    assert sample
-    assert sample.velocity[0] == pytest.approx(0.04)
-    assert mouse.push[0] == pytest.approx(0.1)
-    mouse.calibration = Calibration(rest=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0))
+    pointer.tick(time.perf_counter())
+    assert pointer.sample.push
+    assert pointer.sample.push[0] == pytest.approx(0.1)
+    assert pointer.velocity == pytest.approx((0.04, 0.0, 0.0))
+    pointer.correct(Calibration(rest=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0)))
     handle.reports.append(creeping)
-    sample = mouse.read()
-    assert sample
-    assert sample.velocity == pytest.approx((0.0, 0.0, 0.0))
+    pointer.tick(time.perf_counter())
+    assert pointer.velocity == pytest.approx((0.0, 0.0, 0.0))
 
 
 def test_nothing_is_grabbed_or_given_force_while_a_device_is_calibrated() -> None:

@@ -17,8 +17,8 @@ import pytest
 from octo_motion.core.posing.puppet.figure import Pose
 from octo_motion.device.bridge_process import Bridge
 from octo_motion.device.calibration import NONE, Phase
-from octo_motion.device.ipc import channel as line
-from octo_motion.device.ipc.channel import (
+from octo_motion.device.ipc import message_channel as line
+from octo_motion.device.ipc.message_channel import (
     ChannelClosedError,
     Listener,
     MessageChannel,
@@ -200,7 +200,7 @@ def test_message_that_comes_in_pieces_is_put_together(accepted: Begin) -> None:
     client, server = pair(accepted)
     data = pack(Notice("one", "two")) + pack(Buzz(7))
     for at in range(len(data)):
-        client._socket.send(data[at : at + 1])
+        client._stream._socket.send(data[at : at + 1])
     assert received(server, 2) == [Notice("one", "two"), Buzz(7)]
     client.close()
 
@@ -218,7 +218,7 @@ def test_peer_that_sends_nonsense_is_shut_out_and_it_is_logged(
     accepted: Begin, caplog: pytest.LogCaptureFixture, data: bytes
 ) -> None:
     client, server = pair(accepted)
-    client._socket.send(data)
+    client._stream._socket.send(data)
     with caplog.at_level(logging.WARNING):
         assert closes(server)
     assert "Connection closed" in caplog.text
@@ -229,7 +229,7 @@ def test_peer_that_dies_in_the_middle_of_a_message_is_noticed(
     accepted: Begin, caplog: pytest.LogCaptureFixture
 ) -> None:
     client, server = pair(accepted)
-    client._socket.send(pack(Notice("one", "two"))[:-2])
+    client._stream._socket.send(pack(Notice("one", "two"))[:-2])
     client.close()
     with caplog.at_level(logging.WARNING):
         assert closes(server)
@@ -243,7 +243,7 @@ def test_blender_that_renders_while_a_device_is_calibrated_does_not_lose_the_bri
     bridge = Bridge(server, ())
     for _ in range(60_000):  # two minutes of them
         bridge._hear_calibration(CalibrationMessage.of(0, NONE, Phase.REACH))
-    assert len(server._waiting) < 1_000_000
+    assert len(server._stream.unsent) < 1_000_000
     client.close()
     server.close()
 
@@ -257,7 +257,7 @@ def test_pose_in_which_a_puppet_came_to_rest_reaches_a_blender_that_was_busy(
     pose = posed(figure)
     bridge._hear_blender(FigureMessage.of(figure))
     bridge._hear_blender(Place(pose.positions, pose.orientations))
-    while len(server._waiting) < 100_000:
+    while len(server._stream.unsent) < 100_000:
         server.send(Notice("x" * 900, ""))
     assert bridge.simulation
     bridge._tell_blender()
@@ -283,7 +283,7 @@ def test_peer_that_does_not_read_costs_no_poses_twice_and_at_last_its_place(
     message = Place(np.zeros((4000, 3)), np.zeros((4000, 4)))
     for _ in range(200):
         client.send(message, droppable=True)
-    assert len(client._waiting) < 1_000_000, "what is replaced anyway is left out"
+    assert len(client._stream.unsent) < 1_000_000, "what is replaced anyway is left out"
 
     def insist() -> None:
         for _ in range(200):

@@ -13,7 +13,6 @@ import pytest
 
 from octo_motion.core.errors import DeviceError
 from octo_motion.device.driver import Driver
-from octo_motion.device.hid import system
 from octo_motion.device.hid.system import Found
 from octo_motion.device.sources import discovery as finding
 from octo_motion.device.sources.discovery import Discovery, Sources
@@ -31,8 +30,8 @@ class Desk:
         self.forbidden: set[bytes] = set()
         self.looks = 0
         self.now = 100.0
-        monkeypatch.setattr(system, "descriptor_fingerprint", lambda: None)
-        monkeypatch.setattr(system, "list_devices", self._list)
+        monkeypatch.setattr(finding, "descriptor_fingerprint", lambda: None)
+        monkeypatch.setattr(finding, "list_devices", self._list)
         monkeypatch.setattr(finding, "_EVERY_COSTLY", 0.0)
         monkeypatch.setattr(finding.time, "monotonic", lambda: self.now)
         for module in ("space_mouse", "force_device"):
@@ -206,17 +205,17 @@ def test_device_plugged_in_again_before_its_loss_was_noticed_is_not_opened_twice
 def test_look_that_fails_is_not_the_last_one(
     desk: Desk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    good: Callable[[], list[Found]] = system.list_devices
+    good: Callable[[], list[Found]] = finding.list_devices
 
     def fails() -> list[Found]:
         good()
         raise RuntimeError("a fault of the system")
 
-    monkeypatch.setattr(system, "list_devices", fails)
+    monkeypatch.setattr(finding, "list_devices", fails)
     desk.there = [found()]
     desk.look()
     assert "a fault of the system" in caplog.text
-    monkeypatch.setattr(system, "list_devices", good)
+    monkeypatch.setattr(finding, "list_devices", good)
     desk.look()
     assert len(desk.drivers) == 1
 

@@ -10,11 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.device.driver import DeviceLostError, Dynamics
+from octo_motion.device.driver import DeviceLostError, Dynamics, Sample
 from octo_motion.device.hid import force_device
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.force_device import ForceDevice, is_force_device
 from octo_motion.device.spatial import from_rotation_vector
+from tests.device import firmware
 from tests.device.parts import FakeHandle, found
 
 DYNAMICS = Dynamics(8.0, 0.4, 0.5, 0.001, 0.02, 0.0005, 1e-5, 1e-4, 0.001)
@@ -22,7 +23,7 @@ metres = st.floats(-1.0, 1.0)
 vectors = st.tuples(metres, metres, metres)
 
 
-def state(**changes: object) -> profile.ForceState:
+def state(**changes: object) -> firmware.FirmwareState:
     values: dict[str, object] = {
         "sequence": 7,
         "clock": 123456,
@@ -35,7 +36,7 @@ def state(**changes: object) -> profile.ForceState:
         "velocity": (0.1, -0.2, 0.3),
         "angular_velocity": (1.0, -2.0, 3.0),
     }
-    return profile.ForceState(**{**values, **changes})  # pyright: ignore[reportArgumentType]
+    return firmware.FirmwareState(**{**values, **changes})  # pyright: ignore[reportArgumentType]
 
 
 @given(place=vectors, turn=vectors, velocity=vectors)
@@ -45,20 +46,22 @@ def test_state_survives_to_the_step_of_its_numbers(
     velocity: tuple[float, float, float],
 ) -> None:
     sent = state(position=place, orientation=from_rotation_vector(turn), velocity=velocity)
-    got = profile.parse_state(profile.pack_state(sent))
+    report = firmware.pack_state(sent)
+    got = profile.parse_state(report, 12.0)
     assert got.position == pytest.approx(sent.position, abs=6e-8)
     assert got.orientation == pytest.approx(sent.orientation, abs=2e-9)
     assert got.velocity == pytest.approx(sent.velocity, abs=6e-5)
-    assert (got.sequence, got.clock, got.answered, got.buttons) == (7, 123456, 5, 0b101)
+    assert profile.unpack(profile.STATE, report)[:4] == (7, 123456, 5, 0b101)
+    assert got.buttons == 0b101
+    assert got.time == 12.0
     assert got.held
-    assert got.powered
 
 
 def test_command_is_cut_to_what_its_numbers_hold() -> None:
-    command = profile.Command(
-        70000, 20, enabled=True, force=(100.0, -100.0, 1.5), torque=(0.0, 0.25, -9.0)
+    got = firmware.parse_command(
+        profile.pack_command(70000, (100.0, -100.0, 1.5), (0.0, 0.25, -9.0))
     )
-    got = profile.parse_command(profile.pack_command(command))
+    assert got.enabled
     assert got.sequence == 70000 & 0xFFFF
     assert got.force == pytest.approx((32.767, -32.767, 1.5))
     assert got.torque == pytest.approx((0.0, 0.25, -3.2767))
@@ -66,32 +69,29 @@ def test_command_is_cut_to_what_its_numbers_hold() -> None:
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_force_that_is_no_number_is_never_sent(bad: float) -> None:
-    none = (0.0, 0.0, 0.0)
-    command = profile.Command(1, 20, enabled=True, force=(bad, 0.0, 0.0), torque=none)
     with pytest.raises(profile.ReportError):
-        profile.pack_command(command)
+        profile.pack_command(1, (bad, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def test_features_survive() -> None:
-    got = profile.parse_features(profile.pack_features(profile.ForceFeatures(2, DYNAMICS)))
+    got = profile.parse_features(firmware.pack_features(2, DYNAMICS))
     assert got.buttons == 2
     for name in DYNAMICS.__dataclass_fields__:
         assert getattr(got.dynamics, name) == pytest.approx(getattr(DYNAMICS, name), rel=1e-3)
 
 
 def test_device_stronger_than_a_command_can_say_is_used_as_far_as_that() -> None:
-    strong = profile.pack_features(profile.ForceFeatures(2, Dynamics(60.0, 6.0, 0.5, 0.001)))
+    strong = firmware.pack_features(2, Dynamics(60.0, 6.0, 0.5, 0.001))
     dynamics = profile.parse_features(strong).dynamics
     assert (dynamics.force, dynamics.torque) == pytest.approx((32.767, 3.2767))
     force, torque = (dynamics.force, 0.0, 0.0), (0.0, -dynamics.torque, 0.0)
-    told = profile.Command(1, 20, enabled=True, force=force, torque=torque)
-    command = profile.parse_command(profile.pack_command(told))
+    command = firmware.parse_command(profile.pack_command(1, force, torque))
     assert command.force == pytest.approx(force)
     assert command.torque == pytest.approx(torque)
 
 
 def test_other_version_of_the_profile_is_refused() -> None:
-    report = bytearray(profile.pack_features(profile.ForceFeatures(2, DYNAMICS)))
+    report = bytearray(firmware.pack_features(2, DYNAMICS))
     report[1] = 2
     with pytest.raises(profile.ReportError, match="version 2"):
         profile.parse_features(bytes(report))
@@ -100,12 +100,16 @@ def test_other_version_of_the_profile_is_refused() -> None:
 @given(st.binary(max_size=80), st.sampled_from([1, 2, 3]))
 @settings(max_examples=300)
 def test_any_bytes_are_a_report_or_are_refused(data: bytes, number: int) -> None:
-    parsers = {1: profile.parse_state, 2: profile.parse_command, 3: profile.parse_features}
+    parsers = {
+        1: lambda report: profile.parse_state(report, 0.0),
+        2: firmware.parse_command,
+        3: profile.parse_features,
+    }
     try:
         got = parsers[number](bytes([number]) + data)
     except profile.ReportError:
         return
-    if isinstance(got, profile.ForceState):
+    if isinstance(got, Sample):
         assert math.isclose(sum(each * each for each in got.orientation), 1.0, rel_tol=1e-9)
         assert all(map(math.isfinite, (*got.position, *got.velocity)))
 
@@ -119,7 +123,7 @@ def opened() -> tuple[ForceDevice, FakeHandle]:
 
 def test_newest_whole_report_counts() -> None:
     device, handle = opened()
-    handle.reports.extend(profile.pack_state(state(buttons=value)) for value in (1, 2, 3))
+    handle.reports.extend(firmware.pack_state(state(buttons=value)) for value in (1, 2, 3))
     handle.reports.append(b"\x01damaged")
     sample = device.read()
     assert sample
@@ -134,11 +138,11 @@ def test_motors_without_power_are_given_no_force_that_would_come_with_it(
 ) -> None:
     """Whoever unlocks the emergency stop in mid-grab must not be struck."""
     device, handle = opened()
-    handle.reports.append(profile.pack_state(state(held=held, powered=powered)))
+    handle.reports.append(firmware.pack_state(state(held=held, powered=powered)))
     sample = device.read()
     assert sample
     assert not sample.held
-    handle.reports.append(profile.pack_state(state()))
+    handle.reports.append(firmware.pack_state(state()))
     sample = device.read()
     assert sample
     assert sample.held
@@ -150,7 +154,7 @@ def test_letting_go_disables_the_motors_and_closing_does_so_once_more() -> None:
     device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     device.close()
     device.close()
-    commands = [profile.parse_command(report) for report in handle.written]
+    commands = [firmware.parse_command(report) for report in handle.written]
     assert [command.enabled for command in commands] == [True, False, False]
     assert [command.sequence for command in commands] == [1, 2, 3]
     assert {command.watchdog for command in commands} == {20}

@@ -13,11 +13,16 @@ import pytest
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.device.calibration import NONE, Calibration
-from octo_motion.device.driver import Description, Driver, Kind, Sample
+from octo_motion.device.driver import Driver, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.channel import ChannelClosedError, Listener, MessageChannel, connect
+from octo_motion.device.ipc.message_channel import (
+    ChannelClosedError,
+    Listener,
+    MessageChannel,
+    connect,
+)
 from octo_motion.device.simulation import Simulation
 from octo_motion.device.spatial import IDENTITY
 from tests.core.puppets import chain, posed, soft
@@ -32,14 +37,10 @@ class Named(FakeDriver):
 
     def __init__(self, name: str) -> None:
         super().__init__()
-        self.name = name
+        self.name_it(name)
         self.place = (0.0, 0.0, 0.0)
         self.buttons = 0
         self.now = 0.0
-
-    @property
-    def description(self) -> Description:
-        return Description(self.name, self.name, Kind.POSE, ("Grab", "Key"), self.dynamics)
 
     def read(self) -> Sample | None:
         super().read()

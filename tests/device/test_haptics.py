@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from octo_motion.device.driver import FRESH_SECONDS, Dynamics
 from octo_motion.device.haptics.coupling import DAMPER_SHARE, SHARE, gains_for, stiffest, wrench
+from octo_motion.device.haptics.durations import Histogram
 from octo_motion.device.haptics.local_model import LocalModel
 from octo_motion.device.haptics.passivity import DAMPING, STORED, Observer
 from octo_motion.device.haptics.safety import FALL, RISE, ForceLimits, Shaper, freshness
 from octo_motion.device.haptics.schedule import Schedule
-from octo_motion.device.haptics.timing import Histogram
 from octo_motion.device.held_body import Held, Pull
 from octo_motion.device.sources.simulated_hand import Hand, rest
 from octo_motion.device.spatial import (

@@ -99,6 +99,36 @@ def test_device_without_report_numbers_and_with_odd_widths_is_read() -> None:
     assert mouse.push[:2] == (0.5, 1.0)
 
 
+@pytest.mark.parametrize(("bits", "rest"), [(8, 128), (10, 512), (16, 32768)])
+def test_pad_whose_axes_are_unsigned_is_at_rest_in_the_middle_of_their_range(
+    bits: int, rest: int
+) -> None:
+    most = (1 << bits) - 1
+    pad = MultiAxis(
+        parse_descriptor(
+            b"".join(
+                descriptor.item(kind, value)
+                for kind, value in (
+                    *(("usage_page", 1), ("usage", 8), ("collection", 1)),
+                    *(("usage", usage) for usage in range(0x30, 0x36)),
+                    *(("logical_minimum", 0), ("logical_maximum", most)),
+                    *(("report_size", bits), ("report_count", 6), ("input", 2)),
+                    ("end_collection", 0),
+                )
+            )
+        )
+    )
+
+    def push(*values: int) -> tuple[float, ...]:
+        packed = sum(value << index * bits for index, value in enumerate(values))
+        assert pad.feed(packed.to_bytes(6 * bits // 8 + 1, "little"))
+        return pad.push
+
+    assert push(*[rest] * 6) == (0.0,) * 6
+    assert push(0, 0, 0, most, most, most) == pytest.approx((-1, 1, 1, 1, -1, -1), abs=0.01)
+    assert push(rest + rest // 2, *[rest] * 5)[0] == pytest.approx(0.5, abs=0.01)
+
+
 def test_every_product_is_named_once() -> None:
     ids = [(model.vendor, model.product) for model in MODELS]
     assert len(set(ids)) == len(ids)

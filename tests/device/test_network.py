@@ -21,7 +21,6 @@ from octo_motion.device.driver import DeviceLostError, Dynamics, Kind, Sample
 from octo_motion.device.sources import haply, network
 from octo_motion.device.sources.haply import Haply
 from octo_motion.device.sources.network import (
-    Force,
     NetworkFeatures,
     NetworkState,
     PacketError,
@@ -36,19 +35,27 @@ from octo_motion.device.sources.websocket import (
     masked,
 )
 from octo_motion.device.spatial import IDENTITY
+from tests.device.firmware import Force, pack_packet, parse_force
 from tests.device.parts import HaplyService
 
 KEY = bytes(range(16))
 FEATURES = NetworkFeatures("My arm", 3, Dynamics(5.0, 0.2, 0.4))
 STATE = NetworkState(
-    *(9, 2),
-    held=True,
-    position=(0.1, 0.2, 0.3),
-    orientation=(1.0, 0.0, 0.0, 0.0),
-    velocity=(1.0, 2.0, 3.0),
-    angular_velocity=(4.0, 5.0, 6.0),
+    9,
+    Sample(
+        time=0.0,
+        position=(0.1, 0.2, 0.3),
+        orientation=(1.0, 0.0, 0.0, 0.0),
+        velocity=(1.0, 2.0, 3.0),
+        angular_velocity=(4.0, 5.0, 6.0),
+        buttons=2,
+    ),
 )
-FORCE = Force(1, 9, 20, (1.0, 0.0, 0.0), (0.0, 0.1, 0.0))
+FORCE = network.pack_force(1, 9, (1.0, 0.0, 0.0), (0.0, 0.1, 0.0), KEY)
+
+
+def state(**changes: Any) -> NetworkState:
+    return STATE._replace(sample=STATE.sample._replace(**changes))
 
 
 def wait_for(what: Callable[[], object]) -> object:
@@ -64,25 +71,36 @@ def wait_for(what: Callable[[], object]) -> object:
 # --- Packets -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("packet", [FEATURES, STATE, FORCE])
-def test_packet_arrives_as_it_was_sent(packet: network.Packet) -> None:
-    data = network.pack(packet, KEY)
-    assert parse_datagram(data, KEY) == packet
-    assert len(data) == {NetworkFeatures: 168, NetworkState: 144, Force: 88}[type(packet)]
+@pytest.mark.parametrize("packet", [FEATURES, STATE])
+def test_packet_arrives_as_it_was_sent(packet: NetworkFeatures | NetworkState) -> None:
+    data = pack_packet(packet, KEY)
+    got = parse_datagram(data, KEY)
+    if isinstance(got, NetworkState):
+        got = got._replace(sample=got.sample._replace(time=0.0))
+    assert got == packet
+    assert len(data) == {NetworkFeatures: 168, NetworkState: 144}[type(packet)]
+
+
+def test_force_arrives_as_it_was_sent_and_is_nothing_that_a_program_sends() -> None:
+    assert parse_force(FORCE, KEY) == Force(1, 9, 20, (1.0, 0.0, 0.0), (0.0, 0.1, 0.0))
+    assert len(FORCE) == 88
+    with pytest.raises(PacketError, match="ours to send"):
+        parse_datagram(FORCE, KEY)
 
 
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (network.pack(STATE, b"wrong key, sorry"), "key is wrong"),
-        (network.pack(STATE, KEY)[:-1], "another length"),
+        (pack_packet(STATE, b"wrong key, sorry"), "key is wrong"),
+        (pack_packet(STATE, KEY)[:-1], "another length"),
         (b"GET / HTTP/1.1\r\n\r\n0123456789", "not one of our packets"),
-        (b"OMDF\x02\0" + network.pack(STATE, KEY)[6:], "version 2"),
+        (b"OMDF\x02\0" + pack_packet(STATE, KEY)[6:], "version 2"),
         (b"", "cut off"),
-        (network.pack(replace(STATE, velocity=(1e308, 0.0, 0.0)), KEY), "cannot be"),
-        (network.pack(replace(STATE, angular_velocity=(0.0, 0.0, -2e3)), KEY), "cannot be"),
-        (network.pack(replace(FEATURES, dynamics=Dynamics(1e300)), KEY), "cannot be"),
-        (network.pack(replace(FEATURES, dynamics=Dynamics(5.0, 0.2, 1e308)), KEY), "cannot be"),
+        (pack_packet(state(velocity=(1e308, 0.0, 0.0)), KEY), "cannot be"),
+        (pack_packet(state(angular_velocity=(0.0, 0.0, -2e3)), KEY), "cannot be"),
+        (pack_packet(state(position=(math.nan, 0.0, 0.0)), KEY), "cannot be"),
+        (pack_packet(replace(FEATURES, dynamics=Dynamics(1e300)), KEY), "cannot be"),
+        (pack_packet(replace(FEATURES, dynamics=Dynamics(5.0, 0.2, 1e308)), KEY), "cannot be"),
     ],
 )
 def test_packet_that_is_none_is_refused(data: bytes, said: str) -> None:
@@ -93,9 +111,9 @@ def test_packet_that_is_none_is_refused(data: bytes, said: str) -> None:
 @given(st.sampled_from([FEATURES, STATE]), st.lists(st.tuples(st.integers(0), st.integers(0, 255))))
 @settings(max_examples=300)
 def test_packet_with_bytes_changed_is_read_or_refused(
-    packet: network.Packet, changes: list[tuple[int, int]]
+    packet: NetworkFeatures | NetworkState, changes: list[tuple[int, int]]
 ) -> None:
-    data = bytearray(network.pack(packet, KEY))
+    data = bytearray(pack_packet(packet, KEY))
     for at, value in changes:
         data[at % len(data)] = value
     try:
@@ -103,8 +121,8 @@ def test_packet_with_bytes_changed_is_read_or_refused(
     except PacketError:
         return
     if isinstance(got, NetworkState):
-        assert all(map(math.isfinite, (*got.position, *got.velocity)))
-        assert math.isclose(sum(each**2 for each in got.orientation), 1.0, rel_tol=1e-9)
+        assert all(map(math.isfinite, (*got.sample.position, *got.sample.velocity)))
+        assert math.isclose(sum(each**2 for each in got.sample.orientation), 1.0, rel_tol=1e-9)
 
 
 @pytest.fixture(params=["udp", "tcp"])
@@ -123,24 +141,24 @@ def port(request: pytest.FixtureRequest) -> Iterator[tuple[Port, socket.socket]]
 def test_program_is_a_device_once_it_says_what_it_can(port: tuple[Port, socket.socket]) -> None:
     here, program = port
     assert here.device() is None
-    program.sendall(network.pack(FEATURES, KEY))
+    program.sendall(pack_packet(FEATURES, KEY))
     device = wait_for(here.device)
     assert isinstance(device, network.NetworkDevice)
     assert device.description.name == "My arm"
     assert device.description.dynamics == FEATURES.dynamics
-    program.sendall(network.pack(STATE, KEY))
+    program.sendall(pack_packet(STATE, KEY))
     sample = wait_for(device.read)
     assert isinstance(sample, Sample)
-    assert sample.position == STATE.position
+    assert sample.position == STATE.sample.position
     assert sample.buttons == 2
     device.send((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
-    got = parse_datagram(program.recv(2048), KEY)
+    got = parse_force(program.recv(2048), KEY)
     assert got == Force(1, 9, 20, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
 
 
 def test_program_without_the_key_is_no_device(port: tuple[Port, socket.socket]) -> None:
     here, program = port
-    program.sendall(network.pack(FEATURES, b"another key 16b!"))
+    program.sendall(pack_packet(FEATURES, b"another key 16b!"))
     end = time.monotonic() + 0.2
     while time.monotonic() < end:
         assert here.device() is None
@@ -151,7 +169,7 @@ def test_program_that_falls_silent_is_lost(
     port: tuple[Port, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     here, program = port
-    program.sendall(network.pack(FEATURES, KEY))
+    program.sendall(pack_packet(FEATURES, KEY))
     device = wait_for(here.device)
     assert isinstance(device, network.NetworkDevice)
     assert device.read() is None
@@ -166,14 +184,14 @@ def test_program_that_falls_silent_is_lost(
 def test_program_may_say_again_what_its_device_can_do(port: tuple[Port, socket.socket]) -> None:
     """Over UDP it may get lost, so careful programs repeat it: that is no other device."""
     here, program = port
-    program.sendall(network.pack(FEATURES, KEY))
+    program.sendall(pack_packet(FEATURES, KEY))
     device = wait_for(here.device)
     assert isinstance(device, network.NetworkDevice)
-    program.sendall(network.pack(FEATURES, KEY))
-    program.sendall(network.pack(STATE, KEY))
+    program.sendall(pack_packet(FEATURES, KEY))
+    program.sendall(pack_packet(STATE, KEY))
     assert wait_for(device.read)
     assert here.device() is None
-    program.sendall(network.pack(replace(FEATURES, name="Another"), KEY))
+    program.sendall(pack_packet(replace(FEATURES, name="Another"), KEY))
     other = wait_for(here.device)
     assert isinstance(other, network.NetworkDevice)
     assert other.description.name == "Another"
@@ -183,12 +201,12 @@ def test_garbage_does_not_keep_poses_from_arriving() -> None:
     here = Port("udp", 0, KEY)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
         program.connect(("127.0.0.1", here.number))
-        program.send(network.pack(FEATURES, KEY))
+        program.send(pack_packet(FEATURES, KEY))
         device = wait_for(here.device)
         assert isinstance(device, network.NetworkDevice)
         for _ in range(30):
             program.send(b"garbage")
-        program.send(network.pack(STATE, KEY))
+        program.send(pack_packet(STATE, KEY))
         assert device.read() is not None, "loopback delivers at once"
     here.close()
 
@@ -199,7 +217,7 @@ def test_program_that_reads_slowly_gets_whole_packets() -> None:
         program.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         program.connect(("127.0.0.1", here.number))
         program.settimeout(5.0)
-        program.sendall(network.pack(FEATURES, KEY))
+        program.sendall(pack_packet(FEATURES, KEY))
         device = wait_for(here.device)
         assert isinstance(device, network.NetworkDevice)
         for number in range(100_000):  # a minute and a half of them
@@ -211,8 +229,7 @@ def test_program_that_reads_slowly_gets_whole_packets() -> None:
             device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
             got += program.recv(1 << 20)
             while len(got) >= size:
-                packet = parse_datagram(got[:size], KEY)
-                assert isinstance(packet, Force)
+                packet = parse_force(got[:size], KEY)
                 assert packet.sequence > last
                 got, last = got[size:], packet.sequence
     here.close()
@@ -225,7 +242,7 @@ def test_stranger_who_says_nothing_does_not_keep_the_port(
     with socket.create_connection(("127.0.0.1", here.number)) as stranger:
         wait_for(lambda: here.device() or here._peer)
         with socket.create_connection(("127.0.0.1", here.number)) as program:
-            program.sendall(network.pack(FEATURES, KEY))
+            program.sendall(pack_packet(FEATURES, KEY))
             later = time.perf_counter() + 2.0
             monkeypatch.setattr(network.time, "perf_counter", lambda: later)
             assert wait_for(here.device)

@@ -23,12 +23,12 @@ from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.held_body import Pull
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.channel import Listener, MessageChannel, connect
 from octo_motion.device.ipc.client import Client, ClientState
+from octo_motion.device.ipc.message_channel import Listener, MessageChannel, connect
 from octo_motion.device.sources.discovery import Discovery, Sources
 from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector
 from tests.core.puppets import chain, posed, soft
-from tests.device import uhid
+from tests.device import firmware, uhid
 from tests.device.parts import SPACE_MOUSE
 
 pytestmark = pytest.mark.skipif(not uhid.available(), reason=uhid.WHY_NOT)
@@ -69,7 +69,7 @@ def space_mouse(plug: Callable[..., uhid.VirtualDevice]) -> uhid.VirtualDevice:
 
 def force_device(plug: Callable[..., uhid.VirtualDevice]) -> uhid.VirtualDevice:
     def features(number: int) -> bytes:
-        described = profile.pack_features(profile.ForceFeatures(2, DYNAMICS))
+        described = firmware.pack_features(2, DYNAMICS)
         return described if number == profile.FEATURES else b""
 
     return plug("Octo hand", 0x1209, 0x0001, profile.report_descriptor(), features=features)
@@ -100,8 +100,8 @@ def found_by(discovery: Discovery) -> Driver:
 
 
 def pose_report(position: Vector, buttons: int = 0, turn: Quaternion = IDENTITY) -> bytes:
-    return profile.pack_state(
-        profile.ForceState(
+    return firmware.pack_state(
+        firmware.FirmwareState(
             *(0, 0, 0, buttons),
             held=True,
             powered=True,
@@ -169,13 +169,13 @@ def test_force_device_tells_what_it_can_and_gets_force(
     assert sample.buttons == 2
     driver.send((1.5, 0.0, -2.0), (0.0, 0.1, 0.0))
     wait_for(lambda: device.outputs, "the force arrives")
-    command = profile.parse_command(device.outputs[0])
+    command = firmware.parse_command(device.outputs[0])
     assert command.enabled
     assert command.force == pytest.approx((1.5, 0.0, -2.0))
     assert command.torque == pytest.approx((0.0, 0.1, 0.0))
     driver.close()
     wait_for(lambda: len(device.outputs) == 2, "the last word arrives")
-    assert not profile.parse_command(device.outputs[-1]).enabled
+    assert not firmware.parse_command(device.outputs[-1]).enabled
 
 
 def waited_for(driver: Driver) -> Sample:
@@ -278,12 +278,12 @@ class Hand:
     def unplug(self) -> None:
         self.device.unplug()
 
-    def last_command(self) -> profile.Command:
+    def last_command(self) -> firmware.Command:
         wait_for(lambda: not self.forces()[-1].enabled, "the last word arrives")
         return self.forces()[-1]
 
-    def forces(self) -> list[profile.Command]:
-        return [profile.parse_command(each) for each in self.device.outputs]
+    def forces(self) -> list[firmware.Command]:
+        return [firmware.parse_command(each) for each in self.device.outputs]
 
 
 def bent(client: Client, start: np.ndarray) -> float:

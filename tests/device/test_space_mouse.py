@@ -12,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.device.driver import DeviceLostError, Kind
+from octo_motion.device.calibration import NONE, corrected
+from octo_motion.device.driver import Axes, DeviceLostError, Kind, Sample
 from octo_motion.device.hid import space_mouse, system
 from octo_motion.device.hid.descriptor import parse_descriptor
 from octo_motion.device.hid.space_mouse import SpaceMouse, is_space_mouse
-from octo_motion.device.response import Axes, Response
+from octo_motion.device.response import Response
 from tests.device.parts import SPACE_MOUSE, FakeHandle, found
 
 
@@ -27,9 +28,16 @@ def six(value: float) -> Axes:
 PROPORTIONAL = Response(dead_zone=six(0.0), curve=six(1.0))
 
 
-def plugged_in(response: Response = PROPORTIONAL) -> tuple[SpaceMouse, FakeHandle]:
+def plugged_in() -> tuple[SpaceMouse, FakeHandle]:
     handle = FakeHandle()
-    return SpaceMouse(found(), handle, parse_descriptor(SPACE_MOUSE), response), handle
+    return SpaceMouse(found(), handle, parse_descriptor(SPACE_MOUSE)), handle
+
+
+def read(mouse: SpaceMouse) -> Sample:
+    """As the loop reads it."""
+    sample = mouse.read()
+    assert sample
+    return corrected(sample, Kind.RATE, NONE, PROPORTIONAL)
 
 
 def push(*values: int) -> bytes:
@@ -39,8 +47,7 @@ def push(*values: int) -> bytes:
 def test_newest_report_counts_and_all_older_ones_are_taken() -> None:
     mouse, handle = plugged_in()
     handle.reports.extend(push(value, 0, 0) for value in range(0, 351, 10))
-    sample = mouse.read()
-    assert sample
+    sample = read(mouse)
     assert sample.velocity[0] == pytest.approx(PROPORTIONAL.speed)
     assert not handle.reports
 
@@ -49,8 +56,7 @@ def test_full_push_is_full_speed_in_metres_and_radians_a_second() -> None:
     mouse, handle = plugged_in()
     handle.reports.append(push(0, -350, 0))
     handle.reports.append(struct.pack("<B3h", 2, 0, 0, -350))
-    sample = mouse.read()
-    assert sample
+    sample = read(mouse)
     assert sample.velocity == pytest.approx((0.0, 0.4, 0.0))
     assert sample.angular_velocity == pytest.approx((0.0, 0.0, 2.0))
 
@@ -60,12 +66,10 @@ def test_push_that_is_not_repeated_ends(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(space_mouse.time, "perf_counter", lambda: now)
     mouse, handle = plugged_in()
     handle.reports.append(push(350, 0, 0))
-    sample = mouse.read()
-    assert sample
+    sample = read(mouse)
     assert sample.velocity[0] > 0.0
     now += 0.6
-    sample = mouse.read()
-    assert sample
+    sample = read(mouse)
     assert sample.velocity == (0.0, 0.0, 0.0)
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from ...core.errors import DeviceError
 from ...device.calibration import Calibration
-from ...device.response import Axes
+from ...device.driver import Axes
 from .user_files import own_folder, write_whole
 
 log = logging.getLogger(__name__)

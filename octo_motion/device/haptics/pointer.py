@@ -7,10 +7,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from ..calibration import NONE, Calibration, Calibrator
+from ..calibration import NONE, Calibration, Calibrator, corrected
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..held_body import Held
-from ..hid import SpaceMouse
 from ..ipc import HandMessage, Settings, Workspace
 from ..spatial import (
     IDENTITY,
@@ -76,6 +75,8 @@ class Pointer:
     def __post_init__(self) -> None:
         """Choose the coupling for the device."""
         device = self.driver.description.dynamics
+        self._kind = self.driver.description.kind
+        self._response = self.settings.response()
         self.gains = gains_for(device, self.period) if device else Gains(0.0, 0.0, 0.0, 0.0)
         self._limits = ForceLimits(device.force, device.torque) if device else ForceLimits(0.0, 0.0)
         self._shaper = Shaper(self._limits)
@@ -119,7 +120,12 @@ class Pointer:
     # --- What is told ----------------------------------------------------------------------------
 
     def use(self, settings: Settings) -> None:
-        """Take over settings."""
+        """Take over settings.
+
+        Raises:
+            MessageError: a value is out of range.
+        """
+        self._response = settings.response()
         self.settings = settings
 
     def place(self, workspace: Workspace) -> None:
@@ -129,7 +135,7 @@ class Pointer:
         moved = not self._told_place or workspace.origin != self.workspace.origin
         self.workspace = workspace
         self._told_place = True
-        if self.driver.description.kind is Kind.RATE:
+        if self._kind is Kind.RATE:
             if moved:
                 self.position, self.orientation = workspace.origin, workspace.orientation
         else:
@@ -194,10 +200,13 @@ class Pointer:
         """
         sample = self.driver.read()
         if sample is not None and self.calibrator is not None:
-            self._learn(now, sample)
+            self.calibrator.feed(now, sample)
+            self.sample = sample._replace(
+                velocity=ZERO, angular_velocity=ZERO, buttons=self.sample.buttons
+            )
         elif sample is not None:
             self._press(sample.buttons)
-            sample = self._centred(sample)
+            sample = corrected(sample, self._kind, self.calibration, self._response)
             if self._answered and self._leaps(sample):
                 self._lift()
             self.sample = sample
@@ -233,29 +242,13 @@ class Pointer:
         self.velocity = self.angular_velocity = ZERO
         self._last = None
         self._test_until = -math.inf
-        self.calibrator = Calibrator(self.driver.description.kind) if begin else None
+        self.calibrator = Calibrator(self._kind) if begin else None
 
     def correct(self, calibration: Calibration) -> None:
         """Take over the device's zero and range; lets go, for nothing may jump."""
         self._lift()
         self.calibration = calibration
         self._last = None
-        if isinstance(self.driver, SpaceMouse):
-            self.driver.calibration = calibration
-
-    def _learn(self, now: float, sample: Sample) -> None:
-        assert self.calibrator is not None
-        self.sample = sample._replace(
-            velocity=ZERO, angular_velocity=ZERO, buttons=self.sample.buttons
-        )
-        push = (*sample.position, 0.0, 0.0, 0.0)
-        self.calibrator.feed(now, self.driver.push if isinstance(self.driver, SpaceMouse) else push)
-
-    def _centred(self, sample: Sample) -> Sample:
-        if self.driver.description.kind is Kind.RATE:
-            return sample
-        x, y, z = self.calibration.rest[:3]
-        return sample._replace(position=subtract(sample.position, (x, y, z)))
 
     # --- What a tick is made of ------------------------------------------------------------------
 
@@ -281,7 +274,7 @@ class Pointer:
         space, sample = self.workspace, self.sample
         self.velocity = scale(rotate(space.orientation, sample.velocity), space.scale)
         self.angular_velocity = rotate(space.orientation, sample.angular_velocity)
-        if self.driver.description.kind is Kind.POSE:
+        if self._kind is Kind.POSE:
             self.position = add(
                 space.origin, scale(rotate(space.orientation, sample.position), space.scale)
             )

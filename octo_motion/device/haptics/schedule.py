@@ -26,7 +26,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from .timing import Histogram, LoopTimes
+from .durations import Histogram, LoopTimes
 
 _AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015
 """s before a deadline from which on the loop does not sleep."""

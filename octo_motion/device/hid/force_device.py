@@ -8,10 +8,10 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ...core.errors import DeviceError
-from ..driver import Description, DeviceLostError, Kind, Sample
+from ..driver import Description, DeviceLostError, Driver, Kind, Sample, numbered_buttons
 from ..spatial import ZERO, Vector
 from . import force_profile as profile
-from .system import Found, Handle, HidLine, claim, open_device
+from .system import Found, Handle, HidReports, claim, open_device
 
 
 def is_force_device(found: Found) -> bool:
@@ -19,7 +19,7 @@ def is_force_device(found: Found) -> bool:
     return (found.page, found.usage) == (profile.USAGE_PAGE, profile.USAGE)
 
 
-class ForceDevice:
+class ForceDevice(Driver):
     """One force device."""
 
     def __init__(
@@ -29,17 +29,19 @@ class ForceDevice:
         features: profile.ForceFeatures,
         set_free: Callable[[], None] = lambda: None,
     ) -> None:
+        super().__init__(
+            Description(
+                name=found.name or "Force device",
+                identity=found.identity,
+                lasting=found.lasting,
+                kind=Kind.POSE,
+                buttons=numbered_buttons(features.buttons),
+                dynamics=features.dynamics,
+            )
+        )
         self._sequence = 0
         self._set_free = set_free
-        self._description = Description(
-            name=found.name or "Force device",
-            identity=found.identity,
-            lasting=found.lasting,
-            kind=Kind.POSE,
-            buttons=tuple(f"Button {index + 1}" for index in range(features.buttons)),
-            dynamics=features.dynamics,
-        )
-        self._line = HidLine(handle, self._description.name)
+        self._reports = HidReports(handle, self.description.name)
 
     @classmethod
     def open(cls, found: Found) -> ForceDevice:
@@ -68,26 +70,15 @@ class ForceDevice:
             ) from error
         return cls(found, handle, features, set_free)
 
-    @property
-    def description(self) -> Description:
-        """Who it is."""
-        return self._description
-
     def read(self) -> Sample | None:
         """The newest pose; None where none came, or only damaged ones.
 
         Raises:
             DeviceLostError: it was unplugged.
         """
-        for report in reversed(self._line.waiting()):
+        for report in reversed(self._reports.read()):
             with suppress(profile.ReportError):
-                state = profile.parse_state(report)
-                return Sample(
-                    *(time.perf_counter(), state.position, state.orientation),
-                    *(state.velocity, state.angular_velocity, state.buttons),
-                    # Without power on its motors it gets no force, lest all come with the power.
-                    held=state.held and state.powered,
-                )
+                return profile.parse_state(report, time.perf_counter())
         return None
 
     def send(self, force: Vector, torque: Vector) -> None:
@@ -97,16 +88,12 @@ class ForceDevice:
             DeviceLostError: it was unplugged.
         """
         self._sequence += 1
-        command = profile.Command(
-            self._sequence, profile.WATCHDOG_MILLISECONDS, force != ZERO or torque != ZERO,
-            force, torque,
-        )  # fmt: skip
-        self._line.write(profile.pack_command(command))
+        self._reports.write(profile.pack_command(self._sequence, force, torque))
 
     def close(self) -> None:
         """Take force away and let the device go."""
         with suppress(DeviceLostError, profile.ReportError):
             self.send(ZERO, ZERO)
-        self._line.close()
+        self._reports.close()
         set_free, self._set_free = self._set_free, lambda: None
         set_free()

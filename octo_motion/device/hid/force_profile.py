@@ -4,7 +4,8 @@
 Written so that a microcontroller without floating point can speak it: integers alone, little
 endian, each report within one packet of full-speed USB. docs/device.md tells it to makers.
 
-One table of fields makes descriptor, packer and parser, so that they cannot differ.
+One table of fields makes descriptor, packer and parser, so that they cannot differ. What firmware
+does, writing states and reading commands, is in tests/device/firmware.py.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Final
 
-from ..driver import Dynamics
-from ..spatial import Quaternion, Vector, unit
+from ..driver import Dynamics, Sample, is_possible
+from ..spatial import ZERO, Vector, unit
 from .descriptor import item
 
 VERSION: Final = 1
@@ -27,14 +28,15 @@ STATE, COMMAND, FEATURES = 1, 2, 3
 
 WATCHDOG_MILLISECONDS: Final = 20
 
-_POSITION: Final = 1e-7
-_ORIENTATION: Final = 2.0**-30
-_VELOCITY: Final = 1e-4
-_ANGULAR_VELOCITY: Final = 1e-3
-_FORCE: Final = 1e-3
-_TORQUE: Final = 1e-4
-_FARTHEST: Final = 10.0
-"""m: a hand is never farther from its device's middle."""
+POSITION: Final = 1e-7
+ORIENTATION: Final = 2.0**-30
+VELOCITY: Final = 1e-4
+ANGULAR_VELOCITY: Final = 1e-3
+FORCE: Final = 1e-3
+TORQUE: Final = 1e-4
+"""m, 1, m/s, rad/s, N, N·m: one step of the numbers in states and commands."""
+DYNAMICS: Final = (FORCE, TORQUE, 1e-3, 1e-6, 1e-3, 1e-6, POSITION, 1e-6, 1e-6)
+"""One step of the numbers in the feature report, in the order of ``Dynamics``."""
 
 
 @dataclass(frozen=True)
@@ -104,46 +106,16 @@ _LIMITS: Final = {
     "h": (-0x7FFF, 0x7FFF),
     "i": (-0x7FFFFFFF, 0x7FFFFFFF),
 }
-_STRUCTS: Final = {
+LAYOUTS: Final = {
     number: struct.Struct("<B" + "".join(f"{each.count}{each.code}" for each in items))
     for number, (_way, items) in REPORTS.items()
 }
-SIZES: Final = {number: each.size for number, each in _STRUCTS.items()}
+SIZES: Final = {number: each.size for number, each in LAYOUTS.items()}
 """Bytes of each report, its number included."""
 
 
 class ReportError(ValueError):
     """The bytes are no report of the profile, or not a possible one."""
-
-
-@dataclass(frozen=True)
-class ForceState:
-    """Input report: what the hand does."""
-
-    sequence: int
-    clock: int
-    """µs of the device's own clock, going round at 2³¹."""
-    answered: int
-    """Sequence of the newest command that reached the device."""
-    buttons: int
-    held: bool
-    powered: bool
-    position: Vector
-    orientation: Quaternion
-    velocity: Vector
-    angular_velocity: Vector
-
-
-@dataclass(frozen=True)
-class Command:
-    """Output report: what the hand shall feel."""
-
-    sequence: int
-    watchdog: int
-    """ms"""
-    enabled: bool
-    force: Vector
-    torque: Vector
 
 
 @dataclass(frozen=True)
@@ -175,74 +147,57 @@ def report_descriptor() -> bytes:
     return b"".join(parts)
 
 
-def _unpack(number: int, report: bytes) -> tuple[int, ...]:
-    layout = _STRUCTS[number]
+def unpack(number: int, report: bytes) -> tuple[int, ...]:
+    """The numbers of a report, without its own.
+
+    Raises:
+        ReportError: another report, or too short.
+    """
+    layout = LAYOUTS[number]
     # Windows hands over every report with the length of the longest.
     if len(report) < layout.size or report[0] != number:
         raise ReportError(f"no report {number} of {layout.size} bytes")
     return layout.unpack_from(report)[1:]
 
 
-def parse_state(report: bytes) -> ForceState:
-    """Read an input report, its number included.
+def parse_state(report: bytes, time: float) -> Sample:
+    """Read an input report, its number included, that came at a time.
 
     Raises:
         ReportError: another report, too short, or a pose that cannot be.
     """
-    sequence, clock, answered, buttons, flags, *rest = _unpack(STATE, report)
-    position = _scaled(rest[0:3], _POSITION)
-    if max(map(abs, position)) > _FARTHEST:
-        raise ReportError("the hand is too far away")
+    _sequence, _clock, _answered, buttons, flags, *rest = unpack(STATE, report)
     w, x, y, z = rest[3:7]
-    size = (w * w + x * x + y * y + z * z) * _ORIENTATION**2
+    size = (w * w + x * x + y * y + z * z) * ORIENTATION**2
     orientation = unit((float(w), float(x), float(y), float(z)))
     if orientation is None or not 0.9 < size < 1.1:
         raise ReportError("the orientation is no unit quaternion")
-    return ForceState(
-        *(sequence, clock, answered, buttons, bool(flags & 1), bool(flags & 2)),
-        *(position, orientation),
-        _scaled(rest[7:10], _VELOCITY),
-        _scaled(rest[10:13], _ANGULAR_VELOCITY),
+    sample = Sample(
+        time=time,
+        position=scaled(rest[0:3], POSITION),
+        orientation=orientation,
+        velocity=scaled(rest[7:10], VELOCITY),
+        angular_velocity=scaled(rest[10:13], ANGULAR_VELOCITY),
+        buttons=buttons,
+        # Without power on its motors it gets no force, lest all come with the power.
+        held=flags & 3 == 3,
     )
+    if not is_possible(sample):
+        raise ReportError("the hand is too far away")
+    return sample
 
 
-def pack_state(state: ForceState) -> bytes:
-    """Write an input report: what firmware does; here for tests and stand-ins."""
-    return _STRUCTS[STATE].pack(
-        STATE,
-        *(state.sequence & 0xFFFF, state.clock & 0x7FFFFFFF, state.answered & 0xFFFF),
-        *(state.buttons & 0xFFFF, state.held | state.powered << 1),
-        *_steps(state.position, _POSITION, "i"),
-        *_steps(state.orientation, _ORIENTATION, "i"),
-        *_steps(state.velocity, _VELOCITY, "h"),
-        *_steps(state.angular_velocity, _ANGULAR_VELOCITY, "h"),
-    )
-
-
-def parse_command(report: bytes) -> Command:
-    """Read an output report: what firmware does; here for tests and stand-ins.
-
-    Raises:
-        ReportError: another report, or too short.
-    """
-    sequence, watchdog, flags, *rest = _unpack(COMMAND, report)
-    return Command(
-        *(sequence, watchdog, bool(flags & 1)),
-        *(_scaled(rest[0:3], _FORCE), _scaled(rest[3:6], _TORQUE)),
-    )
-
-
-def pack_command(command: Command) -> bytes:
+def pack_command(sequence: int, force: Vector, torque: Vector) -> bytes:
     """Write an output report; what is beyond the numbers' range is cut to it.
 
     Raises:
         ReportError: force or torque is not finite.
     """
-    return _STRUCTS[COMMAND].pack(
-        COMMAND,
-        *(command.sequence & 0xFFFF, max(0, min(0xFF, command.watchdog)), command.enabled),
-        *_steps(command.force, _FORCE, "h"),
-        *_steps(command.torque, _TORQUE, "h"),
+    enabled = force != ZERO or torque != ZERO
+    return LAYOUTS[COMMAND].pack(
+        *(COMMAND, sequence & 0xFFFF, WATCHDOG_MILLISECONDS, enabled),
+        *in_steps(force, FORCE, "h"),
+        *in_steps(torque, TORQUE, "h"),
     )
 
 
@@ -252,7 +207,7 @@ def parse_features(report: bytes) -> ForceFeatures:
     Raises:
         ReportError: another report, too short, another version of the profile, or no force at all.
     """
-    version, buttons, force, torque, *rest = _unpack(FEATURES, report)
+    version, buttons, force, torque, *rest = unpack(FEATURES, report)
     if version != VERSION:
         raise ReportError(f"version {version} of the profile, not {VERSION}")
     if buttons > 16:
@@ -261,36 +216,22 @@ def parse_features(report: bytes) -> ForceFeatures:
         raise ReportError("a force device without force")
     # No command carries more; one cut along some axes would push another way than it was meant.
     force, torque = min(force, _LIMITS["h"][1]), min(torque, _LIMITS["h"][1])
-    b, angular_b, friction, angular_friction, step, angular_step, delay = rest
-    return ForceFeatures(
-        buttons,
-        Dynamics(
-            *(force * _FORCE, torque * _TORQUE, b * 1e-3, angular_b * 1e-6),
-            *(friction * 1e-3, angular_friction * 1e-6, step * _POSITION, angular_step * 1e-6),
-            delay * 1e-6,
-        ),
-    )
+    values = zip((force, torque, *rest), DYNAMICS, strict=True)
+    return ForceFeatures(buttons, Dynamics(*(number * step for number, step in values)))
 
 
-def pack_features(features: ForceFeatures) -> bytes:
-    """Write the feature report: what firmware does; here for tests and stand-ins."""
-    it = features.dynamics
-    values = [
-        *(it.force / _FORCE, it.torque / _TORQUE, it.damping / 1e-3, it.angular_damping / 1e-6),
-        *(it.friction / 1e-3, it.angular_friction / 1e-6),
-        *(it.resolution / _POSITION, it.angular_resolution / 1e-6, it.delay / 1e-6),
-    ]
-    return _STRUCTS[FEATURES].pack(
-        FEATURES, VERSION, features.buttons, *(max(0, min(0xFFFF, round(each))) for each in values)
-    )
-
-
-def _scaled(steps: list[int], step: float) -> Vector:
+def scaled(steps: list[int], step: float) -> Vector:
+    """The vector that a report tells by its numbers of steps."""
     a, b, c = steps
     return (a * step, b * step, c * step)
 
 
-def _steps(values: tuple[float, ...], step: float, code: str) -> list[int]:
+def in_steps(values: tuple[float, ...], step: float, code: str) -> list[int]:
+    """Numbers of steps, cut to what the report's numbers hold.
+
+    Raises:
+        ReportError: a value is not finite.
+    """
     least, most = _LIMITS[code]
     if not all(map(isfinite, values)):
         raise ReportError("a number is not finite")

@@ -4,13 +4,16 @@
 The devices' own axes are X right, Y towards the user, Z down, turning by the right-hand rule.
 Blender's are X right, Y away from the user, Z up: half a turn about X, so Y and Z change sign, of
 pushing and of turning alike.
+
+At rest an axis says 0 where its range is signed, and the middle of its range where it is not, as
+pads and home-made devices have it: 128 of 0…255.
 """
 
 from __future__ import annotations
 
 from typing import Final
 
-from ..response import Axes
+from ..driver import Axes
 from .descriptor import Field, ReportField, ReportLayout
 from .models import RANGE
 
@@ -46,15 +49,16 @@ class MultiAxis:
 
     def __init__(self, layout: ReportLayout) -> None:
         self._numbered = layout.numbered
-        self._axes: dict[int, list[tuple[int, Field, float]]] = {}
+        self._axes: dict[int, list[tuple[int, Field, int, float]]] = {}
         self._buttons: dict[int, list[tuple[int, Field]]] = {}
         for each in layout.of(ReportField.INPUT):
             if each.page == _DESKTOP and 0 <= each.usage - _FIRST_AXIS < 6:
                 axis = each.usage - _FIRST_AXIS
-                full = max(abs(each.least), abs(each.most))
+                rest = _rest(each)
+                full = max(abs(each.least - rest), abs(each.most - rest))
                 if full:
                     scale = _TO_BLENDER[axis] / full
-                    self._axes.setdefault(each.report, []).append((axis, each, scale))
+                    self._axes.setdefault(each.report, []).append((axis, each, rest, scale))
             elif each.page == _BUTTONS and 0 < each.usage <= _MOST_BUTTONS:
                 self._buttons.setdefault(each.report, []).append((each.usage - 1, each))
         self._push = list(_REST)
@@ -78,10 +82,10 @@ class MultiAxis:
             return False
         number, payload = (report[0], report[1:]) if self._numbered else (0, report)
         known = False
-        for axis, place, scale in self._axes.get(number, ()):
+        for axis, place, rest, scale in self._axes.get(number, ()):
             value = place.value(payload)
             if value is not None:
-                self._push[axis] = max(-1.0, min(1.0, value * scale))
+                self._push[axis] = max(-1.0, min(1.0, (value - rest) * scale))
                 known = True
         for bit, place in self._buttons.get(number, ()):
             value = place.value(payload)
@@ -89,3 +93,8 @@ class MultiAxis:
                 self.buttons = self.buttons & ~(1 << bit) | (bool(value) << bit)
                 known = True
         return known
+
+
+def _rest(axis: Field) -> int:
+    """What an axis says at rest; of the two middles of an even range the upper one."""
+    return 0 if axis.least < 0 else (axis.least + axis.most + 1) // 2

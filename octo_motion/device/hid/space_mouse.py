@@ -6,16 +6,13 @@ from __future__ import annotations
 import time
 from typing import Final
 
-from ..calibration import NONE
-from ..driver import Description, Kind, Sample
-from ..response import Axes, Response
+from ..driver import Description, Driver, Kind, Sample, numbered_buttons
 from ..spatial import Vector
 from .descriptor import DescriptorError, ReportLayout, parse_descriptor
 from .models import USAGE, USAGE_PAGE, model_of
 from .multi_axis import MultiAxis, classic_layout
-from .system import Found, Handle, HidLine, descriptor_of, open_device
+from .system import Found, Handle, HidReports, descriptor_of, open_device
 
-_STILL: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _SILENCE: Final = 0.5
 """s: a pushed cap reports every 8 to 16 ms; after so long it is out of reach, not held still."""
 
@@ -30,33 +27,28 @@ def is_space_mouse(found: Found) -> bool:
     return (found.page, found.usage) == (USAGE_PAGE, USAGE)
 
 
-class SpaceMouse:
+class SpaceMouse(Driver):
     """One space mouse."""
 
-    def __init__(
-        self, found: Found, handle: Handle, layout: ReportLayout, response: Response
-    ) -> None:
+    def __init__(self, found: Found, handle: Handle, layout: ReportLayout) -> None:
         model = model_of(found.vendor, found.product)
         names = model.buttons if model else {}
-        self._axes = MultiAxis(layout)
-        self._heard = 0.0
-        self.response = response
-        self.calibration = NONE
-        self.push: Axes = self._axes.push
-        """As the maker's range says, −1…1; zeros while it is silent."""
-        self._description = Description(
-            name=model.name if model else found.name or "Space mouse",
-            identity=found.identity,
-            lasting=found.lasting,
-            kind=Kind.RATE,
-            buttons=tuple(
-                names.get(bit, f"Button {bit + 1}") for bit in range(max(names, default=1) + 1)
-            ),
+        buttons = numbered_buttons(max(names, default=1) + 1)
+        super().__init__(
+            Description(
+                name=model.name if model else found.name or "Space mouse",
+                identity=found.identity,
+                lasting=found.lasting,
+                kind=Kind.RATE,
+                buttons=tuple(names.get(bit, name) for bit, name in enumerate(buttons)),
+            )
         )
-        self._line = HidLine(handle, self._description.name)
+        self._axes = MultiAxis(layout)
+        self._last_report = 0.0
+        self._reports = HidReports(handle, self.description.name)
 
     @classmethod
-    def open(cls, found: Found, response: Response | None = None) -> SpaceMouse:
+    def open(cls, found: Found) -> SpaceMouse:
         """Open a device that was found.
 
         Raises:
@@ -73,12 +65,7 @@ class SpaceMouse:
         if layout is None or not MultiAxis(layout).useful:
             model = model_of(found.vendor, found.product)
             layout = classic_layout(combined=bool(model and model.combined))
-        return cls(found, handle, layout, response or Response())
-
-    @property
-    def description(self) -> Description:
-        """Who it is."""
-        return self._description
+        return cls(found, handle, layout)
 
     def read(self) -> Sample | None:
         """The newest state, all waiting reports taken in.
@@ -86,24 +73,19 @@ class SpaceMouse:
         Raises:
             DeviceLostError: it was unplugged.
         """
-        reports = self._line.waiting()
+        reports = self._reports.read()
         now = time.perf_counter()
         known = [self._axes.feed(report) for report in reports]
         if any(known):
-            self._heard = now
+            self._last_report = now
         # At rest a device is silent; a push that nobody repeats is one that got lost.
-        silent = now - self._heard > _SILENCE
-        self.push = _STILL if silent else self._axes.push
-        x, y, z, a, b, c = (
-            _STILL if silent else self.response.speeds(self.calibration.push(self.push))
-        )
-        return Sample(
-            now, velocity=(x, y, z), angular_velocity=(a, b, c), buttons=self._axes.buttons
-        )
+        silent = now - self._last_report > _SILENCE
+        push = None if silent else self._axes.push
+        return Sample(now, buttons=self._axes.buttons, push=push)
 
     def send(self, force: Vector, torque: Vector) -> None:
         """Nothing: a space mouse has no motors."""
 
     def close(self) -> None:
         """Let the device go."""
-        self._line.close()
+        self._reports.close()

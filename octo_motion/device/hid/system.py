@@ -202,14 +202,14 @@ def descriptor_of(device: Any) -> bytes | None:
         return None
 
 
-class HidLine:
-    """What a driver hears of an open device and says to it, until it is closed or pulled out."""
+class HidReports:
+    """Reports from and to an open device, until it is closed or pulled out."""
 
     def __init__(self, handle: Handle, name: str) -> None:
         self._handle: Handle | None = handle
         self._name = name
 
-    def waiting(self) -> list[bytes]:
+    def read(self) -> list[bytes]:
         """All reports that wait, oldest first. More than 64 are the next call's.
 
         Raises:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Messages, and the processes that exchange them."""
 
-from .channel import ChannelClosedError, Listener, MessageChannel
 from .client import Client, ClientState
+from .message_channel import ChannelClosedError, Listener, MessageChannel
 from .messages import (
     Button,
     Buzz,

@@ -19,7 +19,7 @@ from ...core.errors import DeviceError
 from ...core.posing.puppet import Figure, Pose
 from ...core.posing.solver import Obstacle
 from ..calibration import Phase
-from .channel import ChannelClosedError
+from .message_channel import ChannelClosedError
 from .messages import (
     Button,
     Calibrate,

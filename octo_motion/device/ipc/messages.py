@@ -19,8 +19,9 @@ from ...core.posing.puppet import Elements, Figure, JointRanges
 from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
 from ...core.rotations import Floats
 from ..calibration import Calibration, Phase
+from ..driver import Axes
 from ..held_body import Held, Pull
-from ..response import Axes, Response
+from ..response import Response
 from ..spatial import IDENTITY, ZERO, Quaternion, Vector, unit
 from .codec import (
     F64,

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, Final, NoReturn
 
 from ...core.errors import DeviceError
-from .channel import ChannelClosedError, MessageChannel, connect, new_secret
+from .message_channel import ChannelClosedError, MessageChannel, connect, new_secret
 
 log = logging.getLogger(__name__)
 

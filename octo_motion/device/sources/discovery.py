@@ -20,16 +20,7 @@ from typing import Final
 
 from ...core.errors import DeviceError
 from ..driver import DeviceLostError, Driver
-from ..hid import (
-    ForceDevice,
-    Found,
-    SpaceMouse,
-    descriptor_fingerprint,
-    is_force_device,
-    is_space_mouse,
-    list_devices,
-)
-from ..response import Response
+from ..hid import Found, descriptor_fingerprint, hid_driver_for, list_devices
 from .haply import PORT as HAPLY_PORT
 from .haply import Haply
 from .network import Port
@@ -209,11 +200,9 @@ class _Search:
                 self._found(found.identity, found.path, driver)
 
     def _open(self, found: Found, now: float) -> Driver | None:
+        kind = hid_driver_for(found)
         try:
-            if is_force_device(found):
-                return ForceDevice.open(found)
-            if is_space_mouse(found):
-                return SpaceMouse.open(found, Response())
+            return kind.open(found) if kind else None
         except DeviceError as error:
             self._refuse(found.identity, error, now)
         return None

@@ -17,11 +17,10 @@ import http.client
 import json
 import re
 import time
-from math import isfinite
 from typing import Any, Final
 
 from ...core.errors import DeviceError
-from ..driver import Description, DeviceLostError, Dynamics, Kind, Sample
+from ..driver import Description, DeviceLostError, Driver, Dynamics, Kind, Sample, is_possible
 from ..spatial import IDENTITY, ZERO, Quaternion, Vector, subtract, unit
 from .websocket import WebSocket, WebSocketError
 
@@ -34,10 +33,6 @@ _ANSWER_SECONDS: Final = 0.02
 """After so long without an answer the next message is sent all the same."""
 _LOST_SECONDS: Final = 0.5
 _BUTTONS: Final = ("a", "b", "c")
-_FARTHEST: Final = 10.0
-_FASTEST: Final = 1000.0
-"""m, m/s: no hand is."""
-
 _MIDDLE: Final[Vector] = (0.0, -0.14, 0.15)
 """m: about the middle of the reach, where a service before 3.5 cannot be asked to count from it."""
 
@@ -52,8 +47,8 @@ def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] |
     Raises:
         DeviceError: it is too old or too new.
     """
-    told = (_told_version(each, seconds) for each in (port, port - 1))
-    found = next((each for each in told if each is not None), None)
+    answers = (_answered_version(each, seconds) for each in (port, port - 1))
+    found = next((each for each in answers if each is not None), None)
     if found is None:
         return None
     version = (int(found[1]), int(found[2]))
@@ -65,8 +60,8 @@ def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] |
     return version
 
 
-def _told_version(port: int, seconds: float) -> re.Match[str] | None:
-    """What whoever listens at a port says of its version."""
+def _answered_version(port: int, seconds: float) -> re.Match[str] | None:
+    """The version that whoever listens at a port answers with."""
     connection = http.client.HTTPConnection(HOST, port, timeout=seconds)
     try:
         connection.request("GET", "/version")
@@ -82,7 +77,7 @@ def _told_version(port: int, seconds: float) -> re.Match[str] | None:
     return re.search(r"(\d+)\.(\d+)", str(data.get("git_tag") or data.get("git_describe") or ""))
 
 
-class Haply:
+class Haply(Driver):
     """One Inverse3, and the grip on it where there is one."""
 
     def __init__(self, socket: WebSocket, version: tuple[int, int]) -> None:
@@ -91,14 +86,15 @@ class Haply:
         self._device = ""
         self._greeted = self._centred = version < _CONFIGURABLE
         self._asked = 0.0
-        self._answered = self._told = time.perf_counter()
-        self._force: Vector = ZERO
-        self._description = Description(
-            name="Haply Inverse3",
-            identity="haply",
-            kind=Kind.POSE,
-            buttons=("A", "B", "C"),
-            dynamics=INVERSE3,
+        self._answered = self._last_state = time.perf_counter()
+        super().__init__(
+            Description(
+                name="Haply Inverse3",
+                identity="haply",
+                kind=Kind.POSE,
+                buttons=("A", "B", "C"),
+                dynamics=INVERSE3,
+            )
         )
 
     @classmethod
@@ -116,11 +112,6 @@ class Haply:
         except WebSocketError:
             return None
 
-    @property
-    def description(self) -> Description:
-        """Who it is."""
-        return self._description
-
     def read(self) -> Sample | None:
         """The newest state.
 
@@ -128,25 +119,25 @@ class Haply:
             DeviceLostError: service or device are gone.
         """
         if self._socket is None:
-            raise DeviceLostError(self._description.name)
+            raise DeviceLostError(self.description.name)
         try:
             texts = self._socket.receive()
         except WebSocketError as error:
-            raise DeviceLostError(self._description.name) from error
+            raise DeviceLostError(self.description.name) from error
         now = time.perf_counter()
         if not texts:
             if now - self._answered > _LOST_SECONDS:
-                raise DeviceLostError(self._description.name)
+                raise DeviceLostError(self.description.name)
             return None
         self._answered, self._asked = now, 0.0
         state = parse(texts[-1], self._device)
         if state is None:
             if not self._device:
-                self._say({})  # no device yet: ask again
-            elif now - self._told > _LOST_SECONDS:
-                raise DeviceLostError(self._description.name)  # pulled out; the service goes on
+                self._send({})  # no device yet: ask again
+            elif now - self._last_state > _LOST_SECONDS:
+                raise DeviceLostError(self.description.name)  # pulled out; the service goes on
             return None
-        self._told = now
+        self._last_state = now
         self._device, sample = state
         if self._version < _CONFIGURABLE:
             sample = sample._replace(position=subtract(sample.position, _MIDDLE))
@@ -159,8 +150,7 @@ class Haply:
             DeviceLostError: the service is gone.
         """
         if self._socket is None:
-            raise DeviceLostError(self._description.name)
-        self._force = force
+            raise DeviceLostError(self.description.name)
         if self._asked and time.perf_counter() - self._asked < _ANSWER_SECONDS:
             return
         x, y, z = force
@@ -171,9 +161,9 @@ class Haply:
         if self._device and not self._centred:
             self._centred = True
             device["configure"] = {"preset": {"preset": "arm_front_centered"}}
-        self._say({"inverse3": [device]})
+        self._send({"inverse3": [device]})
 
-    def _say(self, message: dict[str, Any]) -> None:
+    def _send(self, message: dict[str, Any]) -> None:
         if not self._greeted:
             configure = {
                 "profile": {"name": "octo-motion:posing"},
@@ -186,7 +176,7 @@ class Haply:
         try:
             self._socket.send(json.dumps(message))
         except WebSocketError as error:
-            raise DeviceLostError(self._description.name) from error
+            raise DeviceLostError(self.description.name) from error
 
     def close(self) -> None:
         """Take force away and leave the service."""
@@ -215,14 +205,13 @@ def parse(text: str, device: str = "") -> tuple[str, Sample] | None:
         state = found["state"]
         position, velocity = _vector(state["cursor_position"]), _vector(state["cursor_velocity"])
         status = found.get("status") or {}
-        if max(map(abs, position)) > _FARTHEST or max(map(abs, velocity)) > _FASTEST:
-            return None
         orientation, buttons = _grip(message)
-        return str(found["device_id"])[:64], Sample(
+        sample = Sample(
             *(0.0, position, orientation, velocity, ZERO, buttons),
             # An arm that does not know where it is, or has no power, is given no force.
             held=bool(status.get("calibrated", True) and status.get("power_supply", True)),
         )
+        return (str(found["device_id"])[:64], sample) if is_possible(sample) else None
     except (ValueError, KeyError, StopIteration, TypeError, AttributeError):
         return None
     except (RecursionError, OverflowError):  # nested too deep, a number beyond all floats
@@ -245,6 +234,4 @@ def _grip(message: dict[str, Any]) -> tuple[Quaternion, int]:
 
 def _vector(value: dict[str, Any]) -> Vector:
     x, y, z = (float(value[name]) for name in "xyz")
-    if not (isfinite(x) and isfinite(y) and isfinite(z)):
-        raise ValueError("not finite")
     return (x, y, z)

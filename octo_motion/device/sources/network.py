@@ -2,7 +2,8 @@
 """Any other program as a device: three packets of fixed layout over UDP or TCP, loopback only.
 
 docs/device.md publishes the layout. The program sends what its device can do, then poses; each pose
-is answered with a force. A key of 16 bytes in each packet keeps other programs out.
+is answered with a force. A key of 16 bytes in each packet keeps other programs out. What the
+program does, writing features and states and reading forces, is in tests/device/firmware.py.
 """
 
 from __future__ import annotations
@@ -14,11 +15,20 @@ import socket
 import struct
 import time
 from dataclasses import astuple, dataclass
-from math import isfinite
-from typing import Final
+from typing import Any, Final, NamedTuple
 
-from ..driver import Description, DeviceLostError, Dynamics, Kind, Sample
-from ..spatial import Quaternion, Vector, unit
+from ..driver import (
+    Description,
+    DeviceLostError,
+    Driver,
+    Dynamics,
+    Kind,
+    Sample,
+    is_possible,
+    numbered_buttons,
+)
+from ..spatial import ZERO, Vector, unit
+from ..stream import Stream
 
 log = logging.getLogger(__name__)
 
@@ -26,17 +36,15 @@ MAGIC: Final = b"OMDF"
 VERSION: Final = 1
 KEY_BYTES: Final = 16
 FEATURES, STATE, FORCE = 1, 2, 3
-_HEAD: Final = struct.Struct(f"<4sHH{KEY_BYTES}s")
-_BODIES: Final = {
+HEAD: Final = struct.Struct(f"<4sHH{KEY_BYTES}s")
+BODIES: Final = {
     FEATURES: struct.Struct("<B7x9d64s"),
     STATE: struct.Struct("<IIB7x13d"),
     FORCE: struct.Struct("<III4x6d"),
 }
-SIZES: Final = {kind: _HEAD.size + body.size for kind, body in _BODIES.items()}
+SIZES: Final = {kind: HEAD.size + body.size for kind, body in BODIES.items()}
 _WATCHDOG: Final = 20
-_FARTHEST: Final = 10.0
-_FASTEST: Final = 1000.0
-"""m/s and rad/s: no hand is."""
+"""ms after which a force ends if no other follows."""
 _MOST: Final = 1000.0
 """Newtons, and all else that a device says of itself."""
 _SILENCE: Final = 1.0
@@ -56,70 +64,33 @@ class NetworkFeatures:
     dynamics: Dynamics
 
 
-@dataclass(frozen=True)
-class NetworkState:
+class NetworkState(NamedTuple):
     """What its hand does."""
 
     sequence: int
-    buttons: int
-    held: bool
-    position: Vector
-    orientation: Quaternion
-    velocity: Vector
-    angular_velocity: Vector
+    sample: Sample
 
 
-@dataclass(frozen=True)
-class Force:
-    """What its hand shall feel."""
-
-    sequence: int
-    answered: int
-    """Sequence of the newest state that came."""
-    watchdog: int
-    """ms after which the force ends if no other follows."""
-    force: Vector
-    torque: Vector
+def pack(kind: int, key: bytes, *values: float | bytes) -> bytes:
+    """A packet of a kind, with the fields of its body."""
+    return HEAD.pack(MAGIC, VERSION, kind, key) + BODIES[kind].pack(*values)
 
 
-Packet = NetworkFeatures | NetworkState | Force
+def pack_force(sequence: int, answered: int, force: Vector, torque: Vector, key: bytes) -> bytes:
+    """What the program's hand shall feel; ``answered`` is the sequence of the newest state."""
+    numbers = (sequence & 0xFFFFFFFF, answered & 0xFFFFFFFF, _WATCHDOG)
+    return pack(FORCE, key, *numbers, *force, *torque)
 
 
-def pack(packet: Packet, key: bytes) -> bytes:
-    """Bytes of a packet."""
-    match packet:
-        case NetworkFeatures():
-            name = packet.name.encode()[:64].decode(errors="ignore").encode()
-            kind, values = FEATURES, (packet.buttons, *astuple(packet.dynamics), name)
-        case NetworkState():
-            kind, values = (
-                STATE,
-                (
-                    *(packet.sequence & 0xFFFFFFFF, packet.buttons & 0xFFFFFFFF, packet.held),
-                    *(*packet.position, *packet.orientation),
-                    *(*packet.velocity, *packet.angular_velocity),
-                ),
-            )
-        case Force():
-            kind, values = (
-                FORCE,
-                (
-                    *(packet.sequence & 0xFFFFFFFF, packet.answered & 0xFFFFFFFF),
-                    *(packet.watchdog, *packet.force, *packet.torque),
-                ),
-            )
-    return _HEAD.pack(MAGIC, VERSION, kind, key) + _BODIES[kind].pack(*values)
-
-
-def size_of(data: bytes, key: bytes) -> int:
+def size_of(data: bytes | bytearray, key: bytes) -> int:
     """Bytes of the packet that begins here, by its head of 24 bytes.
 
     Raises:
         PacketError: no head of ours, another version, or another key.
     """
-    if len(data) < _HEAD.size:
+    if len(data) < HEAD.size:
         raise PacketError("cut off")
-    magic, version, kind, theirs = _HEAD.unpack_from(data)
+    magic, version, kind, theirs = HEAD.unpack_from(data)
     if magic != MAGIC or kind not in SIZES:
         raise PacketError("not one of our packets")
     if version != VERSION:
@@ -129,69 +100,65 @@ def size_of(data: bytes, key: bytes) -> int:
     return SIZES[kind]
 
 
-def parse_datagram(data: bytes, key: bytes) -> Packet:
-    """The packet that these bytes are.
+def parse_datagram(data: bytes, key: bytes) -> NetworkFeatures | NetworkState:
+    """The packet of a program that these bytes are.
 
     Raises:
         PacketError: they are none, or say what cannot be.
     """
     if len(data) != size_of(data, key):
         raise PacketError("of another length")
-    kind = _HEAD.unpack_from(data)[2]
-    values = _BODIES[kind].unpack_from(data, _HEAD.size)
-    if not all(isfinite(value) for value in values if isinstance(value, float)):
-        raise PacketError("a number is not finite")
-    if kind == FEATURES:
-        return _features(values)
+    kind = HEAD.unpack_from(data)[2]
+    values = BODIES[kind].unpack_from(data, HEAD.size)
     if kind == FORCE:
-        sequence, answered, watchdog, *rest = values
-        return Force(sequence, answered, watchdog, _vector(rest[0:3]), _vector(rest[3:6]))
-    sequence, buttons, held, *rest = values
-    position, orientation = _vector(rest[0:3]), unit((rest[3], rest[4], rest[5], rest[6]))
-    fastest = max(map(abs, rest[7:13]))
-    if max(map(abs, position)) > _FARTHEST or orientation is None or fastest > _FASTEST:
+        raise PacketError("a force, which is ours to send")
+    return _features(values) if kind == FEATURES else _state(values)
+
+
+def _state(values: tuple[Any, ...]) -> NetworkState:
+    sequence, buttons, held, x, y, z, *turn, vx, vy, vz, wx, wy, wz = values
+    orientation = unit((turn[0], turn[1], turn[2], turn[3]))
+    if orientation is None:
         raise PacketError("a pose that cannot be")
-    return NetworkState(
-        *(sequence, buttons, bool(held), position, orientation),
-        *(_vector(rest[7:10]), _vector(rest[10:13])),
+    sample = Sample(
+        time=time.perf_counter(),
+        position=(x, y, z),
+        orientation=orientation,
+        velocity=(vx, vy, vz),
+        angular_velocity=(wx, wy, wz),
+        buttons=buttons,
+        held=bool(held),
     )
+    if not is_possible(sample):
+        raise PacketError("a pose that cannot be")
+    return NetworkState(sequence, sample)
 
 
-def _features(values: tuple[object, ...]) -> NetworkFeatures:
+def _features(values: tuple[Any, ...]) -> NetworkFeatures:
     buttons, *numbers, name = values
-    assert isinstance(buttons, int)
-    assert isinstance(name, bytes)
-    dynamics = Dynamics(*(float(each) for each in numbers if isinstance(each, float)))
-    said = astuple(dynamics)
-    if buttons > 32 or dynamics.force <= 0.0 or min(said) < 0.0 or max(said) > _MOST:
+    dynamics = Dynamics(*numbers)
+    possible = all(0.0 <= each <= _MOST for each in astuple(dynamics))
+    if buttons > 32 or dynamics.force == 0.0 or not possible:
         raise PacketError("a device that cannot be")
     text = name.rstrip(b"\0").decode(errors="replace")
     return NetworkFeatures("".join(each for each in text if each.isprintable()), buttons, dynamics)
 
 
-def _vector(numbers: list[float]) -> Vector:
-    a, b, c = numbers
-    return (a, b, c)
-
-
-class NetworkDevice:
+class NetworkDevice(Driver):
     """A program that has said what its device can do."""
 
     def __init__(self, port: Port, features: NetworkFeatures) -> None:
         self._port = port
         self._sequence = 0
-        self._description = Description(
-            name=features.name or "Program",
-            identity=f"network:{port.number}",
-            kind=Kind.POSE,
-            buttons=tuple(f"Button {index + 1}" for index in range(features.buttons)),
-            dynamics=features.dynamics,
+        super().__init__(
+            Description(
+                name=features.name or "Program",
+                identity=f"network:{port.number}",
+                kind=Kind.POSE,
+                buttons=numbered_buttons(features.buttons),
+                dynamics=features.dynamics,
+            )
         )
-
-    @property
-    def description(self) -> Description:
-        """Who it is."""
-        return self._description
 
     def read(self) -> Sample | None:
         """The newest pose that came.
@@ -199,15 +166,10 @@ class NetworkDevice:
         Raises:
             DeviceLostError: the program is gone or silent.
         """
-        state = self._port.newest()
-        if state is None:
-            if self._port.silent:
-                raise DeviceLostError(self._description.name)
-            return None
-        return Sample(
-            *(time.perf_counter(), state.position, state.orientation, state.velocity),
-            *(state.angular_velocity, state.buttons, state.held),
-        )
+        sample = self._port.newest()
+        if sample is None and self._port.silent:
+            raise DeviceLostError(self.description.name)
+        return sample
 
     def send(self, force: Vector, torque: Vector) -> None:
         """Answer with a force."""
@@ -216,7 +178,7 @@ class NetworkDevice:
 
     def close(self) -> None:
         """Take force away; the port waits for the next program."""
-        self.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self.send(ZERO, ZERO)
         self._port.forget()
 
 
@@ -236,14 +198,13 @@ class Port:
         if self._stream:
             self._socket.listen(1)
         self.number: int = self._socket.getsockname()[1]
-        self._peer: socket.socket | None = None
+        self._peer: Stream | None = None
         self._address: tuple[str, int] | None = None
-        self._got = self._unsent = b""
         self._known: NetworkFeatures | None = None
         self._features: NetworkFeatures | None = None
-        self._state: NetworkState | None = None
+        self._sample: Sample | None = None
         self._answered = 0
-        self._heard = 0.0
+        self._last_packet = 0.0
         self._complained = ""
 
     def device(self) -> NetworkDevice | None:
@@ -258,33 +219,32 @@ class Port:
     @property
     def silent(self) -> bool:
         """Whether nothing has come for long."""
-        return time.perf_counter() - self._heard > _SILENCE
+        return time.perf_counter() - self._last_packet > _SILENCE
 
-    def newest(self) -> NetworkState | None:
+    def newest(self) -> Sample | None:
         """The newest pose since the last call."""
         self._fill()
-        state, self._state = self._state, None
-        return state
+        sample, self._sample = self._sample, None
+        return sample
 
     def answer(self, sequence: int, force: Vector, torque: Vector) -> None:
         """Send a force to whoever sent the last pose; lost ones are the watchdog's business."""
-        data = pack(Force(sequence, self._answered, _WATCHDOG, force, torque), self._key)
-        with contextlib.suppress(OSError):
-            if self._stream:
-                if self._peer is not None:
-                    # A program that does not read misses whole packets, never a part of one.
-                    if len(self._unsent) < len(data):
-                        self._unsent += data
-                    self._unsent = self._unsent[self._peer.send(self._unsent) :]
-            elif self._address is not None:
+        data = pack_force(sequence, self._answered, force, torque, self._key)
+        if self._peer is not None:
+            # A program that does not read misses whole packets, never a part of one.
+            if len(self._peer.unsent) < len(data):
+                self._peer.unsent += data
+            self._peer.flush()
+        elif self._address is not None:
+            with contextlib.suppress(OSError):
                 self._socket.sendto(data, self._address)
 
     def forget(self) -> None:
         """Be ready for another program."""
         if self._peer is not None:
             self._peer.close()
-        self._peer, self._address, self._got, self._unsent = None, None, b"", b""
-        self._features, self._state, self._known = None, None, None
+        self._peer = self._address = None
+        self._features = self._sample = self._known = None
 
     def close(self) -> None:
         """Close the port."""
@@ -313,8 +273,7 @@ class Port:
             except OSError:
                 return
             try:
-                packet = parse_datagram(data, self._key)
-                self._take(packet)
+                self._take(parse_datagram(data, self._key))
             except PacketError as error:
                 self._complain(error)
                 continue
@@ -326,23 +285,18 @@ class Port:
             self._accept()
         if self._peer is None:
             return
-        try:
-            data = self._peer.recv(65536)
-        except (BlockingIOError, InterruptedError):
-            data = None
-        except OSError:
-            data = b""
-        if data == b"":
+        if not self._peer.receive():
             self.forget()
-            self._heard = 0.0
+            self._last_packet = 0.0
             return
-        self._got += data or b""
-        while len(self._got) >= _HEAD.size:
-            size = size_of(self._got, self._key)
-            if len(self._got) < size:
+        got = self._peer.received
+        while len(got) >= HEAD.size:
+            size = size_of(got, self._key)
+            if len(got) < size:
                 return
-            packet, self._got = parse_datagram(self._got[:size], self._key), self._got[size:]
-            self._take(packet)
+            packet = bytes(got[:size])
+            del got[:size]
+            self._take(parse_datagram(packet, self._key))
 
     def _accept(self) -> None:
         try:
@@ -350,16 +304,11 @@ class Port:
         except OSError:
             return
         self.forget()
-        self._peer, self._heard = peer, time.perf_counter()
-        peer.settimeout(0.0)
-        peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._peer, self._last_packet = Stream(peer), time.perf_counter()
 
-    def _take(self, packet: Packet) -> None:
-        self._heard = time.perf_counter()
-        if isinstance(packet, NetworkFeatures):
-            if packet != self._known:  # some say it again and again, for it may get lost
-                self._features = packet
-        elif isinstance(packet, NetworkState):
-            self._state, self._answered = packet, packet.sequence
-        else:
-            raise PacketError("a force, which is ours to send")
+    def _take(self, packet: NetworkFeatures | NetworkState) -> None:
+        self._last_packet = time.perf_counter()
+        if isinstance(packet, NetworkState):
+            self._answered, self._sample = packet
+        elif packet != self._known:  # some say it again and again, for it may get lost
+            self._features = packet

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ..driver import Description, Dynamics, Kind, Sample
+from ..driver import Description, Driver, Dynamics, Kind, Sample
 from ..spatial import (
     IDENTITY,
     ZERO,
@@ -171,7 +171,7 @@ def _friction(velocity: Vector, viscous: float, dry: float) -> Vector:
     return scale(velocity, viscous + dry / max(speed, 1e-4))
 
 
-class SimulatedHand:
+class SimulatedHand(Driver):
     """The hand as a device, moving in real time."""
 
     def __init__(
@@ -181,18 +181,15 @@ class SimulatedHand:
         self.buttons = 0
         self._clock = clock
         self._last = clock()
-        self._description = Description(
-            name="Simulated hand",
-            identity="simulated",
-            kind=Kind.POSE,
-            buttons=("Grab", "Key"),
-            dynamics=self.hand.device,
+        super().__init__(
+            Description(
+                name="Simulated hand",
+                identity="simulated",
+                kind=Kind.POSE,
+                buttons=("Grab", "Key"),
+                dynamics=self.hand.device,
+            )
         )
-
-    @property
-    def description(self) -> Description:
-        """Who it is."""
-        return self._description
 
     def read(self) -> Sample | None:
         """Where the hand has got to."""

@@ -10,6 +10,8 @@ import socket
 import struct
 from typing import Final
 
+from ..stream import Stream
+
 _GUID: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 _MOST_BYTES: Final = 1_000_000
 _TEXT, _CLOSE, _PING, _PONG = 0x1, 0x8, 0x9, 0xA
@@ -53,7 +55,7 @@ class FrameReader:
         self._message = bytearray()
         self._opcode = 0
 
-    def feed(self, data: bytes) -> list[tuple[int, bytes]]:
+    def feed(self, data: bytes | bytearray) -> list[tuple[int, bytes]]:
         """Opcode and payload of the messages and control frames that are whole now.
 
         Raises:
@@ -105,11 +107,9 @@ class WebSocket:
     """A connection that sends and receives text, never waiting once it is open."""
 
     def __init__(self, connection: socket.socket, rest: bytes) -> None:
-        self._socket = connection
+        self._stream = Stream(connection)
         self._reader = FrameReader()
-        self._messages = [] if not rest else self._reader.feed(rest)
-        self._waiting = bytearray()
-        connection.settimeout(0.0)
+        self._messages = self._reader.feed(rest)
 
     @classmethod
     def connect(cls, host: str, port: int, seconds: float = 0.3) -> WebSocket:
@@ -129,7 +129,6 @@ class WebSocket:
         except OSError as error:
             raise WebSocketError("nobody is there") from error
         try:
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             connection.sendall(request.encode())
             return cls(connection, _read_upgrade(connection, key))
         except OSError as error:
@@ -145,7 +144,7 @@ class WebSocket:
         Raises:
             WebSocketError: the connection is gone.
         """
-        self._waiting += frame(_TEXT, text.encode(), os.urandom(4))
+        self._stream.unsent += frame(_TEXT, text.encode(), os.urandom(4))
         self._flush()
 
     def receive(self) -> list[str]:
@@ -155,43 +154,29 @@ class WebSocket:
             WebSocketError: the connection is gone, or broke the rules.
         """
         self._flush()
-        try:
-            while data := self._socket.recv(65536):
-                self._messages += self._reader.feed(data)
+        if not self._stream.receive():
             raise WebSocketError("the connection ended")
-        except (BlockingIOError, InterruptedError):
-            pass
-        except OSError as error:
-            raise WebSocketError("the connection ended") from error
-        messages, self._messages = self._messages, []
+        messages = self._messages + self._reader.feed(self._stream.received)
+        self._messages = []
+        self._stream.received.clear()
         texts: list[str] = []
         for opcode, payload in messages:
             if opcode == _TEXT:
                 texts.append(payload.decode(errors="replace"))
             elif opcode == _PING:
-                self._waiting += frame(_PONG, payload, os.urandom(4))
+                self._stream.unsent += frame(_PONG, payload, os.urandom(4))
             elif opcode == _CLOSE:
                 raise WebSocketError("the connection was closed")
         return texts
 
     def _flush(self) -> None:
-        while self._waiting:
-            try:
-                sent = self._socket.send(self._waiting)
-            except (BlockingIOError, InterruptedError):
-                return
-            except OSError as error:
-                raise WebSocketError("the connection ended") from error
-            del self._waiting[:sent]
+        if not self._stream.flush():
+            raise WebSocketError("the connection ended")
 
     def close(self) -> None:
         """Close the connection, politely if that does not wait."""
-        try:
-            self._waiting += frame(_CLOSE, b"\x03\xe8", os.urandom(4))
-            self._flush()
-        except WebSocketError:
-            pass
-        self._socket.close()
+        self._stream.unsent += frame(_CLOSE, b"\x03\xe8", os.urandom(4))
+        self._stream.close()
 
 
 def _read_upgrade(connection: socket.socket, key: bytes) -> bytes:

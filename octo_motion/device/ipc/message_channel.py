@@ -9,7 +9,6 @@ that does not is closed, and said in the log; nothing that it sends is looked at
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import hmac
 import logging
@@ -19,6 +18,7 @@ import struct
 import time
 from typing import Final
 
+from ..stream import Stream
 from .messages import HEADER, MAGIC, VERSION, Message, MessageError, pack, read_body, read_header
 
 log = logging.getLogger(__name__)
@@ -53,18 +53,14 @@ class MessageChannel:
     """Messages to and from one peer, never waiting."""
 
     def __init__(self, connection: socket.socket) -> None:
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        connection.settimeout(0.0)
-        self._socket = connection
-        self._got = bytearray()
-        self._waiting = bytearray()
+        self._stream = Stream(connection)
         self.most_waiting = _MOST_WAITING
         """Bytes that may wait for a peer which does not read; then it counts as gone."""
         self.closed = False
 
     def fileno(self) -> int:
         """For ``select``."""
-        return self._socket.fileno()
+        return self._stream.fileno()
 
     def send(self, message: Message, *, droppable: bool = False) -> bool:
         """Send a message, or keep it until the peer reads.
@@ -79,12 +75,12 @@ class MessageChannel:
         Raises:
             ChannelClosedError: the peer is gone, or has not read for very long.
         """
-        if droppable and len(self._waiting) > _DROPPABLE_BEYOND:
+        if droppable and len(self._stream.unsent) > _DROPPABLE_BEYOND:
             self.flush()
             return False
-        self._waiting += pack(message)
+        self._stream.unsent += pack(message)
         self.flush()
-        if len(self._waiting) > self.most_waiting:
+        if len(self._stream.unsent) > self.most_waiting:
             self.close()
             raise ChannelClosedError("the other side does not read")
         return True
@@ -93,15 +89,9 @@ class MessageChannel:
         """Send what waits, as far as the peer takes it."""
         if self.closed:
             raise ChannelClosedError
-        while self._waiting:
-            try:
-                sent = self._socket.send(self._waiting)
-            except (BlockingIOError, InterruptedError):
-                return
-            except OSError as error:
-                self.close()
-                raise ChannelClosedError from error
-            del self._waiting[:sent]
+        if not self._stream.flush():
+            self.close()
+            raise ChannelClosedError
 
     def receive(self) -> list[Message]:
         """All messages that have come whole.
@@ -109,9 +99,8 @@ class MessageChannel:
         Raises:
             ChannelClosedError: the peer is gone, or sent something that is no message.
         """
-        if self._waiting:
-            self.flush()
-        ended = self._fill()
+        self.flush()
+        goes_on = self._stream.receive()
         messages: list[Message] = []
         try:
             while (message := self._next()) is not None:
@@ -120,47 +109,30 @@ class MessageChannel:
             log.warning("Connection closed: %s", error)
             self.close()
             raise ChannelClosedError(str(error)) from error
-        if ended and not messages:
-            if self._got:
+        if not goes_on:
+            if self._stream.received:
                 log.warning("Connection ended in the middle of a message")
             self.close()
             raise ChannelClosedError
         return messages
 
-    def _fill(self) -> bool:
-        """Take what has come; whether the peer has ended."""
-        if self.closed:
-            raise ChannelClosedError
-        while True:
-            try:
-                data = self._socket.recv(262_144)
-            except (BlockingIOError, InterruptedError):
-                return False
-            except OSError:
-                return True
-            if not data:
-                return True
-            self._got += data
-
     def _next(self) -> Message | None:
-        if len(self._got) < HEADER.size:
+        got = self._stream.received
+        if len(got) < HEADER.size:
             return None
-        kind, length = read_header(bytes(self._got[: HEADER.size]))
+        kind, length = read_header(bytes(got[: HEADER.size]))
         end = HEADER.size + length
-        if len(self._got) < end:
+        if len(got) < end:
             return None
-        body = bytes(self._got[HEADER.size : end])
-        del self._got[:end]
+        body = bytes(got[HEADER.size : end])
+        del got[:end]
         return read_body(kind, body)
 
     def close(self) -> None:
         """End the line; what the peer has not got yet is tried once more."""
         if not self.closed:
             self.closed = True
-            if self._waiting:
-                with contextlib.suppress(OSError):
-                    self._socket.send(self._waiting)
-            self._socket.close()
+            self._stream.close()
 
 
 class Listener:

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bytes to and from one peer over TCP, never waiting."""
+
+from __future__ import annotations
+
+import socket
+from typing import Final
+
+_MOST_BYTES: Final = 262_144
+_MOST_READS: Final = 64
+"""In one call: whoever sends without end does not keep a loop from going on."""
+
+
+class Stream:
+    """A connection that is open, what has come over it, and what waits to be sent."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.settimeout(0.0)
+        self._socket = connection
+        self.received = bytearray()
+        """To be taken away by whoever reads it."""
+        self.unsent = bytearray()
+
+    def fileno(self) -> int:
+        """For ``select``."""
+        return self._socket.fileno()
+
+    def receive(self) -> bool:
+        """Take in what has come; False once the peer has ended and nothing more came."""
+        before = len(self.received)
+        for _ in range(_MOST_READS):
+            try:
+                data = self._socket.recv(_MOST_BYTES)
+            except (BlockingIOError, InterruptedError):
+                return True
+            except OSError:
+                data = b""
+            if not data:
+                return len(self.received) > before
+            self.received += data
+        return True
+
+    def flush(self) -> bool:
+        """Send what waits, as far as the peer takes it; False where the peer is gone."""
+        while self.unsent:
+            try:
+                sent = self._socket.send(self.unsent)
+            except (BlockingIOError, InterruptedError):
+                return True
+            except OSError:
+                return False
+            del self.unsent[:sent]
+        return True
+
+    def close(self) -> None:
+        """End the connection; what still waits is tried once more."""
+        self.flush()
+        self._socket.close()
