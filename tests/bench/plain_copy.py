@@ -13,7 +13,7 @@ import numpy as np
 from octo_motion.core.rotations import conjugate, multiply
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.clip.posture import sample_clip, slerp
-from octo_motion.core.splicing.clip.timing import splice_window
+from octo_motion.core.splicing.clip.splice_timing import splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.transfer.parts import part_bones
 from octo_motion.core.splicing.transfer.splice import Splice

@@ -165,7 +165,10 @@ def _run(frames: int) -> Result:
 
     places: dict[str, list[Place]] = {
         "read base and clips": [(stack, "read_clip")],
-        "match bones and landmarks": [(stack, "known_landmarks"), (stack, "carriers")],
+        "match bones and landmarks": [
+            (stack, "known_landmarks"),
+            (stack.Splice, "retargets"),
+        ],
         "compute": [(stack.Stack, "compute")],
         "values of the channels": [(clips, "rotation_channels"), (clips, "_location_channels")],
         "write keys": [(actions, "_write_curves")],

@@ -26,10 +26,13 @@ from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import Floats
 from octo_motion.core.splicing.clip.bvh_check import check_bvh
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.timing import Timing, splice_window
+from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
-from octo_motion.core.splicing.quality import (
+from octo_motion.core.splicing.transfer.parts import LEG, PARTS, part_bones
+from octo_motion.core.splicing.transfer.splice import Splice, spliced
+from tests.bench.plain_copy import plain_copy
+from tests.bench.splice_quality import (
     feet_at_rest,
     foot_slip,
     limb_length,
@@ -38,9 +41,8 @@ from octo_motion.core.splicing.quality import (
     seams,
     turn_error,
 )
-from octo_motion.core.splicing.transfer.parts import LEGS, PARTS, part_bones
-from octo_motion.core.splicing.transfer.splice import Splice, spliced
-from tests.bench.plain_copy import plain_copy
+
+LEGS = PARTS["legs"]
 
 EXAMPLES: Final = Path(__file__).resolve().parents[2] / "docs" / "examples" / "clips"
 PARTS_TOLD: Final = ("right_arm", "left_arm", "legs", "trunk", "head")
@@ -193,7 +195,7 @@ def measure(base: Take, other: Take) -> list[Measured]:
     ways: dict[str, Callable[[Splice], Clip]] = {
         "copied": lambda splice: plain_copy(whole, base.landmarks, splice),
         "direction": lambda splice: spliced(whole, base.landmarks, splice),
-        "exact": lambda splice: spliced(whole, base.landmarks, replace(splice, reach="exact")),
+        "exact": lambda splice: spliced(whole, base.landmarks, replace(splice, goal="exact")),
     }
     same = base.clip.skeleton.names == other.clip.skeleton.names and np.allclose(
         base.clip.skeleton.heads, other.clip.skeleton.heads, atol=1e-5
@@ -221,7 +223,7 @@ def measure(base: Take, other: Take) -> list[Measured]:
 
 def _slip(result: Clip, base: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
     """Millimetres per stance frame of the feet, on a body of 1.7 m."""
-    leg = result.scale * limb_length(result.skeleton, landmarks, "leg.L")
+    leg = result.scale * limb_length(result.skeleton, landmarks, LEG.limb_on("L"))
     if splice.part == LEGS:
         assert splice.landmarks is not None
         span = splice_window(splice.timing, base, splice.clip)

@@ -22,22 +22,17 @@ from octo_motion.core.rotations import (
 )
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.clip.posture import posture_of, sample_clip
-from octo_motion.core.splicing.clip.timing import Timing, splice_window
+from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.clip.unpose import unposed
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
-from octo_motion.core.splicing.quality import feet_at_rest, limb_length
 from octo_motion.core.splicing.transfer.body_frames import chest_frame, pelvis_frame
 from octo_motion.core.splicing.transfer.limb_rotation import SOFT
-from octo_motion.core.splicing.transfer.parts import (
-    LEFT_ARM,
-    LEGS,
-    PARTS,
-    RIGHT_ARM,
-    Part,
-    part_bones,
-)
-from octo_motion.core.splicing.transfer.splice import Reach, Splice, build_splices, spliced
+from octo_motion.core.splicing.transfer.parts import LEG, PARTS, Part, part_bones
+from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices, spliced
+from tests.bench.splice_quality import feet_at_rest, limb_length
+
+LEFT_ARM, LEGS, RIGHT_ARM = (PARTS[name] for name in ("left_arm", "legs", "right_arm"))
 
 # Blender's importer leaves the file open.
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
@@ -65,7 +60,7 @@ OTHERS = (
     "rigs_with_actions/KayKit_Knight.glb",
 )
 CLIPS = (*(f"secondlife/avatar_{name}.bvh" for name in SECOND_LIFE), *OTHERS)
-REACHES: tuple[Reach, ...] = ("direction", "exact")
+GOALS: tuple[LimbGoal, ...] = ("direction", "exact")
 
 
 def load(path: Path, frames: Any = None) -> tuple[Clip, Landmarks]:
@@ -110,9 +105,9 @@ def test_every_part_of_a_clip_on_itself_gives_the_clip_back(shared_data: SharedD
     clip, landmarks = load(shared_data(name))
     size, start = height(clip, landmarks), Timing(clip.frames[0], clip.frames[0])
     for part in PARTS.values():
-        for reach in REACHES:
+        for goal in GOALS:
             for clavicle in (False, True):
-                splice = Splice(part, clip, start, landmarks, reach, part == LEGS, clavicle)
+                splice = Splice(part, clip, start, landmarks, goal, part == LEGS, clavicle)
                 result = spliced(clip, landmarks, splice)
                 assert angle_between(result.rotations, clip.rotations).max() < 1e-4
                 assert np.abs(positions(result) - positions(clip)).max() < 1e-5 * size
@@ -135,9 +130,9 @@ def test_where_the_splice_clip_stands_and_faces_changes_nothing(shared_data: Sha
     world[:, :3, 3] += (1.0, 2.0, 3.0)
     away = replace(clip, rotations=rotations, locations=locations, world=world)
     for part in PARTS.values():
-        for reach in REACHES:
+        for goal in GOALS:
             results = [
-                spliced(base, landmarks, Splice(part, each, Timing(1, 1), marks, reach))
+                spliced(base, landmarks, Splice(part, each, Timing(1, 1), marks, goal))
                 for each in (clip, away)
             ]
             assert angle_between(results[0].rotations, results[1].rotations).max() < 1e-6
@@ -166,14 +161,14 @@ def test_bvh_fbx_and_gltf_of_a_motion_give_the_same(
     assert (lost > 1e-3 * size) == thinned
     same = on_skeleton_of(clip, other)
     for part in PARTS.values():
-        for reach in REACHES:
+        for goal in GOALS:
             for travel in {False, part == LEGS}:
                 ours, theirs, exactly = (
                     positions(
                         spliced(
                             base,
                             landmarks,
-                            Splice(part, each, Timing(1, each.frames[0]), mark, reach, travel),
+                            Splice(part, each, Timing(1, each.frames[0]), mark, goal, travel),
                         )
                     )
                     for each, mark in ((clip, marks), (other, others), (same, marks))
@@ -249,8 +244,8 @@ def test_the_hand_goes_past_the_chest_as_in_the_splice_clip(shared_data: SharedD
     clip, marks = load(shared_data(f"secondlife/avatar_{name}.bvh"))
     base = replace(repeated(walk, len(clip)), rate=clip.rate)
     wanted, arm = in_chest(clip, marks, "hand.R"), arm_length(clip, marks)
-    for reach in REACHES:
-        result = spliced(base, landmarks, Splice(RIGHT_ARM, clip, Timing(1, 1), marks, reach))
+    for goal in GOALS:
+        result = spliced(base, landmarks, Splice(RIGHT_ARM, clip, Timing(1, 1), marks, goal))
         missed = np.linalg.norm(in_chest(result, landmarks, "hand.R") - wanted, axis=-1)
         assert missed.max() < 1e-3 * arm
     # The source's joint is the shoulder: the hand's place is met where the arm is long enough, but
@@ -312,8 +307,8 @@ def test_nothing_pops_neither_at_straight_elbows_nor_at_seams(
 ):
     base, clip = load(shared_data(base_name)), load(shared_data(f"secondlife/avatar_{name}.bvh"))
     for part in (RIGHT_ARM, LEFT_ARM, LEGS):
-        for reach, clavicle in (("direction", False), ("exact", False), ("exact", True)):
-            how = {"part": part, "reach": reach, "clavicle": clavicle}
+        for goal, clavicle in (("direction", False), ("exact", False), ("exact", True)):
+            how = {"part": part, "goal": goal, "clavicle": clavicle}
             coarse, fine = largest_steps(base, clip, (60.0, 240.0), how)
             # A jump would be as large at four times the frames; smooth motion has a quarter.
             assert fine[0] < 0.5 * coarse[0]
@@ -335,8 +330,8 @@ def test_limbs_turn_hardly_faster_than_in_the_clips_they_are_made_from(
     shared_data: SharedData, base_name: str, name: str, part: Part
 ):
     base, clip = load(shared_data(base_name)), load(shared_data(name))
-    for reach in REACHES:
-        ((step, own),) = largest_steps(base, clip, (240.0,), {"part": part, "reach": reach})
+    for goal in GOALS:
+        ((step, own),) = largest_steps(base, clip, (240.0,), {"part": part, "goal": goal})
         # An elbow that has to reach further than the other one straightens faster; a pop is faster
         # by far, five times and more.
         assert step < 3.0 * own
@@ -354,7 +349,7 @@ def drifts(clip: Clip, landmarks: Landmarks, stances: list[tuple[int, int, int]]
     feet = np.stack(
         [positions(clip)[:, index[landmarks[f"foot.{side}"]], :2] for side in "LR"], axis=1
     )
-    leg = clip.scale * limb_length(skeleton, landmarks, "leg.L")
+    leg = clip.scale * limb_length(skeleton, landmarks, LEG.limb_on("L"))
     # Of a body of 1.7 m, legs are 0.82 m long.
     return np.array(
         [
@@ -382,10 +377,10 @@ def test_with_their_travel_feet_do_not_skate(shared_data: SharedData, base_name:
         stances += [(foot, a, b - 1) for a, b in edges.reshape(-1, 2) if b - a > 2]
     assert stances
     assert drifts(clip, marks, stances).max() < 0.015
-    for reach in REACHES:
+    for goal in GOALS:
         timing = Timing(0.0, clip.frames[0])
         along, without = (
-            spliced(fine, landmarks, Splice(LEGS, clip, timing, marks, reach, travel))
+            spliced(fine, landmarks, Splice(LEGS, clip, timing, marks, goal, travel))
             for travel in (True, False)
         )
         assert drifts(along, landmarks, stances).max() < 0.021
@@ -399,7 +394,11 @@ def test_a_clip_that_loops_has_no_pop_where_it_begins_again(shared_data: SharedD
     base, landmarks = load(shared_data("secondlife/avatar_walk.bvh"))
     clip, marks = load(shared_data(name))
     seconds = 2.6 * (clip.frames[-1] - clip.frames[0]) / clip.rate
-    for part, travel in ((RIGHT_ARM, False), (LEGS, False), (LEGS, True)):
+    for part, travel in (
+        (RIGHT_ARM, False),
+        (LEGS, False),
+        (LEGS, True),
+    ):
         jumps = []
         for ease in (0.0, 0.25):
             pace = 240.0

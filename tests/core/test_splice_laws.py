@@ -18,21 +18,26 @@ from octo_motion.core.rotations import (
 )
 from octo_motion.core.skeleton import Skeleton
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.timing import Timing
+from octo_motion.core.splicing.clip.splice_timing import Timing
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.transfer.limb_rotation import SOFT
 from octo_motion.core.splicing.transfer.parts import (
-    HEAD,
-    LEFT_ARM,
-    LEGS,
+    PART_TABLE,
     PARTS,
-    RIGHT_ARM,
-    TRUNK,
     Part,
+    PartKind,
     chain_part,
+    kind_bones,
     part_bones,
+    part_named,
 )
-from octo_motion.core.splicing.transfer.splice import Reach, Splice, Splicer, build_splices, spliced
+from octo_motion.core.splicing.transfer.splice import (
+    LimbGoal,
+    Splice,
+    Splicer,
+    build_splices,
+    spliced,
+)
 from tests.core.rigs import skeleton_of
 from tests.core.splice_bodies import (
     LANDMARKS,
@@ -44,9 +49,13 @@ from tests.core.splice_bodies import (
     turned_about,
 )
 
+HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK = (
+    PARTS[name] for name in ("head", "left_arm", "legs", "right_arm", "trunk")
+)
+
 seeds = st.integers(0, 2**31)
 parts = st.sampled_from(list(PARTS.values()))
-reaches = st.sampled_from(["direction", "exact"])
+goals = st.sampled_from(["direction", "exact"])
 few = settings(max_examples=40)
 
 FROM_START = Timing(1.0, 1.0)
@@ -57,28 +66,28 @@ def positions(clip: Clip) -> Floats:
 
 
 @few
-@given(seed=seeds, part=parts, reach=reaches, clavicle=st.booleans())
+@given(seed=seeds, part=parts, goal=goals, clavicle=st.booleans())
 def test_a_part_of_a_clip_on_itself_gives_the_clip_back(
-    seed: int, part: Part, reach: Reach, *, clavicle: bool
+    seed: int, part: Part, goal: LimbGoal, *, clavicle: bool
 ):
     random = np.random.default_rng(seed)
     clip = motion(random, humanoid(random))
-    for travel in {False, "leg" in part.name}:
-        splice = Splice(part, clip, FROM_START, LANDMARKS, reach, travel, clavicle)
+    for travel in {False, part.kind is not None and part.kind.travels}:
+        splice = Splice(part, clip, FROM_START, LANDMARKS, goal, travel, clavicle)
         result = spliced(clip, LANDMARKS, splice)
         assert angle_between(result.rotations, clip.rotations).max() < 1e-6
         assert np.abs(positions(result) - positions(clip)).max() < 1e-6
 
 
 @few
-@given(seed=seeds, part=parts, reach=reaches)
-def test_moving_and_turning_the_splice_clip_changes_nothing(seed: int, part: Part, reach: Reach):
+@given(seed=seeds, part=parts, goal=goals)
+def test_moving_and_turning_the_splice_clip_changes_nothing(seed: int, part: Part, goal: LimbGoal):
     random = np.random.default_rng(seed)
     base = motion(random, humanoid(random))
     clip = motion(random, humanoid(random, same_proportions=False))
     away = moved(clip, from_rotation_vector(random.normal(size=3)), random.normal(size=3))
     results = [
-        spliced(base, LANDMARKS, Splice(part, each, FROM_START, LANDMARKS, reach))
+        spliced(base, LANDMARKS, Splice(part, each, FROM_START, LANDMARKS, goal))
         for each in (clip, away)
     ]
     assert angle_between(results[0].rotations, results[1].rotations).max() < 1e-6
@@ -104,16 +113,16 @@ def test_travel_begins_where_the_base_stands_and_faces(seed: int, angle: float):
 
 
 @few
-@given(seed=seeds, part=parts, reach=reaches, posed_rest=st.booleans())
+@given(seed=seeds, part=parts, goal=goals, posed_rest=st.booleans())
 def test_axes_units_and_rest_pose_of_the_splice_file_change_nothing(
-    seed: int, part: Part, reach: Reach, *, posed_rest: bool
+    seed: int, part: Part, goal: LimbGoal, *, posed_rest: bool
 ):
     random = np.random.default_rng(seed)
     base = motion(random, humanoid(random), strength=0.4)
     clip = motion(random, base.skeleton, strength=0.4)
     other = in_another_file(random, clip, posed_rest=posed_rest)
     results = [
-        spliced(base, LANDMARKS, Splice(part, each, FROM_START, LANDMARKS, reach))
+        spliced(base, LANDMARKS, Splice(part, each, FROM_START, LANDMARKS, goal))
         for each in (clip, other)
     ]
     # Where a rest pose is a pose, nothing tells how an end bone was turned about itself.
@@ -124,9 +133,9 @@ def test_axes_units_and_rest_pose_of_the_splice_file_change_nothing(
 
 
 @few
-@given(seed=seeds, part=parts, reach=reaches)
+@given(seed=seeds, part=parts, goal=goals)
 def test_other_bones_keep_the_base_and_nothing_given_is_changed(
-    seed: int, part: Part, reach: Reach
+    seed: int, part: Part, goal: LimbGoal
 ):
     random = np.random.default_rng(seed)
     base = motion(random, humanoid(random))
@@ -137,7 +146,7 @@ def test_other_bones_keep_the_base_and_nothing_given_is_changed(
         for array in (each.rotations, each.locations, each.world, each.frames)
     ]
     timing = Timing(3.0, 2.0, length=7.0, ease_in=2.0, ease_out=2.0)
-    result = spliced(base, LANDMARKS, Splice(part, clip, timing, LANDMARKS, reach))
+    result = spliced(base, LANDMARKS, Splice(part, clip, timing, LANDMARKS, goal))
     changed = {base.skeleton.index[name] for name in part_bones(part, base.skeleton, LANDMARKS)}
     others = [bone for bone in range(len(base.skeleton)) if bone not in changed]
     assert np.array_equal(result.rotations[:, others], base.rotations[:, others])
@@ -153,12 +162,12 @@ def test_other_bones_keep_the_base_and_nothing_given_is_changed(
 
 
 @few
-@given(seed=seeds, reach=reaches)
-def test_the_hand_goes_through_the_chest_as_it_did_in_the_splice_clip(seed: int, reach: Reach):
+@given(seed=seeds, goal=goals)
+def test_the_hand_goes_through_the_chest_as_it_did_in_the_splice_clip(seed: int, goal: LimbGoal):
     random = np.random.default_rng(seed)
     skeleton = humanoid(random)
     base, clip = motion(random, skeleton), motion(random, skeleton)
-    result = spliced(base, LANDMARKS, Splice(RIGHT_ARM, clip, FROM_START, LANDMARKS, reach))
+    result = spliced(base, LANDMARKS, Splice(RIGHT_ARM, clip, FROM_START, LANDMARKS, goal))
     for bone in ("forearm.R", "hand.R", "finger.R"):
         assert np.allclose(relative(result, bone, "chest"), relative(clip, bone, "chest"))
 
@@ -194,7 +203,9 @@ def test_an_arm_that_does_not_hang_on_its_collar_bone_comes_without_it():
     for ours, theirs in ((base, loose), (loose, base)):
         with_it, without = (
             spliced(
-                ours, LANDMARKS, Splice(RIGHT_ARM, theirs, FROM_START, LANDMARKS, clavicle=each)
+                ours,
+                LANDMARKS,
+                Splice(RIGHT_ARM, theirs, FROM_START, LANDMARKS, clavicle=each),
             )
             for each in (True, False)
         )
@@ -316,3 +327,17 @@ def test_what_is_missing_is_told():
         spliced(clip, LANDMARKS, Splice(HEAD, clip, FROM_START, LANDMARKS, travel=True))
     with pytest.raises(ClipError, match="no bone 'tail'"):
         spliced(clip, None, Splice(chain_part("tail"), clip, FROM_START))
+
+
+def test_a_kind_of_part_that_the_skeleton_lacks_is_told_and_never_becomes_another():
+    skeleton = humanoid(np.random.default_rng(0))
+    wing = PartKind("wing", root="wing", below="chest", seen_from=("chest",))
+    with pytest.raises(ClipError, match="which bone is the wing"):
+        kind_bones(wing, "", skeleton, LANDMARKS, clavicle=True)
+    with pytest.raises(ClipError, match="no part 'wing'"):
+        part_named("wing")
+
+
+def test_the_table_keeps_its_order():
+    names = "right_arm left_arm legs trunk head right_leg left_leg chain"
+    assert [part.name for part in PART_TABLE][:8] == names.split()

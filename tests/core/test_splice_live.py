@@ -9,13 +9,17 @@ import pytest
 
 from octo_motion.core.rotations import angle_between
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.timing import After, Timing
+from octo_motion.core.splicing.clip.splice_timing import After, Timing
 from octo_motion.core.splicing.transfer import preview as live
 from octo_motion.core.splicing.transfer import splice
-from octo_motion.core.splicing.transfer.parts import HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK, Part
+from octo_motion.core.splicing.transfer.parts import PARTS, Part
 from octo_motion.core.splicing.transfer.preview import SplicePreview
 from octo_motion.core.splicing.transfer.splice import Splice, build_splices
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
+
+HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK = (
+    PARTS[name] for name in ("head", "left_arm", "legs", "right_arm", "trunk")
+)
 
 
 def clips(count: int, frames: int = 60) -> list[Clip]:
@@ -53,7 +57,13 @@ def test_other_splices_below_and_above_count() -> None:
         Splice(LEGS, one, first, LANDMARKS),
         Splice(LEGS, two, Timing(20.0, 1.0, ease_in=9.0), LANDMARKS, travel=True),
         Splice(RIGHT_ARM, three, first, LANDMARKS, "exact"),
-        Splice(LEGS, three, Timing(30.0, 4.0, length=15.0, ease_out=6.0), LANDMARKS, travel=True),
+        Splice(
+            LEGS,
+            three,
+            Timing(30.0, 4.0, length=15.0, ease_out=6.0),
+            LANDMARKS,
+            travel=True,
+        ),
     ]
     for number in range(4):
         assert_same(stack, number, base, replace(stack[number].timing, base_start=12.0))
@@ -68,19 +78,19 @@ def test_a_look_matches_no_bones_and_takes_few_frames(monkeypatch: pytest.Monkey
     ]
     looked_at = SplicePreview(base, LANDMARKS, stack, 0)
     widths: list[int] = []
-    carry = splice.carry
+    write = splice.write_retargeted
 
     def watched(
-        piece: Any, before: Any, moment: Any, turned: Any, *rest: Any, **named: Any
+        retarget: Any, before: Any, moment: Any, turned: Any, *rest: Any, **named: Any
     ) -> None:
         widths.append(len(turned))
-        carry(piece, before, moment, turned, *rest, **named)
+        write(retarget, before, moment, turned, *rest, **named)
 
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("bones are matched again")
 
-    monkeypatch.setattr(splice, "carry", watched)
-    monkeypatch.setattr(splice, "carriers", refuse)
+    monkeypatch.setattr(splice, "write_retargeted", watched)
+    monkeypatch.setattr(splice, "find_retargets", refuse)
     monkeypatch.setattr(live, "splicers", refuse)
     for start in (100.0, 250.0, 598.0):
         looked_at.at(600.0, replace(timing, base_start=start))

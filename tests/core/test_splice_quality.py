@@ -10,8 +10,11 @@ from hypothesis import strategies as st
 
 from octo_motion.core.rotations import Floats, from_rotation_vector, multiply, rotate
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.timing import Timing
-from octo_motion.core.splicing.quality import (
+from octo_motion.core.splicing.clip.splice_timing import Timing
+from octo_motion.core.splicing.transfer.parts import ARM, PARTS, Part
+from octo_motion.core.splicing.transfer.splice import Splice, spliced
+from tests.bench.plain_copy import plain_copy
+from tests.bench.splice_quality import (
     Seam,
     feet_at_rest,
     foot_slip,
@@ -22,9 +25,6 @@ from octo_motion.core.splicing.quality import (
     seams,
     turn_error,
 )
-from octo_motion.core.splicing.transfer.parts import HEAD, LEGS, PARTS, RIGHT_ARM, TRUNK, Part
-from octo_motion.core.splicing.transfer.splice import Splice, spliced
-from tests.bench.plain_copy import plain_copy
 from tests.core.splice_bodies import (
     LANDMARKS,
     humanoid,
@@ -33,6 +33,8 @@ from tests.core.splice_bodies import (
     moved,
     turned_about,
 )
+
+HEAD, LEGS, RIGHT_ARM, TRUNK = (PARTS[name] for name in ("head", "legs", "right_arm", "trunk"))
 
 SMOOTHEST = -np.log(720.0 / 1.875**2)
 """Of the way from rest to rest with the least jerk: 720 is its jerk's integral, 1.875 its highest
@@ -110,7 +112,7 @@ def test_a_clip_misses_itself_by_nothing(part: Part) -> None:
         turn_error(clip, LANDMARKS, splice),
     )
     assert all(len(each) == len(clip) for each in errors)
-    assert sum(each.shape[1] for each in errors) == len(splice.part.pieces)
+    assert sum(each.shape[1] for each in errors) == len(splice.part.sides)
     assert all(np.abs(each).max(initial=0.0) < 1e-6 for each in errors)
 
 
@@ -130,7 +132,7 @@ def test_an_arm_that_hangs_instead_of_pointing_aside_misses_by_the_root_of_two()
     quarter = multiply(multiply(inverse, turned_about((0.0, 1.0, 0.0), -0.5 * np.pi)), arm)
     hanging = turned(straight, "upper_arm.R", quarter)
     splice = Splice(RIGHT_ARM, hanging, Timing(1.0, 1.0), LANDMARKS)
-    assert limb_length(skeleton, LANDMARKS, "arm.R") == pytest.approx(0.6)
+    assert limb_length(skeleton, LANDMARKS, ARM.limb_on("R")) == pytest.approx(0.6)
     assert path_error(straight, LANDMARKS, splice) == pytest.approx(np.sqrt(2.0))
 
 
@@ -148,8 +150,8 @@ def test_a_hand_is_out_of_reach_by_what_the_arm_is_too_short() -> None:
     splice = replace(splice, clip=wide)
     beyond = out_of_reach(clip, LANDMARKS, splice)
     assert beyond.max() > 0.1
-    for reach in ("direction", "exact"):
-        result = spliced(clip, LANDMARKS, replace(splice, reach=reach))
+    for goal in ("direction", "exact"):
+        result = spliced(clip, LANDMARKS, replace(splice, goal=goal))
         left = out_of_reach(result, LANDMARKS, splice)
         assert (path_error(result, LANDMARKS, splice) >= left - 1e-9).all()
 

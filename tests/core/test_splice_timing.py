@@ -8,7 +8,7 @@ import pytest
 
 from octo_motion.core.errors import ClipError
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.timing import Timing, splice_window
+from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.transfer.timing_suggestions import suggest_timings
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
 

@@ -19,7 +19,7 @@ from .splice_list import (
     OCTO_MOTION_UL_splices,
     active_splice,
 )
-from .stack import ARM_PARTS, LEG_PARTS
+from .splice_properties import part_kind
 
 
 class _Panel(ArmaturePanel):
@@ -87,12 +87,13 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
     def show(self, layout: Any, settings: Any) -> None:
         item = active_splice(settings)
         layout.prop(item, "part")
-        if item.part == "CHAIN":
+        kind = part_kind(item)
+        if kind is None:
             layout.prop_search(item, "bone", settings.id_data.data, "bones")
         source = layout.column()
         source.alert = item.source is None
         source.prop(item, "source")
-        if item.part == "CHAIN" and item.source is not None:
+        if kind is None and item.source is not None:
             layout.prop_search(item, "source_bone", item.source.data, "bones")
         _draw_action(layout, item, "action", "slot")
         if item.source is None or item.action is None:
@@ -100,12 +101,14 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
         elif not item.source.users_scene:
             layout.label(text="Deleted, kept for this splice", icon="INFO")
         layout.prop(item, "visual")
-        if item.part != "CHAIN":
-            layout.row().prop(item, "mode", expand=True)
-        if item.part in ARM_PARTS:
+        if kind is None:
+            return
+        layout.row().prop(item, "mode", expand=True)
+        if kind.clavicle:
             layout.prop(item, "with_clavicle")
-        if item.part in LEG_PARTS:
+        if kind.travels:
             layout.prop(item, "with_travel")
+        if len(kind.seen_from) > 1:
             seen = layout.row()
             seen.active = not item.with_travel
             seen.prop(item, "seen_from", expand=True)

@@ -20,17 +20,12 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
 from ..override_flags import OVERRIDE, OVERRIDE_LIST
 
-PARTS: Final = (
-    ("RIGHT_ARM", "Right Arm", "From the right collar bone or shoulder to the fingers", 0),
-    ("LEFT_ARM", "Left Arm", "From the left collar bone or shoulder to the fingers", 1),
-    ("LEGS", "Legs", "Both legs", 2),
-    ("TRUNK", "Trunk", "From above the pelvis to the chest", 3),
-    ("HEAD", "Head", "Neck and head", 4),
-    ("RIGHT_LEG", "Right Leg", "From the right hip to the toes", 5),
-    ("LEFT_LEG", "Left Leg", "From the left hip to the toes", 6),
-    ("CHAIN", "Chain", "A bone and all beneath it: a tail, an octopus arm", 7),
+PARTS: Final = tuple(
+    (part.name.upper(), part.title, part.description, number)
+    for number, part in enumerate(PART_TABLE)
 )
 
 AFTER: Final = (
@@ -54,6 +49,12 @@ SEEN_FROM: Final = (
         1,
     ),
 )
+
+
+def part_kind(item: Any) -> PartKind | None:
+    """What a splice's part is, ``None`` for a chain."""
+    name = item.part.lower()
+    return None if name == CHAIN.name else part_named(name).kind
 
 
 def _is_armature(_: Any, candidate: bpy.types.Object) -> bool:

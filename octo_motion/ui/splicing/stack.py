@@ -28,42 +28,33 @@ from ...core.errors import ClipError, WriteError
 from ...core.splicing.clip import After, Clip, Timing, splice_window
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL, Landmarks, map_skeleton
 from ...core.splicing.transfer import (
-    PARTS,
+    CHAIN,
+    LimbGoal,
+    MappedClip,
     Part,
-    Reach,
-    SeenFrom,
-    Side,
     Splice,
     Suggestion,
     build_splices,
-    carriers,
     chain_part,
     part_bones,
+    part_named,
     suggest_timings,
 )
 from ..plain import plain
 from .landmark_properties import read_landmarks, write_landmarks
 from .properties import OCTO_MOTION_PG_splicing, splicing_settings
 
-ARM_PARTS: Final = frozenset({"RIGHT_ARM", "LEFT_ARM"})
-"""Parts that may begin at the collar bone."""
-
 _FINER: Final = 4
 """Samples per frame of a clip that is slowed down, …"""
 _MOST: Final = 20_000
 """… and how many of them at most."""
 
-LEG_PARTS: Final = frozenset({"LEGS", "RIGHT_LEG", "LEFT_LEG"})
-"""Parts that can bring their travel along."""
-
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class Source(MappedClip):
     """A clip with what is known of its skeleton."""
 
     armature: str
-    clip: Clip
-    landmarks: Landmarks | None
     problem: str
     """Why there are no landmarks."""
     found: bool
@@ -217,7 +208,8 @@ class ClipReader:
                 count = finer * (len(clip) - 1) + 1
                 frames = np.linspace(clip.frames[0], clip.frames[-1], count)
                 clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
-            self._sources[key] = Source(armature.name, clip, *known_landmarks(armature))
+            landmarks, problem, found = known_landmarks(armature)
+            self._sources[key] = Source(clip, landmarks, armature.name, problem, found)
         return self._sources[key]
 
 
@@ -257,15 +249,6 @@ def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, 
 def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
     source = reader.item(item)
     part = _part(item, base, source)
-    how = _How(
-        clavicle=item.with_clavicle,
-        seen_from=cast("SeenFrom", item.seen_from.lower() if item.part in LEG_PARTS else ""),
-        # The panel offers it for legs alone.
-        travel=item.with_travel and item.part in LEG_PARTS,
-    )
-    if part.pieces:
-        for each in (base, source):
-            _check_landmarks(part, each, how)
     splice = Splice(
         part=part,
         clip=source.clip,
@@ -279,37 +262,24 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
             after=cast("After", item.after.lower()),
         ),
         landmarks=source.landmarks,
-        reach=cast("Reach", item.mode.lower()),
-        travel=how.travel,
-        clavicle=how.clavicle,
-        seen_from=how.seen_from,
+        goal=cast("LimbGoal", item.mode.lower()),
+        # The panel offers it for legs alone.
+        travel=item.with_travel and part.kind is not None and part.kind.travels,
+        clavicle=item.with_clavicle,
+        seen_from=item.seen_from.lower(),
     )
+    if part.kind is not None:
+        for each in (base, source):
+            _check_landmarks(splice, each)
     # What only both together can tell.
-    how.check(part, *_sides(base, source))
+    splice.retargets(base)
     return splice
 
 
-@dataclass(frozen=True)
-class _How:
-    """What of a splice's settings decides which bones it needs."""
-
-    clavicle: bool
-    seen_from: SeenFrom
-    travel: bool
-
-    def check(self, part: Part, base: Side, source: Side) -> None:
-        """Raise if a bone is missing."""
-        seen_from = "pelvis" if self.travel else self.seen_from
-        carriers(part, base, source, clavicle=self.clavicle, seen_from=seen_from)
-
-
-def _sides(base: Source, source: Source) -> tuple[Side, Side]:
-    return Side(base.clip, base.landmarks), Side(source.clip, source.landmarks)
-
-
 def _part(item: Any, base: Source, source: Source) -> Part:
-    if item.part != "CHAIN":
-        return PARTS[item.part.lower()]
+    name = item.part.lower()
+    if name != CHAIN.name:
+        return part_named(name)
     if not item.bone:
         raise ClipError(
             f"The chain of splice '{item.name}' has no first bone.",
@@ -326,7 +296,7 @@ def _part(item: Any, base: Source, source: Source) -> Part:
     return part
 
 
-def _check_landmarks(part: Part, source: Source, how: _How) -> None:
+def _check_landmarks(splice: Splice, source: Source) -> None:
     """Ask for what cannot be told, with the name of whose it is."""
     remedy = (
         f"Make '{source.armature}' active, click Find Landmarks in the panel Splicing > Landmarks "
@@ -334,9 +304,8 @@ def _check_landmarks(part: Part, source: Source, how: _How) -> None:
     )
     if source.landmarks is None:
         raise ClipError(f"'{source.armature}' has no landmarks. {source.problem}", remedy)
-    side = Side(source.clip, source.landmarks)
     try:
-        how.check(part, side, side)
+        replace(splice, clip=source.clip, landmarks=source.landmarks).retargets(source)
     except ClipError as error:
         known = source.landmarks.bones
         bones = source.clip.skeleton.index
@@ -453,7 +422,7 @@ def _held(base: Source, splice: Splice) -> list[str]:
     """Bones of a splice that constraints or drivers move, of a body those that are landmarks."""
     skeleton, part = base.clip.skeleton, splice.part
     bones = _changed(base, splice)
-    if part.pieces and base.landmarks is not None:
+    if part.kind is not None and base.landmarks is not None:
         # Rigs have machinery beneath them that is to follow.
         known = set(base.landmarks.bones.values())
         bones = tuple(each for each in bones if each in known)

@@ -5,7 +5,7 @@ from .bvh_check import check_bvh
 from .clip import Clip
 from .posture import Posture, posture_of, sample_clip, sample_scales, sample_world, slerp
 from .scaled_pose import without_scale
-from .timing import After, SpliceWindow, Timing, splice_window, window_middle
+from .splice_timing import After, SpliceWindow, Timing, splice_window, window_middle
 from .unpose import orientations_of, unposed
 
 __all__ = [

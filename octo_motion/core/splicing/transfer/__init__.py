@@ -1,31 +1,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A part of one clip carried over to another."""
 
-from .body_frames import AnatomicalFrame, chest_frame, laid_over, pelvis_frame
-from .carry import Side, carriers
-from .parts import PARTS, Part, bones_beneath, chain_part, landmark_bone, part_bones
+from .parts import (
+    CHAIN,
+    PART_TABLE,
+    Part,
+    PartKind,
+    bones_beneath,
+    chain_part,
+    part_bones,
+    part_named,
+)
 from .preview import SplicePreview
-from .splice import Reach, SeenFrom, Splice, build_splices
+from .retarget import MappedClip
+from .splice import LimbGoal, Splice, build_splices
 from .timing_suggestions import Suggestion, suggest_timings
 
 __all__ = [
-    "PARTS",
-    "AnatomicalFrame",
+    "CHAIN",
+    "PART_TABLE",
+    "LimbGoal",
+    "MappedClip",
     "Part",
-    "Reach",
-    "SeenFrom",
-    "Side",
+    "PartKind",
     "Splice",
     "SplicePreview",
     "Suggestion",
     "bones_beneath",
     "build_splices",
-    "carriers",
     "chain_part",
-    "chest_frame",
-    "laid_over",
-    "landmark_bone",
     "part_bones",
-    "pelvis_frame",
+    "part_named",
     "suggest_timings",
 ]

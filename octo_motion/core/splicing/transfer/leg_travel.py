@@ -27,8 +27,8 @@ from ...rotations import (
 from ..clip import Clip, Posture, SpliceWindow, sample_clip, sample_world, slerp
 from ..humanoid import chain_length
 from .body_frames import AnatomicalFrame
-from .carry import Carrier, Side
-from .parts import landmark_bone
+from .parts import LEG, landmark_bone
+from .retarget import MappedClip, Retarget
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _LEVEL: Final = np.array([1.0, 1.0, 0.0])
@@ -49,19 +49,19 @@ class LegTravel:
     """What of the way through the world does not hang on its timing.
 
     Args:
-        carrier: a leg, seen from the pelvis.
+        retarget: of a leg, seen from the pelvis.
         ground: height of the ground on which the base stands, world units.
 
     Raises:
         ClipError: the base's hips cannot leave their parent.
     """
 
-    def __init__(self, carrier: Carrier, ground: float) -> None:
-        self._carrier = carrier
+    def __init__(self, retarget: Retarget, ground: float) -> None:
+        self._retarget = retarget
         self._ground = ground
-        self._other_ground = ground_height(carrier.splice)
-        ours, theirs = carrier.base, carrier.splice
-        skeleton, hips = ours.skeleton, carrier.frames[0].bone
+        self._other_ground = ground_height(retarget.splice)
+        ours, theirs = retarget.base, retarget.splice
+        skeleton, hips = ours.skeleton, retarget.frames[0].bone
         if skeleton.connected[hips] and skeleton.parents[hips] >= 0:
             name, parent = skeleton.names[hips], skeleton.names[skeleton.parents[hips]]
             raise ClipError(
@@ -82,7 +82,7 @@ class LegTravel:
             rotations: (frames, bones, 4) of them, to be changed.
             locations: (frames, bones, 3), likewise.
         """
-        ours = self._carrier.frames[0]
+        ours = self._retarget.frames[0]
         own = _path(clip, ours, base, clip.frames)
         path = self._path(span)
         first, last = span.frames.start, span.frames.stop - 1
@@ -109,7 +109,7 @@ class LegTravel:
 
     def _path(self, span: SpliceWindow) -> _Path:
         """The splice's pelvis through the world, round after round where it loops."""
-        clip, frame = self._carrier.splice.clip, self._carrier.frames[1]
+        clip, frame = self._retarget.splice.clip, self._retarget.frames[1]
         path = _path(clip, frame, sample_clip(clip, span.splice_frames), span.splice_frames)
         if not (span.rounds.any() or span.seams.any()):
             return path
@@ -175,21 +175,21 @@ def _heading(goal: Floats, start: Floats) -> Floats:
     return from_axis_angle(_UP, 2.0 * np.arctan2(between[3], between[0]))
 
 
-def _leg(side: Side) -> float:
+def _leg(mapped: MappedClip) -> float:
     """Length of the legs, armature units."""
-    names = ("thigh", "shin", "foot")
-    marks = side.humanoid()
+    marks = mapped.humanoid()
     return 0.5 * sum(
         chain_length(
-            side.skeleton, [landmark_bone(side.skeleton, marks, f"{name}.{left}") for name in names]
+            mapped.skeleton,
+            [landmark_bone(mapped.skeleton, marks, name) for name in LEG.limb_on(side)],
         )
-        for left in "LR"
+        for side in "LR"
     )
 
 
-def ground_height(side: Side) -> float:
+def ground_height(mapped: MappedClip) -> float:
     """Height of the lowest point that a foot reaches in a clip, world units."""
-    clip, marks = side.clip, side.humanoid()
+    clip, marks = mapped.clip, mapped.humanoid()
     count = min(len(clip), _GROUND_SAMPLES)
     chosen = clip.frames[np.linspace(0, len(clip) - 1, count).astype(np.intp)]
     posture = sample_clip(clip, chosen)

@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from ...easing import smooth_step
 from ...rotations import (
     Floats,
     conjugate,
@@ -85,7 +86,7 @@ def joint_turn(limb: LimbTriangle, wanted: LimbTriangle) -> Floats:
     sine = np.sum(cross(normal, other) * goal, axis=-1)
     angle = np.arctan2(sine, np.sum(normal * other, axis=-1))
     # It has faded out long before half a turn, where the way round would jump.
-    trust = _smooth((_DISAGREES - np.abs(angle)) / (_DISAGREES - _AGREES))
+    trust = smooth_step((_DISAGREES - np.abs(angle)) / (_DISAGREES - _AGREES))
     share = np.minimum(_bend(limb), _bend(wanted)) * trust
     return multiply(from_axis_angle(goal, angle * share), aimed)
 
@@ -122,7 +123,7 @@ def bend_to_reach(
     across = normalized(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
     plane = normal / np.maximum(upper * lower, 1e-12)[:, None]
     missing = np.maximum(np.sin(_STRAIGHT) - np.linalg.norm(plane, axis=-1), 0.0)
-    missing = missing * _smooth(np.abs(bend - now) / _MOVED)
+    missing = missing * smooth_step(np.abs(bend - now) / _MOVED)
     axis = normalized(plane + missing[:, None] * across)
     straight = ~np.any(axis, axis=-1)
     axis[straight] = across[straight]
@@ -171,7 +172,7 @@ def _wanted_bend(
     ends = np.maximum(1.0 - now / np.maximum(straight, 1e-12), (now - _TIGHT) / (np.pi - _TIGHT))
     span = soft * np.clip(ends, 0.0, 1.0)
     off = np.abs(distance - np.linalg.norm(limb.hand - limb.joint, axis=-1))
-    own = 1.0 - _smooth(off / np.maximum(span, 1e-9 * (upper + lower)))
+    own = 1.0 - smooth_step(off / np.maximum(span, 1e-9 * (upper + lower)))
     return own * now + (1.0 - own) * bend
 
 
@@ -211,11 +212,6 @@ def _bend(limb: LimbTriangle) -> Floats:
 
 def _told(bend: Floats, bent: float) -> Floats:
     """0 … 1: how much a bend (frames,) says, if one as large as ``bent`` says all."""
-    opened = _smooth((bend - _STRAIGHT) / (bent - _STRAIGHT))
+    opened = smooth_step((bend - _STRAIGHT) / (bent - _STRAIGHT))
     shut = np.pi - _STRAIGHT
-    return np.minimum(opened, _smooth((shut - bend) / (shut - _FOLDED)))
-
-
-def _smooth(share: Floats) -> Floats:
-    bounded = np.clip(share, 0.0, 1.0)
-    return bounded * bounded * (3.0 - 2.0 * bounded)
+    return np.minimum(opened, smooth_step((shut - bend) / (shut - _FOLDED)))

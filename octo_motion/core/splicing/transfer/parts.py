@@ -1,15 +1,73 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parts of a body that can be spliced: sets of bones with one joint to all the rest."""
+"""The parts of a body that can be spliced: sets of bones with one joint to all the rest.
+
+:data:`PART_TABLE` is the one place that says which there are: panel, command line and tests read
+it. docs/extending.md tells how to add a row.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, Literal
 
 from ...errors import ClipError
 from ...skeleton import Skeleton
 from ..humanoid import Landmarks
+
+SeenFrom = Literal["", "chest", "pelvis"]
+
+
+@dataclass(frozen=True)
+class PartKind:
+    """How a part is found on a skeleton and seen from the body, the same for left and right."""
+
+    name: str
+    """For messages."""
+    root: str
+    """Landmark of the bone with which the part begins, without its side."""
+    seen_from: tuple[SeenFrom, ...]
+    """Frames of the body from which it can be seen [Splice, 2.1]; the first one unless asked
+    otherwise."""
+    below: str = ""
+    """Landmark of the bone on which the part hangs, if it begins farther up than with its root:
+    with the first bone on the way there."""
+    limb: tuple[str, str, str] | None = None
+    """Landmarks of joint, elbow (knee) and hand (foot), without their side, of what points
+    somewhere [Splice, 2.2]; a part without takes over how the splice clip's is turned."""
+    clavicle: str = ""
+    """Landmark of the bone that may come along above the root."""
+    travels: bool = False
+    """Whether it can bring the splice clip's way through the world with it."""
+    spine: bool = False
+    """Whether it ends with its root, and is matched along its length, whatever the numbers of its
+    bones, so that the chest comes to lie as it does in the splice clip."""
+
+    def frame(self, asked: SeenFrom) -> SeenFrom:
+        """The frame from which such a part is seen if one is asked for, "" for the usual."""
+        return asked if asked in self.seen_from else self.seen_from[0]
+
+    def limb_on(self, side: str) -> tuple[str, ...]:
+        """Landmarks of joint, elbow and hand on a side; none of a part that is no limb."""
+        return tuple(sided(name, side) for name in self.limb or ())
+
+
+ARM: Final = PartKind(
+    "arm",
+    root="upper_arm",
+    seen_from=("chest",),
+    limb=("upper_arm", "forearm", "hand"),
+    clavicle="clavicle",
+)
+LEG: Final = PartKind(
+    "leg",
+    root="thigh",
+    seen_from=("pelvis", "chest"),
+    limb=("thigh", "shin", "foot"),
+    travels=True,
+)
+TRUNK: Final = PartKind("trunk", root="chest", below="hips", seen_from=("pelvis",), spine=True)
+HEAD: Final = PartKind("head", root="head", below="chest", seen_from=("chest",))
 
 
 @dataclass(frozen=True)
@@ -17,30 +75,66 @@ class Part:
     """What to splice. A part of a humanoid, or any chain of bones."""
 
     name: str
-    pieces: tuple[str, ...]
-    """"arm.L", "arm.R", "leg.L", "leg.R", "trunk", "head"; empty for a chain."""
+    """In capitals the identifier in Blender's files."""
+    title: str
+    """In the panel."""
+    description: str
+    """In the panel's tooltip."""
+    kind: PartKind | None = None
+    """None for a chain."""
+    sides: tuple[str, ...] = ("",)
+    """"L", "R" or both; "" on the mid plane. Each has a joint of its own."""
     root: str = ""
     """Of a chain: its first bone on the base's skeleton; all beneath belongs to it."""
     splice_root: str = ""
     """The same on the splice clip's skeleton, if it has another name there."""
 
 
-RIGHT_ARM: Final = Part("right_arm", ("arm.R",))
-LEFT_ARM: Final = Part("left_arm", ("arm.L",))
-LEGS: Final = Part("legs", ("leg.L", "leg.R"))
-TRUNK: Final = Part("trunk", ("trunk",))
-HEAD: Final = Part("head", ("head",))
-LEFT_LEG: Final = Part("left_leg", ("leg.L",))
-RIGHT_LEG: Final = Part("right_leg", ("leg.R",))
+CHAIN: Final = Part("chain", "Chain", "A bone and all beneath it: a tail, an octopus arm")
 
-PARTS: Final = {
-    part.name: part for part in (RIGHT_ARM, LEFT_ARM, LEGS, TRUNK, HEAD, LEFT_LEG, RIGHT_LEG)
-}
+PART_TABLE: Final = (
+    Part(
+        "right_arm",
+        "Right Arm",
+        "From the right collar bone or shoulder to the fingers",
+        ARM,
+        ("R",),
+    ),
+    Part(
+        "left_arm", "Left Arm", "From the left collar bone or shoulder to the fingers", ARM, ("L",)
+    ),
+    Part("legs", "Legs", "Both legs", LEG, ("L", "R")),
+    Part("trunk", "Trunk", "From above the pelvis to the chest", TRUNK),
+    Part("head", "Head", "Neck and head", HEAD),
+    Part("right_leg", "Right Leg", "From the right hip to the toes", LEG, ("R",)),
+    Part("left_leg", "Left Leg", "From the left hip to the toes", LEG, ("L",)),
+    CHAIN,
+)
+"""All parts, in the panel's order. Blender's files keep a part by its place: new rows go last."""
+
+PARTS: Final = {part.name: part for part in PART_TABLE if part.kind is not None}
+"""Parts of a humanoid, by name."""
 
 
 def chain_part(root: str, splice_root: str = "") -> Part:
     """A bone and all beneath it: a tail, an octopus arm."""
-    return Part(root, (), root, splice_root or root)
+    return replace(CHAIN, name=root, root=root, splice_root=splice_root or root)
+
+
+def part_named(name: str) -> Part:
+    """A part of a humanoid.
+
+    Raises:
+        ClipError: there is none of this name.
+    """
+    if name not in PARTS:
+        raise ClipError(f"There is no part '{name}'.", f"Choose one of: {', '.join(PARTS)}.")
+    return PARTS[name]
+
+
+def sided(landmark: str, side: str) -> str:
+    """A landmark on a side ("L", "R"), or on the mid plane ("")."""
+    return f"{landmark}.{side}" if side else landmark
 
 
 def bone_of(skeleton: Skeleton, name: str) -> int:
@@ -105,32 +199,35 @@ def part_bones(
     Raises:
         ClipError: a bone or landmark that the part needs is missing.
     """
-    found: set[int] = set()
-    for piece in part.pieces:
+    if part.kind is None:
+        found = set(bones_beneath(skeleton, [bone_of(skeleton, part.root)]))
+    else:
         assert landmarks is not None
-        found |= set(piece_bones(piece, skeleton, landmarks, clavicle=clavicle))
-    if part.root:
-        found |= set(bones_beneath(skeleton, [bone_of(skeleton, part.root)]))
+        sides = (
+            kind_bones(part.kind, side, skeleton, landmarks, clavicle=clavicle)
+            for side in part.sides
+        )
+        found = set[int]().union(*sides)
     return tuple(skeleton.names[bone] for bone in sorted(found))
 
 
-def piece_bones(
-    piece: str, skeleton: Skeleton, landmarks: Landmarks, *, clavicle: bool
+def kind_bones(
+    kind: PartKind, side: str, skeleton: Skeleton, landmarks: Landmarks, *, clavicle: bool
 ) -> list[int]:
-    """Indices of the bones of one piece, parents first; its joint is the first bone's."""
+    """Indices of the bones on one side, parents first; their joint is the first bone's.
+
+    Raises:
+        ClipError: the skeleton has no such part, or it does not hang where it should.
+    """
 
     def bone(*choices: str) -> int:
-        return landmark_bone(skeleton, landmarks, *choices)
+        return landmark_bone(skeleton, landmarks, *(sided(each, side) for each in choices))
 
-    kind, _, side = piece.partition(".")
-    if kind == "arm":
-        first = (f"clavicle.{side}",) if clavicle else ()
-        return bones_beneath(skeleton, [bone(*first, f"upper_arm.{side}")])
-    if kind == "leg":
-        return bones_beneath(skeleton, [bone(f"thigh.{side}")])
-    if kind == "trunk":
-        return path_down(skeleton, bone("hips"), bone("chest"), "trunk")
-    return bones_beneath(skeleton, path_down(skeleton, bone("chest"), bone("head"), "head")[:1])
+    if not kind.below:
+        first = (kind.clavicle,) if clavicle and kind.clavicle else ()
+        return bones_beneath(skeleton, [bone(*first, kind.root)])
+    path = path_down(skeleton, bone(kind.below), bone(kind.root), kind.name)
+    return path if kind.spine else bones_beneath(skeleton, path[:1])
 
 
 def _spoken(landmark: str) -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -36,14 +36,11 @@ from ..clip import (
     window_middle,
 )
 from ..humanoid import Landmarks
-from .carry import Carrier, Side, carriers, carry
 from .leg_travel import LegTravel, ground_height
-from .parts import Part
+from .parts import Part, SeenFrom
+from .retarget import MappedClip, Retarget, find_retargets, write_retargeted
 
-Reach = Literal["direction", "exact"]
-SeenFrom = Literal["", "chest", "pelvis"]
-
-_LEG_PIECES: Final = frozenset({"leg.L", "leg.R"})
+LimbGoal = Literal["direction", "exact"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +52,7 @@ class Splice:
     timing: Timing
     landmarks: Landmarks | None = None
     """Of the splice clip's skeleton; a chain needs none."""
-    reach: Reach = "direction"
+    goal: LimbGoal = "direction"
     """Hands and feet in the direction where they were seen (the source), or on the very point."""
     travel: bool = False
     """Whether legs bring the splice clip's way through the world with them."""
@@ -65,6 +62,20 @@ class Splice:
     seen_from: SeenFrom = ""
     """From where legs are seen: the pelvis if empty, the chest in the source."""
     mute: bool = False
+
+    def retargets(self, base: MappedClip) -> list[Retarget]:
+        """How the part goes onto a base, one for each side.
+
+        Raises:
+            ClipError: a bone or landmark is missing.
+        """
+        return find_retargets(
+            self.part,
+            base,
+            MappedClip(self.clip, self.landmarks),
+            clavicle=self.clavicle,
+            seen_from="pelvis" if self.travel else self.seen_from,
+        )
 
 
 def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice]) -> Clip:
@@ -111,19 +122,18 @@ class Splicer:
         Raises:
             ClipError: a bone or landmark is missing.
         """
-        if splice.travel and not _LEG_PIECES.intersection(splice.part.pieces):
+        if splice.travel and not (splice.part.kind is not None and splice.part.kind.travels):
             raise ClipError(
                 f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
             )
-        seen_from = "pelvis" if splice.travel else splice.seen_from
-        sides = Side(base, landmarks), Side(splice.clip, splice.landmarks)
+        mapped = MappedClip(base, landmarks)
         self.splice = splice
         self._base = base
-        self._pieces = carriers(splice.part, *sides, clavicle=splice.clavicle, seen_from=seen_from)
-        self._bones = sorted({bone for piece in self._pieces for bone in piece.bones})
+        self._retargets = splice.retargets(mapped)
+        self._bones = sorted({bone for each in self._retargets for bone in each.bones})
         self._travel = None
         if splice.travel:
-            self._travel = LegTravel(self._pieces[0], ground_height(sides[0]))
+            self._travel = LegTravel(self._retargets[0], ground_height(mapped))
 
     def window(self, timing: Timing) -> SpliceWindow:
         """What a timing means for the base.
@@ -174,20 +184,20 @@ class Splicer:
         moment = sample_clip(self.splice.clip, span.splice_frames, span.seams)
         # Views: what is written here is written into the whole.
         turned, moved = rotations[span.frames], locations[span.frames]
-        exact = self.splice.reach == "exact"
-        for piece in self._pieces:
-            carry(piece, before, moment, turned, moved, exact=exact)
+        exact = self.splice.goal == "exact"
+        for each in self._retargets:
+            write_retargeted(each, before, moment, turned, moved, exact=exact)
         if (span.weights < 1.0).any():
             _ease(base, span, self._bones, turned, moved)
         if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
             self._travel.move(base, span, whole, rotations, locations)
-        scales = _scaled(base, self.splice.clip, span, self._pieces)
+        scales = _scaled(base, self.splice.clip, span, self._retargets)
         return replace(base, rotations=rotations, locations=locations, scales=scales)
 
 
 def _scaled(
-    base: Clip, splice: Clip, span: SpliceWindow, pieces: Sequence[Carrier]
+    base: Clip, splice: Clip, span: SpliceWindow, retargets: Sequence[Retarget]
 ) -> Floats | None:
     """The base's scales with those of the part, which only mean something on the same bones."""
     if base.scales is None and splice.scales is None:
@@ -197,11 +207,11 @@ def _scaled(
     # A view: what is written here is written into the whole.
     acting = scales[span.frames]
     weights = span.weights[:, None, None]
-    for piece in pieces:
-        pairs = piece.match.pairs if piece.match.same_rest else {}
-        bones = [bone for bone in piece.bones if bone in pairs]
+    for each in retargets:
+        pairs = each.match.pairs if each.match.same_rest else {}
+        bones = [bone for bone in each.bones if bone in pairs]
         others = [pairs[bone] for bone in bones]
-        rest = [bone for bone in piece.bones if bone not in pairs]
+        rest = [bone for bone in each.bones if bone not in pairs]
         there = sample_scales(splice, span.splice_frames, span.seams, others)
         acting[:, bones] += weights * (there - acting[:, bones])
         acting[:, rest] += weights * (1.0 - acting[:, rest])

@@ -17,8 +17,8 @@ from ...rotations import Floats, conjugate, rotate
 from ..clip import Clip, sample_clip
 from ..humanoid import Landmarks, chain_length
 from .body_frames import laid_over, pelvis_frame
-from .carry import Side
-from .parts import landmark_bone
+from .parts import LEG, landmark_bone
+from .retarget import MappedClip
 
 _RATE: Final = 20.0
 """Samples per second: more than legs need."""
@@ -73,7 +73,7 @@ def suggest_timings(
     Raises:
         ClipError: a landmark is missing.
     """
-    ours, theirs = Side(*base), Side(*splice)
+    ours, theirs = MappedClip(*base), MappedClip(*splice)
     start = splice[0].frames[0] if splice_start is None else splice_start
     end = splice[0].frames[-1]
     if length is not None:
@@ -102,21 +102,19 @@ def suggest_timings(
     return found
 
 
-def _legs(side: Side, base: Side, frames: Floats, pace: float) -> Floats:
+def _legs(mapped: MappedClip, base: MappedClip, frames: Floats, pace: float) -> Floats:
     """Where knees and feet are in the pelvis's frame and how they swing, (frames, 24), in leg
     lengths.
     """
-    marks = side.humanoid()
-    skeleton = side.skeleton
+    marks = mapped.humanoid()
+    skeleton = mapped.skeleton
     reference = pelvis_frame(base.skeleton, base.humanoid())
     frame = laid_over(pelvis_frame(skeleton, marks), reference)
-    posture = sample_clip(side.clip, frames)
+    posture = sample_clip(mapped.clip, frames)
     back, place = conjugate(frame.orientation(posture)), frame.place(posture)
     positions = []
-    for left in "LR":
-        joints = [
-            landmark_bone(skeleton, marks, f"{name}.{left}") for name in ("thigh", "shin", "foot")
-        ]
+    for side in "LR":
+        joints = [landmark_bone(skeleton, marks, name) for name in LEG.limb_on(side)]
         length = chain_length(skeleton, joints)
         positions += [rotate(back, posture.head(bone) - place) / length for bone in joints[1:]]
     seen = np.concatenate(positions, axis=-1)

@@ -14,23 +14,22 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rotations import Floats, angle_between, conjugate, multiply, rotate
-from ..skeleton import Skeleton
-from .clip import Clip, Posture, SpliceWindow, posture_of, sample_clip, sample_world, splice_window
-from .humanoid import Landmarks
-from .transfer import AnatomicalFrame, Splice, chest_frame, laid_over, landmark_bone, pelvis_frame
+from octo_motion.core.rotations import Floats, angle_between, conjugate, multiply, rotate
+from octo_motion.core.skeleton import Skeleton
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.posture import Posture, posture_of, sample_clip, sample_world
+from octo_motion.core.splicing.clip.splice_timing import SpliceWindow, splice_window
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.transfer.body_frames import (
+    AnatomicalFrame,
+    chest_frame,
+    laid_over,
+    pelvis_frame,
+)
+from octo_motion.core.splicing.transfer.parts import LEG, Part, landmark_bone
+from octo_motion.core.splicing.transfer.splice import Splice
 
 Bools = NDArray[np.bool_]
-
-LIMBS: Final = {
-    f"{kind}.{side}": tuple(f"{name}.{side}" for name in names)
-    for kind, names in (
-        ("arm", ("upper_arm", "forearm", "hand")),
-        ("leg", ("thigh", "shin", "foot")),
-    )
-    for side in "LR"
-}
-"""Joint, bend and end of each limb, by piece."""
 
 _STILL_SPEED: Final = 0.12
 """Leg lengths per second below which a foot stands: a tenth of a slow walk's speed."""
@@ -122,14 +121,13 @@ def _limbs(result: Clip, landmarks: Landmarks, splice: Splice) -> list[_SeenLimb
     base = _posture(result, span.frames)
     other = sample_clip(splice.clip, span.splice_frames)
     found: list[_SeenLimb] = []
-    for piece in splice.part.pieces:
-        if piece not in LIMBS:
-            continue
-        ours, seen = _seen_from(piece, (result.skeleton, landmarks), (splice.clip.skeleton, theirs))
-        length = limb_length(result.skeleton, landmarks, piece)
-        ratio = length / limb_length(splice.clip.skeleton, theirs, piece)
-        joint, end = (_joint(base, ours, landmarks, LIMBS[piece][place]) for place in (0, -1))
-        wanted = ratio * _joint(other, seen, theirs, LIMBS[piece][-1])
+    bodies = (result.skeleton, landmarks), (splice.clip.skeleton, theirs)
+    for limb in _limbs_of(splice.part):
+        ours, seen = _seen_from(splice.part, *bodies)
+        length = limb_length(*bodies[0], limb)
+        ratio = length / limb_length(*bodies[1], limb)
+        joint, end = (_joint(base, ours, landmarks, limb[place]) for place in (0, -1))
+        wanted = ratio * _joint(other, seen, theirs, limb[-1])
         found.append(_SeenLimb(joint, end, wanted, length))
     return found
 
@@ -154,7 +152,7 @@ def turn_error(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
         splice: what was to be spliced.
 
     Returns:
-        (frames, pieces) radians, over the frames in which the splice is fully in; no pieces for
+        (frames, 1) radians, over the frames in which the splice is fully in; (frames, 0) for
         limbs.
     """
     span, whole = _whole(result, splice)
@@ -162,18 +160,12 @@ def turn_error(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
         (result.skeleton, landmarks, _posture(result, span.frames)),
         (splice.clip.skeleton, _landmarks(splice), sample_clip(splice.clip, span.splice_frames)),
     )
-    errors = []
-    for piece in splice.part.pieces:
-        if piece == "trunk":
-            seen = [_chest_turn(*side) for side in sides]
-        elif piece == "head":
-            seen = [_head_turn(*side) for side in sides]
-        else:
-            continue
-        errors.append(angle_between(seen[0], seen[1])[whole])
-    if not errors:
+    kind = splice.part.kind
+    if kind is None or kind.limb is not None:
         return np.zeros((int(whole.sum()), 0))
-    return np.stack(errors, axis=-1)
+    turn = _chest_turn if kind.spine else _head_turn
+    ours, theirs = (turn(*side) for side in sides)
+    return angle_between(ours, theirs)[whole][:, None]
 
 
 def log_dimensionless_jerk(path: Floats, rate: float) -> float:
@@ -222,17 +214,15 @@ def seams(result: Clip, base: Clip, landmarks: Landmarks, splice: Splice) -> lis
     found: list[Seam] = []
     for frames in _seam_frames(span, len(base)):
         moments = _moments(span, splice, base, frames)
-        for piece in splice.part.pieces:
-            if piece not in LIMBS:
-                continue
+        for limb in _limbs_of(splice.part):
             sides = (base.skeleton, landmarks), (splice.clip.skeleton, theirs)
-            ours, other = _seen_from(piece, *sides)
+            ours, other = _seen_from(splice.part, *sides)
             paths = (
-                _end(_posture(result, frames), ours, landmarks, piece),
-                _end(_posture(base, frames), ours, landmarks, piece),
-                _end(sample_clip(splice.clip, moments), other, theirs, piece),
+                _end(_posture(result, frames), ours, landmarks, limb),
+                _end(_posture(base, frames), ours, landmarks, limb),
+                _end(sample_clip(splice.clip, moments), other, theirs, limb),
             )
-            length = limb_length(base.skeleton, landmarks, piece)
+            length = limb_length(base.skeleton, landmarks, limb)
             speed = np.linalg.norm(np.diff(paths[0], axis=0), axis=-1).max() * base.rate / length
             jerks = [log_dimensionless_jerk(path, base.rate) for path in paths]
             if speed > _LEAST_SPEED and np.isfinite(jerks).all():
@@ -286,10 +276,16 @@ def foot_slip(clip: Clip, landmarks: Landmarks, still: Bools) -> Floats:
     return moved[still[1:] & still[:-1]]
 
 
-def limb_length(skeleton: Skeleton, landmarks: Landmarks, piece: str) -> float:
-    """Length of a limb along its bones, armature units."""
-    bones = [landmark_bone(skeleton, landmarks, name) for name in LIMBS[piece]]
+def limb_length(skeleton: Skeleton, landmarks: Landmarks, limb: Sequence[str]) -> float:
+    """Length of a limb along its landmarks' bones, armature units."""
+    bones = [landmark_bone(skeleton, landmarks, name) for name in limb]
     return float(np.linalg.norm(np.diff(skeleton.heads[bones], axis=0), axis=1).sum())
+
+
+def _limbs_of(part: Part) -> list[tuple[str, ...]]:
+    """Landmarks of joint, bend and end of each limb of a part; none of trunk and head."""
+    kind = part.kind
+    return [kind.limb_on(side) for side in part.sides] if kind and kind.limb else []
 
 
 def _landmarks(splice: Splice) -> Landmarks:
@@ -309,9 +305,10 @@ def _posture(clip: Clip, frames: slice) -> Posture:
 
 
 def _seen_from(
-    piece: str, ours: tuple[Skeleton, Landmarks], theirs: tuple[Skeleton, Landmarks]
+    part: Part, ours: tuple[Skeleton, Landmarks], theirs: tuple[Skeleton, Landmarks]
 ) -> tuple[AnatomicalFrame, AnatomicalFrame]:
-    frame = chest_frame if piece.startswith("arm") else pelvis_frame
+    assert part.kind is not None
+    frame = chest_frame if part.kind.seen_from[0] == "chest" else pelvis_frame
     base = frame(*ours)
     return base, laid_over(frame(*theirs), base)
 
@@ -322,9 +319,11 @@ def _joint(posture: Posture, frame: AnatomicalFrame, landmarks: Landmarks, landm
     return rotate(conjugate(frame.orientation(posture)), posture.head(bone) - frame.place(posture))
 
 
-def _end(posture: Posture, frame: AnatomicalFrame, landmarks: Landmarks, piece: str) -> Floats:
+def _end(
+    posture: Posture, frame: AnatomicalFrame, landmarks: Landmarks, limb: Sequence[str]
+) -> Floats:
     """Hand or foot in a body's frame, (frames, 3)."""
-    return _joint(posture, frame, landmarks, LIMBS[piece][-1])
+    return _joint(posture, frame, landmarks, limb[-1])
 
 
 def _chest_turn(skeleton: Skeleton, landmarks: Landmarks, posture: Posture) -> Floats:
@@ -379,6 +378,6 @@ def _foot_points(clip: Clip, landmarks: Landmarks, times: Floats) -> Floats:
 
 def _leg(clip: Clip, landmarks: Landmarks) -> float:
     lengths: Sequence[float] = [
-        limb_length(clip.skeleton, landmarks, f"leg.{side}") for side in "LR"
+        limb_length(clip.skeleton, landmarks, LEG.limb_on(side)) for side in "LR"
     ]
     return clip.scale * sum(lengths) / len(lengths)

@@ -9,6 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...easing import smooth_step
 from ...errors import ClipError
 from ...rotations import Floats
 from .clip import Clip
@@ -104,9 +105,9 @@ def splice_window(timing: Timing, base: Clip, splice: Clip) -> SpliceWindow:
     passed = base.frames[frames] - start
     weights = entering = np.ones(len(passed))
     if timing.ease_in > 0.0:
-        weights = entering = _smooth(passed / timing.ease_in)
+        weights = entering = smooth_step(passed / timing.ease_in)
     if timing.ease_out > 0.0 and np.isfinite(end):
-        weights = np.minimum(weights, _smooth((end - base.frames[frames]) / timing.ease_out))
+        weights = np.minimum(weights, smooth_step((end - base.frames[frames]) / timing.ease_out))
     moments = timing.splice_start + passed * step
     rounds, seams = np.zeros(len(passed), dtype=np.intp), np.zeros(len(passed))
     eases = timing.ease_in * step, timing.ease_out * step
@@ -133,10 +134,10 @@ def _looped(
         before = ease_out / (ease_in + ease_out)
         goes_on = rounds < rounds[-1]
         if ease_out > 0.0:
-            going = before * _smooth(1.0 - (last - wrapped) / ease_out)
+            going = before * smooth_step(1.0 - (last - wrapped) / ease_out)
             seams += np.where(goes_on, going, 0.0)
         if ease_in > 0.0:
-            coming = (1.0 - before) * _smooth(1.0 - (wrapped - first) / ease_in)
+            coming = (1.0 - before) * smooth_step(1.0 - (wrapped - first) / ease_in)
             seams -= np.where(rounds > 0, coming, 0.0)
     return wrapped, rounds.astype(np.intp), seams
 
@@ -170,8 +171,3 @@ def _check(timing: Timing) -> None:
 def window_middle(weights: Floats) -> int:
     """Where base and splice are about equally strong."""
     return int(np.argmin(np.abs(weights - 0.5)))
-
-
-def _smooth(share: Floats) -> Floats:
-    bounded = np.clip(share, 0.0, 1.0)
-    return bounded * bounded * (3.0 - 2.0 * bounded)

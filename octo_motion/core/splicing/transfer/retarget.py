@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One piece of a body carried over from the splice clip onto the base, frame by frame."""
+"""A part of a body on one side retargeted from the splice clip onto the base, frame by frame."""
 
 from __future__ import annotations
 
@@ -32,9 +32,16 @@ from ..humanoid import (
 )
 from .body_frames import AnatomicalFrame, chain_frame, chest_frame, laid_over, pelvis_frame
 from .limb_rotation import LimbTriangle, bend_to_reach, hinge_axis, joint_turn
-from .parts import Part, bone_of, bones_beneath, landmark_bone, piece_bones
-
-_LIMBS = {"arm": ("upper_arm", "forearm", "hand"), "leg": ("thigh", "shin", "foot")}
+from .parts import (
+    Part,
+    PartKind,
+    SeenFrom,
+    bone_of,
+    bones_beneath,
+    kind_bones,
+    landmark_bone,
+    sided,
+)
 
 _UPRIGHT = np.radians(30.0)
 """Between chest and pelvis: at more than this nobody stands. Some files' bones all lie along one
@@ -45,7 +52,7 @@ _HINGE_SAMPLES = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class MappedClip:
     """A clip, and which bones of it are which."""
 
     clip: Clip
@@ -66,7 +73,7 @@ class Side:
         return self.landmarks
 
     @contextmanager
-    def told(self) -> Iterator[None]:
+    def named_in_errors(self) -> Iterator[None]:
         """Errors within say which of the two clips they speak of."""
         try:
             yield
@@ -76,7 +83,7 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
-class _Joined:
+class _JoinedBones:
     """Bones that hang on each other alike on both skeletons.
 
     Seen from its parent, such a bone needs no other: ``before ∘ rotation ∘ after``.
@@ -91,15 +98,15 @@ class _Joined:
 
 
 @dataclass(frozen=True, eq=False)
-class Carrier:
-    """All that does not change over time: one piece on two skeletons."""
+class Retarget:
+    """All that does not change over time: a part on one side, on two skeletons."""
 
-    base: Side
-    splice: Side
+    base: MappedClip
+    splice: MappedClip
     bones: tuple[int, ...]
     """Of the base, parents first; the joint is the first one's."""
     frames: tuple[AnatomicalFrame, AnatomicalFrame]
-    """From which the piece is seen, on base and splice."""
+    """From which the part is seen, on base and splice."""
     match: Correspondence
     limb: tuple[tuple[int, int, int], tuple[int, int, int]] | None
     """Joint, elbow and hand, on base and splice."""
@@ -109,7 +116,7 @@ class Carrier:
     """Whether the rest pose of one of the two is none to compare the other's with."""
 
     @cached_property
-    def joined(self) -> _Joined | None:
+    def joined(self) -> _JoinedBones | None:
         """The bones that can be carried over one by one, if there are any."""
         base, other = self.base.skeleton, self.splice.skeleton
         pairs, constants = self.match.pairs, self.match.constants
@@ -130,7 +137,7 @@ class Carrier:
         before = multiply(
             multiply(conjugate(_offsets(base, bones)), conjugate(above)), _offsets(other, answers)
         )
-        return _Joined(tuple(bones), tuple(answers), before, after)
+        return _JoinedBones(tuple(bones), tuple(answers), before, after)
 
     @cached_property
     def ratio(self) -> float:
@@ -153,24 +160,25 @@ class Carrier:
         return rotate(conjugate(self.match.constants[joint]), axis)
 
 
-def carriers(
-    part: Part, base: Side, splice: Side, *, clavicle: bool, seen_from: str
-) -> list[Carrier]:
-    """The pieces of a part.
+def find_retargets(
+    part: Part, base: MappedClip, splice: MappedClip, *, clavicle: bool, seen_from: SeenFrom
+) -> list[Retarget]:
+    """A part's retargets, one for each side.
 
     Raises:
         ClipError: a bone is missing on either skeleton.
     """
-    if part.root:
-        return [_chain_carrier(part, base, splice)]
+    kind = part.kind
+    if kind is None:
+        return [_chain_retarget(part, base, splice)]
     return [
-        _piece_carrier(piece, base, splice, clavicle=clavicle, seen_from=seen_from)
-        for piece in part.pieces
+        _side_retarget(kind, side, (base, splice), clavicle=clavicle, seen_from=seen_from)
+        for side in part.sides
     ]
 
 
-def carry(
-    carrier: Carrier,
+def write_retargeted(
+    retarget: Retarget,
     base: Posture,
     splice: Posture,
     rotations: Floats,
@@ -178,10 +186,10 @@ def carry(
     *,
     exact: bool,
 ) -> None:
-    """Write the piece's rotations, fully spliced, into the base's arrays.
+    """Write the part's rotations, fully spliced, into the base's arrays.
 
     Args:
-        carrier: the piece.
+        retarget: of the part on one side.
         base: the base over these frames, as it was.
         splice: the splice clip at the moments that belong to them.
         rotations: (frames, bones, 4) of the base's skeleton, to be changed.
@@ -189,24 +197,24 @@ def carry(
         exact: whether hands and feet land on the point where they were seen, as far as the limb
             reaches; otherwise they lie in its direction, as in the source.
     """
-    ours, theirs = carrier.frames
+    ours, theirs = retarget.frames
     our_frame = ours.orientation(base)
     # From the splice clip's world into the base's: the bodies' frames laid over each other.
     between = multiply(our_frame, conjugate(theirs.orientation(splice)))
     result = posture_of(base.skeleton, rotations, locations)
-    if carrier.spread is not None:
-        _carry_spread(carrier, between, splice, result, rotations)
+    if retarget.spread is not None:
+        _write_spread(retarget, between, splice, result, rotations)
         return
-    _carry_inner(carrier, between, (result, splice), rotations, locations)
-    if carrier.limb is None:
+    _write_inner(retarget, between, (result, splice), rotations, locations)
+    if retarget.limb is None:
         return
-    (joint, elbow, hand), (_, other_elbow, other_hand) = carrier.limb
+    (joint, elbow, hand), (_, other_elbow, other_hand) = retarget.limb
     result = posture_of(base.skeleton, rotations, locations)
     limb = LimbTriangle(result.head(joint), result.head(elbow), result.head(hand))
     our_place, their_place = ours.place(base), theirs.place(splice)
 
     def seen(bone: int) -> Floats:
-        return our_place + carrier.ratio * rotate(between, splice.head(bone) - their_place)
+        return our_place + retarget.ratio * rotate(between, splice.head(bone) - their_place)
 
     wanted = LimbTriangle(limb.joint, seen(other_elbow), seen(other_hand))
     turn = joint_turn(limb, wanted)
@@ -217,8 +225,8 @@ def carry(
             limb.joint + rotate(turn, limb.elbow - limb.joint),
             limb.joint + rotate(turn, limb.hand - limb.joint),
         )
-        hinge = rotate(multiply(turn, result.orientation(joint)), carrier.hinge)
-        alike = carrier.match.same_body
+        hinge = rotate(multiply(turn, result.orientation(joint)), retarget.hinge)
+        alike = retarget.match.same_body
         upper_bend, lower_bend = bend_to_reach(turned, wanted.hand, hinge, alike=alike)
         turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
     _turn_limb(result, rotations, (joint, turn), (elbow, lower_turn))
@@ -239,8 +247,8 @@ def _turn_limb(
         rotations[:, elbow] = multiply(conjugate(carried), wanted)
 
 
-def _carry_inner(
-    carrier: Carrier,
+def _write_inner(
+    retarget: Retarget,
     between: Floats,
     postures: tuple[Posture, Posture],
     rotations: Floats,
@@ -248,29 +256,29 @@ def _carry_inner(
 ) -> None:
     """Orientations of all matched bones as they are seen from the body."""
     result, splice = postures
-    joined = carrier.joined
+    joined = retarget.joined
     if joined is not None:
         inner = multiply(joined.before, splice.rotations(joined.splice))
         rotations[:, joined.base] = multiply(inner, joined.after)
-        if carrier.match.same_rest:
+        if retarget.match.same_rest:
             for bone, answer in zip(joined.base, joined.splice, strict=True):
                 locations[:, bone] = splice.location(answer)
     inside = () if joined is None else joined.base
-    for bone in carrier.bones:
-        if bone in carrier.match.pairs and bone not in inside:
-            answer, constant = carrier.match.pairs[bone], carrier.match.constants[bone]
+    for bone in retarget.bones:
+        if bone in retarget.match.pairs and bone not in inside:
+            answer, constant = retarget.match.pairs[bone], retarget.match.constants[bone]
             wanted = multiply(multiply(between, splice.orientation(answer)), constant)
             rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
 
 
-def _carry_spread(
-    carrier: Carrier, between: Floats, splice: Posture, result: Posture, rotations: Floats
+def _write_spread(
+    retarget: Retarget, between: Floats, splice: Posture, result: Posture, rotations: Floats
 ) -> None:
     """A chain onto one with another number of bones: turns from rest, read off along its length."""
-    assert carrier.spread is not None
-    ours, theirs = carrier.spread
+    assert retarget.spread is not None
+    ours, theirs = retarget.spread
     base, other = result.skeleton, splice.skeleton
-    rests = carrier.frames[0].at_rest(base), carrier.frames[1].at_rest(other)
+    rests = retarget.frames[0].at_rest(base), retarget.frames[1].at_rest(other)
     lay = multiply(rests[1], conjugate(rests[0]))
     places = np.interp(
         _fractions(base, ours), _fractions(other, theirs), np.arange(len(theirs), dtype=np.float64)
@@ -283,17 +291,17 @@ def _carry_spread(
             turn = slerp(turn, after, np.full(len(turn), place - first))
         rest = multiply(lay, base.rest_rotations[bone])
         wanted = multiply(between, multiply(turn, rest))
-        if carrier.bent_rest and bone != ours[-1]:
+        if retarget.bent_rest and bone != ours[-1]:
             segment = base.heads[ours[ours.index(bone) + 1]] - base.heads[bone]
             along = rotate(between, _direction(splice, theirs, first))
             carried = result.carried(bone)
             own = rotate(multiply(carried, conjugate(base.rest_rotations[bone])), segment)
             own = np.broadcast_to(normalized(own), along.shape)
             wanted = multiply(shortest_arc(own, along), carried)
-        if bone == ours[-1] and bone in carrier.match.constants:
+        if bone == ours[-1] and bone in retarget.match.constants:
             # The chest itself: its frame is met, not just its turn from rest.
             own = splice.orientation(theirs[-1])
-            wanted = multiply(multiply(between, own), carrier.match.constants[bone])
+            wanted = multiply(multiply(between, own), retarget.match.constants[bone])
         rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
 
 
@@ -317,84 +325,100 @@ def _offsets(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
     )
 
 
-def _piece_carrier(
-    piece: str, base: Side, splice: Side, *, clavicle: bool, seen_from: str
-) -> Carrier:
-    ours, theirs = base.humanoid(), splice.humanoid()
-    kind, _, side = piece.partition(".")
-    if kind == "arm" and clavicle:
-        clavicle = all(
-            _has_clavicle(each.skeleton, each.humanoid(), side) for each in (base, splice)
-        )
-    from_pelvis = kind == "trunk" or (kind == "leg" and seen_from != "chest")
-    with base.told():
-        bones = piece_bones(piece, base.skeleton, ours, clavicle=clavicle)
-        chest = chest_frame(base.skeleton, ours)
-        pelvis = pelvis_frame(base.skeleton, ours) if from_pelvis else chest
-    with splice.told():
-        others = piece_bones(piece, splice.skeleton, theirs, clavicle=clavicle)
-        chests = chest, laid_over(chest_frame(splice.skeleton, theirs), chest)
+def _side_retarget(
+    kind: PartKind,
+    side: str,
+    clips: tuple[MappedClip, MappedClip],
+    *,
+    clavicle: bool,
+    seen_from: SeenFrom,
+) -> Retarget:
+    """The retarget of a humanoid's part on one side."""
+    base, splice = clips
+    marks = base.humanoid(), splice.humanoid()
+    if kind.clavicle and clavicle:
+        clavicle = all(_hangs_on_clavicle(kind, side, each) for each in clips)
+    from_pelvis = kind.frame(seen_from) == "pelvis"
+    with base.named_in_errors():
+        bones = kind_bones(kind, side, base.skeleton, marks[0], clavicle=clavicle)
+        chest = chest_frame(base.skeleton, marks[0])
+        pelvis = pelvis_frame(base.skeleton, marks[0]) if from_pelvis else chest
+    with splice.named_in_errors():
+        others = kind_bones(kind, side, splice.skeleton, marks[1], clavicle=clavicle)
+        chests = chest, laid_over(chest_frame(splice.skeleton, marks[1]), chest)
         frames = chests
         if from_pelvis:
-            frames = pelvis, laid_over(pelvis_frame(splice.skeleton, theirs), pelvis)
-    pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, (ours, theirs))
-    spread = None
-    if kind == "trunk":
-        if len(bones) == len(others):
-            pairs = dict(zip(bones, others, strict=True))
-        else:
-            pairs = {bones[-1]: others[-1]}
-            spread = tuple(bones), tuple(others)
+            frames = pelvis, laid_over(pelvis_frame(splice.skeleton, marks[1]), pelvis)
+    if kind.spine:
+        return _spine_retarget(clips, (bones, others), frames, chests)
+    pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, marks)
     rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
-    bent = False
-    if kind == "trunk":
-        sides = zip(frames, chests, (base, splice), strict=True)
-        bent = any(
-            angle_between(low.at_rest(each.skeleton), high.at_rest(each.skeleton)) > _UPRIGHT
-            for low, high, each in sides
-        )
-    match = find_correspondence(
-        base.skeleton, splice.skeleton, pairs, rests, (ours, theirs), aim_all=bent
-    )
-    if kind == "trunk":
-        constants = dict(match.constants)
-        constants[bones[-1]] = multiply(chests[1].turn, conjugate(chests[0].turn))
-        match = replace(match, constants=constants)
+    match = find_correspondence(base.skeleton, splice.skeleton, pairs, rests, marks)
     limb = None
-    if kind in _LIMBS:
-        names = [f"{name}.{side}" for name in _LIMBS[kind]]
-        with base.told():
-            our_limb = _three(base.skeleton, ours, names)
-        with splice.told():
-            limb = our_limb, _three(splice.skeleton, theirs, names)
-    return Carrier(base, splice, tuple(bones), frames, match, limb, spread, bent)
+    if kind.limb is not None:
+        limb = _limb_joints(kind, side, base), _limb_joints(kind, side, splice)
+    return Retarget(base, splice, tuple(bones), frames, match, limb, None)
 
 
-def _has_clavicle(skeleton: Skeleton, landmarks: Landmarks, side: str) -> bool:
-    """Whether there is a collar bone, and the arm hangs on it."""
-    if landmarks.get(f"clavicle.{side}") is None:
-        return False
-    clavicle, upper = (
-        landmark_bone(skeleton, landmarks, f"{name}.{side}") for name in ("clavicle", "upper_arm")
+def _spine_retarget(
+    clips: tuple[MappedClip, MappedClip],
+    bones: tuple[Sequence[int], Sequence[int]],
+    frames: tuple[AnatomicalFrame, AnatomicalFrame],
+    chests: tuple[AnatomicalFrame, AnatomicalFrame],
+) -> Retarget:
+    """The retarget of the bones between pelvis and chest, which ends with the chest's frame.
+
+    Args:
+        clips: base and splice, as are all of the following.
+        bones: from the lowest up, the chest last.
+        frames: from which the trunk is seen.
+        chests: the chests' own frames.
+    """
+    (base, splice), (ours, theirs) = clips, bones
+    if len(ours) == len(theirs):
+        pairs, spread = dict(zip(ours, theirs, strict=True)), None
+    else:
+        pairs, spread = {ours[-1]: theirs[-1]}, (tuple(ours), tuple(theirs))
+    rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
+    bent = any(
+        angle_between(rest, chest.at_rest(each.skeleton)) > _UPRIGHT
+        for rest, chest, each in zip(rests, chests, clips, strict=True)
     )
-    return upper in bones_beneath(skeleton, [clavicle])
+    marks = base.humanoid(), splice.humanoid()
+    match = find_correspondence(base.skeleton, splice.skeleton, pairs, rests, marks, aim_all=bent)
+    top = multiply(chests[1].turn, conjugate(chests[0].turn))
+    match = replace(match, constants={**match.constants, ours[-1]: top})
+    return Retarget(base, splice, tuple(ours), frames, match, None, spread, bent)
 
 
-def _three(skeleton: Skeleton, landmarks: Landmarks, names: Sequence[str]) -> tuple[int, int, int]:
-    first, second, third = (landmark_bone(skeleton, landmarks, name) for name in names)
-    for upper, lower in ((first, second), (second, third)):
-        if lower not in bones_beneath(skeleton, [upper]):
-            raise ClipError(
-                f"'{skeleton.names[lower]}' does not hang on '{skeleton.names[upper]}'.",
-                "Such a limb follows controls: bake its motion onto its bones first.",
-            )
-    return first, second, third
+def _hangs_on_clavicle(kind: PartKind, side: str, mapped: MappedClip) -> bool:
+    """Whether there is a collar bone, and the arm hangs on it."""
+    skeleton, marks = mapped.skeleton, mapped.humanoid()
+    names = sided(kind.clavicle, side), sided(kind.root, side)
+    if marks.get(names[0]) is None:
+        return False
+    clavicle, root = (landmark_bone(skeleton, marks, name) for name in names)
+    return root in bones_beneath(skeleton, [clavicle])
 
 
-def _chain_carrier(part: Part, base: Side, splice: Side) -> Carrier:
-    with base.told():
+def _limb_joints(kind: PartKind, side: str, mapped: MappedClip) -> tuple[int, int, int]:
+    """The bones that begin at joint, elbow and hand."""
+    skeleton, marks = mapped.skeleton, mapped.humanoid()
+    with mapped.named_in_errors():
+        joint, elbow, hand = (landmark_bone(skeleton, marks, name) for name in kind.limb_on(side))
+        for upper, lower in ((joint, elbow), (elbow, hand)):
+            if lower not in bones_beneath(skeleton, [upper]):
+                raise ClipError(
+                    f"'{skeleton.names[lower]}' does not hang on '{skeleton.names[upper]}'.",
+                    "Such a limb follows controls: bake its motion onto its bones first.",
+                )
+    return joint, elbow, hand
+
+
+def _chain_retarget(part: Part, base: MappedClip, splice: MappedClip) -> Retarget:
+    with base.named_in_errors():
         bones = bones_beneath(base.skeleton, [bone_of(base.skeleton, part.root)])
-    with splice.told():
+    with splice.named_in_errors():
         others = bones_beneath(
             splice.skeleton, [bone_of(splice.skeleton, part.splice_root or part.root)]
         )
@@ -413,7 +437,7 @@ def _chain_carrier(part: Part, base: Side, splice: Side) -> Carrier:
     match = find_correspondence(
         base.skeleton, splice.skeleton, pairs, rests, (None, None), aim_all=True
     )
-    return Carrier(base, splice, tuple(bones), frames, match, None, spread)
+    return Retarget(base, splice, tuple(bones), frames, match, None, spread)
 
 
 def _single(skeleton: Skeleton, bones: Sequence[int]) -> bool:
