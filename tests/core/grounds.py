@@ -139,7 +139,7 @@ def walker(
     """
     skeleton, made, body = body_with_arms(arms, joints, rolls=rolls)
     table = gait_presets()[gait]
-    generator = GaitPoser(skeleton, made, body, GaitSettings(table, stand=True, **options))
+    generator = GaitPoser(skeleton, made, body, GaitSettings(table, raise_to_floor=True, **options))
     travel = TravelSettings(stride=table.stride * generator.arm_length)
     rhythm = None
     if rest:

@@ -372,12 +372,12 @@ def test_give_takes_the_snap_out_of_an_arm_that_straightens() -> None:
     rig = body_with_arms(1, 12)
 
     def snaps(give: float) -> float:
-        turns = posed(generated(rig, give=give), 480).rotations
+        turns = posed(generated(rig, stretch_slack=give), 480).rotations
         return float(angle_between(turns[1:], turns[:-1]).max())
 
     assert snaps(0.08) < 0.5 * snaps(0.0)
     # What it lets an arm reach beyond its targets is not missed, and nothing else is.
-    assert posed(generated(rig, give=0.08)).misses.max() <= 1e-3
+    assert posed(generated(rig, stretch_slack=0.08)).misses.max() <= 1e-3
 
 
 def with_segments(
@@ -409,7 +409,7 @@ def test_an_elbow_of_two_bones_does_not_change_sides_at_a_stroke(
 ) -> None:
     """At 48 frames a cycle; before, it did by 22 to 31° within one."""
     rig = with_segments(body_with_arms(1, len(shares)), shares, 0.1)
-    generator = generated(rig, gait=PRESETS[name], give=0.08, steady=0.08)
+    generator = generated(rig, gait=PRESETS[name], stretch_slack=0.08, smoothing_cycles=0.08)
     turns = posed(generator).rotations
     assert np.degrees(angle_between(turns[:-1], turns[1:]).max()) < 14.0
 
@@ -418,7 +418,9 @@ def test_an_elbow_of_two_bones_does_not_change_sides_at_a_stroke(
 def test_arms_that_spring_from_one_point_trail_side_by_side(shares: tuple[float, ...]) -> None:
     """Before, their outer halves trailed in one line, none 0.02 arm lengths beside it."""
     rig = with_segments(body_with_arms(8, len(shares)), shares, 0.0)
-    generator = generated(rig, gait=PRESETS["jet_escape"], give=0.08, steady=0.08)
+    generator = generated(
+        rig, gait=PRESETS["jet_escape"], stretch_slack=0.08, smoothing_cycles=0.08
+    )
     turns = posed(generator).rotations
     joints = np.stack([posed_joints(rig[0], arm, turns, generator.bones) for arm in rig[1]], axis=1)
     outer = joints[:, :, len(shares) // 2 :, :2]
@@ -440,7 +442,10 @@ def test_a_body_that_lies_closes_its_arms_before_its_face_and_opens_them_all_rou
     ]
     body = dataclasses.replace(body, center=np.zeros(3))
     generator = GaitPoser(
-        skeleton, ahead, body, GaitSettings(PRESETS["swim"], give=0.08, lean=0.5 * np.pi)
+        skeleton,
+        ahead,
+        body,
+        GaitSettings(PRESETS["swim"], stretch_slack=0.08, swim_lean=0.5 * np.pi),
     )
     assert len(ahead) == 8
     turns = posed(generator).rotations
@@ -473,7 +478,7 @@ def test_bank_twists_each_group_by_its_own_angle() -> None:
     curve = gait.curve_from_degrees([0, 180, 360], bank=[[30, 30, 30], [0, 0, 0], [-12, -12, -12]])
     table = dataclasses.replace(PRESETS["swim"], curves={0: curve})
     skeleton, arms, body = body_with_arms(2, 12, taper=0.0)
-    generator = GaitPoser(skeleton, arms, body, GaitSettings(table, sway=0.0))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(table, lateral_bend=0.0))
 
     turns = posed(generator, 2).rotations[0].reshape(2, 12, 4)
     twist = np.degrees(2.0 * np.arctan2(turns[..., 2], turns[..., 0]))
@@ -524,7 +529,7 @@ def test_standing_there_are_arms_on_the_ground_at_any_time_and_none_is_below(
     name: str, always: int, joints: int
 ) -> None:
     skeleton, arms, body = body_with_arms(8, joints)
-    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS[name], stand=True))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS[name], raise_to_floor=True))
 
     poses = posed(generator, 96)
 
@@ -546,7 +551,7 @@ def test_standing_there_are_arms_on_the_ground_at_any_time_and_none_is_below(
 @pytest.mark.parametrize("joints", [7, 12, 30])
 def test_standing_pops_nothing(joints: int) -> None:
     skeleton, arms, body = body_with_arms(1, joints)
-    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"], stand=True))
+    generator = GaitPoser(skeleton, arms, body, GaitSettings(PRESETS["walk"], raise_to_floor=True))
 
     coarse, fine = (
         angle_between(turns[:-1], turns[1:]).max(axis=0)
@@ -561,7 +566,8 @@ def test_level_gaits_swimmers_and_stiff_arms_stand_on_nothing(name: str, joints:
     rig = body_with_arms(2, joints)
 
     plain, standing = (
-        posed(generated(rig, gait=PRESETS[name], stand=stand)).rotations for stand in (False, True)
+        posed(generated(rig, gait=PRESETS[name], raise_to_floor=stand)).rotations
+        for stand in (False, True)
     )
 
     assert np.array_equal(plain, standing)
@@ -596,14 +602,14 @@ def test_a_bone_that_is_gone_is_a_clear_error() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sway": float("nan")}, "A setting of the gait is not a number."),
+        ({"lateral_bend": float("nan")}, "A setting of the gait is not a number."),
         ({"weights": (0.5, 0.0)}, "A joint's weight is not between 0 and 1."),
         ({"weights": (1.5,)}, "A joint's weight is not between 0 and 1."),
         ({"weights": ()}, "A joint's weight is not between 0 and 1."),
         ({"variation": (0.2, 0.1)}, "The variation's minimum is greater than its maximum."),
         ({"contraction": -0.5}, "The contraction is -0.5."),
         ({"softness": 1.5}, "The softness is 1.5."),
-        ({"give": -0.1}, "The give is -0.1."),
+        ({"stretch_slack": -0.1}, "The give is -0.1."),
     ],
 )
 def test_a_senseless_setting_is_a_clear_error(changes: dict[str, object], message: str) -> None:

@@ -91,7 +91,7 @@ def test_evened_random_additions_come_again_with_their_period(cycle: int) -> Non
 @pytest.mark.parametrize("steady", [-0.01, 0.26, float("nan")])
 def test_a_window_that_makes_no_sense_is_told(steady: float) -> None:
     with pytest.raises(SettingsError):
-        GaitSettings(gait.gait_presets()["walk"], steady=steady)
+        GaitSettings(gait.gait_presets()["walk"], smoothing_cycles=steady)
 
 
 # --- Over frames ---------------------------------------------------------------------------------
@@ -168,7 +168,7 @@ def posed(walk: Walker, times: Floats, higher: Any = None, *, steady: bool) -> G
 @pytest.mark.parametrize("ground", ["plane", "bumps"])
 def test_arms_swing_more_evenly_and_hold_on_as_they_did(ground: str) -> None:
     corners = walker(GROUNDS[ground], stretch=True)
-    even = walker(GROUNDS[ground], stretch=True, steady=STEADY)
+    even = walker(GROUNDS[ground], stretch=True, smoothing_cycles=STEADY)
     before = posed(corners, corners.times, steady=False)
     alone = posed(even, even.times, steady=False)
     after = posed(even, even.times, steady=True)
@@ -188,7 +188,7 @@ def test_arms_swing_more_evenly_and_hold_on_as_they_did(ground: str) -> None:
 
 
 def test_arms_that_are_raised_are_as_even_as_the_others() -> None:
-    walk = walker(GROUNDS["bumps"], stretch=True, steady=STEADY)
+    walk = walker(GROUNDS["bumps"], stretch=True, smoothing_cycles=STEADY)
     times = walk.times[:120]
     whole = posed(walk, times, steady=True)
     chosen = np.arange(40, 60)

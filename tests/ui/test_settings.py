@@ -79,8 +79,9 @@ def test_every_setting_can_be_overridden_except_names_of_list_items() -> None:
 
 def test_defaults_are_those_of_core() -> None:
     settings = locomotion_settings(make_octopus())
-    for name in ("contraction", "softness", "sway", "phase_spread", "seed", "turning"):
+    for name in ("contraction", "softness", "phase_spread", "seed", "turning"):
         assert getattr(settings, name) == pytest.approx(getattr(GaitSettings, name)), name
+    assert settings.sway == pytest.approx(GaitSettings.lateral_bend)
     for name in ("heading", "heading_angle", "burst", "look_ahead", "keep_upright", "corner"):
         assert getattr(settings, name) == pytest.approx(getattr(TravelSettings, name)), name
 

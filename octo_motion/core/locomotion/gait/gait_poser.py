@@ -88,10 +88,10 @@ class GaitSettings:
     """Weights a of the joints, at even steps from the arm's root to its tip, each in (0, 1]."""
     softness: float = 0.8
     """0 leaves bends where CCD puts them; towards 1 they are spread over neighbouring joints."""
-    give: float = 0.0
+    stretch_slack: float = 0.0
     """Group lengths by which an arm may reach beyond its targets as it straightens, so that it does
     so gently; 0 meets them, as the source does, with a snap."""
-    sway: float = np.radians(10.0)
+    lateral_bend: float = np.radians(10.0)
     """Bend across the gait's own that each group starts with, so that no group passes through a
     straight line."""
     phase_spread: float = 1.0
@@ -103,24 +103,30 @@ class GaitSettings:
     """Cycles after which the random additions come again, 0 for never."""
     turning: float = 0.5
     """Share of the turn that lies ahead which the arms take on as pitch [Octopus, §3.5]."""
-    steady: float = 0.0
+    smoothing_cycles: float = 0.0
     """Cycles before and after each moment over which movement is evened out in time; 0 leaves the
     table's corners, as the source does."""
     heading: float = 0.0
     """WALK: radians anticlockwise from the way that the body goes to its front: arms take their
     phases from the gait by where they are seen from that way."""
-    stand: bool = False
+    raise_to_floor: bool = False
     """WALK: whether targets that lie deeper than most are raised to a floor where most are, so
     that many arms stand on the ground together, and not the tip of one. The source's walk, whose
     targets are the table's alone, knows no ground."""
-    lean: float = 0.0
+    swim_lean: float = 0.0
     """SWIM: how far from the body's +Z towards its back the way lies that its arms trail behind;
     see ``TravelSettings``. Radians."""
 
     def __post_init__(self) -> None:
         numbers = (
-            *(self.contraction, self.softness, self.give, self.sway, self.phase_spread),
-            *(self.turning, self.steady, self.heading, self.lean),
+            *(
+                self.contraction,
+                self.softness,
+                self.stretch_slack,
+                self.lateral_bend,
+                self.phase_spread,
+            ),
+            *(self.turning, self.smoothing_cycles, self.heading, self.swim_lean),
             *(*self.weights, *self.variation),
         )
         if not np.all(np.isfinite(numbers)):
@@ -139,11 +145,12 @@ class GaitSettings:
             )
         if not 0.0 <= self.softness <= 1.0:
             raise SettingsError(f"The softness is {self.softness:g}.", "Give a value from 0 to 1.")
-        if not 0.0 <= self.give <= 1.0:
-            raise SettingsError(f"The give is {self.give:g}.", "Give a value from 0 to 1.")
-        if not 0.0 <= self.steady <= MOST_STEADY:
+        if not 0.0 <= self.stretch_slack <= 1.0:
+            raise SettingsError(f"The give is {self.stretch_slack:g}.", "Give a value from 0 to 1.")
+        if not 0.0 <= self.smoothing_cycles <= MOST_STEADY:
             raise SettingsError(
-                f"Steady is {self.steady:g} cycles.", f"Give a value from 0 to {MOST_STEADY:g}."
+                f"Steady is {self.smoothing_cycles:g} cycles.",
+                f"Give a value from 0 to {MOST_STEADY:g}.",
             )
 
 
@@ -155,7 +162,7 @@ class ArmPoses:
     """(frames, bones, 4) unit quaternions in each bone's rest frame (Blender's matrix_basis)."""
     misses: Floats
     """(frames, arms, groups) distance of each group's end from its target, in arm lengths, less
-    what the setting ``give`` lets it and those before it reach beyond."""
+    what the setting ``stretch_slack`` lets it and those before it reach beyond."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +199,7 @@ class GaitPoser:
         self._roots = np.array([each[0] for each in joints])
         # From an arm's own frame to the body's: azimuth counts from the front, −Y.
         bones = [arm.bones for arm in self._arms]
-        lean = 0.0 if gait.on_ground else settings.lean
+        lean = 0.0 if gait.on_ground else settings.swim_lean
         find = partial(swim_azimuths, lean=lean) if lean else arm_azimuths
         azimuths = find(skeleton, bones, body)
         # The same to a body whose +Z is the way that it swims along.
@@ -214,11 +221,11 @@ class GaitPoser:
         self._offsets = settings.phase_spread * np.array(spread) + [arm.phase for arm in arms]
         sway = np.array([_across(gait.curve(pair)) for pair in self._pairs])
         sway[:, PITCH] *= self._hands
-        self._sway = settings.sway * sway
+        self._sway = settings.lateral_bend * sway
         self._builds = self._group(segments)
         self._floor = -np.inf
         self._few: ContentCache[tuple[Floats, Floats]] = ContentCache()
-        if settings.stand and gait.on_ground:
+        if settings.raise_to_floor and gait.on_ground:
             floor = float(np.quantile(self._whole_cycle()[0], _STANDING))
             if floor < -_LEAST_DEPTH * self.arm_length:
                 self._floor = floor
@@ -267,7 +274,7 @@ class GaitPoser:
             part = Build(tuple(chosen), build.chain, build.widths)
             own = np.repeat(phases[:, None], len(chosen), axis=1)
             pairs = tuple(self._pairs[arm] for arm in chosen)
-            angles = gait_angles(gait, own, pairs, steady=self._settings.steady)
+            angles = gait_angles(gait, own, pairs, steady=self._settings.smoothing_cycles)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
             directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
@@ -332,7 +339,7 @@ class GaitPoser:
                 same for all.
         """
         settings = self._settings
-        steady = settings.steady
+        steady = settings.smoothing_cycles
         angles = gait_angles(settings.gait, phases, self._pairs, steady=steady) + variation(
             settings.gait,
             phases,
@@ -495,16 +502,16 @@ class GaitPoser:
             _batch_last(links, batch),
             targets,
             softness=self._settings.softness,
-            give=self._settings.give,
+            give=self._settings.stretch_slack,
             floor=floor,
         )
         joints = running(build.chain.lengths[:, None, None] * directions)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
         missed = np.linalg.norm(ends - targets[1:], axis=1)
-        if self._settings.give > 0.0:
+        if self._settings.stretch_slack > 0.0:
             roots = np.concatenate([np.zeros_like(ends[:1]), ends[:-1]])
             chords = np.linalg.norm(targets[1:] - roots, axis=1)
-            beyond = overreach(chords, build.widths[:, None], self._settings.give)
+            beyond = overreach(chords, build.widths[:, None], self._settings.stretch_slack)
             # A group of a single bone begins where the one before has ended, and ends as far off.
             missed = np.maximum(missed - beyond.cumsum(axis=0), 0.0)
         return (

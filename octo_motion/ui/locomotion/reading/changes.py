@@ -191,7 +191,7 @@ class GaitTransitionPlan:
             moved = Moved.still(len(distance), self.bones)
             way = self.ways[self._way(leg)]
             cycle = frames_per_metre * way.travel.stride
-            steady = SwingSmoothing.over(way.generator.settings.steady, cycle)
+            steady = SwingSmoothing.over(way.generator.settings.smoothing_cycles, cycle)
             for start in range(0, len(part), step):
                 chosen = slice(start, min(start + step, len(part)))
                 self._pose(leg, distance, places, moved, frames=part, part=chosen, steady=steady)

@@ -81,17 +81,17 @@ def gait_settings(
         contraction=settings.contraction,
         weights=weights,
         softness=settings.softness,
-        give=settings.give,
-        steady=settings.steady,
-        sway=settings.sway,
+        stretch_slack=settings.give,
+        smoothing_cycles=settings.steady,
+        lateral_bend=settings.sway,
         phase_spread=settings.phase_spread,
         variation=(settings.variation_min, settings.variation_max),
         seed=settings.seed,
         period=settings.cycles if settings.travel_on == "NONE" else 0,
         turning=settings.turning,
         heading=_heading(settings),
-        stand=settings.stand,
-        lean=0.0 if gait.on_ground else lean,
+        raise_to_floor=settings.stand,
+        swim_lean=0.0 if gait.on_ground else lean,
     )
 
 

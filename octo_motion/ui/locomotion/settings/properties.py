@@ -313,7 +313,7 @@ class OCTO_MOTION_PG_locomotion(
         name="Sway",
         description="Bend across the gait's own that keeps an arm from becoming a straight line",
         subtype="ANGLE",
-        default=GaitSettings.sway,
+        default=GaitSettings.lateral_bend,
         min=0.0,
         max=0.5 * np.pi,
         soft_max=np.radians(45.0),

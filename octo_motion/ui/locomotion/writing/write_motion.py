@@ -416,7 +416,9 @@ class Shot:
 
     def _steady(self) -> SwingSmoothing | None:
         """How arms in the air are evened out over time, if at all."""
-        return SwingSmoothing.over(self.generator.settings.steady, self.every * self.cycle)
+        return SwingSmoothing.over(
+            self.generator.settings.smoothing_cycles, self.every * self.cycle
+        )
 
     def _reach(self, posed: _Posed) -> np.ndarray:
         """Let arms reach; which of them do (frames, arms)."""
@@ -458,7 +460,7 @@ class Shot:
         known = [self.generator]
         if self.changing is not None:
             known = [way.generator for way in self.changing.ways]
-        lying = next((each for each in known if each.settings.lean), None)
+        lying = next((each for each in known if each.settings.swim_lean), None)
         if lying is None:
             return None
         share = np.ones(len(self.moments)) if self.swimming is None else self.swimming
