@@ -175,8 +175,8 @@ def walker(
         radii=[np.linspace(*radii, joints + 1)] * arms,
         may_stretch=[stretch] * arms,
         phases=(0.0, 2.0 * np.pi * route.length / travel.stride),
-        wishes=wishes,
-        rhythm=rhythm,
+        contact_overrides=wishes,
+        timing=rhythm,
     )
     return Walker(skeleton, generator, body, route, travel, line, ground, walk)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.rig.arm_batches import alike
+from octo_motion.core.locomotion.rig.arm_batches import batches_by_bones
 from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import Floats, normalized
 from tests.core.rigs import body_with_arms
@@ -37,7 +37,7 @@ def posed(arm: ArmFrames, seed: int) -> tuple[Floats, Floats]:
 
 
 def test_their_joints_are_where_each_arm_s_own_are(arms: list[ArmFrames]) -> None:
-    for numbers, together in alike(arms):
+    for numbers, together in batches_by_bones(arms):
         poses = [posed(arms[number], number) for number in numbers]
         rotations = np.concatenate([np.moveaxis(each, 0, 2) for each, _ in poses], axis=2)
         strains = np.concatenate([each.T for _, each in poses], axis=1)
@@ -52,7 +52,7 @@ def test_their_joints_are_where_each_arm_s_own_are(arms: list[ArmFrames]) -> Non
 
 
 def test_bones_come_back_from_their_orientations(arms: list[ArmFrames]) -> None:
-    for numbers, together in alike(arms):
+    for numbers, together in batches_by_bones(arms):
         rotations = np.moveaxis(posed(arms[numbers[0]], 1)[0], 0, 2)
         for place in range(len(numbers)):
             arm = np.full(MOMENTS, place)
@@ -61,7 +61,7 @@ def test_bones_come_back_from_their_orientations(arms: list[ArmFrames]) -> None:
 
 
 def test_arms_of_as_many_bones_are_together(arms: list[ArmFrames]) -> None:
-    found = alike(arms)
+    found = batches_by_bones(arms)
     assert sorted(number for numbers, _ in found for number in numbers) == list(range(len(arms)))
     assert len(found) == 2
     for numbers, together in found:

@@ -202,7 +202,9 @@ def test_a_goal_at_the_root_leaves_finite_numbers(count: int) -> None:
 def test_a_goal_however_far_away_is_pointed_at(far: float, give: float) -> None:
     directions, lengths, goal = a_group(3, 4)
     goal = far * normalized(goal)
-    found = columns(ccd.close_group(columns(directions), lengths, columns(goal), give=give))
+    found = columns(
+        ccd.close_group(columns(directions), lengths, columns(goal), stretch_slack=give)
+    )
     assert normalized(chord(found, lengths)) == pytest.approx(normalized(goal), abs=1e-6)
     away = np.linalg.norm(goal, axis=-1)
     assert np.all(ccd.overreach(away, np.full(away.shape, lengths.sum()), give) <= 1e-9)

@@ -67,7 +67,7 @@ def apart(bulk: Bulk, rotations: Floats) -> Floats | None:
         bulk,
         rotations,
         np.zeros(rotations.shape[:2]),
-        lying=[np.zeros((FRAMES, len(arm.bones) + 1), dtype=bool) for arm in bulk.arms],
+        in_contact=[np.zeros((FRAMES, len(arm.bones) + 1), dtype=bool) for arm in bulk.arms],
         busy=np.zeros((FRAMES, len(bulk.arms)), dtype=bool),
         travel=travel,
         ground=None,

@@ -92,7 +92,7 @@ def test_without_a_period_random_additions_never_come_again() -> None:
     phases = np.array([[0.5], [0.5 + 2.0 * np.pi], [0.5 + 4.0 * np.pi]])
     free = gait.variation(table, phases, (1,), (-1.0, 1.0), 0)
     assert not np.allclose(free[0], free[2])
-    bound = gait.variation(table, phases, (1,), (-1.0, 1.0), 0, period=2)
+    bound = gait.variation(table, phases, (1,), (-1.0, 1.0), 0, cycle_period=2)
     np.testing.assert_allclose(bound[0], bound[2], atol=1e-12)
     assert not np.allclose(bound[0], bound[1])
 

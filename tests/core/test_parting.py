@@ -212,7 +212,7 @@ def crowd(*arms: Floats, lying: np.ndarray | None = None) -> Crowd:
         joints=joints,
         radii=np.full(shape[1:], RADIUS),
         at_rest=rest,
-        lying=np.zeros(shape, dtype=bool) if lying is None else lying,
+        in_contact=np.zeros(shape, dtype=bool) if lying is None else lying,
         kept=np.zeros(shape[:2], dtype=bool),
         upward=UP,
         up=np.tile(UP, (shape[0], 1)),
@@ -242,9 +242,9 @@ def beside() -> Crowd:
 def over_lying() -> Crowd:
     """An arm low in the air that comes into one that lies on the ground from its fifth joint on."""
     group = crowd(swinging(0.05), straight(np.full(FRAMES, 0.0), RADIUS, at=-0.02))
-    lying = np.zeros(group.lying.shape, dtype=bool)
+    lying = np.zeros(group.in_contact.shape, dtype=bool)
     lying[:, 1, 5:] = True
-    return replace(group, lying=lying)
+    return replace(group, in_contact=lying)
 
 
 @pytest.mark.parametrize("group", [beside(), over_lying()], ids=["in the air", "lying"])
@@ -270,7 +270,7 @@ def test_what_lies_on_the_ground_stays_where_it_lies() -> None:
     group = over_lying()
     moved = parted(group, (), floor=Level(), width=WIDTH)
     assert moved is not None
-    assert np.abs(moved - group.joints)[group.lying].max() < 1e-9
+    assert np.abs(moved - group.joints)[group.in_contact].max() < 1e-9
 
 
 def test_arms_make_way_in_time_and_not_in_a_jump() -> None:
@@ -301,7 +301,7 @@ def test_a_part_of_the_motion_is_made_like_the_whole() -> None:
         replace(
             group,
             joints=group.joints[some],
-            lying=group.lying[some],
+            lying=group.in_contact[some],
             kept=group.kept[some],
             up=group.up[some],
         ),
@@ -348,9 +348,9 @@ def crossing(frames: slice) -> Crowd:
     turned = np.full(FRAMES, -0.3)
     turned[frames] = 0.3
     group = crowd(straight(-turned, RADIUS, at=0.1), straight(turned, RADIUS, at=-0.1))
-    lying = np.zeros(group.lying.shape, dtype=bool)
+    lying = np.zeros(group.in_contact.shape, dtype=bool)
     lying[:, :, 2:] = True
-    return replace(group, lying=lying)
+    return replace(group, in_contact=lying)
 
 
 def test_arms_that_cannot_be_parted_move_as_before() -> None:

@@ -37,7 +37,7 @@ def walk(request: pytest.FixtureRequest) -> Walker:
 
 def test_what_lies_on_the_ground_does_not_slide(walk: Walker) -> None:
     poses = walk.pose(walk.times)
-    for joints, lying, arms in zip(poses.joints, poses.lying, walk.walk.builds, strict=True):
+    for joints, lying, arms in zip(poses.joints, poses.in_contact, walk.walk.builds, strict=True):
         worst = quality.slip(joints, lying, poses.cycles[:, list(arms)], np.ones(len(arms)))
         # Newton's method leaves rounding alone.
         assert worst.value < 1e-6
@@ -50,7 +50,7 @@ def test_nor_does_it_between_two_frames(ground: str) -> None:
     joints, half = walk.played(walk.times)
     poses = walk.pose(half)
     order = [arm for arms in walk.walk.builds for arm in arms]
-    lying = np.concatenate(poses.lying, axis=1)
+    lying = np.concatenate(poses.in_contact, axis=1)
     exact = np.concatenate(poses.joints, axis=1)
     error = np.linalg.norm(joints[:, order] - exact, axis=-1) * lying
     # At most a hundredth of the arm; what is measured is three thousandths.
@@ -63,14 +63,14 @@ def test_no_joint_is_below_the_ground(walk: Walker) -> None:
 
 
 def test_several_arms_stand_at_any_time(walk: Walker) -> None:
-    lying = walk.pose(walk.times).lying
+    lying = walk.pose(walk.times).in_contact
     standing = sum(each.any(axis=-1).sum(axis=1) for each in lying)
     assert standing.min() >= 2
     assert standing.mean() > 3.0
 
 
 def test_a_part_of_the_arm_lies_down_not_its_tip_alone(walk: Walker) -> None:
-    (lying,) = walk.pose(walk.times).lying
+    (lying,) = walk.pose(walk.times).in_contact
     middle = np.abs(walk.since(walk.times)) < 0.02
     shares = lying.sum(axis=-1)[middle[:, list(walk.walk.builds[0])]]
     assert shares.min() >= 0.25 * lying.shape[-1]
@@ -96,7 +96,7 @@ def test_a_tip_that_lies_down_does_not_twitch() -> None:
     cycle = walk.travel.stride / walk.route.length
     count = 480
     poses = walk.pose(np.linspace(0.4, 0.4 + 1.3 * cycle, int(1.3 * count)))
-    joints, lying = poses.joints[0], poses.lying[0][..., -1]
+    joints, lying = poses.joints[0], poses.in_contact[0][..., -1]
     segments = np.diff(joints, axis=2)
     segments /= np.linalg.norm(segments, axis=-1, keepdims=True)
     cosines = np.sum(segments[:, :, 1:] * segments[:, :, :-1], axis=-1)
@@ -135,7 +135,7 @@ def test_others_stretch_within_the_limit_and_where_they_lie_not_at_all(limit: fl
     walk = walking("slope", stretch=True, settings=StanceSettings(stretch=limit))
     poses = walk.pose(walk.times)
     assert 0.1 * limit < poses.strains.max() <= limit
-    lying = poses.lying[0][:, :, :-1] & poses.lying[0][:, :, 1:]
+    lying = poses.in_contact[0][:, :, :-1] & poses.in_contact[0][:, :, 1:]
     strains = poses.strains.reshape(len(walk.times), 8, 12)[:, list(walk.walk.builds[0])]
     assert np.abs(strains[lying]).max() < 1e-9
 
@@ -154,7 +154,7 @@ def test_arms_swing_clear_of_the_ground() -> None:
 def test_a_walk_starts_and_ends_at_rest(ground: str, gait: str) -> None:
     walk = walking(ground, stretch=True, rest=1.0, gait=gait)
     poses = walk.pose(walk.times)
-    (joints,), (lying,) = poses.joints, poses.lying
+    (joints,), (lying,) = poses.joints, poses.in_contact
     order = list(walk.walk.builds[0])
     # All arms lie down at both ends, a third of what lies down at most is peeled off …
     assert lying[[0, -1]].sum(axis=-1).min() >= 4
@@ -192,7 +192,7 @@ def test_suckers_face_the_ground_where_the_arm_lies(ground: str) -> None:
         down = -normals(walk.ground, poses.joints[0][:, place, :-1])
         down -= np.sum(down * along, axis=-1, keepdims=True) * along
         cosine = np.sum(below * down, axis=-1) / np.linalg.norm(down, axis=-1)
-        lying = poses.lying[0][:, place, :-1] & poses.lying[0][:, place, 1:]
+        lying = poses.in_contact[0][:, place, :-1] & poses.in_contact[0][:, place, 1:]
         assert np.degrees(np.arccos(cosine[lying].min())) < 25.0
 
 
@@ -236,7 +236,7 @@ def test_a_contact_that_was_moved_is_where_it_was_moved_to_and_the_others_stay()
         np.testing.assert_array_equal(each.position, holds(free, each.arm)[each.cycle].position)
     poses = walk.pose(walk.times)
     worst = quality.slip(
-        poses.joints[0], poses.lying[0], poses.cycles[:, list(walk.walk.builds[0])], ONE
+        poses.joints[0], poses.in_contact[0], poses.cycles[:, list(walk.walk.builds[0])], ONE
     )
     assert worst.value < 1e-6
 
@@ -246,8 +246,8 @@ def test_a_contact_that_was_deleted_is_gone_and_the_arm_stays_in_the_air() -> No
     assert 3 not in holds(walk, 2)
     poses = walk.pose(walk.times)
     place = walk.walk.builds[0].index(2)
-    assert not poses.lying[0][poses.cycles[:, 2] == 3, place].any()
-    assert poses.lying[0][poses.cycles[:, 2] == 2, place].any()
+    assert not poses.in_contact[0][poses.cycles[:, 2] == 3, place].any()
+    assert poses.in_contact[0][poses.cycles[:, 2] == 2, place].any()
 
 
 def test_a_contact_can_come_later() -> None:
@@ -256,8 +256,8 @@ def test_a_contact_can_come_later() -> None:
         for wishes in ((), [ContactOverride(2, 3, shift=0.1)])
     )
     old, new = holds(free, 2)[3], holds(walk, 2)[3]
-    assert new.on - old.on == pytest.approx(0.1 * 2.0 * np.pi)
-    assert new.off - old.off == pytest.approx(0.1 * 2.0 * np.pi)
+    assert new.touch_down - old.touch_down == pytest.approx(0.1 * 2.0 * np.pi)
+    assert new.lift_off - old.lift_off == pytest.approx(0.1 * 2.0 * np.pi)
 
 
 def test_a_contact_out_of_reach_is_told_and_nothing_breaks() -> None:

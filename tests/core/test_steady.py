@@ -46,7 +46,7 @@ def bend(directions: Floats) -> Floats:
 def test_the_table_is_evened_out_by_the_mean_over_a_window(name: str, steady: float) -> None:
     table = gait.gait_presets()[name]
     phases = np.linspace(-7.0, 14.0, 37)[:, None]
-    found = gait.gait_angles(table, phases, (1,), steady=steady)
+    found = gait.gait_angles(table, phases, (1,), smoothing_cycles=steady)
     # The middles of many slices of the window, each weighing the less, the further off it is.
     slices = (np.arange(4000) + 0.5) / 2000.0 - 1.0
     weights = 1.0 - np.abs(slices)
@@ -60,7 +60,7 @@ def test_without_it_the_table_keeps_its_corners() -> None:
     table = gait.gait_presets()["walk"]
     phases = np.linspace(0.0, 9.0, 50)[:, None]
     exact = gait.gait_angles(table, phases, (1,))
-    assert np.array_equal(gait.gait_angles(table, phases, (1,), steady=0.0), exact)
+    assert np.array_equal(gait.gait_angles(table, phases, (1,), smoothing_cycles=0.0), exact)
 
 
 @given(seed=st.integers(0, 99), period=st.sampled_from([0, 3]))
@@ -70,7 +70,9 @@ def test_random_additions_have_no_corners_either(seed: int, period: int) -> None
 
     def varied(steady: float) -> Floats:
         limits = (-0.3, 0.4)
-        return gait.variation(table, phases, (1, 2), limits, seed, period=period, steady=steady)
+        return gait.variation(
+            table, phases, (1, 2), limits, seed, cycle_period=period, smoothing_cycles=steady
+        )
 
     corners, even = (np.abs(np.diff(varied(each), 2, axis=0)).max() for each in (0.0, STEADY))
     assert even < 0.1 * corners
@@ -82,7 +84,9 @@ def test_evened_random_additions_come_again_with_their_period(cycle: int) -> Non
     table = gait.gait_presets()["walk"]
     phases = np.linspace(0.0, gait.CYCLE, 50)[:, None] + np.zeros(3)
     found = [
-        gait.variation(table, each, (1, 2, 3), (0.0, 0.2), 5, period=2, steady=STEADY)
+        gait.variation(
+            table, each, (1, 2, 3), (0.0, 0.2), 5, cycle_period=2, smoothing_cycles=STEADY
+        )
         for each in (phases, phases + 2 * cycle * gait.CYCLE)
     ]
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)
@@ -162,7 +166,7 @@ def test_arms_that_turn_about_within_a_frame_stay_whole() -> None:
 def posed(walk: Walker, times: Floats, higher: Any = None, *, steady: bool) -> GroundedPoses:
     travel, centres, orientations = walk.places(times)
     how = over(STEADY, FRAMES) if steady else None
-    return walk.walk.pose(travel.phase, travel.turn, centres, orientations, higher, steady=how)
+    return walk.walk.pose(travel.phase, travel.turn, centres, orientations, higher, smoothing=how)
 
 
 @pytest.mark.parametrize("ground", ["plane", "bumps"])
@@ -179,7 +183,7 @@ def test_arms_swing_more_evenly_and_hold_on_as_they_did(ground: str) -> None:
     # By a third, as it is asked for; and by half with what leaves the ground without a jerk.
     assert jerk(after) < jerk(alone) < jerk(before)
     assert jerk(after) < 0.67 * jerk(before)
-    for ours, theirs, lies in zip(after.joints, alone.joints, alone.lying, strict=True):
+    for ours, theirs, lies in zip(after.joints, alone.joints, alone.in_contact, strict=True):
         assert lies.any()
         np.testing.assert_allclose(ours[lies], theirs[lies], atol=1e-12)
     heights = after.joints[0][..., 2] - GROUNDS[ground].height(after.joints[0])

@@ -80,7 +80,7 @@ def test_an_arm_climbs_a_step_that_is_higher_than_its_bones_are_long_and_lies_on
 def test_what_rests_on_steps_is_not_in_them_and_no_bone_turns_over(height: float) -> None:
     walk = walker(steps(height))
     poses = walk.pose(walk.times)
-    (joints,), (rests,) = poses.joints, poses.lying
+    (joints,), (rests,) = poses.joints, poses.in_contact
     below = walk.ground.height(joints) - joints[..., 2]
     assert np.any(rests)
     assert below[rests].max() < 0.005

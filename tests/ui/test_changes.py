@@ -95,7 +95,7 @@ def test_arms_that_hold_on_do_not_slide_while_the_gait_changes(settings: Any) ->
     unit = shot.travel.stride / (2.0 * np.pi)
     for each in walk.footholds():
         off = unit * each.off
-        if each.on * unit < shot.changing.changes[0].end:
+        if each.touch_down * unit < shot.changing.changes[0].end:
             assert off <= window.start[each.arm] + 1e-6
             assert each.short < 1e-3
     assert shot.out_of_reach.max() < 1e-3

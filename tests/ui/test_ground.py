@@ -69,7 +69,7 @@ def arms_in_world(armature: Any, frames: np.ndarray) -> tuple[np.ndarray, np.nda
     for frame in frames:
         ends = joints_in_world(armature, frame)
         played.append([np.concatenate([ends[own, 0], ends[own[-1:], 1]]) for own in numbers])
-    return np.array(played), poses.lying[0], poses.cycles[:, list(arms)]
+    return np.array(played), poses.in_contact[0], poses.cycles[:, list(arms)]
 
 
 def test_one_click_walks_on_a_plane_and_nothing_slides(octopus: Any) -> None:

@@ -132,7 +132,7 @@ def test_in_place_the_ground_goes_by_under_arms_that_hold_it(gait: str, cycles: 
     speed = np.linalg.norm(np.diff(played[:-1], axis=0), axis=-1).max(axis=(1, 2))
     over = np.linalg.norm(played[-1] - played[-2], axis=-1).max()
     assert over < 1.2 * speed.max()
-    lying, lengths = poses.lying[0][:, :, :-1], shot.generator.lengths[list(arms)]
+    lying, lengths = poses.in_contact[0][:, :, :-1], shot.generator.lengths[list(arms)]
     worst = quality.slip(played, lying, poses.cycles[:, list(arms)], lengths)
     assert lying.any(axis=-1).sum(axis=1).min() >= 2
     assert worst.value < 1e-5

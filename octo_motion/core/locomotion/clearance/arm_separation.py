@@ -16,7 +16,7 @@ import numpy as np
 from ...batched import product
 from ...rotations import Floats, conjugate, normalized, rotate, shortest_arc
 from ..ground import Ground
-from ..rig import ArmFrames, ArmsTogether, alike
+from ..rig import ArmBatch, ArmFrames, batches_by_bones
 from .capsule_overlap import Capsules
 from .overlap_contacts import Crowd, Opened
 from .overlap_solver import parted
@@ -79,7 +79,7 @@ def separate_arms(
     rotations: Floats,
     strains: Floats,
     *,
-    lying: Sequence[np.ndarray],
+    in_contact: Sequence[np.ndarray],
     busy: np.ndarray,
     travel: tuple[Floats, Floats],
     ground: Ground | None,
@@ -93,7 +93,7 @@ def separate_arms(
         bulk: the arms and the body.
         rotations: (frames, bones, 4) of all arms, one after the other.
         strains: (frames, bones) by how much bones are longer than at rest, as a share.
-        lying: for each arm (frames, joints) which joints rest on the ground.
+        in_contact: for each arm (frames, joints) which joints rest on the ground.
         busy: (frames, arms) which arms must not be moved.
         travel: locations (frames, 3) and orientations (frames, 4) of the armature, world.
         ground: what they walk on, if anything.
@@ -107,7 +107,8 @@ def separate_arms(
     # Arms with fewer joints than others end in the same one several times.
     chosen = [np.append(each, np.repeat(each[-1:], most - len(each))) for each in some]
     posed = [
-        _Posed.of(numbers, together, ends, rotations) for numbers, together in alike(bulk.arms)
+        _Posed.of(numbers, together, ends, rotations)
+        for numbers, together in batches_by_bones(bulk.arms)
     ]
     joints = np.empty((len(rotations), len(bulk.arms), most, 3))
     for each in posed:
@@ -119,8 +120,8 @@ def separate_arms(
         at_rest=np.stack(
             [arm.joints(arm.at_rest)[which] for arm, which in zip(bulk.arms, chosen, strict=True)]
         ),
-        lying=np.stack(
-            [_lying(own, which) for own, which in zip(lying, chosen, strict=True)], axis=1
+        in_contact=np.stack(
+            [_in_contact(own, which) for own, which in zip(in_contact, chosen, strict=True)], axis=1
         ),
         kept=busy,
         upward=bulk.upward,
@@ -143,7 +144,7 @@ class _Posed:
 
     numbers: list[int]
     """Which of all arms they are."""
-    together: ArmsTogether
+    together: ArmBatch
     columns: np.ndarray
     """(arms, bones) which of all bones are theirs."""
     orientations: Floats
@@ -151,7 +152,7 @@ class _Posed:
 
     @classmethod
     def of(
-        cls, numbers: list[int], together: ArmsTogether, ends: np.ndarray, rotations: Floats
+        cls, numbers: list[int], together: ArmBatch, ends: np.ndarray, rotations: Floats
     ) -> _Posed:
         """Some arms, as the rotations (frames, bones, 4) of all have them.
 
@@ -201,7 +202,7 @@ class _Posed:
         rotations[frame[:, None], self.columns[arm]] = np.moveaxis(fresh, 2, 0)
 
 
-def _lying(joints: np.ndarray, which: np.ndarray) -> np.ndarray:
+def _in_contact(joints: np.ndarray, which: np.ndarray) -> np.ndarray:
     """Which of some joints (frames, some) stand for one that lies: what lies moves nowhere."""
     passed = np.concatenate([np.zeros((len(joints), 1), dtype=int), joints.cumsum(axis=1)], axis=1)
     before, after = np.append(which[:1], which[:-1]), np.append(which[1:], which[-1:])

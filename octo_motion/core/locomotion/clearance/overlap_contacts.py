@@ -52,7 +52,7 @@ class Crowd:
     """(arms, joints)"""
     at_rest: Floats
     """(arms, joints, 3)"""
-    lying: np.ndarray
+    in_contact: np.ndarray
     """(frames, arms, joints) which joints rest on the ground and must not move."""
     kept: np.ndarray
     """(frames, arms) which arms are to stay as they are."""

@@ -132,11 +132,11 @@ class _Parting:
         self._directions = self._before.copy()
         self._length = float(self._lengths.sum(axis=2).mean())
         self._scale = float(crowd.radii.mean())
-        lies = crowd.lying.any(axis=2)
+        lies = crowd.in_contact.any(axis=2)
         self._held = np.where(lies, 1.0, self._covered(lies.astype(np.float64), brief=True))
-        self._anchor = _anchors(crowd.lying)
+        self._anchor = _anchors(crowd.in_contact)
         self._free, self._loose = (
-            self._in_time(each, crowd.kept[..., None]) for each in _freedom(crowd.lying)
+            self._in_time(each, crowd.kept[..., None]) for each in _freedom(crowd.in_contact)
         )
         self._allowed, self._room = self._clearance()
 
@@ -386,24 +386,24 @@ def _turns(first: Floats, second: Floats) -> Floats:
     return np.maximum(own, np.sqrt(squares.max(axis=-1, initial=0.0)))
 
 
-def _anchors(lying: np.ndarray) -> np.ndarray:
+def _anchors(in_contact: np.ndarray) -> np.ndarray:
     """The first joint (frames, arms) that lies; of an arm that does not, the nearest in time."""
-    lies = lying.any(axis=2)
+    lies = in_contact.any(axis=2)
     count, frames = len(lies), np.arange(len(lies))[:, None]
     last = np.maximum.accumulate(np.where(lies, frames, -count), axis=0)
     coming = np.minimum.accumulate(np.where(lies, frames, 2 * count)[::-1], axis=0)[::-1]
     closest = np.where(frames - last <= coming - frames, last, coming)
-    return np.take_along_axis(lying.argmax(axis=2), np.clip(closest, 0, count - 1), axis=0)
+    return np.take_along_axis(in_contact.argmax(axis=2), np.clip(closest, 0, count - 1), axis=0)
 
 
-def _freedom(lying: np.ndarray) -> tuple[Floats, Floats]:
+def _freedom(in_contact: np.ndarray) -> tuple[Floats, Floats]:
     """How far segments (frames, arms, segments) and joints may move, 0…1."""
-    numbers = np.arange(lying.shape[2])
+    numbers = np.arange(in_contact.shape[2])
     far = 10 * len(numbers)
     # Joints to the nearest one that lies, towards the tip and towards the root.
-    onward = np.where(lying, numbers, far)[..., ::-1]
+    onward = np.where(in_contact, numbers, far)[..., ::-1]
     onward = np.minimum.accumulate(onward, axis=2)[..., ::-1] - numbers
-    back = numbers - np.maximum.accumulate(np.where(lying, numbers, -far), axis=2)
+    back = numbers - np.maximum.accumulate(np.where(in_contact, numbers, -far), axis=2)
     segments = smooth_step(np.minimum(onward[..., :-1], back[..., 1:]) / _BORDER)
     # The root is the body's.
     return segments, smooth_step(np.minimum(np.minimum(onward, back), numbers) / _BORDER)

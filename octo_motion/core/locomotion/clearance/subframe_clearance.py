@@ -21,7 +21,7 @@ from ...batched import turned
 from ...rotations import Floats, rotate
 from ...temporal_filter import covered
 from ..ground import Ground
-from ..rig import ArmFrames, ArmsTogether, Poses, alike, halfway_automatic
+from ..rig import ArmBatch, ArmFrames, Poses, batches_by_bones, halfway_automatic
 
 _TOLERATED: Final = 0.002
 """Arm lengths that a joint may be below the ground half way between frames …"""
@@ -69,9 +69,9 @@ class ArmsOverGround:
         return found
 
     @cached_property
-    def _alike(self) -> list[tuple[list[int], ArmsTogether]]:
+    def _batches(self) -> list[tuple[list[int], ArmBatch]]:
         """The arms by how many bones they have."""
-        return alike(self.arms)
+        return batches_by_bones(self.arms)
 
     def clear(self, joints: Sequence[Floats], arms: Sequence[int] | None = None) -> Floats:
         """Arm lengths (frames, arms) that each arm's lowest joint is above the ground.
@@ -98,7 +98,7 @@ class ArmsOverGround:
         """
         frames, count = poses.rotations.shape[:2]
         found = np.zeros((frames - 1, len(self.arms)))
-        for numbers, together in self._alike:
+        for numbers, together in self._batches:
             wanted = [place for place, each in enumerate(numbers) if arms is None or each in arms]
             if not wanted:
                 continue

@@ -81,7 +81,7 @@ def keep_off_ground(
             needed=np.ascontiguousarray(needed.T),
             loose=np.ascontiguousarray(out.T),
             ground=course.ground,
-            rounds=_ROUNDS,
+            iterations=_ROUNDS,
             soft=_SOFT * needed.max(axis=1),
         )
         back = conjugate(facing)

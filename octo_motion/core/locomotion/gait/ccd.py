@@ -94,7 +94,7 @@ def solve_ccd(
     targets: Floats,
     *,
     softness: float = 0.8,
-    give: float = 0.0,
+    stretch_slack: float = 0.0,
     floor: Floats | None = None,
 ) -> Floats:
     """Directions (segments, 3, batch) of arms whose groups end at their targets.
@@ -106,7 +106,7 @@ def solve_ccd(
         links: (links, 4, batch) orientations of the links.
         targets: (links + 1, 3, batch) pseudo-targets Q₀ … Q₃; those out of reach are pointed at.
         softness: 0 leaves the bends as they are; towards 1 they are spread over neighbours.
-        give: group lengths by which a group may reach beyond its target as it straightens.
+        stretch_slack: group lengths by which a group may reach beyond its target as it straightens.
         floor: (batch,) height that joints between the groups' ends keep above, as far as the
             targets let them.
     """
@@ -117,10 +117,10 @@ def solve_ccd(
         own = aimed(turned(links[group], shape[segments]), lengths, goal)
         for _ in range(SWEEPS if len(own) > 1 else 0):
             own = swept(own, lengths, chain.weights[segments], goal)
-        directions[segments] = close_group(own, lengths, goal, give=give)
+        directions[segments] = close_group(own, lengths, goal, stretch_slack=stretch_slack)
         root = root + chord(directions[segments], lengths)
-    rounds = SOFTENINGS if softness > 0.0 or floor is not None else 0
-    for number in range(1, rounds + 1):
+    iterations = SOFTENINGS if softness > 0.0 or floor is not None else 0
+    for number in range(1, iterations + 1):
         before = directions
         for _ in range(_SPREADS):
             directions = softened(directions, softness)
@@ -129,12 +129,12 @@ def solve_ccd(
         if floor is not None:
             directions = lifted(directions, chain.lengths, floor)
         # Only the last closing has to be exact.
-        steps = _NEWTON_STEPS if number == rounds else _NEWTON_STEPS_BETWEEN
+        steps = _NEWTON_STEPS if number == iterations else _NEWTON_STEPS_BETWEEN
         root = np.zeros_like(root)
         for group, segments in enumerate(chain.groups):
             lengths, goal = chain.lengths[segments], targets[group + 1] - root
             directions[segments] = close_group(
-                directions[segments], lengths, goal, steps, give=give
+                directions[segments], lengths, goal, steps, stretch_slack=stretch_slack
             )
             root = root + chord(directions[segments], lengths)
     return directions
@@ -258,7 +258,7 @@ def close_group(
     goal: Floats,
     steps: int = _NEWTON_STEPS,
     *,
-    give: float = 0.0,
+    stretch_slack: float = 0.0,
 ) -> Floats:
     """A group bent as much as it takes for its end to be at the goal, in the shape it has.
 
@@ -277,15 +277,15 @@ def close_group(
         slack = 0.5 * (slack + np.sqrt(slack * slack + _ROUNDING**2))
         # Far out of reach it is nothing at all, and would be divided by nothing.
         slack = np.maximum(slack, _TINY)
-        slack *= slack / (slack + give)
+        slack *= slack / (slack + stretch_slack)
         directions = _scaled(directions, lengths, np.maximum(whole * (1.0 - slack), 0.0), steps)
     return aimed(directions, lengths, goal)
 
 
-def overreach(chords: Floats, whole: Floats, give: float) -> Floats:
+def overreach(chords: Floats, whole: Floats, stretch_slack: float) -> Floats:
     """How far beyond goals so far away groups of these lengths reach (see :func:`close_group`)."""
     slack = np.clip(1.0 - chords / whole, _TINY, 1.0)
-    return whole * slack * give / (slack + give)
+    return whole * slack * stretch_slack / (slack + stretch_slack)
 
 
 def softened(directions: Floats, amount: float) -> Floats:

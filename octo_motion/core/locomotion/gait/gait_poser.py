@@ -274,7 +274,7 @@ class GaitPoser:
             part = Build(tuple(chosen), build.chain, build.widths)
             own = np.repeat(phases[:, None], len(chosen), axis=1)
             pairs = tuple(self._pairs[arm] for arm in chosen)
-            angles = gait_angles(gait, own, pairs, steady=self._settings.smoothing_cycles)
+            angles = gait_angles(gait, own, pairs, smoothing_cycles=self._settings.smoothing_cycles)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
             directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
@@ -328,26 +328,28 @@ class GaitPoser:
         return self.asked_at(self.arm_phases(np.asarray(phase, dtype=np.float64)), turn)
 
     def asked_at(
-        self, phases: Floats, turn: Floats, period: Sequence[int] | None = None
+        self, phases: Floats, turn: Floats, cycle_period: Sequence[int] | None = None
     ) -> tuple[Floats, Floats]:
         """The same for phases (frames, arms) of the arms themselves.
 
         Args:
             phases: radians.
             turn: as of :meth:`pose`.
-            period: each arm's cycles after which random additions come again, if that is not the
-                same for all.
+            cycle_period: each arm's cycles after which random additions come again, if that is not
+                the same for all.
         """
         settings = self._settings
         steady = settings.smoothing_cycles
-        angles = gait_angles(settings.gait, phases, self._pairs, steady=steady) + variation(
+        angles = gait_angles(
+            settings.gait, phases, self._pairs, smoothing_cycles=steady
+        ) + variation(
             settings.gait,
             phases,
             self._pairs,
             settings.variation,
             settings.seed,
-            period=settings.period if period is None else period,
-            steady=steady,
+            cycle_period=settings.period if cycle_period is None else cycle_period,
+            smoothing_cycles=steady,
         )
         if not settings.gait.on_ground:
             angles = self._beside(angles)
@@ -502,7 +504,7 @@ class GaitPoser:
             _batch_last(links, batch),
             targets,
             softness=self._settings.softness,
-            give=self._settings.stretch_slack,
+            stretch_slack=self._settings.stretch_slack,
             floor=floor,
         )
         joints = running(build.chain.lengths[:, None, None] * directions)

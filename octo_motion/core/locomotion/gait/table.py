@@ -56,7 +56,7 @@ class GaitCurve:
         start, end = self.phases[knot], self.phases[knot + 1]
         return knot, (inside - start) / (end - start)
 
-    def rounding(self, phase: Floats, steady: float) -> Floats:
+    def rounding(self, phase: Floats, smoothing_cycles: float) -> Floats:
         """What rounds corners off at phases (…): evens out what is linear between knots over time.
 
         The mean of a straight line over a window is the line itself. So the weighted mean over so
@@ -66,13 +66,13 @@ class GaitCurve:
 
         Args:
             phase: radians.
-            steady: cycles, half at most.
+            smoothing_cycles: cycles, half at most.
 
         Returns:
             (…, knots − 1) radians, for the change of slope at each knot but the last, which is
             the first again.
         """
-        within = steady * CYCLE
+        within = smoothing_cycles * CYCLE
         away = phase[..., None] - self.phases[:-1]
         away -= CYCLE * np.rint(away / CYCLE)
         return within / 6.0 * np.maximum(1.0 - np.abs(away) / within, 0.0) ** 3
@@ -147,7 +147,7 @@ class GaitTable:
 
 
 def gait_angles(
-    table: GaitTable, phases: Floats, pairs: tuple[int, ...], *, steady: float = 0.0
+    table: GaitTable, phases: Floats, pairs: tuple[int, ...], *, smoothing_cycles: float = 0.0
 ) -> Floats:
     """Angles of all arms.
 
@@ -155,7 +155,7 @@ def gait_angles(
         table: the gait.
         phases: (frames, arms) radians, each arm's own offset included.
         pairs: pair of each arm.
-        steady: cycles before and after each moment over which it is evened out
+        smoothing_cycles: cycles before and after each moment over which it is evened out
             (:meth:`GaitCurve.rounding`).
 
     Returns:
@@ -165,10 +165,10 @@ def gait_angles(
     for pair, columns in _columns_by_curve(table, pairs).items():
         curve, own = table.curve(pair), phases[:, columns]
         result[:, columns] = curve.evaluate(own)
-        if steady > 0.0:
+        if smoothing_cycles > 0.0:
             slopes = np.diff(curve.angles, axis=0) / np.diff(curve.phases)[:, None, None]
             corners = slopes - np.roll(slopes, 1, axis=0)
-            rounding = curve.rounding(own, steady)
+            rounding = curve.rounding(own, smoothing_cycles)
             result[:, columns] += np.einsum("fak,klc->falc", rounding, corners)
     return result
 
@@ -180,8 +180,8 @@ def variation(
     limits: tuple[float, float],
     seed: int,
     *,
-    period: int | Sequence[int] = 0,
-    steady: float = 0.0,
+    cycle_period: int | Sequence[int] = 0,
+    smoothing_cycles: float = 0.0,
 ) -> Floats:
     """Random additions to the angles: R(j, k) of [Octopus, §3.4].
 
@@ -196,8 +196,8 @@ def variation(
         pairs: pair of each arm.
         limits: j and k, radians.
         seed: any whole number ≥ 0.
-        period: cycles after which the numbers come again, 0 for never; or each arm's own.
-        steady: as of :func:`gait_angles`.
+        cycle_period: cycles after which the numbers come again, 0 for never; or each arm's own.
+        smoothing_cycles: as of :func:`gait_angles`.
 
     Returns:
         (frames, arms, links, angles) radians.
@@ -207,11 +207,11 @@ def variation(
     if phases.size == 0 or (low == 0.0 and high == 0.0):
         return result
     cycles = np.floor_divide(phases, CYCLE).astype(np.int64)
-    rounds = np.broadcast_to(np.asarray(period, dtype=np.int64), phases.shape[1:])
+    periods = np.broadcast_to(np.asarray(cycle_period, dtype=np.int64), phases.shape[1:])
     first, last = int(cycles.min()) - 1, int(cycles.max()) + 2
     every = np.arange(first, last + 1)[:, None]
     # (cycles, arms) numbers of the cycles whose draws count.
-    drawn = np.where(rounds > 0, every % np.maximum(rounds, 1), every)
+    drawn = np.where(periods > 0, every % np.maximum(periods, 1), every)
     kept = {int(each) for each in np.unique(drawn)}
     for pair, columns in _columns_by_curve(table, pairs).items():
         curve, own = table.curve(pair), phases[:, columns]
@@ -231,12 +231,12 @@ def variation(
         share = share[..., None, None]
         result[:, columns, :, :2] = (1.0 - share) * values[place, arms]
         result[:, columns, :, :2] += share * values[place + 1, arms]
-        if steady > 0.0:
+        if smoothing_cycles > 0.0:
             apart = np.tile(np.diff(curve.phases), len(every))[:-1, None, None, None]
             slopes = np.diff(values, axis=0) / apart
             corners = np.zeros_like(values)
             corners[1:-1] = np.diff(slopes, axis=0)
-            rounding = curve.rounding(own, steady)
+            rounding = curve.rounding(own, smoothing_cycles)
             for number in range(knots):
                 nearest = np.rint((own - curve.phases[number]) / CYCLE).astype(np.int64) - first
                 corner = corners[nearest * knots + number, arms]

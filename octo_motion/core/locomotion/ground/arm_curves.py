@@ -2,7 +2,7 @@
 """Shapes of arms as a whole: along a curve, between two others, off the ground, onto a goal.
 
 A shape is the directions of an arm's segments, (segments, 3, batch), unit vectors; the batch comes
-last, as in ``columns``. Every function is smooth in what it is given, so that what it makes of a
+last, as in ``batched``. Every function is smooth in what it is given, so that what it makes of a
 motion that is continuous is continuous.
 """
 
@@ -260,7 +260,7 @@ def raise_over_ground(
     needed: Floats,
     loose: Floats,
     ground: Ground,
-    rounds: int,
+    iterations: int,
     soft: Floats,
 ) -> Floats:
     """Directions (segments, 3, batch) of arms whose joints are not too near to the ground.
@@ -276,7 +276,7 @@ def raise_over_ground(
         needed: (segments + 1, batch) how high above the ground each joint should be.
         loose: (segments + 1, batch) how far each is to be raised, 0…1.
         ground: what they should be above of.
-        rounds: how often the lowest of them are raised.
+        iterations: how often the lowest of them are raised.
         soft: (…, batch) how much above what is needed they begin to be raised.
     """
     least = (1e-4 * np.max(np.broadcast_to(soft, needed.shape), axis=0)) ** 2
@@ -284,7 +284,7 @@ def raise_over_ground(
     weak = _WEAK * lengths[0] ** 2
     joints = np.empty((len(lengths) + 1, *roots.shape))
     result = directions
-    for number in range(rounds):
+    for number in range(iterations):
         joints[0] = roots
         np.multiply(lengths[:, None], result, out=joints[1:])
         running(joints)
@@ -306,7 +306,7 @@ def raise_over_ground(
                     needed=needed[:, low],
                     loose=loose[:, low],
                     ground=ground,
-                    rounds=rounds if len(low) else 0,
+                    iterations=iterations if len(low) else 0,
                     soft=soft[..., low],
                 )
                 return result

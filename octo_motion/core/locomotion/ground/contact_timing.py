@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from ...rotations import Floats, multiply, normalized, rotate
 from ..gait import CYCLE
 from .body_height import BodyLine
-from .crawl_planner import CrawlHolds, CrawlPath, CrawlSettings, plan_crawl
+from .crawl_planner import CrawlPath, CrawlSettings, CrawlStances, plan_crawl
 
 _PER_REACH: Final = 32
 """Samples of a journey to the length of an arm."""
 _SPARE: Final = 6.0
-"""Reaches of crawl besides the loop that is cut from it, at least."""
+"""Reaches of crawl besides the loop that is cut from it: more than four of the longest stances and
+pauses, whatever the settings, so that there is one more to cut at."""
 _CUTS: Final = 24
 """Places where it might be cut."""
 _LOOPS: Final = 3
@@ -43,11 +44,11 @@ _HASTE: Final = 2.0
 """How much worse it is on a short way that an arm hurries than that it is late."""
 
 
-class Rhythm(Protocol):
+class ContactTiming(Protocol):
     """Phases of the arms along the way."""
 
     @property
-    def rounds(self) -> Sequence[int] | None:
+    def cycle_period(self) -> Sequence[int] | None:
         """Each arm's cycles in a loop, where these are not the same for all."""
         ...
 
@@ -77,7 +78,7 @@ class EvenTiming:
     """Metres."""
     offsets: Floats
     """(arms,) radians that each arm is ahead of the body."""
-    rounds: Sequence[int] | None = None
+    cycle_period: Sequence[int] | None = None
 
     def phases(self, distance: Floats) -> Floats:
         """(frames, arms)."""
@@ -95,13 +96,13 @@ class EvenTiming:
 
 
 @dataclass(frozen=True, eq=False)
-class Tabled:
+class TabledTiming:
     """Each arm by a table of its own."""
 
     tables: Sequence[ContactTable]
     middle: float
     """Phase of the gait, radians, half way through a hold."""
-    rounds: Sequence[int] | None = None
+    cycle_period: Sequence[int] | None = None
     """Each arm's cycles in a loop, if it is one."""
 
     def phases(self, distance: Floats) -> Floats:
@@ -122,49 +123,49 @@ class Tabled:
         return found[..., 0], found[..., 1]
 
 
-def free(holds: CrawlHolds, arms: int, *, middle: float, duty: float) -> Tabled:
+def crawl_timing(stances: CrawlStances, arms: int, *, middle: float, duty: float) -> TabledTiming:
     """The rhythm of arms whose cycles begin and end with their own holds.
 
     Args:
-        holds: of all arms.
+        stances: of all arms.
         arms: how many there are.
         middle: phase of the gait half way through a hold, radians.
         duty: share of a cycle that a hold takes in the gait.
     """
-    return Tabled([_table(holds, arm, duty) for arm in range(arms)], middle)
+    return TabledTiming([_table(stances, arm, duty) for arm in range(arms)], middle)
 
 
 def timing_at_rest(
-    rhythm: EvenTiming | Tabled,
+    timing: EvenTiming | TabledTiming,
     length: float,
     *,
     start: bool,
     end: bool,
     middle: float,
     duty: float,
-) -> Tabled:
+) -> TabledTiming:
     """The same rhythm of a body that starts from a standstill, comes to one, or both.
 
     An arm that would hang in the air then swings in time, or not yet, or no more: whichever is
     nearer. In between, and for all others, nothing changes.
 
     Args:
-        rhythm: of the body that goes on before and after its route.
+        timing: of the body that goes on before and after its route.
         length: metres of the route.
         start: whether the body stands at the start.
         end: whether it stands at the end.
         middle: phase of the gait half way through a hold, radians.
         duty: share of a cycle that a hold takes.
     """
-    if isinstance(rhythm, EvenTiming):
-        ends = (rhythm.phases(np.array([0.0, length])) - middle) / CYCLE
+    if isinstance(timing, EvenTiming):
+        ends = (timing.phases(np.array([0.0, length])) - middle) / CYCLE
         tables: Sequence[ContactTable] = [
-            _even_table(first, last, rhythm.stride, duty) for first, last in ends.T.tolist()
+            _even_table(first, last, timing.stride, duty) for first, last in ends.T.tolist()
         ]
     else:
-        tables = rhythm.tables
+        tables = timing.tables
     rested = [_rested(table, length, duty, start=start, end=end) for table in tables]
-    return Tabled(rested, middle)
+    return TabledTiming(rested, middle)
 
 
 def crawling(
@@ -177,7 +178,7 @@ def crawling(
     middle: float,
     duty: float,
     stands: tuple[bool, bool] = (False, False),
-) -> Tabled:
+) -> TabledTiming:
     """The rhythm of a body that crawls.
 
     Args:
@@ -194,7 +195,7 @@ def crawling(
     distance = _samples(length, reach)
     way = line.at(distance)
     journey = _journey(distance, way, roots, outward, reach=reach, stands=stands)
-    return free(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
+    return crawl_timing(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
 
 
 def crawling_in_place(
@@ -206,7 +207,7 @@ def crawling_in_place(
     reach: float,
     middle: float,
     duty: float,
-) -> Tabled:
+) -> TabledTiming:
     """The rhythm of a body that crawls straight on, and is after its route's length as before.
 
     Each arm's holds are cut from a longer crawl, as many as fill the loop best, and stretched or
@@ -222,22 +223,20 @@ def crawling_in_place(
         duty: share of a cycle that a hold takes in the gait.
     """
     loop = line.route.length
-    # As much as four holds and pauses, however long these may be: there is one more to cut at.
-    pause = max(settings.pause[1], settings.search[1]) + settings.far - settings.near
-    whole = loop + max(_SPARE, 4.0 * pause) * reach
+    whole = loop + _SPARE * reach
     distance = _samples(whole, reach)
     (start, end), (turned, _) = line.at(np.array([0.0, loop]))
     centres = start + distance[:, None] / loop * (end - start)
     way = centres, np.tile(turned, (len(distance), 1))
     journey = _journey(distance, way, roots, outward, reach=reach)
-    holds = plan_crawl(journey, settings)
+    stances = plan_crawl(journey, settings)
     cuts = [
-        [_cut(holds, arm, loop, start) for arm in range(len(roots))]
+        [_cut(stances, arm, loop, start) for arm in range(len(roots))]
         for start in np.linspace(0.25, 0.5, _CUTS) * (whole - loop)
     ]
     best = max(cuts, key=lambda arms: _support(arms, loop))
-    tables = [_looped(*holds, loop, duty) for holds in best]
-    return Tabled(tables, middle, rounds=[len(start) for start, _, _ in best])
+    tables = [_looped(*stances, loop, duty) for stances in best]
+    return TabledTiming(tables, middle, cycle_period=[len(start) for start, _, _ in best])
 
 
 def _samples(length: float, reach: float) -> Floats:
@@ -277,11 +276,13 @@ def _journey(
     )
 
 
-def _cut(holds: CrawlHolds, arm: int, loop: float, start: float) -> tuple[Floats, Floats, Floats]:
+def _cut(
+    stances: CrawlStances, arm: int, loop: float, start: float
+) -> tuple[Floats, Floats, Floats]:
     """Starts, ends and aims of an arm's holds in a loop that is cut at a distance."""
-    own = np.flatnonzero(holds.arm == arm)
-    own = own[np.searchsorted(holds.start[own], start) :]
-    begins, ends = holds.start[own], holds.end[own]
+    own = np.flatnonzero(stances.arm == arm)
+    own = own[np.searchsorted(stances.start[own], start) :]
+    begins, ends = stances.start[own], stances.end[own]
     lasts = begins[1:] - begins[0]
     many = int(np.argmin(np.abs(np.log(lasts / loop)))) + 1
     factor = loop / lasts[many - 1]
@@ -289,23 +290,23 @@ def _cut(holds: CrawlHolds, arm: int, loop: float, start: float) -> tuple[Floats
     return (
         first + factor * (begins[:many] - begins[0]),
         first + factor * (ends[:many] - begins[0]),
-        _aims(holds, own[:many]),
+        _aims(stances, own[:many]),
     )
 
 
-def _aims(holds: CrawlHolds, chosen: NDArray[Any]) -> Floats:
+def _aims(stances: CrawlStances, chosen: NDArray[Any]) -> Floats:
     """Angles and distances of some holds (…, 2)."""
-    return np.stack([holds.turn[chosen], holds.away[chosen]], axis=-1)
+    return np.stack([stances.turn[chosen], stances.away[chosen]], axis=-1)
 
 
 def _support(arms: Sequence[tuple[Floats, Floats, Floats]], loop: float) -> tuple[int, int]:
     """How many arms hold on in a loop at least, and in all."""
     at = np.linspace(0.0, loop, 96, endpoint=False)
-    holding = np.zeros(len(at), dtype=np.int64)
+    in_stance = np.zeros(len(at), dtype=np.int64)
     for start, end, _ in arms:
         since = np.mod(at[:, None] - start, loop)
-        holding += np.any(since < end - start, axis=1)
-    return int(holding.min()), int(holding.sum())
+        in_stance += np.any(since < end - start, axis=1)
+    return int(in_stance.min()), int(in_stance.sum())
 
 
 def _looped(start: Floats, end: Floats, aims: Floats, loop: float, duty: float) -> ContactTable:
@@ -402,14 +403,14 @@ def _even_table(first: float, last: float, stride: float, duty: float) -> Contac
         stride: metres in a cycle.
         duty: share of a cycle that a hold takes.
     """
-    holds = np.arange(np.floor(first) - 1.0, np.ceil(last) + 2.0)
-    values = (holds[:, None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
+    stances = np.arange(np.floor(first) - 1.0, np.ceil(last) + 2.0)
+    values = (stances[:, None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
     return ContactTable(stride * (values - first), values, np.full(len(values), 1.0 / stride))
 
 
-def _table(holds: CrawlHolds, arm: int, duty: float) -> ContactTable:
-    own: NDArray[np.bool_] = holds.arm == arm
-    start, end = holds.start[own], holds.end[own]
+def _table(stances: CrawlStances, arm: int, duty: float) -> ContactTable:
+    own: NDArray[np.bool_] = stances.arm == arm
+    start, end = stances.start[own], stances.end[own]
     number = np.arange(len(start), dtype=np.float64)
     at = np.stack([start, end], axis=1).ravel()
     values: Floats = np.stack([number - 0.5 * duty, number + 0.5 * duty], axis=1).ravel()
@@ -424,7 +425,7 @@ def _table(holds: CrawlHolds, arm: int, duty: float) -> ContactTable:
     values = np.concatenate(
         [values[0] - np.array([1.0, swing]), values, values[-1] + np.array([swing, 1.0])]
     )
-    return ContactTable(at, values, _monotone(at, values), aims=_aims(holds, own))
+    return ContactTable(at, values, _monotone(at, values), aims=_aims(stances, own))
 
 
 def _rested(

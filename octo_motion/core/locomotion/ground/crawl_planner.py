@@ -24,6 +24,25 @@ from ...errors import SettingsError
 from ...rotations import Floats, normalized, rotate_in_plane
 from .arm_clearance import Outline, clearance
 
+_PUSHING: Final = np.radians(70.0)
+"""Largest angle between an arm's push and the way to go of an arm that pushes."""
+_ASTRAY: Final = np.radians(25.0)
+"""Angle by which a foothold may come to lie beside the arm's own direction before it lifts off."""
+_MOST_ASIDE: Final = np.radians(20.0)
+"""Largest angle by which an arm takes hold beside its own direction to keep clear of others."""
+_CLEAR: Final = 0.13
+"""Arm lengths that arms in stance should be apart, from the middle of one to the other's."""
+_SHORTEST: Final = 0.16
+"""Arm lengths that a stance lasts at least: in less an arm would hardly have lain down."""
+_PAUSE: Final = (0.2, 0.45)
+"""Shortest and longest way, in arm lengths, between two stances of an arm that pushes: time to
+swing."""
+_SEARCH: Final = (0.3, 0.8)
+"""The same of an arm that does not push."""
+_SHARE: Final = (0.7, 1.0)
+"""Shares of the longest possible stance after which an arm lifts off."""
+_LEAST: Final = 3
+"""Arms in stance at any time, if the body has as many."""
 _BEFORE: Final = 1.5
 """Arm lengths before the start at which the crawl begins, so that arms hold when it is seen."""
 _TRIED: Final = 16
@@ -47,7 +66,7 @@ _LONGER: Final = 0.06
 """Arm lengths by which a hold may be too long where the body comes to rest in it."""
 _TURNS: Final = np.array([0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0])
 """Shares of the most that an arm turns aside, which it tries."""
-_ASIDE: Final = 0.15
+_WORTH: Final = 0.15
 """How much clearance, as a share of what is wanted, turning aside all the way must be worth."""
 
 
@@ -59,44 +78,18 @@ class CrawlSettings:
     """From an arm's root to where it takes hold to push."""
     far: float = 0.78
     """From there to where it lets go."""
-    lies: float = 0.3
-    """Part of an arm that lies on the ground beyond that place."""
-    pushing: float = np.radians(70.0)
-    """Largest angle between an arm's push and the way to go of an arm that pushes."""
-    astray: float = np.radians(25.0)
-    """Angle by which a hold may come to lie beside the arm's own direction before it lets go."""
-    aside: float = np.radians(20.0)
-    """Largest angle by which an arm takes hold beside its own direction to keep clear of others."""
-    clear: float = 0.13
-    """How far from each other arms that hold on should be, from the middle of one to the other's.
-    """
-    shortest: float = 0.16
-    """Way that a hold lasts at least: in less an arm would hardly have lain down."""
-    pause: tuple[float, float] = (0.2, 0.45)
-    """Shortest and longest way between two holds of an arm that pushes: time to swing."""
-    search: tuple[float, float] = (0.3, 0.8)
-    """Shortest and longest way between two holds of an arm that does not."""
-    hold: tuple[float, float] = (0.7, 1.0)
-    """Shares of the longest possible hold after which an arm lets go."""
-    least: int = 3
-    """Arms that hold on at any time, if the body has as many."""
+    planted: float = 0.3
+    """Share of an arm that lies on the ground beyond that place."""
     seed: int = 0
 
     def __post_init__(self) -> None:
-        pairs = (self.pause, self.search, self.hold)
-        lengths = (self.near, self.far, self.lies, self.clear, self.shortest)
-        angles = (self.pushing, self.astray, self.aside)
-        numbers = (*lengths, *angles, *(x for p in pairs for x in p))
+        numbers = (self.near, self.far, self.planted)
         if not np.all(np.isfinite(numbers)) or min(numbers) <= 0.0:
             raise SettingsError("A setting of the crawl is not a number above 0.", "Set it anew.")
         if self.near >= self.far:
             raise SettingsError(
                 f"Arms take hold {self.near:g} arm lengths away and let go at {self.far:g}.",
                 "Let them take hold nearer than they let go.",
-            )
-        if any(low > high for low, high in pairs):
-            raise SettingsError(
-                "A least value of the crawl is greater than the greatest.", "Exchange the two."
             )
 
 
@@ -119,7 +112,7 @@ class CrawlPath:
 
 
 @dataclass(frozen=True, eq=False)
-class CrawlHolds:
+class CrawlStances:
     """Holds of all arms, sorted by arm and start."""
 
     arm: NDArray[np.intp]
@@ -142,7 +135,7 @@ class CrawlHolds:
         return len(self.arm)
 
 
-def plan_crawl(journey: CrawlPath, settings: CrawlSettings) -> CrawlHolds:
+def plan_crawl(journey: CrawlPath, settings: CrawlSettings) -> CrawlStances:
     """Where the arms hold on along a journey.
 
     An arm's next hold depends on the holds before it, but all of them on the journey alone: any
@@ -157,7 +150,7 @@ def plan_crawl(journey: CrawlPath, settings: CrawlSettings) -> CrawlHolds:
 
 
 @dataclass(frozen=True, eq=False)
-class _Hold:
+class _Stance:
     """One hold, metres."""
 
     arm: int
@@ -183,12 +176,12 @@ class _Crawl:
         self._streams = [
             np.random.default_rng([settings.seed, 7919, arm]) for arm in range(self._arms)
         ]
-        self._holds: list[_Hold] = []
-        self._latest: dict[int, _Hold] = {}
+        self._stances: list[_Stance] = []
+        self._latest: dict[int, _Stance] = {}
         """Of each arm."""
         self._distances: list[float] = journey.distance.tolist()
         along = np.sum(journey.outward * journey.ahead[:, None], axis=-1)
-        self._pushing = -along >= np.cos(settings.pushing)
+        self._pushing = -along >= np.cos(_PUSHING)
         """(samples, arms)"""
         first, last = self._distances[0], self._distances[-1]
         starts, stops = journey.stands
@@ -196,7 +189,7 @@ class _Crawl:
         self._last = last if stops else np.inf
         """Where the body stands."""
 
-    def run(self) -> CrawlHolds:
+    def run(self) -> CrawlStances:
         distance, unit = self._journey.distance, self._unit
         first, last = float(distance[0]), float(distance[-1])
         if np.isfinite(self._first):
@@ -228,8 +221,8 @@ class _Crawl:
     def _not_too_few(self, planned: list[float]) -> list[float]:
         """When each arm would take hold next: earlier than planned if else too few hold on."""
         ends = sorted(each.end for each in self._latest.values())
-        least, overlap = min(self._settings.least, self._arms - 1), _OVERLAP * self._unit
-        pause = self._settings.pause[0] * self._unit
+        least, overlap = min(_LEAST, self._arms - 1), _OVERLAP * self._unit
+        pause = _PAUSE[0] * self._unit
         # From when on fewer than enough arms would hold, and none would push.
         few = ends[-least] - overlap if 0 < least <= len(ends) else np.inf
         none = max((each.end for each in self._latest.values() if each.pushes), default=np.inf)
@@ -250,15 +243,15 @@ class _Crawl:
 
     def _take_hold(self, arm: int, at: float) -> float:
         """Let an arm take hold at a distance; where it lets go."""
-        settings, unit = self._settings, self._unit
+        unit = self._unit
         longest = self._longest(arm, at)
-        share = self._streams[arm].uniform(*settings.hold)
-        lasts = max(share * longest, min(settings.shortest * unit, longest))
+        share = self._streams[arm].uniform(*_SHARE)
+        lasts = max(share * longest, min(_SHORTEST * unit, longest))
         # Nobody else to take over yet: hold on for as long as it goes.
         others = [each for each in self._latest.values() if each.arm != arm]
-        pause = settings.pause[0] * unit
+        pause = _PAUSE[0] * unit
         there = sum(each.end > at + lasts or each.end + pause < at + lasts for each in others)
-        if there + self._arms - 1 - len(others) < settings.least:
+        if there + self._arms - 1 - len(others) < _LEAST:
             lasts = longest
         return self._add(arm, *self._in_time(at, lasts, longest))
 
@@ -270,7 +263,7 @@ class _Crawl:
         if at + lasts <= in_time:
             return at, at + lasts
         if at + longest + _LONGER * self._unit < self._last:
-            if in_time - at >= min(self._settings.shortest * self._unit, longest):
+            if in_time - at >= min(_SHORTEST * self._unit, longest):
                 return at, in_time
             # Too late for two holds, and too early for one: it waits.
             at = self._last - longest
@@ -278,18 +271,17 @@ class _Crawl:
 
     def _add(self, arm: int, start: float, end: float) -> float:
         """Note a hold, at a place that is clear of the other arms' where there is one."""
-        settings = self._settings
         seen = max(start, self._first), min(end, self._last)
         turn, places = 0.0, self._places(arm, sum(seen) / 2.0, np.zeros(1))
         others = [each for each in self._latest.values() if each.arm != arm and each.end > seen[0]]
         if others:
-            wanted = settings.clear * self._unit
+            wanted = _CLEAR * self._unit
             clear = self._clearance(arm, seen, places, others)[0]
             if clear < wanted:
-                turns = np.append(0.0, settings.aside * _TURNS)
+                turns = np.append(0.0, _MOST_ASIDE * _TURNS)
                 tried = self._places(arm, sum(seen) / 2.0, turns)
                 clears = self._clearance(arm, seen, tried, others) / wanted
-                good = np.minimum(clears, 1.0) - _ASIDE * np.abs(turns) / settings.aside
+                good = np.minimum(clears, 1.0) - _WORTH * np.abs(turns) / _MOST_ASIDE
                 best = int(np.argmax(good))
                 turn, places = turns[best], (tried[0][best : best + 1], tried[1][best : best + 1])
         place, tip = places[0][0], places[1][0]
@@ -298,9 +290,9 @@ class _Crawl:
         across = outward[0] * reach[1] - outward[1] * reach[0]
         turn = float(np.arctan2(across, outward @ reach))
         away = float(np.hypot(*reach))
-        hold = _Hold(arm, start, end, place, tip, turn, away, self._pushes(arm, seen[0]))
-        self._holds.append(hold)
-        self._latest[arm] = hold
+        stance = _Stance(arm, start, end, place, tip, turn, away, self._pushes(arm, seen[0]))
+        self._stances.append(stance)
+        self._latest[arm] = stance
         return end
 
     def _clearance(
@@ -308,7 +300,7 @@ class _Crawl:
         arm: int,
         seen: tuple[float, float],
         places: tuple[Floats, Floats],
-        others: list[_Hold],
+        others: list[_Stance],
     ) -> Floats:
         """Metres (places,) that an arm is clear of others, in the time that both hold on."""
         times = np.array([[seen[0], min(seen[1], each.end)] for each in others])
@@ -335,13 +327,13 @@ class _Crawl:
         root, outward = self._at(arm, np.array([middle]))
         way = rotate_in_plane(outward[0], turns)
         place = root + 0.5 * (settings.near + settings.far) * unit * way
-        return place, place + settings.lies * unit * way
+        return place, place + settings.planted * unit * way
 
     def _longest(self, arm: int, at: float) -> float:
         """How far the body can go while an arm keeps a hold that begins at a distance."""
         settings, unit = self._settings, self._unit
         most = settings.far - settings.near
-        lasts = unit * np.linspace(min(settings.shortest, most), most, _TRIED)
+        lasts = unit * np.linspace(min(_SHORTEST, most), most, _TRIED)
         root, outward = self._at(arm, at + 0.5 * lasts)
         place = root + 0.5 * (settings.near + settings.far) * unit * outward
         kept = np.ones(_TRIED, dtype=np.bool_)
@@ -351,13 +343,13 @@ class _Crawl:
             away = np.hypot(reach[:, 0], reach[:, 1])
             kept &= away >= (settings.near - _SLACK) * unit
             kept &= away <= (settings.far + _SLACK) * unit
-            kept &= np.sum(reach * outward, axis=1) >= np.cos(settings.astray) * away
+            kept &= np.sum(reach * outward, axis=1) >= np.cos(_ASTRAY) * away
         # The longest of those that are kept from the shortest on.
         return float(lasts[max(int(np.argmin(np.append(kept, False))) - 1, 0)])
 
     def _rest(self, arm: int, at: float) -> float:
         """How far the body goes before an arm takes hold again."""
-        limits = self._settings.pause if self._pushes(arm, at) else self._settings.search
+        limits = _PAUSE if self._pushes(arm, at) else _SEARCH
         planned = float(self._streams[arm].uniform(*limits))
         swing, lie = _LAST
         left = (self._last - at) / self._unit
@@ -385,14 +377,14 @@ class _Crawl:
             root += beyond[:, None] * journey.ahead[np.where(beyond < 0.0, 0, -1)]
         return root, normalized(outward)
 
-    def _sorted(self) -> CrawlHolds:
-        holds = sorted(self._holds, key=lambda each: (each.arm, each.start))
-        return CrawlHolds(
-            arm=np.array([each.arm for each in holds], dtype=np.intp),
-            start=np.array([each.start for each in holds]),
-            end=np.array([each.end for each in holds]),
-            place=np.array([each.place for each in holds]).reshape(-1, 2),
-            turn=np.array([each.turn for each in holds]),
-            away=np.array([each.away for each in holds]),
-            pushes=np.array([each.pushes for each in holds], dtype=np.bool_),
+    def _sorted(self) -> CrawlStances:
+        stances = sorted(self._stances, key=lambda each: (each.arm, each.start))
+        return CrawlStances(
+            arm=np.array([each.arm for each in stances], dtype=np.intp),
+            start=np.array([each.start for each in stances]),
+            end=np.array([each.end for each in stances]),
+            place=np.array([each.place for each in stances]).reshape(-1, 2),
+            turn=np.array([each.turn for each in stances]),
+            away=np.array([each.away for each in stances]),
+            pushes=np.array([each.pushes for each in stances], dtype=np.bool_),
         )

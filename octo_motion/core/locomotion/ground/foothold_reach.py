@@ -83,7 +83,7 @@ class Passing:
     def __init__(self, roots: Floats, seen: Sequence[Floats]) -> None:
         self.middle = roots
         """(arms, cycles, 3) half way through, world."""
-        self.on, self.peeling, self.off = seen
+        self.touch_down, self.peeling, self.lift_off = seen
         """The same as the hold begins, as peeling begins, and as the hold ends."""
 
 
@@ -181,9 +181,9 @@ def _spot(
     roots, nearest = passing.middle, _NEAREST * reach.whole
     taut = _TAUT * reach.longer
     held = (
-        (passing.on, taut * reach.free, 0.0 * reach.free),
+        (passing.touch_down, taut * reach.free, 0.0 * reach.free),
         (passing.peeling, taut * reach.free, 0.0 * reach.free),
-        (passing.off, taut * (reach.free + reach.peeled), reach.peeled),
+        (passing.lift_off, taut * (reach.free + reach.peeled), reach.peeled),
     )
     found = np.broadcast_to(0.5 * reach.free, aim.shape[:2])
     lack = np.zeros(aim.shape[:2])
@@ -191,7 +191,7 @@ def _spot(
         z = ground.height(roots[..., :2] + found[..., None] * aim)
         easy = (_EASY * reach.free) ** 2 - (roots[..., 2] - z) ** 2
         least = np.broadcast_to(nearest, z.shape)
-        for root in (passing.on, roots, passing.off):
+        for root in (passing.touch_down, roots, passing.lift_off):
             onto = np.sum((root[..., :2] - roots[..., :2]) * aim, axis=-1)
             slackest = reach.slackest**2 - (root[..., 2] - z) ** 2
             least = np.maximum(least, onto + np.sqrt(np.maximum(slackest, nearest**2)))

@@ -19,7 +19,7 @@ from ...rotations import Floats, rotate, rotate_in_plane
 from ..gait import CYCLE
 from ..path import Line
 from .contact_curve import laid
-from .contact_timing import Rhythm
+from .contact_timing import ContactTiming
 from .foothold_reach import PEELING, Passing, hold_times, peeled_to, spots
 from .foothold_relaxation import settled
 from .stance_settings import Limbs, StanceSettings
@@ -56,9 +56,9 @@ class Footholds:
     """Number of the first cycle that is here."""
     touching: int
     """The joint c that touches first."""
-    on: Floats
+    touch_down: Floats
     """(arms, cycles) when the hold begins, in cycles from the middle that the gait gives it."""
-    off: Floats
+    lift_off: Floats
     """(arms, cycles) when it ends."""
     middle: Floats
     """(arms, cycles) halfway between unrolled and peeling."""
@@ -76,20 +76,20 @@ class Footholds:
     """(arms, cycles) radians by which they are bent to one side on the way to the tip."""
     peeled_to: Floats
     """(arms, cycles) metres along the arm up to which it is peeled off as the hold ends."""
-    roots_on: Floats
+    roots_at_touch_down: Floats
     """(arms, cycles, 3) where the arm's root is as the hold begins, world …"""
-    roots_off: Floats
+    roots_at_lift_off: Floats
     """(arms, cycles, 3) … and as it ends."""
     short: Floats
     """(arms, cycles) metres that it is out of reach."""
 
     def unrolled(self) -> Floats:
         """(arms, cycles) when all of it lies down."""
-        return self.on + UNROLLING * (self.off - self.on)
+        return self.touch_down + UNROLLING * (self.lift_off - self.touch_down)
 
     def peeled(self) -> Floats:
         """(arms, cycles) when it begins to be peeled off."""
-        return self.off - PEELING * (self.off - self.on)
+        return self.lift_off - PEELING * (self.lift_off - self.touch_down)
 
 
 def cycles_at(phases: Floats, middle: float) -> tuple[np.ndarray, Floats]:
@@ -107,13 +107,13 @@ def lay(
     line: Line,
     ground: Ground,
     settings: StanceSettings,
-    rhythm: Rhythm,
+    timing: ContactTiming,
     *,
     middle: float,
     cycles: tuple[int, int],
-    wishes: Sequence[ContactOverride] = (),
+    contact_overrides: Sequence[ContactOverride] = (),
     seed: int = 0,
-    alike: bool = False,
+    cyclic: bool = False,
 ) -> Footholds:
     """Lay all footholds of some arms.
 
@@ -122,29 +122,29 @@ def lay(
         line: the body's way.
         ground: what it walks on.
         settings: how arms hold on.
-        rhythm: when they do.
+        timing: when they do.
         middle: phase of the gait, radians, half way through the hold.
         cycles: the first and the last that are wanted.
-        wishes: the artist's; of arms by their number in the body.
+        contact_overrides: the artist's; of arms by their number in the body.
         seed: of the small differences from step to step.
-        alike: whether there are none, so that each cycle is like the one before.
+        cyclic: whether there are none, so that each cycle is like the one before.
     """
     first, last = cycles
     shape = len(limbs.arms), last - first + 1
     numbers = np.arange(first, last + 1)
-    wanted = _wanted(limbs, shape, first, wishes)
-    shift = wanted.shift
+    overridden = _overridden(limbs, shape, first, contact_overrides)
+    shift = overridden.shift
 
     # Cycles of each arm at the middles that the gait gives to its holds.
     given: Floats = np.broadcast_to(middle / CYCLE + numbers.astype(np.float64), shape)
 
     def roots_at(since: Floats) -> tuple[Floats, Floats]:
         """World positions of the arms' roots, and the body's orientations, at such times."""
-        centres, rotations = line.at(rhythm.distances(limbs.arms, given + since))
+        centres, rotations = line.at(timing.distances(limbs.arms, given + since))
         return centres + rotate(rotations, limbs.roots[:, None]), rotations
 
     roots, rotations = roots_at(shift)
-    asked, away = rhythm.aims(limbs.arms, numbers)
+    asked, away = timing.aims(limbs.arms, numbers)
     aim, lie = (rotate_in_plane(each, asked) for each in _ahead(limbs, rotations))
     joint = limbs.touching(settings.planted)
     sizes = np.stack([limbs.reach[-1], limbs.reach[-1] - limbs.reach[joint]], axis=-1)
@@ -159,32 +159,36 @@ def lay(
     found = spots(limbs, ground, settings, passings, aim=aim, away=away)
     spot = roots.copy()
     spot[..., :2] += found.distance[..., None] * aim
-    side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if alike else numbers, seed)
-    heading = np.where(wanted.turned, wanted.headings, np.arctan2(lie[..., 1], lie[..., 0]))
+    side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if cyclic else numbers, seed)
+    heading = np.where(overridden.turned, overridden.headings, np.arctan2(lie[..., 1], lie[..., 0]))
     curl: Floats = np.broadcast_to(_CURL * (side - 0.5), shape)
     round_about = limbs.radii[joint:].T[:, None]
     skins = np.broadcast_to(round_about, (*shape, round_about.shape[-1]))
-    spot = np.where(wanted.moved[..., None], wanted.places, spot)
+    spot = np.where(overridden.moved[..., None], overridden.places, spot)
     joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
-    on = np.maximum(shift - found.half, -_EARLIEST)
-    off = np.minimum(shift + found.half, _EARLIEST)
+    touch_down = np.maximum(shift - found.half, -_EARLIEST)
+    lift_off = np.minimum(shift + found.half, _EARLIEST)
     # Shifted holds are told from the middle that the gait gives them.
-    roots_on, roots_off = roots_at(on)[0], roots_at(off)[0]
+    roots_at_touch_down, roots_at_lift_off = roots_at(touch_down)[0], roots_at(lift_off)[0]
     return Footholds(
         first=first,
         touching=joint,
-        on=on,
-        off=off,
-        middle=0.5 * ((on + UNROLLING * (off - on)) + (off - PEELING * (off - on))),
-        present=wanted.present,
+        touch_down=touch_down,
+        lift_off=lift_off,
+        middle=0.5
+        * (
+            (touch_down + UNROLLING * (lift_off - touch_down))
+            + (lift_off - PEELING * (lift_off - touch_down))
+        ),
+        present=overridden.present,
         joints=joints,
         normals=normals(ground, joints),
         skins=skins,
         headings=heading,
         curls=curl,
-        peeled_to=peeled_to(limbs, joint, joints, roots_off),
-        roots_on=roots_on,
-        roots_off=roots_off,
+        peeled_to=peeled_to(limbs, joint, joints, roots_at_lift_off),
+        roots_at_touch_down=roots_at_touch_down,
+        roots_at_lift_off=roots_at_lift_off,
         short=found.short,
     )
 
@@ -206,12 +210,12 @@ def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) ->
         joints=joints,
         normals=normals(ground, joints),
         skins=skins,
-        peeled_to=peeled_to(limbs, joint, joints, footholds.roots_off),
+        peeled_to=peeled_to(limbs, joint, joints, footholds.roots_at_lift_off),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
+class _Overridden:
     """Wishes by arm and cycle, (arms, cycles)."""
 
     present: np.ndarray
@@ -222,23 +226,23 @@ class _Wanted:
     headings: Floats
 
 
-def _wanted(
-    limbs: Limbs, shape: tuple[int, int], first: int, wishes: Sequence[ContactOverride]
-) -> _Wanted:
+def _overridden(
+    limbs: Limbs, shape: tuple[int, int], first: int, contact_overrides: Sequence[ContactOverride]
+) -> _Overridden:
     present, moved, turned = np.ones(shape, dtype=bool), *np.zeros((2, *shape), dtype=bool)
     places, (shift, headings) = np.zeros((*shape, 3)), np.zeros((2, *shape))
     if limbs.free is not None:
         present[limbs.free] = False
-    for wish in wishes:
-        if wish.arm not in limbs.arms or not 0 <= wish.cycle - first < shape[1]:
+    for override in contact_overrides:
+        if override.arm not in limbs.arms or not 0 <= override.cycle - first < shape[1]:
             continue
-        at = limbs.arms.index(wish.arm), wish.cycle - first
-        present[at], shift[at] = present[at] and not wish.removed, wish.shift
-        if wish.position is not None:
-            moved[at], places[at] = True, wish.position
-        if wish.heading is not None:
-            turned[at], headings[at] = True, wish.heading
-    return _Wanted(present, shift, moved, places, turned, headings)
+        at = limbs.arms.index(override.arm), override.cycle - first
+        present[at], shift[at] = present[at] and not override.removed, override.shift
+        if override.position is not None:
+            moved[at], places[at] = True, override.position
+        if override.heading is not None:
+            turned[at], headings[at] = True, override.heading
+    return _Overridden(present, shift, moved, places, turned, headings)
 
 
 def _ahead(limbs: Limbs, rotations: Floats) -> tuple[Floats, Floats]:

@@ -7,7 +7,7 @@ the two it is a blend. Its segments are then turned, as little as it takes, unti
 foothold: those that lie on the ground not at all. All of it is a function of the frame's own
 phase and place; there is no frame before it.
 
-Vectors are (…, 3, batch), as in ``columns``; the batch is frames × arms.
+Vectors are (…, 3, batch), as in ``batched``; the batch is frames × arms.
 """
 
 from __future__ import annotations
@@ -149,14 +149,14 @@ class Batch:
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
+class Stance:
     """How a batch of arms holds on at its times."""
 
     weight: Floats
     """(batch,) 1 holds on, 0 free in the middle of a swing."""
-    lies_from: Floats
+    contact_from: Floats
     """(batch,) metres along the arm from which on it lies on the ground …"""
-    lies_to: Floats
+    contact_to: Floats
     """(batch,) … and up to which."""
     by_tip: np.ndarray
     """(batch,) whether it is the tip that the ground holds, or the joint that touches first."""
@@ -171,12 +171,12 @@ class Hold:
     touching: int
     """c"""
 
-    def part(self, chosen: np.ndarray) -> Hold:
+    def part(self, chosen: np.ndarray) -> Stance:
         """Some of the batch."""
-        return Hold(
+        return Stance(
             self.weight[chosen],
-            self.lies_from[chosen],
-            self.lies_to[chosen],
+            self.contact_from[chosen],
+            self.contact_to[chosen],
             self.by_tip[chosen],
             self.joints[..., chosen],
             self.carried[:, chosen],
@@ -193,7 +193,7 @@ class Hold:
 
 
 @dataclass(frozen=True, eq=False)
-class Stood:
+class StancePose:
     """A batch of arms on the ground."""
 
     directions: Floats
@@ -204,11 +204,11 @@ class Stood:
     """(segments + 1, 3, batch) world."""
     misses: Floats
     """(batch,) metres between an arm that holds on and its foothold."""
-    lying: np.ndarray
+    in_contact: np.ndarray
     """(segments + 1, batch) which joints rest on the ground and must not move."""
 
 
-def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) -> Hold:
+def stance_at(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) -> Stance:
     """The footholds of a batch, and how far each is laid down or peeled off.
 
     Args:
@@ -219,7 +219,7 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
     """
     roots = batch.roots
     at = batch.arms, cycles - footholds.first
-    on, off = footholds.on[at], footholds.off[at]
+    on, off = footholds.touch_down[at], footholds.lift_off[at]
     touching, whole = batch.reach[footholds.touching], batch.reach[-1]
     earlier = _EARLIER * (on + 0.5)
     down = smooth_step((since - on + earlier) / (UNROLLING * (off - on) + earlier))
@@ -231,13 +231,15 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
     # An arm in the air goes along with the body, and does so gently at first.
     before, after = np.maximum(on - since, 0.0), np.maximum(since - off, 0.0)
     moved = np.where(
-        since < on, roots - footholds.roots_on[at].T, roots - footholds.roots_off[at].T
+        since < on,
+        roots - footholds.roots_at_touch_down[at].T,
+        roots - footholds.roots_at_lift_off[at].T,
     )
     carried = moved * least_jerk((before + after) / _GOING)
-    return Hold(
+    return Stance(
         weight=weight * footholds.present[at],
-        lies_from=touching + gone * (footholds.peeled_to[at] - touching),
-        lies_to=touching + down * (whole - touching),
+        contact_from=touching + gone * (footholds.peeled_to[at] - touching),
+        contact_to=touching + down * (whole - touching),
         by_tip=since > footholds.middle[at],
         joints=np.ascontiguousarray(joints),
         carried=carried,
@@ -247,8 +249,8 @@ def hold(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) 
     )
 
 
-def pulled(
-    batch: Batch, shapes: Floats, held: Hold, ground: Ground, settings: StanceSettings
+def pulled_to_footholds(
+    batch: Batch, shapes: Floats, stance: Stance, ground: Ground, settings: StanceSettings
 ) -> tuple[Floats, Floats]:
     """Strains (segments, batch) and directions (segments, 3, batch) of arms.
 
@@ -257,85 +259,91 @@ def pulled(
     Args:
         batch: the arms.
         shapes: (segments, 3, batch) the gait's directions, world.
-        held: how each one holds on.
+        stance: how each one holds on.
         ground: what it must not pass through.
         settings: how arms hold on.
     """
-    strains, standing = _held(batch, shapes, held, ground, settings)
-    return strains, lerp_bends(batch.outward, standing, shapes, 1.0 - held.weight)
+    strains, standing = _in_stance(batch, shapes, stance, ground, settings)
+    return strains, lerp_bends(batch.outward, standing, shapes, 1.0 - stance.weight)
 
 
-def unheld(held: Hold) -> Floats:
+def airborne(stance: Stance) -> Floats:
     """How far the movement of arms (batch,) is to be evened out over time: 0 while they hold on."""
-    return np.minimum((1.0 - held.weight) / _UNHELD, 1.0)
+    return np.minimum((1.0 - stance.weight) / _UNHELD, 1.0)
 
 
-def stand(
+def kept_over_ground(
     batch: Batch,
     pose: tuple[Floats, Floats],
-    held: Hold,
+    stance: Stance,
     ground: Ground,
     settings: StanceSettings,
-) -> Stood:
+) -> StancePose:
     """Arms that are in the air brought off the ground.
 
     Args:
         batch: the arms.
         pose: strains and directions, as :func:`pulled` returns them.
-        held: how each one holds on.
+        stance: how each one holds on.
         ground: what it must not pass through.
         settings: how arms hold on.
     """
-    (strains, directions), weight, reach = pose, held.weight, batch.reach
+    (strains, directions), weight, reach = pose, stance.weight, batch.reach
     lengths = batch.lengths * (1.0 + strains)
     swinging = np.flatnonzero(weight < 1.0)
     if len(swinging):
-        part, own = batch.part(swinging), held.part(swinging)
+        part, own = batch.part(swinging), stance.part(swinging)
         away = 1.0 - own.weight
-        let_go, at_once = smooth_step(_LETTING_GO * away), smooth_step(_AT_ONCE * away)
+        off_ground, at_once = smooth_step(_LETTING_GO * away), smooth_step(_AT_ONCE * away)
         free = _freedom(part, own)
         whole = part.reach[-1]
         # What has lain is as high as its skin is thick, and no higher yet.
-        rising = (settings.lift * away**2 + _OVER * let_go) * whole + part.lift
+        rising = (settings.lift * away**2 + _OVER * off_ground) * whole + part.lift
         # In the air an arm may roll: any side of it may come to be below.
         rolled = smooth_step(np.cbrt(away / _STARTING) / _ROLLED)
         near = part.radii.copy()
         near[own.touching :] = own.skins + rolled * (near[own.touching :] - own.skins)
         near[own.touching :] += own.weight * _crested(own, ground)
         most = np.max(part.radii, axis=0) + rising
-        soft = _SOFT * (part.radii + let_go * (most - part.radii)) + _TINY
+        soft = _SOFT * (part.radii + off_ground * (most - part.radii)) + _TINY
         directions = directions.copy()
         directions[..., swinging] = raise_over_ground(
             directions[..., swinging],
             lengths[:, swinging],
             free=free + (1.0 - free) * at_once,
             roots=part.roots,
-            needed=near + rising - (1.0 - let_go) * soft,
+            needed=near + rising - (1.0 - off_ground) * soft,
             loose=at_once * _out(part.reach),
             ground=ground,
-            rounds=_RAISES,
+            iterations=_RAISES,
             soft=soft,
         )
     joints = np.concatenate([batch.roots[None], lengths[:, None] * directions]).cumsum(axis=0)
-    goal = np.where(held.by_tip, held.joints[-1], held.joints[0])
-    missed = np.where(held.by_tip, joints[-1], joints[held.touching]) - goal
+    goal = np.where(stance.by_tip, stance.joints[-1], stance.joints[0])
+    missed = np.where(stance.by_tip, joints[-1], joints[stance.touching]) - goal
     slack = 1e-9 * reach[-1]
-    lying = (reach >= held.lies_from - slack) & (reach <= held.lies_to + slack) & (weight >= 1.0)
-    return Stood(directions, strains, joints, np.sqrt(dot(missed, missed)) * (weight >= 1.0), lying)
+    lying = (
+        (reach >= stance.contact_from - slack)
+        & (reach <= stance.contact_to + slack)
+        & (weight >= 1.0)
+    )
+    return StancePose(
+        directions, strains, joints, np.sqrt(dot(missed, missed)) * (weight >= 1.0), lying
+    )
 
 
-def _crested(held: Hold, ground: Ground) -> Floats:
+def _crested(stance: Stance, ground: Ground) -> Floats:
     """Metres (segments + 1 − c, batch) that joints lie higher than their skin is thick.
 
     Over a crest bones that are straight would cut into it: an arm that lays itself down there, or
     has just let go, stays above it as one that lies.
     """
-    above = held.joints[:, 2] - ground.height(np.moveaxis(held.joints, 1, -1))
-    return np.maximum(above - held.skins, 0.0)
+    above = stance.joints[:, 2] - ground.height(np.moveaxis(stance.joints, 1, -1))
+    return np.maximum(above - stance.skins, 0.0)
 
 
-def _held(
-    batch: Batch, shapes: Floats, held: Hold, ground: Ground, settings: StanceSettings
+def _in_stance(
+    batch: Batch, shapes: Floats, stance: Stance, ground: Ground, settings: StanceSettings
 ) -> tuple[Floats, Floats]:
     """Strains (segments, batch) and directions (segments, 3, batch) of arms that hold on.
 
@@ -343,24 +351,30 @@ def _held(
     never do it is the gait's shape.
     """
     strains, directions = np.zeros(shapes[:, 0].shape), shapes.copy()
-    chosen = np.flatnonzero(held.weight > 0.0)
+    chosen = np.flatnonzero(stance.weight > 0.0)
     if len(chosen) == 0:
         return strains, directions
-    batch, held, shapes = batch.part(chosen), held.part(chosen), shapes[..., chosen]
-    free, loose = _freedom(batch, held), _loose(batch, held)
-    strain, guess, chord = _asked(batch, held, settings)
+    batch, stance, shapes = batch.part(chosen), stance.part(chosen), shapes[..., chosen]
+    free, loose = _freedom(batch, stance), _loose(batch, stance)
+    strain, guess, chord = _asked(batch, stance, settings)
     strain = strain * free
     lengths = batch.lengths * (1.0 + strain)
     # What is out of reach is pointed at: at full stretch no solver has a definite answer.
-    ratio = np.sqrt(dot(chord, chord)) / (held.lies_from + np.sum(batch.lengths * strain, axis=0))
+    ratio = np.sqrt(dot(chord, chord)) / (
+        stance.contact_from + np.sum(batch.lengths * strain, axis=0)
+    )
     over = np.maximum(ratio - _NEARLY, 0.0)
     short = (over - _REST * np.tanh(over / _REST)) / np.maximum(ratio, _TINY)
-    goal = held.carried + np.where(held.by_tip, held.joints[-1], held.joints[0]) - short * chord
+    goal = (
+        stance.carried
+        + np.where(stance.by_tip, stance.joints[-1], stance.joints[0])
+        - short * chord
+    )
     # Some of the gait stays, but for what lies or unrolls.
-    kept = np.where(_kneed(batch, held), 0.0, _KEPT)
+    kept = np.where(_kneed(batch, stance), 0.0, _KEPT)
     own = unit(guess + (kept * free)[:, None] * (shapes - guess))
-    before = np.arange(len(lengths))[:, None] < held.touching
-    to_goal = (before | held.by_tip).astype(np.float64)
+    before = np.arange(len(lengths))[:, None] < stance.touching
+    to_goal = (before | stance.by_tip).astype(np.float64)
 
     for number, steps in enumerate(_STEPS):
         # The last time it only has to meet its goal.
@@ -373,7 +387,7 @@ def _held(
             needed=batch.radii + (_OVER * batch.reach[-1] + batch.lift),
             loose=loose,
             ground=ground,
-            rounds=_RAISES_BETWEEN,
+            iterations=_RAISES_BETWEEN,
             soft=_SOFT * np.max(batch.radii, axis=0) + _TINY,
         )
         own = drawn(
@@ -387,8 +401,8 @@ def _held(
         )
     # What is beyond the joint that is held can be raised without letting go; where it comes to
     # lie it needs no raising, or it would stay up until the last moment and then drop.
-    beyond = (1.0 - to_goal) * smooth_step((batch.reach[1:] - held.lies_to) / batch.lengths)
-    skins = np.concatenate([batch.radii[: held.touching], held.skins])
+    beyond = (1.0 - to_goal) * smooth_step((batch.reach[1:] - stance.contact_to) / batch.lengths)
+    skins = np.concatenate([batch.radii[: stance.touching], stance.skins])
     soft = _SOFT * skins + _TINY
     own = raise_over_ground(
         own,
@@ -398,21 +412,21 @@ def _held(
         needed=skins - soft,
         loose=loose,
         ground=ground,
-        rounds=_RAISES_BETWEEN,
+        iterations=_RAISES_BETWEEN,
         soft=soft,
     )
-    strains[:, chosen], directions[..., chosen] = strain * held.weight, own
+    strains[:, chosen], directions[..., chosen] = strain * stance.weight, own
     return strains, directions
 
 
-def _kneed(batch: Batch, held: Hold) -> np.ndarray:
+def _kneed(batch: Batch, stance: Stance) -> np.ndarray:
     """Which arms (batch,) have one joint that counts before they touch."""
-    free = batch.limbs.lengths[: held.touching]
+    free = batch.limbs.lengths[: stance.touching]
     alone = np.sum(free, axis=0) ** 2 < _KNEE * np.sum(free * free, axis=0)
-    return alone[batch.arms] & (held.touching > 1)
+    return alone[batch.arms] & (stance.touching > 1)
 
 
-def _knee(batch: Batch, held: Hold, chord: Floats, longer: Floats) -> Floats:
+def _knee(batch: Batch, stance: Stance, chord: Floats, longer: Floats) -> Floats:
     """Directions (segments, 3, batch) of arms with a single knee, as two sides of a triangle.
 
     It stands over the way to the ground, up and out: whichever way the body goes, its plane turns
@@ -420,15 +434,15 @@ def _knee(batch: Batch, held: Hold, chord: Floats, longer: Floats) -> Floats:
 
     Args:
         batch: the arms.
-        held: how each holds on.
+        stance: how each holds on.
         chord: (3, batch) from each one's root to where it meets the ground.
         longer: (batch,) factor by which it is stretched.
     """
     reach = batch.reach
-    inner = reach[1 : held.touching]
-    knee = 1 + np.argmin(np.abs(inner - 0.5 * reach[held.touching]), axis=0)
+    inner = reach[1 : stance.touching]
+    knee = 1 + np.argmin(np.abs(inner - 0.5 * reach[stance.touching]), axis=0)
     upper = longer * np.take_along_axis(reach, knee[None], axis=0)[0]
-    lower = longer * held.lies_from - upper
+    lower = longer * stance.contact_from - upper
     away = np.maximum(np.sqrt(dot(chord, chord)), _TINY)
     along = chord / away
     side = batch.outward + batch.upward
@@ -441,17 +455,17 @@ def _knee(batch: Batch, held: Hold, chord: Floats, longer: Floats) -> Floats:
     return np.where(before, thigh, shin)
 
 
-def _freedom(batch: Batch, held: Hold) -> Floats:
+def _freedom(batch: Batch, stance: Stance) -> Floats:
     """How far each segment (segments, batch) is free to turn: 0 where it lies on the ground."""
-    return smooth_step((held.lies_from - batch.reach[:-1]) / (_BORDER * batch.lengths))
+    return smooth_step((stance.contact_from - batch.reach[:-1]) / (_BORDER * batch.lengths))
 
 
-def _loose(batch: Batch, held: Hold) -> Floats:
+def _loose(batch: Batch, stance: Stance) -> Floats:
     """How far each joint (segments + 1, batch) may be raised: 0 where it lies, and at the root."""
     reach, width = batch.reach, batch.reach[1]
-    before = smooth_step((held.lies_from - reach) / width)
-    after = smooth_step((reach - held.lies_to) / width)
-    return np.maximum(before, np.where(held.by_tip, 0.0, after)) * _out(reach)
+    before = smooth_step((stance.contact_from - reach) / width)
+    after = smooth_step((reach - stance.contact_to) / width)
+    return np.maximum(before, np.where(stance.by_tip, 0.0, after)) * _out(reach)
 
 
 def _out(reach: Floats) -> Floats:
@@ -459,48 +473,50 @@ def _out(reach: Floats) -> Floats:
     return smooth_step(reach / (0.15 * reach[-1]))
 
 
-def _asked(batch: Batch, held: Hold, settings: StanceSettings) -> tuple[Floats, Floats, Floats]:
+def _asked(batch: Batch, stance: Stance, settings: StanceSettings) -> tuple[Floats, Floats, Floats]:
     """Strains (1, batch) and directions (segments, 3, batch) of arms that hold on.
 
     And the way (3, batch) from each one's root to where it meets the ground.
     """
-    first = held.touching
-    lying = np.diff(held.joints, axis=0)
+    first = stance.touching
+    lying = np.diff(stance.joints, axis=0)
     lying /= batch.lengths[first:, None]
-    place, arriving = _met(batch, held, lying)
+    place, arriving = _met(batch, stance, lying)
     chord = place - batch.roots
-    ratio = np.sqrt(dot(chord, chord)) / held.lies_from
+    ratio = np.sqrt(dot(chord, chord)) / stance.contact_from
     strain = np.zeros((1, ratio.shape[-1]))
     if batch.limbs.may_stretch and settings.stretch > 0.0:
         strain[0] = _strained(ratio, settings.stretch)
-    directions = _arch(batch, held, chord, arriving, strain[0])
-    if np.any(kneed := _kneed(batch, held)):
-        directions = np.where(kneed, _knee(batch, held, chord, 1.0 + strain[0]), directions)
-    through = np.clip((held.lies_from - batch.reach[first:-1]) / batch.lengths[first:], 0.0, 1.0)
+    directions = _arch(batch, stance, chord, arriving, strain[0])
+    if np.any(kneed := _kneed(batch, stance)):
+        directions = np.where(kneed, _knee(batch, stance, chord, 1.0 + strain[0]), directions)
+    through = np.clip(
+        (stance.contact_from - batch.reach[first:-1]) / batch.lengths[first:], 0.0, 1.0
+    )
     directions[first:] = through[:, None] * directions[first:] + (1.0 - through[:, None]) * lying
-    rolled = _rolled(batch, held, lying, directions[first - 1])
-    directions[first:] = np.where(held.by_tip, directions[first:], rolled)
+    rolled = _rolled(batch, stance, lying, directions[first - 1])
+    directions[first:] = np.where(stance.by_tip, directions[first:], rolled)
     return strain, unit(directions), chord
 
 
-def _met(batch: Batch, held: Hold, lying: Floats) -> tuple[Floats, Floats]:
+def _met(batch: Batch, stance: Stance, lying: Floats) -> tuple[Floats, Floats]:
     """Where arms meet the ground, and which way they run into it, (3, batch) both.
 
     Args:
         batch: the arms.
-        held: how each holds on.
+        stance: how each holds on.
         lying: (segments − c, 3, batch) unit vectors along the segments that lie.
     """
-    lengths, reach, first, last = batch.lengths, batch.reach, held.touching, len(lying) - 1
+    lengths, reach, first, last = batch.lengths, batch.reach, stance.touching, len(lying) - 1
     # Directions at the joints that lie.
     at_joints = np.concatenate([lying[:1], 0.5 * (lying[1:] + lying[:-1]), lying[-1:]])
-    place = held.carried.copy()
+    place = stance.carried.copy()
     arriving = np.zeros_like(batch.roots)
     for number in range(len(lying)):
         low, high = reach[first + number], reach[first + number + 1]
-        share = np.clip((held.lies_from - low) / (high - low), 0.0, 1.0)
-        inside = (held.lies_from >= low) & ((held.lies_from < high) | (number == last))
-        place += inside * (held.joints[number] + share * lying[number] * lengths[first + number])
+        share = np.clip((stance.contact_from - low) / (high - low), 0.0, 1.0)
+        inside = (stance.contact_from >= low) & ((stance.contact_from < high) | (number == last))
+        place += inside * (stance.joints[number] + share * lying[number] * lengths[first + number])
         arriving += inside * (
             at_joints[number] + share * (at_joints[number + 1] - at_joints[number])
         )
@@ -522,7 +538,7 @@ def _strained(ratio: Floats, stretch: float) -> Floats:
     return stretch * np.tanh(taut / stretch) - shortest * np.tanh(slack / shortest)
 
 
-def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Floats) -> Floats:
+def _arch(batch: Batch, stance: Stance, chord: Floats, arriving: Floats, strain: Floats) -> Floats:
     """Directions (segments, 3, batch) of arms that are one curve from the body to the ground.
 
     A cubic that leaves and arrives as the arm does, and is as long. The slacker the arm, the more
@@ -530,13 +546,13 @@ def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Flo
 
     Args:
         batch: the arms.
-        held: how each holds on.
+        stance: how each holds on.
         chord: (3, batch) from each one's root to where it meets the ground.
         arriving: (3, batch) unit: which way it runs into it there.
         strain: (batch,) by how much it is longer than at rest, as a share.
     """
     lengths, reach = batch.lengths, batch.reach
-    ratio = np.sqrt(dot(chord, chord)) / held.lies_from
+    ratio = np.sqrt(dot(chord, chord)) / stance.contact_from
     slack = smooth_step((_EASY - ratio) / _ARCHING)
     rising = _RAISED + _ARCHED * slack
     # Slack, it comes down rather than back from under the body.
@@ -546,9 +562,9 @@ def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Flo
     leaving, arriving = spread_chain(
         (leaving, arriving), chord, batch.upward, ratio / (1.0 + strain)
     )
-    size = held.lies_from * (1.0 + strain)
-    middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / held.lies_from, 0.0, 1.0)[:, None]
-    parts = np.clip(held.lies_from - reach[:-1], 0.0, lengths)
+    size = stance.contact_from * (1.0 + strain)
+    middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / stance.contact_from, 0.0, 1.0)[:, None]
+    parts = np.clip(stance.contact_from - reach[:-1], 0.0, lengths)
     tight = ratio / (1.0 + strain)
     over = 0.5 * (tight - _BUNCHED)
     least = _BUNCHED + over + np.sqrt(over * over + _BUNCHING**2)
@@ -563,19 +579,19 @@ def _arch(batch: Batch, held: Hold, chord: Floats, arriving: Floats, strain: Flo
     return bent(directions, parts, chord, tight / least)
 
 
-def _rolled(batch: Batch, held: Hold, lying: Floats, before: Floats) -> Floats:
+def _rolled(batch: Batch, stance: Stance, lying: Floats, before: Floats) -> Floats:
     """Directions (segments − c, 3, batch) of what is not unrolled yet: it stands up.
 
     Args:
         batch: the arms.
-        held: how each holds on.
+        stance: how each holds on.
         lying: (segments − c, 3, batch) unit: how it will lie.
         before: (3, batch) unit: the direction of the segment before.
     """
-    first, reach = held.touching, batch.reach
+    first, reach = stance.touching, batch.reach
     span = reach[-1] - reach[first]
     # The more, the further out.
-    beyond = np.maximum(reach[first + 1 :] - held.lies_to, 0.0) / span
+    beyond = np.maximum(reach[first + 1 :] - stance.contact_to, 0.0) / span
     angle = _CURLED * beyond * np.sqrt(beyond)
     # It folds back no further than what comes before it leaves room for.
     bend = np.arccos(np.clip(dot(before, lying[0]), -1.0, 1.0))

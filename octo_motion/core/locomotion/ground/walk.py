@@ -16,11 +16,19 @@ from ..gait import CYCLE, Build, GaitPoser, bone_twists
 from ..path import Line
 from ..rig import ArmSkin, BodyFrame, Facing, carried_to, rotate_bones, sucker_sides
 from .arm_curves import unit
-from .contact_timing import EvenTiming, Rhythm
+from .contact_timing import ContactTiming, EvenTiming
 from .footholds import ContactOverride, Footholds, cycles_at, lay, relaid
 from .skin_under_joints import Seen, skin_below
 from .stance_settings import Limbs, StanceSettings
-from .stance_swing import Batch, Hold, Stood, hold, pulled, stand, unheld
+from .stance_swing import (
+    Batch,
+    Stance,
+    StancePose,
+    airborne,
+    kept_over_ground,
+    pulled_to_footholds,
+    stance_at,
+)
 from .surface import Ground
 from .swing_smoothing import SwingSmoothing
 
@@ -48,7 +56,7 @@ class GroundedPoses:
     """(frames, arms) distance of an arm that holds on from its foothold, in arm lengths."""
     joints: tuple[Floats, ...]
     """For each build (frames, arms, segments + 1, 3), world."""
-    lying: tuple[np.ndarray, ...]
+    in_contact: tuple[np.ndarray, ...]
     """For each build (frames, arms, segments + 1): which joints rest on the ground."""
     cycles: np.ndarray
     """(frames, arms) number of the cycle that each arm is in."""
@@ -65,7 +73,7 @@ class GroundedPoses:
             self.strains[frames],
             self.misses[frames],
             tuple(each[frames] for each in self.joints),
-            tuple(each[frames] for each in self.lying),
+            tuple(each[frames] for each in self.in_contact),
             self.cycles[frames],
             tuple(each[:, :, frames] for each in self.shapes),
             tuple(each[:, :, frames] for each in self.evened),
@@ -99,9 +107,9 @@ class Foothold:
     """(3,) the joint that touches first, world."""
     heading: float
     """Radians about world Z from +X."""
-    on: float
+    touch_down: float
     """Phase of the body, radians, at which the arm touches …"""
-    off: float
+    lift_off: float
     """… and at which it lets go."""
     lasts: float
     """Cycles of the arm in between, which a body at rest is slow to come through."""
@@ -114,7 +122,7 @@ class GroundedWalk:
 
     Args:
         skeleton: the rig.
-        generator: its gait.
+        poser: its gait.
         body: where the body lies in armature space.
         line: its way.
         ground: what it walks on.
@@ -123,9 +131,9 @@ class GroundedWalk:
         radii: for each arm (bones + 1,) armature units from each joint to the skin below it.
         may_stretch: for each arm, whether its bones may get longer.
         phases: the first and the last of the body's phases, radians.
-        wishes: the artist's footholds.
-        rhythm: when arms hold on; none for the gait's own.
-        alike: whether each cycle is like the one before.
+        contact_overrides: the artist's footholds.
+        timing: when arms hold on; none for the gait's own.
+        cyclic: whether each cycle is like the one before.
         skins: of each arm: where one is not round, it lies on the side that is below. None for
             round ones.
     """
@@ -133,7 +141,7 @@ class GroundedWalk:
     def __init__(  # noqa: PLR0917 - what it is made of, in the order in which it is made
         self,
         skeleton: Skeleton,
-        generator: GaitPoser,
+        poser: GaitPoser,
         body: BodyFrame,
         line: Line,
         ground: Ground,
@@ -143,27 +151,27 @@ class GroundedWalk:
         radii: Sequence[Floats],
         may_stretch: Sequence[bool],
         phases: tuple[float, float],
-        wishes: Sequence[ContactOverride] = (),
-        rhythm: Rhythm | None = None,
-        alike: bool = False,
+        contact_overrides: Sequence[ContactOverride] = (),
+        timing: ContactTiming | None = None,
+        cyclic: bool = False,
         skins: Sequence[ArmSkin] = (),
     ) -> None:
-        self._generator, self._line, self._ground = generator, line, ground
-        self._settings, self._scale, self._alike = settings, scale, alike
-        self._middle = generator.settings.gait.power_phase
+        self._poser, self._line, self._ground = poser, line, ground
+        self._settings, self._scale, self._cyclic = settings, scale, cyclic
+        self._middle = poser.settings.gait.power_phase
         self._body_turn = from_matrix(body.rotation)
         self._stride = line.settings.stride
-        self._rhythm = rhythm or EvenTiming(self._stride, generator.offsets)
+        self._timing = timing or EvenTiming(self._stride, poser.offsets)
         ends, _ = cycles_at(self.arm_phases(np.array(phases)), self._middle)
         first, last = ends
         self._cycles = int(first.min()), int(last.max())
         self._last = first, last
         down = -body.rotation[:, 2]
-        self._sides = [sucker_sides(skeleton, arm.bones, down) for arm in generator.arms]
+        self._sides = [sucker_sides(skeleton, arm.bones, down) for arm in poser.arms]
         # Where nothing varies at random, the seed does not matter.
-        seed = generator.settings.seed if any(generator.settings.variation) else 0
+        seed = poser.settings.seed if any(poser.settings.variation) else 0
         self._limbs: list[tuple[Build, Limbs, Footholds]] = []
-        for build in generator.builds:
+        for build in poser.builds:
             for stretch in sorted({may_stretch[arm] for arm in build.arms}):
                 arms = tuple(arm for arm in build.arms if may_stretch[arm] == stretch)
                 part = Build(arms, build.chain, build.widths)
@@ -173,25 +181,25 @@ class GroundedWalk:
                     line,
                     ground,
                     settings,
-                    self._rhythm,
+                    self._timing,
                     middle=self._middle,
                     cycles=self._cycles,
-                    wishes=wishes,
+                    contact_overrides=contact_overrides,
                     seed=seed,
-                    alike=alike,
+                    cyclic=cyclic,
                 )
                 self._limbs.append((part, limbs, footholds))
         if not self._are_round(skins):
             below = self._below(skins, phases)
             self._limbs = [
-                (build, limbs, relaid(holds, limbs, ground, own))
-                for (build, limbs, holds), own in zip(self._limbs, below, strict=True)
+                (build, limbs, relaid(footholds, limbs, ground, own))
+                for (build, limbs, footholds), own in zip(self._limbs, below, strict=True)
             ]
 
     def _are_round(self, skins: Sequence[ArmSkin]) -> bool:
         return not skins or all(
-            skins[arm].is_round(self._sides[arm], holds.touching)
-            for build, _, holds in self._limbs
+            skins[arm].is_round(self._sides[arm], footholds.touching)
+            for build, _, footholds in self._limbs
             for arm in build.arms
         )
 
@@ -207,30 +215,30 @@ class GroundedWalk:
         looks = int(np.ceil((phases[1] - phases[0]) / CYCLE * _LOOKS)) + 1
         phase = np.linspace(*phases, looks)
         centres, orientations = self._line.at(phase / CYCLE * self._stride)
-        stood = self.pose(phase, np.zeros((looks, 2)), centres, orientations)
-        ends = np.cumsum([0] + [len(arm.bones) for arm in self._generator.arms])
+        pose = self.pose(phase, np.zeros((looks, 2)), centres, orientations)
+        ends = np.cumsum([0] + [len(arm.bones) for arm in self._poser.arms])
         to_world = multiply(orientations, conjugate(self._body_turn))
         found: list[Floats] = []
-        for number, (build, _, holds) in enumerate(self._limbs):
-            below = np.empty(holds.skins.shape)
+        for number, (build, _, footholds) in enumerate(self._limbs):
+            below = np.empty(footholds.skins.shape)
             for place, arm in enumerate(build.arms):
-                own = stood.rotations[:, None, ends[arm] : ends[arm + 1]]
-                carried = carried_to([self._generator.rests[arm]], own)[:, 0]
-                cycles = stood.cycles[:, arm] - holds.first
+                own = pose.rotations[:, None, ends[arm] : ends[arm + 1]]
+                carried = carried_to([self._poser.rests[arm]], own)[:, 0]
+                cycles = pose.cycles[:, arm] - footholds.first
                 seen = Seen(
-                    joints=stood.joints[number][:, place],
+                    joints=pose.joints[number][:, place],
                     orientations=multiply(to_world[:, None], carried),
-                    upward=holds.normals[place, cycles],
-                    rests=stood.lying[number][:, place, holds.touching :],
-                    cycles=0 * cycles if self._alike else cycles,
+                    upward=footholds.normals[place, cycles],
+                    rests=pose.in_contact[number][:, place, footholds.touching :],
+                    cycles=0 * cycles if self._cyclic else cycles,
                 )
-                known = holds.skins[place, :1] if self._alike else holds.skins[place]
+                known = footholds.skins[place, :1] if self._cyclic else footholds.skins[place]
                 below[place] = skin_below(skins[arm], seen, known, self._ground, scale=self._scale)
             found.append(below)
         return found
 
     def _limbs_of(self, build: Build, radii: Sequence[Floats], *, stretch: bool) -> Limbs:
-        generator, columns = self._generator, list(build.arms)
+        generator, columns = self._poser, list(build.arms)
         lengths = self._scale * build.chain.lengths[:, None] * generator.lengths[columns]
         limbs = Limbs(
             arms=build.arms,
@@ -253,7 +261,7 @@ class GroundedWalk:
 
     def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
-        return self._rhythm.phases(self._stride * np.asarray(phase) / CYCLE)
+        return self._timing.phases(self._stride * np.asarray(phase) / CYCLE)
 
     def pose(
         self,
@@ -263,7 +271,7 @@ class GroundedWalk:
         orientations: Floats,
         higher: Raise | None = None,
         *,
-        steady: SwingSmoothing | None = None,
+        smoothing: SwingSmoothing | None = None,
     ) -> GroundedPoses:
         """The arms at some frames.
 
@@ -274,21 +282,21 @@ class GroundedWalk:
             orientations: (frames, 4) of the canonical body, world.
             higher: which arms are to be higher, and nothing is said of the others; none for all
                 of them, as high as they have to be.
-            steady: how arms in the air are evened out over frames that follow one another, none
+            smoothing: how arms in the air are evened out over frames that follow one another, none
                 for each frame by itself. Those that are within its reach of an end that is none of
                 the motion's own are of no use.
         """
-        generator = self._generator
+        generator = self._poser
         frames, count = len(phase), len(generator.arms)
         wanted = range(count) if higher is None else higher.arms
         phases = self.arm_phases(phase)
-        angles, steering = generator.asked_at(phases, turn, self._rhythm.rounds)
+        angles, steering = generator.asked_at(phases, turn, self._timing.cycle_period)
         cycles, since = cycles_at(phases, self._middle)
         ends = np.cumsum([0] + [len(arm.bones) for arm in generator.arms])
         rotations = np.zeros((frames, ends[-1], 4))
         strains = np.zeros((frames, ends[-1]))
         misses = np.zeros((frames, count))
-        joints, lying, asked, evened = [], [], [], []
+        joints, in_contact, asked, evened = [], [], [], []
         to_armature = multiply(self._body_turn, conjugate(orientations))
         for number, (build, limbs, footholds) in enumerate(self._limbs):
             chosen = [place for place, arm in enumerate(build.arms) if arm in wanted]
@@ -297,7 +305,7 @@ class GroundedWalk:
             own, segments = angles[:, columns], len(build.chain.lengths)
             if not columns:
                 joints.append(np.zeros((segments + 1, frames, 0, 3)))
-                lying.append(np.zeros((segments + 1, frames, 0), dtype=bool))
+                in_contact.append(np.zeros((segments + 1, frames, 0), dtype=bool))
                 continue
             if higher is None or higher.shapes is None:
                 every = list(build.arms)
@@ -318,58 +326,63 @@ class GroundedWalk:
                 self._lifted(limbs, higher, chosen, columns, frames),
             )
             times = (each[:, columns].reshape(batch) for each in (cycles, since))
-            held = hold(arms, footholds, *times)
-            longer, ways = pulled(arms, shapes, held, self._ground, self._settings)
+            stance = stance_at(arms, footholds, *times)
+            longer, ways = pulled_to_footholds(arms, shapes, stance, self._ground, self._settings)
             each_frame = segments, 3, frames, many
             if higher is not None and higher.evened:
                 added = higher.evened[number][..., chosen].reshape(ways.shape)
                 ways = unit(ways + added)
-            elif higher is None and steady is not None:
-                before, share = ways, unheld(held).reshape(frames, many)
-                ways = steady.evened(ways.reshape(each_frame), share).reshape(ways.shape)
+            elif higher is None and smoothing is not None:
+                before, share = ways, airborne(stance).reshape(frames, many)
+                ways = smoothing.evened(ways.reshape(each_frame), share).reshape(ways.shape)
                 evened.append((ways - before).reshape(each_frame))
-            stood = stand(arms, (longer, ways), held, self._ground, self._settings)
-            posed = self._rotations(columns, stood, held, to_armature, bone_twists(build, own))
-            longer = stood.strains.reshape(segments, frames, many)
+            pose = kept_over_ground(arms, (longer, ways), stance, self._ground, self._settings)
+            posed = self._rotations(columns, pose, stance, to_armature, bone_twists(build, own))
+            longer = pose.strains.reshape(segments, frames, many)
             for place, arm in enumerate(columns):
                 rotations[:, ends[arm] : ends[arm + 1]] = posed[:, place]
                 strains[:, ends[arm] : ends[arm + 1]] = longer[:, :, place].T
-            misses[:, columns] = (stood.misses / arms.reach[-1]).reshape(frames, many)
-            joints.append(np.moveaxis(stood.joints.reshape(segments + 1, 3, frames, many), 1, -1))
-            lying.append(stood.lying.reshape(segments + 1, frames, many))
+            misses[:, columns] = (pose.misses / arms.reach[-1]).reshape(frames, many)
+            joints.append(np.moveaxis(pose.joints.reshape(segments + 1, 3, frames, many), 1, -1))
+            in_contact.append(pose.in_contact.reshape(segments + 1, frames, many))
         return GroundedPoses(
             rotations,
             strains,
             misses,
             tuple(np.moveaxis(each, 0, 2) for each in joints),
-            tuple(np.moveaxis(each, 0, 2) for each in lying),
+            tuple(np.moveaxis(each, 0, 2) for each in in_contact),
             cycles,
             tuple(asked),
             tuple(evened),
         )
 
     def _rotations(
-        self, columns: list[int], stood: Stood, held: Hold, to_armature: Floats, bank: Floats
+        self,
+        columns: list[int],
+        pose: StancePose,
+        stance: Stance,
+        to_armature: Floats,
+        bank: Floats,
     ) -> Floats:
         """Rotations (frames, arms, bones, 4) of arms that stand, their suckers to the ground.
 
         Args:
             columns: which arms.
-            stood: how they stand.
-            held: how they hold on.
+            pose: how they stand.
+            stance: how they hold on.
             to_armature: (frames, 4) from the world to the armature.
             bank: (bones, frames, arms) radians that the gait twists them by.
         """
-        segments, many = len(stood.directions), len(columns)
+        segments, many = len(pose.directions), len(columns)
         shape = segments, 3, len(to_armature), many
         back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
-        towards = turned(back, -held.upwards(segments)).reshape(shape)
+        towards = turned(back, -stance.upwards(segments)).reshape(shape)
         along = np.minimum(_FIRST_TURN + np.arange(segments) / 3.0, 1.0)
         most = min(_MOST_TURN, _TURN / segments) * along
-        turns = most[:, None, None] * held.weight.reshape(shape[2:])
+        turns = most[:, None, None] * stance.weight.reshape(shape[2:])
         return rotate_bones(
-            [self._generator.rests[arm] for arm in columns],
-            turned(back, stood.directions).reshape(shape),
+            [self._poser.rests[arm] for arm in columns],
+            turned(back, pose.directions).reshape(shape),
             bank,
             Facing([self._sides[arm] for arm in columns], towards, turns),
         )
@@ -405,8 +418,8 @@ class GroundedWalk:
             values: of the builds.
             higher: which arms they were asked of, none for all; of others it is none at all.
         """
-        wanted = range(len(self._generator.arms)) if higher is None else higher.arms
-        found = {arm: np.zeros((0, 1, 3)) for arm in range(len(self._generator.arms))}
+        wanted = range(len(self._poser.arms)) if higher is None else higher.arms
+        found = {arm: np.zeros((0, 1, 3)) for arm in range(len(self._poser.arms))}
         found |= {
             arm: each[:, place]
             for arms, each in zip(self.builds, values, strict=True)
@@ -424,8 +437,12 @@ class GroundedWalk:
                     at = place, cycle - laid.first
                     if not laid.present[at]:
                         continue
-                    turns = self._middle / CYCLE + cycle + np.array([laid.on[at], laid.off[at]])
-                    ends = self._rhythm.distances([arm], turns[None])[0] * CYCLE / self._stride
+                    turns = (
+                        self._middle / CYCLE
+                        + cycle
+                        + np.array([laid.touch_down[at], laid.lift_off[at]])
+                    )
+                    ends = self._timing.distances([arm], turns[None])[0] * CYCLE / self._stride
                     found.append(
                         Foothold(
                             arm,
@@ -434,7 +451,7 @@ class GroundedWalk:
                             float(laid.headings[at]),
                             float(ends[0]),
                             float(ends[1]),
-                            float(laid.off[at] - laid.on[at]),
+                            float(laid.lift_off[at] - laid.touch_down[at]),
                             float(laid.short[at] / limbs.reach[-1, place]),
                         )
                     )

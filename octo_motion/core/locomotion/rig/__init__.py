@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which bones are arms, and what leads from bones to joints and back."""
 
-from .arm_batches import ArmsTogether, alike
+from .arm_batches import ArmBatch, batches_by_bones
 from .arm_chains import (
     ArmChain,
     BodyFrame,
@@ -30,20 +30,20 @@ from .poses import Poses, halfway_automatic, halfway_linear
 from .skin_offset import ArmSkin, arm_skin, nearest_bones
 
 __all__ = [
+    "ArmBatch",
     "ArmChain",
     "ArmFrames",
     "ArmRest",
     "ArmSkin",
-    "ArmsTogether",
     "BodyFrame",
     "Detection",
     "Facing",
     "Poses",
     "Side",
-    "alike",
     "arm_azimuths",
     "arm_rest",
     "arm_skin",
+    "batches_by_bones",
     "bend_rotations",
     "body_frame",
     "carried_by_root_bone",

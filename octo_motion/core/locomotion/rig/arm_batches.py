@@ -2,7 +2,7 @@
 """Arms of as many bones each, from their bones to their joints and back, all of them at once.
 
 The same as ``ArmFrames`` says of one arm, without its frames: each bone's orientation tells where
-its segment points. Components come first and the batch last, as in ``columns``.
+its segment points. Components come first and the batch last, as in ``batched``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .arm_frames import ArmFrames
 
 
 @dataclass(frozen=True, eq=False)
-class ArmsTogether:
+class ArmBatch:
     """Arms of as many bones each; the batch is any of them, at any moments."""
 
     roots: Floats
@@ -33,7 +33,7 @@ class ArmsTogether:
     """(bones, arms) whether the bone before turns this one."""
 
     @classmethod
-    def of(cls, arms: Sequence[ArmFrames]) -> ArmsTogether:
+    def of(cls, arms: Sequence[ArmFrames]) -> ArmBatch:
         """Some arms, all of as many bones."""
         return cls(
             np.stack([arm.root for arm in arms], axis=-1),
@@ -99,12 +99,12 @@ class ArmsTogether:
         return running(result)
 
 
-def alike(arms: Sequence[ArmFrames]) -> list[tuple[list[int], ArmsTogether]]:
+def batches_by_bones(arms: Sequence[ArmFrames]) -> list[tuple[list[int], ArmBatch]]:
     """Arms, and their numbers, by how many bones they have."""
     by_bones: dict[int, list[int]] = {}
     for number, arm in enumerate(arms):
         by_bones.setdefault(len(arm.bones), []).append(number)
     return [
-        (numbers, ArmsTogether.of([arms[number] for number in numbers]))
+        (numbers, ArmBatch.of([arms[number] for number in numbers]))
         for numbers in by_bones.values()
     ]

@@ -98,7 +98,7 @@ class Facing:
     """For each arm (bones, 3): unit vectors across the segments, in the bones' rest frames."""
     towards: Floats
     """(bones, 3, frames, arms) unit vectors, armature space."""
-    hold: Floats
+    most_turn: Floats
     """(bones, frames, arms) radians that a bone is turned at most against the one before."""
 
 
@@ -174,7 +174,7 @@ def rotate_bones(
             # Where all face away, each would add its own to what those before it turned.
             right = np.cos(banked) * cosine - np.sin(banked) * sine
             askew *= 0.5 * (1.0 + right)
-            twisted = twisted + 0.5 * facing.hold[bone].reshape(batch) * askew
+            twisted = twisted + 0.5 * facing.most_turn[bone].reshape(batch) * askew
         if np.any(twisted):
             turn = product(turn, np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segment]))
         orientation = product(carried, turn)

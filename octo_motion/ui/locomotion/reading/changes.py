@@ -363,7 +363,7 @@ class GaitTransitionPlan:
             wide = frames[inside]
             travel = self._travel(number, distance[wide])
             where = places[0][wide], places[1][wide]
-            stood = walk.pose(travel.phase, travel.turn, *where, steady=steady).part(own)
+            stood = walk.pose(travel.phase, travel.turn, *where, smoothing=steady).part(own)
             moved.rotations[chosen], moved.strains[chosen] = stood.rotations, stood.strains
             if not moved.evened:
                 count = len(distance)
@@ -375,7 +375,7 @@ class GaitTransitionPlan:
             moved.late[chosen] = stood.misses
             # Ways have cycles of their own.
             moved.cycles[chosen] = stood.cycles + _APART * number
-            for arm, rests in zip(moved.lying, walk.by_arm(stood.lying), strict=True):
+            for arm, rests in zip(moved.lying, walk.by_arm(stood.in_contact), strict=True):
                 arm[chosen] = rests
         else:
             travel = self._travel(number, distance[chosen])
@@ -546,7 +546,7 @@ def _holds(
     found: list[list[tuple[float, float, int]]] = [[] for _ in range(arms)]
     unit = way.travel.stride / CYCLE
     for each in walk.footholds() if walk is not None else ():
-        on, off = unit * each.on, unit * each.off
+        on, off = unit * each.touch_down, unit * each.lift_off
         if first < 0.5 * (on + off) <= last:
             found[each.arm].append((on, off, each.cycle))
     result = []

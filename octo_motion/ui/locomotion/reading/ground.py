@@ -143,7 +143,7 @@ class Standing:
         centres, orientations = places
         frames, own = frames_around(part, steady.reach, len(centres), cyclic=cyclic)
         phase, turn = travel.phase[frames], travel.turn[frames]
-        stood = self.walk.pose(phase, turn, centres[frames], orientations[frames], steady=steady)
+        stood = self.walk.pose(phase, turn, centres[frames], orientations[frames], smoothing=steady)
         return stood.part(own)
 
 
@@ -241,7 +241,7 @@ def read_standing(
             line,
             generator.roots * scale,
             generator.outward,
-            CrawlSettings(near, far, lies=stance.planted, seed=generator.settings.seed),
+            CrawlSettings(near, far, planted=stance.planted, seed=generator.settings.seed),
             reach=reach,
             middle=gait.power_phase,
             duty=stance.duty,
@@ -268,9 +268,9 @@ def read_standing(
             radii=radii,
             may_stretch=stretch,
             phases=(0.0, 2.0 * np.pi * strides(route, travel)),
-            wishes=wished,
-            rhythm=rhythm,
-            alike=alike,
+            contact_overrides=wished,
+            timing=rhythm,
+            cyclic=alike,
             skins=skins,
         )
 

@@ -389,7 +389,7 @@ class Shot:
             joints.append(standing.walk.by_arm(stood.joints))
             shapes.append(stood.shapes)
             evened.append(stood.evened)
-            for arm, rests in zip(posed.lying, standing.walk.by_arm(stood.lying), strict=True):
+            for arm, rests in zip(posed.lying, standing.walk.by_arm(stood.in_contact), strict=True):
                 arm[part] = rests
             if part.stop < count:
                 yield part.stop / count
@@ -444,7 +444,7 @@ class Shot:
             replace(self.apart.bulk, opened=self._opened()),
             posed.rotations,
             posed.strains,
-            lying=posed.lying,
+            in_contact=posed.lying,
             busy=busy,
             travel=going,
             ground=self._ground(),
@@ -736,7 +736,7 @@ def show_contacts(armature: bpy.types.Object, shot: Shot) -> int:
     for each in shot.standing.walk.footholds():
         name = shot.arms[each.arm].name
         wish = shot.wanted.get((name, each.cycle), ContactEdit())
-        on, off = np.interp([each.on, each.off], phases, frames)
+        on, off = np.interp([each.touch_down, each.lift_off], phases, frames)
         contacts.append(
             Contact(
                 name,
