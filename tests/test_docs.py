@@ -366,16 +366,17 @@ def test_every_option_of_the_command_line_is_described(word: str) -> None:
 
 
 def test_every_key_of_a_job_is_described() -> None:
-    from octo_motion.command_line.job_file import KEYS
+    from octo_motion.command_line.shot_schema import KINDS
 
-    assert set(rows(section("## Job files", BATCH))) == set(KEYS)
+    keys = {key for keys in KINDS.values() for key in keys}
+    assert set(rows(section("## Job files", BATCH))) == keys
 
 
 def test_every_parameter_of_a_new_octopus_is_named_for_jobs() -> None:
-    from octo_motion.command_line import job_file as job
+    from octo_motion.command_line.shot_schema import OCTOPUS
 
     text = rows(section("## Job files", BATCH))["octopus"][0]
-    assert [name for name in job._OCTOPUS_KEYS if f"`{name}`" not in text] == []
+    assert [name for name in OCTOPUS.keys if f"`{name}`" not in text] == []
 
 
 def test_every_gait_that_comes_along_is_in_the_guide() -> None:

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
-from .quality_limits import NAMES
-from .shot_request import EXPORT_SUFFIXES, HIGHEST_FPS, MOST_FRAMES
+from .schema import Kind, Number, Unfit
+from .shot_schema import KINDS, Option
 
 COMMAND: Final = "octo_motion"
 """Name of the command."""
@@ -47,6 +47,11 @@ same keys each time, on the same computer. The file that is read stays as it is,
 is given; an output is written whole or not at all.
 """
 
+_ABOUT: Final = {
+    "generate": ("let the armature of one file walk or swim", _GENERATE),
+    "splice": ("put parts of other motions onto one motion", _SPLICE),
+    "pose": ("pose an armature by a script", _POSE),
+}
 _BAKE: Final = """\
 Make many shots from a job file, each in a process of its own.
 
@@ -108,164 +113,85 @@ def parser(program: str, *, has_open_file: bool) -> argparse.ArgumentParser:
         epilog=f"{_STATUS} '{program} bake --help' shows what a job file looks like.",
     )
     commands = main.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    _add_generate(commands, has_open_file=has_open_file)
-    _add_splice(commands, has_open_file=has_open_file)
-    _add_pose(commands, has_open_file=has_open_file)
+    for kind, keys in KINDS.items():
+        title, description = _ABOUT[kind]
+        command = _command(commands, kind, title, description, _STATUS)
+        for name, key in keys.items():
+            if key.option is not None:
+                _add_option(command, name, key.kind, key.option, has_open_file=has_open_file)
+        command.add_argument(
+            "--overwrite",
+            action="store_true",
+            help="let the output replace a file that is there; without --output the one that is "
+            "read",
+        )
     _add_bake(commands)
     return main
 
 
-def _add_generate(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser], *, has_open_file: bool
-) -> None:
-    command = commands.add_parser(
-        "generate",
-        help="let the armature of one file walk or swim",
-        description=_GENERATE,
-        epilog=_STATUS,
+def _command(
+    commands: argparse._SubParsersAction[argparse.ArgumentParser],
+    name: str,
+    title: str,
+    description: str,
+    epilog: str,
+) -> argparse.ArgumentParser:
+    return commands.add_parser(
+        name,
+        help=title,
+        description=description,
+        epilog=epilog,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    _add_files(command, "the .blend file to read", "the creature", has_open_file=has_open_file)
-    command.add_argument(
-        "--armature", metavar="NAME", default="", help="default: the one that has arms"
-    )
-    command.add_argument(
-        "--route", metavar="NAME", default="", help="the curve; default: the armature's own"
-    )
-    command.add_argument(
-        "--ground", metavar="NAME", default="", help="the mesh to walk on; default: its own"
-    )
-    command.add_argument(
-        "--gait", metavar="NAME", default="", help="a gait by name, or a gait file (.json)"
-    )
-    _add_settings(command, "a setting, such as speed=0.4, sway=12° or table.stride=1.2")
-    command.add_argument(
-        "--limit",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        dest="limits",
-        help=f"write nothing if a figure of the motion ({', '.join(NAMES)}) is above; "
-        "may be repeated",
-    )
 
 
-def _add_splice(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser], *, has_open_file: bool
+def _add_option(
+    command: argparse.ArgumentParser, name: str, kind: Kind, option: Option, *, has_open_file: bool
 ) -> None:
-    command = commands.add_parser(
-        "splice",
-        help="put parts of other motions onto one motion",
-        description=_SPLICE,
-        epilog=_STATUS,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    _add_files(
-        command,
-        "the motion or .blend file to splice onto, before any --splice",
-        "the armature and what hangs on it",
-        has_open_file=has_open_file,
-    )
+    """What says on the command line what a key says in a job file."""
+    if name == "file":
+        default = " (default: the one that is open)" if has_open_file else ""
+        command.add_argument(
+            name,
+            metavar=option.metavar,
+            nargs="?" if has_open_file else None,
+            help=option.help + default,
+        )
+        return
+    repeated = {"action": "append", "default": []} if option.collect else {}
+    words = {"nargs": "+"} if isinstance(option.metavar, tuple) else {}
     command.add_argument(
-        "--splice",
-        metavar=("PART", "FILE NAME=VALUE"),
-        nargs="+",
-        action="append",
-        default=[],
-        dest="splices",
-        help="a part, the motion file that it is from, and settings; may be repeated",
-    )
-    command.add_argument(
-        "--armature", metavar="NAME", default="", help="default: the one that has splices"
-    )
-    command.add_argument(
-        "--base", metavar="ACTION", default="", help="default: the list's, or the armature's own"
-    )
-    command.add_argument(
-        "--frames",
-        metavar="N",
-        type=_frame_count,
-        help="how long the base lasts: a walk of one cycle is repeated, a longer one is cut",
-    )
-    _add_settings(command, "a setting of the base, such as visual=true or landmarks.chest=Spine2")
-
-
-def _add_pose(
-    commands: argparse._SubParsersAction[argparse.ArgumentParser], *, has_open_file: bool
-) -> None:
-    command = commands.add_parser(
-        "pose",
-        help="pose an armature by a script",
-        description=_POSE,
-        epilog=_STATUS,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    _add_files(command, "the .blend file to read", "the figure", has_open_file=has_open_file)
-    command.add_argument(
-        "--script", metavar="FILE", type=Path, required=True, help="the pose script (.json)"
-    )
-    command.add_argument(
-        "--armature", metavar="NAME", default="", help="default: the only one, or the active one"
-    )
-    command.add_argument("--fps", type=_frame_rate, help="frames per second of the scene")
-
-
-def _add_files(
-    command: argparse.ArgumentParser, file: str, exported: str, *, has_open_file: bool
-) -> None:
-    """What is read and what is written."""
-    default = " (default: the one that is open)" if has_open_file else ""
-    command.add_argument(
-        "file",
-        metavar="FILE",
-        type=Path,
-        nargs="?" if has_open_file else None,
-        help=f"{file}{default}",
-    )
-    command.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help="the .blend file to write"
-    )
-    command.add_argument(
-        "--overwrite",
-        action="store_true",
-        help="let the output replace a file that is there; without --output the one that is read",
-    )
-    command.add_argument(
-        "--export",
-        metavar="FILE",
-        type=Path,
-        action="append",
-        default=[],
-        help=f"export {exported} as well ({', '.join(EXPORT_SUFFIXES)}); may be repeated",
+        *(option.flags or (f"--{name}",)),
+        metavar=option.metavar,
+        dest=name,
+        type=_number(kind) if isinstance(kind, Number) else str,
+        help=option.help,
+        required=option.required,
+        **repeated,
+        **words,
     )
 
 
-def _add_settings(command: argparse.ArgumentParser, what: str) -> None:
-    command.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        dest="settings",
-        help=f"{what}; may be repeated",
-    )
-    command.add_argument("--fps", type=_frame_rate, help="frames per second of the scene")
+def _number(kind: Number) -> Callable[[str], float]:
+    def number(text: str) -> float:
+        try:
+            return kind.value(text)
+        except Unfit as unfit:
+            raise argparse.ArgumentTypeError(f"'{text}' is not {unfit}") from None
+
+    return number
 
 
 def _add_bake(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    command = commands.add_parser(
-        "bake",
-        help="make many shots from a job file",
-        description=_BAKE,
-        epilog=f"{_JOB}\n{_STATUS}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    command = _command(
+        commands, "bake", "make many shots from a job file", _BAKE, f"{_JOB}\n{_STATUS}"
     )
     command.add_argument("job", metavar="JOB.toml", type=Path, help="the job file")
     command.add_argument(
         "-j",
         "--jobs",
         metavar="N",
-        type=_positive,
+        type=_number(Number(1, whole=True)),
         help="processes at a time (default: one for each processor, four at most)",
     )
     command.add_argument(
@@ -293,27 +219,3 @@ def parse(
         return parser(program, has_open_file=has_open_file).parse_args(arguments)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 2
-
-
-def _positive(text: str) -> int:
-    number = int(text) if text.isdecimal() else 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number above 0")
-    return number
-
-
-def _frame_count(text: str) -> int:
-    number = int(text) if text.isdecimal() else 0
-    if not 2 <= number <= MOST_FRAMES:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 2 to {MOST_FRAMES}")
-    return number
-
-
-def _frame_rate(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 1.0 <= number <= HIGHEST_FPS:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number from 1 to {HIGHEST_FPS}")
-    return number

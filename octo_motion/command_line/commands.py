@@ -5,27 +5,25 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import bpy
 
 from ..core.errors import OctoMotionError, SettingsError, WriteError
-from ..core.locomotion.gait import gait_to_json
 from ..ui.locomotion.writing import Summary
 from .command_line import parse
-from .job_file import Known, export_fault, is_gait_file, read_gait_file
 from .job_runner import STOPPED, BakeOptions, bake
 from .motion_files import is_motion
 from .outputs import commit, staged
 from .processes import stoppable
-from .quality_limits import parse_limits, told
-from .setting_values import Setting, Value, check_settings, parse_assignments
-from .shot_request import ShotEntry, SpliceWork
+from .quality_limits import told
+from .schema import Reading
+from .shot_request import ShotRequest
 from .shot_runner import perform
-from .splice_entries import parse_splice, read_splices
-from .vocabulary import check_file, known
+from .shot_schema import KINDS, read_shot
+from .vocabulary import known, with_gait
 from .worker import RUN_SHOT, run_shot
 
 _WRONG: Final = 2
@@ -49,182 +47,88 @@ def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
 
 
 def _bake(options: argparse.Namespace) -> int:
-    wanted = BakeOptions(
-        job=options.job,
-        report=options.report.resolve() if options.report else None,
-        jobs=options.jobs,
-        force=options.force,
-        check=options.check,
-        only=tuple(options.only),
-    )
+    said = {name: value for name, value in vars(options).items() if name != "command"}
     try:
-        return bake(wanted, known(), check_file, _say)
+        return bake(BakeOptions(**said))
     except OctoMotionError as error:
         return _complain(error, _WRONG)
 
 
 def _make(options: argparse.Namespace) -> int:
     """One file, to walk or swim, with splices or posed."""
-    make_entry = {"splice": _splice_entry, "pose": _pose_entry}.get(options.command, _entry)
     try:
-        entry = make_entry(options, known())
+        shot = _requested(options)
     except OctoMotionError as error:
         return _complain(error, _WRONG)
     try:
-        with staged(entry.outputs) as places:
-            performed = perform(entry, places)
+        with staged(shot.outputs) as places:
+            performed = perform(shot, places)
             commit(places)
     except OctoMotionError as error:
         return _complain(error, 1)
-    for warning in performed.summary.warnings:
-        _say(f"Warning: {warning}")
-    _say(f"{performed.armature}: {performed.summary.message}")
-    if isinstance(performed.summary, Summary):
-        _say(f"Quality: {told(performed.summary.figures)}.")
-    for path in entry.outputs:
-        _say(f"Written: {path}")
+    summary = performed.summary
+    for warning in summary.warnings:
+        print(f"Warning: {warning}", flush=True)
+    print(f"{performed.armature}: {summary.message}", flush=True)
+    if isinstance(summary, Summary):
+        print(f"Quality: {told(summary.figures)}.", flush=True)
+    for path in shot.outputs:
+        print(f"Written: {path}", flush=True)
     return 0
 
 
-def _entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
-    """What the arguments of ``generate`` ask for.
+def _requested(options: argparse.Namespace) -> ShotRequest:
+    """The shot that the arguments ask for: a table of a job, put into other words.
 
     Raises:
         OctoMotionError: they make no sense.
     """
-    source, read = _files(options)
-    output, exports = _outputs(options, read)
-    return ShotEntry(
-        name=read.stem,
-        file=source,
-        armature=options.armature,
-        route=options.route,
-        ground=options.ground,
-        gait=_gait(options.gait, may_name),
-        settings=_settings(options, may_name.settings),
-        limits=parse_limits(options.limits),
-        fps=options.fps,
-        output=output,
-        exports=exports,
-    )
-
-
-def _splice_entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
-    """What the arguments of ``splice`` ask for.
-
-    Raises:
-        OctoMotionError: they make no sense.
-    """
-    source, read = _files(options)
-    tables = [parse_splice(words) for words in options.splices]
-    splices, faults = None, []
-    if tables:
-        splices, faults = read_splices(tables, may_name.splice_settings, _resolved)
-    elif is_motion(read):
-        faults = ["There is nothing to splice: give --splice PART FILE."]
-    if faults:
-        raise SettingsError("\n".join(faults))
-    output, exports = _outputs(options, read, *(each.clip for each in splices or () if each.clip))
-    return ShotEntry(
-        name=read.stem,
-        file=source,
-        armature=options.armature,
-        settings=_settings(options, may_name.splicing_settings),
-        fps=options.fps,
-        output=output,
-        exports=exports,
-        splicing=SpliceWork(options.base, options.frames, splices),
-    )
-
-
-def _pose_entry(options: argparse.Namespace, may_name: Known) -> ShotEntry:
-    """What the arguments of ``pose`` ask for.
-
-    Raises:
-        OctoMotionError: they make no sense.
-    """
-    del may_name
-    source, read = _files(options)
-    script = options.script.resolve()
-    if not script.is_file():
-        raise SettingsError(f"There is no file '{script}'.", "Give the path of a pose script.")
-    output, exports = _outputs(options, read, script)
-    return ShotEntry(
-        name=read.stem,
-        file=source,
-        armature=options.armature,
-        fps=options.fps,
-        output=output,
-        exports=exports,
-        posing=script,
-    )
-
-
-def _files(options: argparse.Namespace) -> tuple[Path | None, Path]:
-    """The file that is named, if any, and the one that is read."""
-    source = options.file.resolve() if options.file else None
-    read = source or (Path(bpy.data.filepath).resolve() if bpy.data.filepath else None)
-    if read is None:
+    if not (options.file or bpy.data.filepath):
         raise OctoMotionError("No file is open.", "Give the .blend file to read.")
-    return source, read
-
-
-def _outputs(options: argparse.Namespace, *read: Path) -> tuple[Path | None, tuple[Path, ...]]:
-    """The .blend file to write, and what to export to.
-
-    Args:
-        options: the arguments.
-        read: all files that are read, the scene first.
-    """
-    output = options.output.resolve() if options.output else None
+    read = _resolved(options.file or bpy.data.filepath)
+    table: dict[str, Any] = {"name": read.stem, "kind": options.command}
+    for name, key in KINDS[options.command].items():
+        value = getattr(options, name, None)
+        if key.option is not None and value:
+            table[name] = key.option.collect(value) if key.option.collect else value
     # What is read may be a motion file: that is never the one to overwrite.
-    if output is None and options.overwrite and not (options.export and is_motion(read[0])):
-        output = read[0]
-    exports = tuple(path.resolve() for path in options.export)
-    if output is None and not exports:
+    if options.overwrite and not (options.output or (options.export and is_motion(read))):
+        table["output"] = str(read)
+    if not table.keys() & {"output", "export"}:
         raise WriteError(
             "There is nothing to write.",
             "Give --output, --export, or --overwrite for the file itself.",
         )
-    if output is not None and output.suffix.lower() != ".blend":
-        raise WriteError(f"The output '{output.name}' is no .blend file.", "Let it end in .blend.")
-    for path in exports:
-        if fault := export_fault(path):
-            raise WriteError(fault)
-    outputs = (*((output,) if output else ()), *exports)
-    if len(set(outputs)) < len(outputs):
+    if options.command == "splice" and is_motion(read) and not options.splices:
+        raise SettingsError("There is nothing to splice: give --splice PART FILE.")
+    reading = Reading(known(), _resolved, has_open_file=True)
+    shot = read_shot(table, reading)
+    if reading.faults:
+        raise SettingsError("\n".join(reading.faults))
+    _check_outputs(shot, read, overwrite=options.overwrite)
+    return with_gait(shot)
+
+
+def _check_outputs(shot: ShotRequest, read: Path, *, overwrite: bool) -> None:
+    """Make sure that no file is lost.
+
+    Raises:
+        WriteError: an output is there already, or is read.
+    """
+    if len(set(shot.outputs)) < len(shot.outputs):
         raise WriteError("Two outputs have the same path.", "Give each its own.")
-    for path in outputs:
-        if path in read[1:]:
+    for path in shot.outputs:
+        if path in shot.inputs and path != read:
             raise WriteError(f"'{path}' is a clip that is read.", "Give another path.")
-        if path.exists() and not options.overwrite:
-            what = "is the file that is read" if path == read[0] else "is there already"
+        if path.exists() and not overwrite:
+            what = "is the file that is read" if path == read else "is there already"
             raise WriteError(f"'{path}' {what}.", "Give another path, or --overwrite.")
-    return output, exports
-
-
-def _settings(options: argparse.Namespace, valid: Mapping[str, Setting]) -> dict[str, Value]:
-    values, faults = check_settings(valid, parse_assignments(options.settings))
-    if faults:
-        raise SettingsError("\n".join(faults))
-    return values
 
 
 def _resolved(text: str) -> Path:
     return Path(text).expanduser().resolve()
 
 
-def _gait(name: str, may_name: Known) -> str:
-    if not name:
-        return ""
-    table = read_gait_file(Path(name)) if is_gait_file(name) else may_name.gait(name)
-    return gait_to_json(table)
-
-
 def _complain(error: OctoMotionError, status: int) -> int:
     print(f"Error: {error}", file=sys.stderr, flush=True)
     return status
-
-
-def _say(line: str) -> None:
-    print(line, flush=True)

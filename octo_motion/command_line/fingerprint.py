@@ -6,12 +6,13 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 
-def fingerprint(asked: dict[str, Any], gait: str) -> str:
+def fingerprint(asked: Mapping[str, Any], gait: str) -> str:
     """Digits that change with the shot's table, the gait's content and our version.
 
     Files that are read have digests of their own, see :func:`digest`.

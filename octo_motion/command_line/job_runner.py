@@ -5,20 +5,22 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from ..core.errors import OctoMotionError
 from .fingerprint import digest, fingerprint
-from .job_file import JobError, JobFile, JobShot, Known, load_gait_file, read_job
+from .job_file import JobError, JobFile, read_job
 from .outputs import commit, staged
 from .processes import Ended, Task, check_jobs, last_lines, run_processes
 from .report import ShotRecord, count, judge, read_report, write_report
-from .setting_values import unknown
-from .shot_request import ShotEntry
-from .worker import WorkerAnswer, child_command, child_environment, read_answer, write_request
+from .schema import unknown
+from .shot_request import ShotRequest
+from .vocabulary import check_file, known, with_gait
+from .worker import child_command, child_environment, read_answer, write_request
 
 STOPPED = 130
 """Exit status of a run that was stopped by Ctrl-C, as shells have it."""
@@ -40,7 +42,7 @@ class BakeOptions:
 class _Plan:
     """A shot that was looked at."""
 
-    entry: ShotEntry
+    shot: ShotRequest
     fingerprint: str
     inputs: tuple[Path, ...]
     problem: str = ""
@@ -48,19 +50,8 @@ class _Plan:
     kept: tuple[str, ...] = ()
 
 
-def bake(
-    options: BakeOptions,
-    known: Known,
-    check_file: Callable[[Path], None],
-    say: Callable[[str], None],
-) -> int:
-    """Run a job.
-
-    Args:
-        options: which, and how.
-        known: what shots may name.
-        check_file: raises OctoMotionError if Blender cannot read a file.
-        say: takes lines about the progress.
+def bake(options: BakeOptions) -> int:
+    """Run a job, and print how far it has come.
 
     Returns:
         The exit status: 0 all is done, 1 a shot failed, 130 stopped.
@@ -69,33 +60,33 @@ def bake(
         OctoMotionError: the job, its report or the options are wrong. Nothing has been run.
     """
     path = options.job.resolve()
-    report = options.report or path.with_suffix(".report.json")
-    job = read_job(path, known, report)
+    report = options.report.resolve() if options.report else path.with_suffix(".report.json")
+    job = read_job(path, known(), report)
     chosen = _chosen(job, options.only)
     records = read_report(report)
-    run = _Run(job, records, report, say, len(chosen))
-    problems = _problems(chosen, check_file)
+    run = _Run(job, records, report, len(chosen))
+    problems = _problems(chosen)
     plans = [_plan(shot, run, problems, force=options.force) for shot in chosen]
     jobs = check_jobs(options.jobs, sum(not (plan.problem or plan.skip) for plan in plans))
     if options.check:
         for plan in plans:
             state = plan.problem or ("unchanged" if plan.skip else "ready")
-            say(f"{plan.entry.name}: {state}")
+            _say(f"{plan.shot.name}: {state}")
         return 1 if any(plan.problem for plan in plans) else 0
     return run.all(plans, jobs)
 
 
-def _chosen(job: JobFile, only: Sequence[str]) -> list[JobShot]:
-    names = [shot.entry.name for shot in job.shots]
+def _chosen(job: JobFile, only: Sequence[str]) -> list[ShotRequest]:
+    names = [shot.name for shot in job.shots]
     if faults := [unknown("shot", name, names) for name in only if name not in names]:
         raise JobError(f"'{job.path}'", faults)
-    return [shot for shot in job.shots if not only or shot.entry.name in only]
+    return [shot for shot in job.shots if not only or shot.name in only]
 
 
-def _problems(shots: Sequence[JobShot], check_file: Callable[[Path], None]) -> dict[Path, str]:
+def _problems(shots: Sequence[ShotRequest]) -> dict[Path, str]:
     """What is wrong with the files of shots; many shots may be of one file."""
     problems: dict[Path, str] = {}
-    for file in {path for shot in shots for path in shot.entry.inputs}:
+    for file in {path for shot in shots for path in shot.opened}:
         try:
             check_file(file)
         except OctoMotionError as error:
@@ -103,25 +94,29 @@ def _problems(shots: Sequence[JobShot], check_file: Callable[[Path], None]) -> d
     return problems
 
 
-def _plan(shot: JobShot, run: _Run, problems: Mapping[Path, str], *, force: bool) -> _Plan:
+def _plan(asked: ShotRequest, run: _Run, problems: Mapping[Path, str], *, force: bool) -> _Plan:
     """Look at a shot, without changing anything."""
-    inputs = shot.inputs
     try:
-        entry = load_gait_file(shot)
-        problem = next((problems[path] for path in entry.inputs if path in problems), "")
+        shot = with_gait(asked)
+        gait = str(shot.gait)
+        problem = next((problems[path] for path in shot.opened if path in problems), "")
     except OctoMotionError as error:
-        entry, problem = shot.entry, str(error)
-    plan = _Plan(entry, fingerprint(shot.asked, entry.gait), inputs, problem)
+        shot, gait, problem = asked, "", str(error)
+    plan = _Plan(shot, fingerprint(run.job.asked[shot.name], gait), asked.inputs, problem)
     if problem or force:
         return plan
     verdict = judge(
-        run.records.get(entry.name),
+        run.records.get(shot.name),
         plan.fingerprint,
-        [run.relative(path) for path in inputs],
-        [run.relative(path) for path in entry.outputs],
+        [run.relative(path) for path in asked.inputs],
+        [run.relative(path) for path in shot.outputs],
         run.digest,
     )
     return replace(plan, skip=verdict.skip, problem=verdict.reason, kept=verdict.kept)
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
 
 
 @dataclass
@@ -131,7 +126,6 @@ class _Run:
     job: JobFile
     records: dict[str, ShotRecord]
     report: Path
-    say: Callable[[str], None]
     total: int
     finished: int = 0
     digests: dict[str, str] = field(default_factory=dict)
@@ -146,7 +140,7 @@ class _Run:
                 self._skip(plan)
         # Now, so that a report that cannot be written is known before hours of work.
         self._write_report()
-        waiting = {plan.entry.name: plan for plan in plans if not (plan.problem or plan.skip)}
+        waiting = {plan.shot.name: plan for plan in plans if not (plan.problem or plan.skip)}
         order = list(waiting.values())
         try:
             self._bake(order, waiting, jobs)
@@ -160,109 +154,77 @@ class _Run:
 
     def _bake(self, order: Sequence[_Plan], waiting: dict[str, _Plan], jobs: int) -> None:
         """Bake shots; those that have come to an end leave ``waiting``."""
-        with tempfile.TemporaryDirectory(prefix="octo-motion-") as scratch:
-            stage = _Stage(Path(scratch))
-            with stage:
-                processes = run_processes(self._tasks(order, waiting, stage), jobs)
-                try:
-                    for ended in processes:
-                        plan = waiting[ended.name]
-                        self._finish(plan, ended, stage)
-                        del waiting[ended.name]
-                        self._report()
-                finally:
-                    processes.close()
+        with (
+            tempfile.TemporaryDirectory(prefix="octo-motion-") as folder,
+            _Scratch(Path(folder)) as scratch,
+            closing(run_processes(self._tasks(order, waiting, scratch), jobs)) as processes,
+        ):
+            for ended in processes:
+                self._finish(waiting[ended.name], ended, scratch)
+                del waiting[ended.name]
+                self._report()
 
     def _tasks(
-        self, order: Sequence[_Plan], waiting: dict[str, _Plan], stage: _Stage
+        self, order: Sequence[_Plan], waiting: dict[str, _Plan], scratch: _Scratch
     ) -> Iterator[Task]:
         for number, plan in enumerate(order):
             try:
-                yield stage.task(number, plan.entry)
+                yield scratch.task(number, plan.shot)
             except OctoMotionError as error:
                 self._fail(plan, str(error))
-                del waiting[plan.entry.name]
+                del waiting[plan.shot.name]
                 self._report()
 
-    def _finish(self, plan: _Plan, ended: Ended, stage: _Stage) -> None:
-        name = plan.entry.name
-        answer = read_answer(stage.answer(name))
-        error = ended.reason if answer is None else answer.error
-        if answer is not None and not error and ended.status != 0:
-            error = ended.reason
+    def _finish(self, plan: _Plan, ended: Ended, scratch: _Scratch) -> None:
+        name = plan.shot.name
+        said = read_answer(scratch.answer(name))
+        error = said.pop("error", "") or ("" if ended.status == 0 and said else ended.reason)
+        libraries = said.pop("libraries", ())
         if not error:
             try:
-                commit(stage.places[name])
+                commit(scratch.places[name])
             except OctoMotionError as problem:
                 error = str(problem)
-        seconds = round(ended.seconds, 3)
-        if error or answer is None:
-            self._fail(plan, error, seconds, last_lines(stage.log(name)), answer)
-            stage.leave(name)
-            return
-        read = [*plan.inputs, *(Path(each) for each in answer.libraries)]
-        self.records[name] = ShotRecord(
-            name=name,
-            status="done",
-            frames=answer.frames,
-            frame_start=answer.frame_start,
-            frame_end=answer.frame_end,
-            seconds=seconds,
-            warnings=list(answer.warnings),
-            quality=answer.quality,
-            keys=answer.keys,
-            dense_keys=answer.dense_keys,
-            outputs={self.relative(path): digest(path) for path in plan.entry.outputs},
-            inputs={path: self.digest(path) for path in map(self.relative, read)},
-            fingerprint=plan.fingerprint,
-        )
-        stage.leave(name)
-        self._tell(name, f"done, {answer.frames} frames in {seconds:.1f} s", answer.warnings)
+        said["seconds"] = round(ended.seconds, 3)
+        if error:
+            self._fail(plan, error, log=last_lines(scratch.log(name)), **said)
+        else:
+            read = [*plan.inputs, *map(Path, libraries)]
+            self.records[name] = ShotRecord(
+                name=name,
+                status="done",
+                outputs={self.relative(path): digest(path) for path in plan.shot.outputs},
+                inputs={path: self.digest(path) for path in map(self.relative, read)},
+                fingerprint=plan.fingerprint,
+                **said,
+            )
+            made = f"done, {said['frames']} frames in {ended.seconds:.1f} s"
+            self._tell(name, made, said["warnings"])
+        scratch.leave(name)
 
-    def _fail(
-        self,
-        plan: _Plan,
-        error: str,
-        seconds: float | None = None,
-        log: str = "",
-        answer: WorkerAnswer | None = None,
-    ) -> None:
-        name = plan.entry.name
+    def _fail(self, plan: _Plan, error: str, **said: Any) -> None:
+        name = plan.shot.name
         before = self.records.get(name)
-        said = answer or WorkerAnswer()
-        self.records[name] = ShotRecord(
-            name=name,
-            status="failed",
-            error=error,
-            frames=said.frames,
-            frame_start=said.frame_start,
-            frame_end=said.frame_end,
-            seconds=seconds,
-            warnings=list(said.warnings),
-            quality=said.quality,
-            keys=said.keys,
-            dense_keys=said.dense_keys,
-            earlier_outputs=before.written if before else {},
-            log=log,
-        )
+        kept = before.written if before else {}
+        self.records[name] = ShotRecord(name, "failed", error, earlier_outputs=kept, **said)
         self._tell(name, f"failed: {error}")
 
     def _skip(self, plan: _Plan) -> None:
-        name = plan.entry.name
+        name = plan.shot.name
         self.records[name] = replace(self.records[name], status="skipped")
         kept = [f"'{path}' has been changed since it was baked, and is kept." for path in plan.kept]
         self._tell(name, "skipped, unchanged", kept)
 
     def _tell(self, name: str, what: str, warnings: Sequence[str] = ()) -> None:
         self.finished += 1
-        self.say(f"[{self.finished}/{self.total}] {name}: {what}")
+        _say(f"[{self.finished}/{self.total}] {name}: {what}")
         for warning in warnings:
-            self.say(f"    {warning}")
+            _say(f"    {warning}")
 
     def _conclude(self, plans: Sequence[_Plan]) -> int:
-        records = [self.records[plan.entry.name] for plan in plans]
+        records = [self.records[plan.shot.name] for plan in plans]
         told = (f"{count(records, each)} {each}" for each in ("done", "skipped", "failed"))
-        self.say(f"{', '.join(told)}. Report: {self.report_problem or self.report}")
+        _say(f"{', '.join(told)}. Report: {self.report_problem or self.report}")
         return 1 if count(records, "failed") or self.report_problem else 0
 
     def _report(self) -> None:
@@ -276,7 +238,7 @@ class _Run:
 
     def _write_report(self) -> None:
         """Write the report: shots in the job's order; those that are no longer in it leave."""
-        names = (shot.entry.name for shot in self.job.shots)
+        names = (shot.name for shot in self.job.shots)
         records = [self.records[name] for name in names if name in self.records]
         write_report(self.report, self.job.path, records)
 
@@ -295,7 +257,7 @@ class _Run:
         return self.digests[relative]
 
 
-class _Stage(ExitStack):
+class _Scratch(ExitStack):
     """Requests, answers, logs and unfinished outputs of the shots; gone in the end."""
 
     def __init__(self, folder: Path) -> None:
@@ -305,20 +267,20 @@ class _Stage(ExitStack):
         self._numbers: dict[str, int] = {}
         self._open: dict[str, ExitStack] = {}
 
-    def task(self, number: int, entry: ShotEntry) -> Task:
+    def task(self, number: int, shot: ShotRequest) -> Task:
         """Everything ready for one shot.
 
         Raises:
             WriteError: an output cannot be written where it is wanted.
         """
-        self._numbers[entry.name] = number
+        self._numbers[shot.name] = number
         own = self.enter_context(ExitStack())
-        self._open[entry.name] = own
-        self.places[entry.name] = own.enter_context(staged(entry.outputs))
-        request = self._path(entry.name, "request.json")
-        write_request(request, entry, self.places[entry.name])
-        command = child_command(request, self.answer(entry.name))
-        return Task(entry.name, command, child_environment(self._folder), self.log(entry.name))
+        self._open[shot.name] = own
+        self.places[shot.name] = own.enter_context(staged(shot.outputs))
+        request = self._path(shot.name, "request.json")
+        write_request(request, shot, self.places[shot.name])
+        command = child_command(request, self.answer(shot.name))
+        return Task(shot.name, command, child_environment(self._folder), self.log(shot.name))
 
     def leave(self, name: str) -> None:
         """Delete what is left of a shot's unfinished outputs."""

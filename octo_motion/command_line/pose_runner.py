@@ -3,23 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 
 from ..ui.posing.pose_script import play_file
-
-
-@dataclass(frozen=True)
-class PoseSummary:
-    """What came of a script, for people and for reports."""
-
-    message: str
-    frames: int
-    frame_start: int
-    frame_end: int
-    warnings: tuple[str, ...]
+from .report import ShotSummary
 
 
 def is_posable(armature: bpy.types.Object) -> bool:
@@ -27,7 +16,7 @@ def is_posable(armature: bpy.types.Object) -> bool:
     return isinstance(armature.data, bpy.types.Armature) and bool(len(armature.data.bones))
 
 
-def pose(armature: bpy.types.Object, scene: bpy.types.Scene, script: Path) -> PoseSummary:
+def pose(armature: bpy.types.Object, scene: bpy.types.Scene, script: Path) -> ShotSummary:
     """Play a pose script on an armature; the context has its scene.
 
     Raises:
@@ -36,4 +25,4 @@ def pose(armature: bpy.types.Object, scene: bpy.types.Scene, script: Path) -> Po
     player = play_file(armature, scene, script)
     first, last = scene.frame_start, scene.frame_end
     message = f"played '{script.name}', {player.keys} bones keyed."
-    return PoseSummary(message, last - first + 1, first, last, ())
+    return ShotSummary(message, last - first + 1, first, last)

@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from ..core.errors import OctoMotionError, SettingsError
+from ..core.errors import OctoMotionError
 from ..core.locomotion.metrics import KINDS, Figure
-from .setting_values import unknown
 
 NAMES: Final = tuple(kind.lower() for kind in KINDS)
 """What may be limited, as jobs and reports call it."""
@@ -29,50 +28,6 @@ class LimitError(OctoMotionError):
     def __init__(self, problem: str, summary: Any, remedy: str = "") -> None:
         super().__init__(problem, remedy)
         self.summary = summary
-
-
-def read_limits(given: Any) -> tuple[dict[str, float], list[str]]:
-    """Limits by name, and all that is wrong with what was given.
-
-    Args:
-        given: a table as it stands in a job; a limit of ``inf`` is none.
-    """
-    if not isinstance(given, Mapping):
-        return {}, [f"limits must be a table, such as {{ slip = 0.01 }}, not {given!r}."]
-    limits: dict[str, float] = {}
-    faults: list[str] = []
-    for name, value in given.items():
-        if name not in NAMES:
-            faults.append(f"limits: {unknown('figure', str(name), NAMES)}")
-        elif isinstance(value, bool) or not isinstance(value, int | float) or not value >= 0.0:
-            faults.append(
-                f"limits: {name} must be a number of 0 or more, not {value!r}. "
-                f"Valid: {', '.join(NAMES)}."
-            )
-        elif math.isfinite(value):
-            limits[name] = float(value)
-    return limits, faults
-
-
-def parse_limits(texts: Iterable[str]) -> dict[str, float]:
-    """Limits from ``name=value`` texts; of a name given twice the last counts.
-
-    Raises:
-        SettingsError: one has no equals sign, no such figure exists, or it cannot be limited so.
-    """
-    table: dict[str, float | str] = {}
-    for text in texts:
-        name, sign, value = (part.strip() for part in text.partition("="))
-        if not sign or not name:
-            raise SettingsError(f"'{text}' limits nothing.", "Write --limit name=value.")
-        try:
-            table[name] = float(value)
-        except ValueError:
-            table[name] = value
-    limits, faults = read_limits(table)
-    if faults:
-        raise SettingsError("\n".join(faults))
-    return limits
 
 
 def quality(figures: Sequence[Figure]) -> dict[str, dict[str, Any]]:

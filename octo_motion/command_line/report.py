@@ -20,6 +20,17 @@ Status = Literal["done", "skipped", "failed"]
 
 
 @dataclass(frozen=True)
+class ShotSummary:
+    """What was made of a shot that is spliced or posed, for people and for reports."""
+
+    message: str
+    frames: int
+    frame_start: int
+    frame_end: int
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class ShotRecord:
     """What became of one shot. Paths are relative to the job's folder where that is possible."""
 

@@ -4,21 +4,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+import types
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args, get_origin, get_type_hints
 
 from ..core.locomotion.octopus import OctopusShape
-from .setting_values import Value
 
-EXPORT_SUFFIXES: Final = (".glb", ".fbx", ".abc")
 HIGHEST_FPS: Final = 32767
 """Blender's own limit."""
 
-MOST_FRAMES: Final = 1_000_000
-"""A little below Blender's last frame."""
-
 Points = tuple[tuple[float, float, float], ...]
+Settings = dict[str, Any]
+"""Values by name: truths, numbers, texts and points."""
 
 
 @dataclass(frozen=True)
@@ -49,27 +48,18 @@ class NewSplice:
     """Armature in the .blend file that the clip is for, the one that is spliced onto if empty."""
     action: str = ""
     """Name of the action, the only one of the motion file or the source's own if empty."""
-    settings: dict[str, Value] = field(default_factory=dict)
+    settings: Settings = field(default_factory=dict)
     """Values of the item by name, the part among them, and ``landmarks.NAME`` of the source."""
 
 
 @dataclass(frozen=True)
-class SpliceWork:
-    """What to splice."""
+class ShotRequest:
+    """What one shot is made from, and what is made of it: its keys in a job file, see
+    ``shot_schema``.
+    """
 
-    base: str = ""
-    """Name of the action to splice onto; the armature's own, or the list's, if empty."""
-    frames: int | None = None
-    """Frames that the base is to last, repeated or cut; as long as it is if not given."""
-    splices: tuple[NewSplice, ...] | None = None
-    """In order, or none for the list that the file has."""
-
-
-@dataclass(frozen=True)
-class ShotEntry:
-    """What one shot is made from, and what is made of it."""
-
-    name: str
+    name: str = ""
+    kind: str = "generate"
     file: Path | None = None
     """The file to open; without it and without an octopus, the file that is open. To splice, it
     may be a motion file."""
@@ -79,81 +69,77 @@ class ShotEntry:
     """Name of a curve, a route to draw, or "" for the armature's own."""
     ground: str = ""
     """Name of the object to walk on, or "" for the armature's own."""
-    lists: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
-    """Items of its lists, by the names of ``shot_lists.LISTS``; others are as in the file."""
-    gait: str = ""
-    """The gait table as JSON, or "" for the armature's own."""
-    settings: dict[str, Value] = field(default_factory=dict)
+    gait: str | Path = ""
+    """The gait table as JSON, a file that is still to be read, or "" for the armature's own."""
+    changes: list[Settings] | None = None
+    """Items of the list, as in the file if not given; so are the next two."""
+    reaches: list[Settings] | None = None
+    contacts: list[Settings] | None = None
+    script: Path | None = None
+    """The pose script to play."""
+    base: str = ""
+    """Name of the action to splice onto; the armature's own, or the list's, if empty."""
+    frames: int | None = None
+    """Frames that the base is to last, repeated or cut; as long as it is if not given."""
+    splices: list[NewSplice] | None = None
+    """In order, or none for the list that the file has."""
+    settings: Settings = field(default_factory=dict)
+    limits: dict[str, float] = field(default_factory=dict)
+    """How bad the figures of its motion may be, by name; see ``quality_limits``."""
     fps: float | None = None
     output: Path | None = None
-    exports: tuple[Path, ...] = ()
-    splicing: SpliceWork | None = None
-    """What to splice."""
-    posing: Path | None = None
-    """The pose script to play. With neither: the armature is to walk or swim."""
-    limits: dict[str, float] = field(default_factory=dict)
-    """How bad the figures of its motion may be, by name; see ``limits``."""
+    export: tuple[Path, ...] = ()
+
+    @property
+    def opened(self) -> tuple[Path, ...]:
+        """All files that Blender is to open or import: scene and clips."""
+        named = (self.file, *(splice.clip for splice in self.splices or ()))
+        return tuple(dict.fromkeys(path for path in named if path is not None))
 
     @property
     def inputs(self) -> tuple[Path, ...]:
-        """All files that are named to be read: scene and clips."""
-        splices = (self.splicing and self.splicing.splices) or ()
-        named = (self.file, self.posing, *(splice.clip for splice in splices))
-        return tuple(dict.fromkeys(path for path in named if path is not None))
+        """All files that are named to be read."""
+        texts = (each for each in (self.script, self.gait) if isinstance(each, Path))
+        return (*self.opened, *texts)
 
     @property
     def outputs(self) -> tuple[Path, ...]:
         """All files that are to be written."""
-        return (*((self.output,) if self.output else ()), *self.exports)
+        return (*((self.output,) if self.output else ()), *self.export)
 
     def to_plain(self) -> dict[str, Any]:
         """For JSON; ``from_plain`` reads it."""
-        plain = asdict(self)
-        plain["file"] = str(self.file) if self.file else None
-        plain["posing"] = str(self.posing) if self.posing else None
-        plain["output"] = str(self.output) if self.output else None
-        plain["exports"] = [str(path) for path in self.exports]
-        for splice in (plain["splicing"] or {}).get("splices") or ():
-            splice["clip"] = str(splice["clip"]) if splice["clip"] else None
-        return plain
+        return _plain(self)
 
     @classmethod
-    def from_plain(cls, plain: dict[str, Any]) -> ShotEntry:
-        """The entry that ``to_plain`` made plain."""
-        octopus, route = plain["octopus"], plain["route"]
-        if isinstance(route, dict):
-            points = tuple((x, y, z) for x, y, z in route["points"])
-            route = NewRoute(points, route["is_bezier"], route["cyclic"])
-        return cls(
-            name=plain["name"],
-            file=Path(plain["file"]) if plain["file"] else None,
-            octopus=NewOctopus(OctopusShape(**octopus["shape"]), octopus["with_mesh"])
-            if octopus
-            else None,
-            armature=plain["armature"],
-            route=route,
-            ground=plain["ground"],
-            lists=plain["lists"],
-            gait=plain["gait"],
-            settings=plain["settings"],
-            fps=plain["fps"],
-            output=Path(plain["output"]) if plain["output"] else None,
-            exports=tuple(Path(path) for path in plain["exports"]),
-            splicing=_splice_work(plain["splicing"]) if plain["splicing"] else None,
-            posing=Path(plain["posing"]) if plain["posing"] else None,
-            limits=plain["limits"],
-        )
+    def from_plain(cls, plain: Mapping[str, Any]) -> ShotRequest:
+        """The request that ``to_plain`` made plain."""
+        return _restored(cls, plain)
 
 
-def _splice_work(plain: dict[str, Any]) -> SpliceWork:
-    given = plain["splices"]
-    splices = None if given is None else tuple(map(_new_splice, given))
-    return SpliceWork(plain["base"], plain["frames"], splices)
+def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        return {each.name: _plain(getattr(value, each.name)) for each in fields(value)}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return str(value) if isinstance(value, Path) else value
 
 
-def _new_splice(plain: dict[str, Any]) -> NewSplice:
-    clip = Path(plain["clip"]) if plain["clip"] else None
-    return NewSplice(clip, plain["source"], plain["action"], plain["settings"])
+def _restored(hint: Any, plain: Any) -> Any:
+    """The value of a type that was made plain; of several types, the first that it could be of."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if plain is None:
+        return None
+    if origin is types.UnionType:
+        fits = (each for each in arguments if is_dataclass(each) == isinstance(plain, dict))
+        return _restored(next(fits), plain)
+    if origin in {list, tuple} and isinstance(plain, list):
+        values = [_restored(arguments[0], each) for each in plain]
+        return values if origin is list else tuple(values)
+    if isinstance(hint, type) and is_dataclass(hint):
+        hints = get_type_hints(hint)
+        return hint(**{name: _restored(hints[name], value) for name, value in plain.items()})
+    return Path(plain) if hint is Path else plain
 
 
 def frame_rate(fps: float) -> tuple[int, float]:

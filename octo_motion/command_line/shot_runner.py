@@ -15,27 +15,29 @@ from ..blender.animation import writable_armature
 from ..blender.overrides import linked_names
 from ..blender.rig import read_skeleton, world_matrix
 from ..blender.scene import add_octopus, add_route_curve, remove_markers
-from ..core.errors import OctoMotionError, RigError, RouteError, SettingsError, WriteError
+from ..core.errors import OctoMotionError, RigError, SettingsError, WriteError
 from ..core.locomotion.gait import gait_from_json
 from ..core.locomotion.rig import detect_arms
 from ..ui.locomotion.generate_motion import generate
 from ..ui.locomotion.settings.contact_overrides import once_called, store
 from ..ui.locomotion.settings.properties import locomotion_settings, set_gait
 from ..ui.locomotion.writing import Summary
-from . import pose_runner as pose_stage
-from . import splice_runner as splice_stage
 from .exports import check_export, export
 from .motion_files import is_motion
 from .operator_errors import blender_said
+from .pose_runner import is_posable, pose
 from .quality_limits import check_limits
-from .shot_request import NewRoute, ShotEntry, frame_rate
+from .report import ShotSummary
+from .schema import set_values
+from .shot_request import NewRoute, ShotRequest, frame_rate
+from .splice_runner import Clips, has_splices, import_base, splice
 
 _ROUTE_NAME: Final = "Octopus Route"
 _COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
 """How files compressed with Zstandard and with gzip begin."""
 
 
-AnySummary = Summary | splice_stage.SpliceSummary | pose_stage.PoseSummary
+AnySummary = Summary | ShotSummary
 
 
 @dataclass(frozen=True)
@@ -48,87 +50,85 @@ class Performed:
     """Paths of the files that the scene is linked from, and of those that clips consist of."""
 
 
-def perform(entry: ShotEntry, places: Mapping[Path, Path]) -> Performed:
+def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
     """Make a shot and write its outputs.
 
     Args:
-        entry: the shot.
+        shot: what is asked for.
         places: where each of its outputs is to be written.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
         LimitError: the motion is not as good as it has to be; nothing has been written.
     """
-    clips = splice_stage.Clips()
-    motion = entry.file if entry.splicing and entry.file and is_motion(entry.file) else None
+    clips = Clips()
+    motion = shot.file if shot.kind == "splice" and shot.file and is_motion(shot.file) else None
     if motion is not None:
-        armature, clips = splice_stage.import_base(motion, entry.fps)
+        armature, clips = import_base(motion, shot.fps)
         compress, scene = False, armature.users_scene[0]
     else:
-        compress, (armature, scene) = _open(entry), _find(entry)
+        compress, (armature, scene) = _open(shot), _find(shot)
     libraries = [bpy.path.abspath(each.filepath) for each in bpy.data.libraries]
     with _context(scene, armature):
         if bpy.context.mode.startswith("EDIT"):
             # So was the file saved; what is being edited is not to be keyed, nor exported.
             bpy.ops.object.mode_set(mode="OBJECT")
-        if entry.fps is not None:
-            scene.render.fps, scene.render.fps_base = frame_rate(entry.fps)
-        for path in entry.exports:
+        if shot.fps is not None:
+            scene.render.fps, scene.render.fps_base = frame_rate(shot.fps)
+        for path in shot.export:
             check_export(path, armature, scene)
-        if entry.splicing is not None:
-            work = (entry.splicing, entry.settings)
-            summary = splice_stage.splice(armature, *work, clips, motion)
-        elif entry.posing is not None:
-            summary = pose_stage.pose(armature, scene, entry.posing)
+        if shot.kind == "splice":
+            summary = splice(armature, shot, clips, motion)
+        elif shot.script is not None:
+            summary = pose(armature, scene, shot.script)
         else:
-            _apply(entry, armature, scene)
+            _apply(shot, armature, scene)
             summary = generate(armature, bpy.context)
-            check_limits(entry.limits, summary)
-        if entry.octopus is not None or motion is not None:
+            check_limits(shot.limits, summary)
+        if shot.octopus is not None or motion is not None:
             scene.frame_start, scene.frame_end = summary.frame_start, summary.frame_end
-        if entry.output is not None:
-            _save(places[entry.output], compress=compress)
+        if shot.output is not None:
+            _save(places[shot.output], compress=compress)
         # Whatever the exports need of the scene, the file has been saved before.
-        for path in entry.exports:
+        for path in shot.export:
             export(places[path], armature, scene, summary.frame_start, summary.frame_end)
     libraries += [str(path) for path in clips.read]
     return Performed(summary, armature.name, tuple(libraries))
 
 
-def _find(entry: ShotEntry) -> tuple[bpy.types.Object, bpy.types.Scene]:
+def _find(shot: ShotRequest) -> tuple[bpy.types.Object, bpy.types.Scene]:
     """The armature to move, and a scene that it is in."""
     scene = bpy.context.scene
     assert scene is not None
-    if entry.octopus is not None:
-        armature = add_octopus(
-            bpy.context, entry.octopus.shape, Matrix(), with_skin=entry.octopus.with_mesh
-        )
+    if shot.octopus is not None:
+        shape, with_mesh = shot.octopus.shape, shot.octopus.with_mesh
+        return add_octopus(bpy.context, shape, Matrix(), with_skin=with_mesh), scene
+    fits = {"generate": _has_arms, "splice": has_splices, "pose": is_posable}[shot.kind]
+    armature = find_armature(shot.armature, scene, fits)
+    if armature.name in scene.objects:
         return armature, scene
-    fits = splice_stage.has_splices if entry.splicing else _has_arms
-    if entry.posing is not None:
-        fits = pose_stage.is_posable
-    armature = find_armature(entry.armature, scene, fits)
-    return armature, _scene_of(armature, scene)
+    for other in bpy.data.scenes:
+        if armature.name in other.objects:
+            return armature, other
+    raise RigError(f"'{armature.name}' is in no scene.", "Link it to a scene.")
 
 
-def _open(entry: ShotEntry) -> bool:
+def _open(shot: ShotRequest) -> bool:
     """Have the scene open; whether its file is compressed."""
-    if entry.octopus is not None:
+    if shot.octopus is not None:
         bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
         return False
-    if entry.file is None:
+    if shot.file is None:
         return _is_compressed(Path(bpy.data.filepath))
-    if not entry.file.is_file():
-        raise OctoMotionError(
-            f"There is no file '{entry.file}'.", "Give the path of a .blend file."
-        )
+    if not shot.file.is_file():
+        raise OctoMotionError(f"There is no file '{shot.file}'.", "Give the path of a .blend file.")
     try:
-        bpy.ops.wm.open_mainfile(filepath=str(entry.file), load_ui=False)
+        bpy.ops.wm.open_mainfile(filepath=str(shot.file), load_ui=False)
     except RuntimeError as error:
         raise OctoMotionError(
-            f"'{entry.file}' cannot be opened: {blender_said(error)}", "Give a .blend file."
+            f"'{shot.file}' cannot be opened: {blender_said(error)}", "Give a .blend file."
         ) from error
-    return _is_compressed(entry.file)
+    return _is_compressed(shot.file)
 
 
 def _is_compressed(path: Path) -> bool:
@@ -155,7 +155,10 @@ def find_armature(
         if not found:
             raise RigError(f"There is no object '{name}'.", _choose(bpy.data.objects))
         local = [each for each in found if each.library is None]
-        return _checked((local or found)[0])
+        armature = (local or found)[0]
+        if armature.type != "ARMATURE":
+            raise RigError(f"'{name}' is not an armature.", _choose(bpy.data.objects))
+        return armature
     every = [each for each in scene.objects if each.type == "ARMATURE"]
     armatures = [each for each in every if each.library is None] or every
     if not armatures:
@@ -179,12 +182,6 @@ def _choose(objects: Any) -> str:
     return f"Name the armature: {', '.join(names)}."
 
 
-def _checked(armature: bpy.types.Object) -> bpy.types.Object:
-    if armature.type != "ARMATURE":
-        raise RigError(f"'{armature.name}' is not an armature.", _choose(bpy.data.objects))
-    return armature
-
-
 def _has_arms(armature: bpy.types.Object) -> bool:
     if len(locomotion_settings(armature).arms):
         return True
@@ -194,16 +191,6 @@ def _has_arms(armature: bpy.types.Object) -> bool:
     except RigError:
         return False
     return True
-
-
-def _scene_of(armature: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Scene:
-    """The scene given if the armature is in it, else the first that has it."""
-    if armature.name in scene.objects:
-        return scene
-    for other in bpy.data.scenes:
-        if armature.name in other.objects:
-            return other
-    raise RigError(f"'{armature.name}' is in no scene.", "Link it to a scene.")
 
 
 def _context(scene: bpy.types.Scene, armature: bpy.types.Object) -> Any:
@@ -219,54 +206,45 @@ def _context(scene: bpy.types.Scene, armature: bpy.types.Object) -> Any:
     return bpy.context.temp_override(**given, scene=scene, view_layer=layer)
 
 
-def _apply(entry: ShotEntry, armature: bpy.types.Object, scene: bpy.types.Scene) -> None:
+def _apply(shot: ShotRequest, armature: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """Write what the shot asks for into the armature's settings."""
     writable_armature(armature)
     settings: Any = locomotion_settings(armature)
-    if entry.gait:
-        set_gait(settings, gait_from_json(entry.gait))
-    for name, value in entry.settings.items():
-        *groups, last = name.split(".")
-        group = settings
-        for each in groups:
-            group = getattr(group, each)
-        setattr(group, last, value)
-    if entry.ground:
-        settings.ground.object = _object(entry.ground, "MESH", "a mesh")
-    _fill_lists(entry, armature, settings)
-    if isinstance(entry.route, NewRoute):
-        settings.route = _draw(entry.route, scene)
-    elif entry.route:
-        settings.route = _curve(entry.route)
+    if shot.gait:
+        set_gait(settings, gait_from_json(str(shot.gait)))
+    set_values(settings, shot.settings)
+    if shot.ground:
+        settings.ground.object = _object(shot.ground, "MESH")
+    if shot.changes is not None:
+        _filled(settings.change, "places", shot.changes)
+        if "change.by" not in shot.settings:
+            settings.change.by = "MARKERS" if shot.changes else "NONE"
+    if shot.reaches is not None:
+        names = [each.get("target") for each in shot.reaches]
+        targets = [_object(name) if name else None for name in names]
+        pairs = zip(shot.reaches, targets, strict=True)
+        _filled(settings, "reaches", [{**each, "target": target} for each, target in pairs])
+    if shot.contacts is not None:
+        _fill_contacts(shot.contacts, armature, settings)
+    if isinstance(shot.route, NewRoute):
+        settings.route = _draw(shot.route, scene)
+    elif shot.route:
+        settings.route = _object(shot.route, "CURVE", "Give a route by its points.")
 
 
-def _fill_lists(entry: ShotEntry, armature: bpy.types.Object, settings: Any) -> None:
-    """Give the armature the lists of the shot, in place of its own."""
-    lists = entry.lists
-    if "changes" in lists:
-        _filled(settings.change, "places", lists["changes"])
-        if "change.by" not in entry.settings:
-            settings.change.by = "MARKERS" if lists["changes"] else "NONE"
-    if "reaches" in lists:
-        objects = [each.get("target") for each in lists["reaches"]]
-        found = [_object(name) if name else None for name in objects]
-        rest = [{**each, "target": None} for each in lists["reaches"]]
-        _filled(settings, "reaches", rest)
-        for item, target in zip(list(settings.reaches)[-len(rest) :], found, strict=False):
-            item.target = target
-    if "contacts" in lists:
-        names = [item.name for item in settings.arms]
-        for each in lists["contacts"]:
-            if names and each["arm"] not in names:
-                raise RigError(
-                    f"There is no arm '{each['arm']}'.", f"Name one of {', '.join(names)}."
-                )
-        # Those that are shown would count too.
-        remove_markers(armature, once_called(settings.ground))
-        settings.ground.shown = ""
-        items = [{**each, "locked": "position" in each} for each in lists["contacts"]]
-        store(settings.ground, {})
-        _filled(settings.ground, "contacts", items)
+def _fill_contacts(
+    contacts: Sequence[Mapping[str, Any]], armature: bpy.types.Object, settings: Any
+) -> None:
+    names = [item.name for item in settings.arms]
+    for each in contacts:
+        if names and each["arm"] not in names:
+            raise RigError(f"There is no arm '{each['arm']}'.", f"Name one of {', '.join(names)}.")
+    # Those that are shown would count too.
+    remove_markers(armature, once_called(settings.ground))
+    settings.ground.shown = ""
+    store(settings.ground, {})
+    items = [{**each, "locked": "position" in each} for each in contacts]
+    _filled(settings.ground, "contacts", items)
 
 
 def _filled(settings: Any, name: str, items: Sequence[Mapping[str, Any]]) -> None:
@@ -296,20 +274,28 @@ def _filled(settings: Any, name: str, items: Sequence[Mapping[str, Any]]) -> Non
             setattr(item, each, value)
 
 
-def _object(name: str, kind: str = "", what: str = "") -> bpy.types.Object:
+def _object(
+    name: str, kind: str = "", instead: str = "Give a file that has one."
+) -> bpy.types.Object:
     """The object of that name.
+
+    Args:
+        name: of the object.
+        kind: of objects that will do; any without it.
+        instead: the remedy where there is none at all.
 
     Raises:
         SettingsError: there is none, or it is of another kind.
     """
     found = [each for each in bpy.data.objects if each.name == name]
-    fitting = [each for each in found if kind in {"", each.type}]
-    if fitting:
-        return fitting[0]
-    names = sorted({each.name for each in bpy.data.objects if kind in {"", each.type}})
-    remedy = f"Name one of {', '.join(names)}." if names else "Give a file that has one."
-    problem = f"'{name}' is not {what}." if found else f"There is no object '{name}'."
-    raise SettingsError(problem, remedy)
+    fitting = [each for each in bpy.data.objects if kind in {"", each.type}]
+    named = next((each for each in found if each in fitting), None)
+    if named is not None:
+        return named
+    noun = kind.lower() or "object"
+    problem = f"'{name}' is not a {noun}." if found else f"There is no {noun} '{name}'."
+    names = ", ".join(sorted({each.name for each in fitting}))
+    raise SettingsError(problem, f"Name one of {names}." if names else instead)
 
 
 def _draw(route: NewRoute, scene: bpy.types.Scene) -> bpy.types.Object:
@@ -330,37 +316,18 @@ def _draw(route: NewRoute, scene: bpy.types.Scene) -> bpy.types.Object:
     return curve
 
 
-def _curve(name: str) -> bpy.types.Object:
-    found = [each for each in bpy.data.objects if each.name == name]
-    curves = [each for each in found if each.type == "CURVE"]
-    if curves:
-        return curves[0]
-    problem = f"'{name}' is not a curve." if found else f"There is no curve '{name}'."
-    names = sorted(each.name for each in bpy.data.objects if each.type == "CURVE")
-    raise RouteError(
-        problem, f"Name one of {', '.join(names)}." if names else "Give a route by its points."
-    )
-
-
 def _save(place: Path, *, compress: bool) -> None:
     # As a copy: the file that is open stays what it is. Paths in it that are relative are made so
     # for the new folder.
-    _run(
-        lambda: bpy.ops.wm.save_as_mainfile(
+    try:
+        bpy.ops.wm.save_as_mainfile(
             filepath=str(place),
             check_existing=False,
             compress=compress,
             relative_remap=True,
             copy=True,
-        ),
-        "The file",
-    )
-
-
-def _run(operator: Callable[[], Any], what: str) -> None:
-    try:
-        operator()
+        )
     except RuntimeError as error:
         raise WriteError(
-            f"{what} cannot be written: {blender_said(error)}", "Choose another place."
+            f"The file cannot be written: {blender_said(error)}", "Choose another place."
         ) from error

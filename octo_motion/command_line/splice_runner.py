@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -17,8 +16,9 @@ from ..ui.splicing.properties import splicing_settings
 from ..ui.splicing.splice_properties import PARTS
 from ..ui.splicing.stack import ClipReader, prepare_splices, write
 from .motion_files import check_motion, files_within
-from .setting_values import Value, unknown
-from .shot_request import HIGHEST_FPS, NewSplice, SpliceWork, frame_rate
+from .report import ShotSummary
+from .schema import set_values, unknown
+from .shot_request import HIGHEST_FPS, NewSplice, ShotRequest, frame_rate
 
 _FIRST_FRAME: Final = 1
 
@@ -27,17 +27,6 @@ _BROADCAST: Final = 1.001
 
 _SPARE_EASE: Final = 0.25
 """Of a clip's length, as in the panel: longer easing would leave little of a short clip."""
-
-
-@dataclass(frozen=True)
-class SpliceSummary:
-    """What was spliced, for people and for reports."""
-
-    message: str
-    frames: int
-    frame_start: int
-    frame_end: int
-    warnings: tuple[str, ...]
 
 
 @dataclass
@@ -137,22 +126,18 @@ def _rounded(rate: float) -> float:
 
 def has_splices(armature: bpy.types.Object) -> bool:
     """Whether an armature's list of splices has any."""
-    return bool(len(_stack(armature).splices))
+    stack: Any = splicing_settings(armature)
+    return bool(len(stack.splices))
 
 
 def splice(
-    armature: bpy.types.Object,
-    work: SpliceWork,
-    settings: Mapping[str, Value],
-    clips: Clips,
-    base_file: Path | None,
-) -> SpliceSummary:
+    armature: bpy.types.Object, shot: ShotRequest, clips: Clips, base_file: Path | None
+) -> ShotSummary:
     """Fill the list of an armature as it is asked for, and build.
 
     Args:
         armature: what gets the result; the context has its scene.
-        work: what to splice.
-        settings: of the armature's splicing, by name.
+        shot: what to splice.
         clips: files that have been imported.
         base_file: the motion file that the armature was imported from, if it was.
 
@@ -160,23 +145,23 @@ def splice(
         OctoMotionError: something is wrong that the user can put right.
     """
     writable_armature(armature)
-    stack = _stack(armature)
-    if work.splices is None and not has_splices(armature):
+    stack: Any = splicing_settings(armature)
+    if shot.splices is None and not has_splices(armature):
         raise ClipError(
             f"'{armature.name}' has no splices in its list.",
             "Say what to splice, a part and a motion file at least.",
         )
-    if work.base or base_file is not None:
-        stack.base = _base(work.base, clips, base_file)
-        stack.base_slot = ""
-    _set(stack, settings)
-    if work.frames is not None or work.splices is not None:
+    if shot.base or base_file is not None:
+        named = clips.action(base_file, shot.base) if base_file is not None else _action(shot.base)
+        stack.base, stack.base_slot = named, ""
+    set_values(stack, shot.settings)
+    if shot.frames is not None or shot.splices is not None:
         _choose_base(armature, stack)
-    if work.frames is not None and stack.base is not None:
-        stack.base = lasting(stack.base, work.frames)
-    if work.splices is not None:
+    if shot.frames is not None and stack.base is not None:
+        stack.base = lasting(stack.base, shot.frames)
+    if shot.splices is not None:
         _clear(stack)
-        for number, each in enumerate(work.splices, 1):
+        for number, each in enumerate(shot.splices, 1):
             try:
                 _add(armature, each, clips, base_file)
             except OctoMotionError as error:
@@ -185,11 +170,7 @@ def splice(
     made = write(prepared, prepared.compute())
     first, last = (round(each) for each in bpy.data.actions[made.action].frame_range)
     warnings = (*clips.warnings, *made.warnings)
-    return SpliceSummary(made.message, made.frames, first, last, warnings)
-
-
-def _stack(armature: bpy.types.Object) -> Any:
-    return splicing_settings(armature)
+    return ShotSummary(made.message, made.frames, first, last, warnings)
 
 
 def _choose_base(armature: bpy.types.Object, stack: Any) -> None:
@@ -198,12 +179,6 @@ def _choose_base(armature: bpy.types.Object, stack: Any) -> None:
     if stack.base is None and data is not None and data.action is not None:
         stack.base = data.action
         stack.base_slot = data.action_slot.identifier if data.action_slot else ""
-
-
-def _base(name: str, clips: Clips, base_file: Path | None) -> bpy.types.Action:
-    if base_file is not None:
-        return clips.action(base_file, name)
-    return _action(name)
 
 
 def _action(name: str) -> bpy.types.Action:
@@ -229,12 +204,11 @@ def _add(
 ) -> None:
     """Add a splice with what the panel's button gives it, and what is asked for."""
     source, action = _source(armature, asked, clips, base_file)
-    landmarks, values = dict[str, Value](), dict[str, Value]()
-    for name, value in asked.settings.items():
-        group, _, landmark = name.rpartition("landmarks.")
-        (values if group or landmark == name else landmarks)[landmark] = value
-    _set(_stack(source).landmarks, landmarks)
-    reader, stack = ClipReader(), _stack(armature)
+    values = {name: each for name, each in asked.settings.items() if not _is_landmark(name)}
+    landmarks = {name: each for name, each in asked.settings.items() if _is_landmark(name)}
+    set_values(splicing_settings(source), landmarks)
+    reader = ClipReader()
+    stack: Any = splicing_settings(armature)
     slot, visual = str(values.get("slot", "")), bool(values.get("visual", False))
     begins = float(reader.base(armature).clip.frames[0])
     frames = reader.source(source, action, slot, visual=visual).clip.frames
@@ -243,8 +217,12 @@ def _add(
     item.base_start, item.splice_start = begins, float(frames[0])
     ease = min(item.ease_in, _SPARE_EASE * float(frames[-1] - frames[0]))
     item.ease_in = item.ease_out = round(ease)
-    _set(item, values)
+    set_values(item, values)
     item.name = item.name or _name(item, stack.splices)
+
+
+def _is_landmark(name: str) -> bool:
+    return name.startswith("landmarks.")
 
 
 def _name(item: Any, items: Any) -> str:
@@ -290,12 +268,3 @@ def _own_action(source: bpy.types.Object, armature: bpy.types.Object) -> bpy.typ
     if source == armature:
         raise ClipError(f"'{source.name}' is both base and source.", "Name the source's action.")
     return data.action
-
-
-def _set(group: Any, values: Mapping[str, Value]) -> None:
-    for name, value in values.items():
-        *groups, last = name.split(".")
-        owner = group
-        for each in groups:
-            owner = getattr(owner, each)
-        setattr(owner, last, value)

@@ -3,24 +3,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ..blender.files import load_gait
+from ..blender.files import load_gait, read_gait_file
 from ..core.errors import OctoMotionError
+from ..core.locomotion.gait import gait_to_json
 from ..ui.locomotion.settings.changes import ChangeItem
 from ..ui.locomotion.settings.ground import ContactItem
 from ..ui.locomotion.settings.properties import OCTO_MOTION_PG_locomotion
 from ..ui.locomotion.settings.reaches import ReachItem
 from ..ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
 from ..ui.splicing.properties import OCTO_MOTION_PG_splicing
-from ..ui.splicing.splice_properties import SpliceItem
-from .job_file import Known
+from ..ui.splicing.splice_properties import PARTS, SpliceItem
 from .motion_files import check_motion, is_motion
-from .setting_values import Setting
+from .schema import Choice, Kind, Known, Number, Text, flag, point
+from .shot_request import ShotRequest
+from .shot_schema import gait_name
 
 _OWN_KEYS = {"name", "gait"}
 """No settings: Blender's own name of a group, and the gait, which a shot names itself."""
@@ -30,38 +33,38 @@ _LISTED = {"changes": ChangeItem, "reaches": ReachItem, "contacts": ContactItem}
 
 def known() -> Known:
     """What shots may name in this Blender."""
+    parts = tuple(identifier for identifier, *_ in PARTS)
     return Known(
-        settings=_by_name(_settings(OCTO_MOTION_PG_locomotion)),
-        gait=load_gait,
-        splicing_settings=_by_name(_settings(OCTO_MOTION_PG_splicing)),
-        splice_settings=_by_name(
-            (
-                Setting("name", "STRING"),
-                *_settings(SpliceItem),
-                *_settings(OCTO_MOTION_PG_landmarks, "landmarks."),
-            )
-        ),
-        lists={name: _by_name(_of_item(item)) for name, item in _LISTED.items()},
+        {
+            "generate": dict(_settings(OCTO_MOTION_PG_locomotion)),
+            "splice": dict(_settings(OCTO_MOTION_PG_splicing)),
+            "splices": {
+                "name": Text(may_be_empty=True),
+                **dict(_settings(SpliceItem)),
+                "part": Choice(parts, "part"),
+                **dict(_settings(OCTO_MOTION_PG_landmarks, "landmarks.")),
+            },
+            **{name: dict(_of_item(item)) for name, item in _LISTED.items()},
+        },
+        load_gait,
     )
 
 
-def _by_name(settings: Iterable[Setting]) -> dict[str, Setting]:
-    return {setting.name: setting for setting in settings}
-
-
-def _of_item(item: Any) -> Iterator[Setting]:
+def _of_item(item: Any) -> Iterator[tuple[str, Kind]]:
     """What may be said of an item of a list: of an object its name, of a contact its place."""
-    yield Setting("name", "STRING")
+    yield "name", Text(may_be_empty=True)
     for name in item.__annotations__:
         each: Any = item.bl_rna.properties[name]
-        if each.type == "POINTER" or name == "gait":
-            yield Setting(name, "STRING")
+        if name == "gait":
+            yield name, gait_name
+        elif each.type == "POINTER":
+            yield name, Text(may_be_empty=True)
         elif each.type == "FLOAT" and each.is_array:
-            yield Setting(name, "POINT")
+            yield name, point
     yield from _settings(item)
 
 
-def _settings(group: Any, before: str = "") -> Iterator[Setting]:
+def _settings(group: Any, before: str = "") -> Iterator[tuple[str, Kind]]:
     """Plain values of a group of properties, and of the groups within."""
     properties: Any = group.bl_rna.properties  # of many types, which the stubs do not tell apart
     for each in properties:
@@ -72,21 +75,28 @@ def _settings(group: Any, before: str = "") -> Iterator[Setting]:
             inner = bpy.types.PropertyGroup.bl_rna_get_subclass_py(each.fixed_type.identifier, None)
             if inner is not None:
                 yield from _settings(inner, f"{name}.")
-        elif each.type in {"BOOLEAN", "INT", "FLOAT"} and each.is_array:
-            continue
-        elif each.type in {"INT", "FLOAT"}:
-            yield Setting(
-                name,
-                each.type,
-                minimum=each.hard_min,
-                maximum=each.hard_max,
-                is_angle=each.unit == "ROTATION",
-            )
         elif each.type == "ENUM":
-            choices = tuple(item.identifier for item in each.enum_items)
-            yield Setting(name, "ENUM", choices=choices)
-        elif each.type in {"BOOLEAN", "STRING"}:
-            yield Setting(name, each.type)
+            yield name, Choice(tuple(item.identifier for item in each.enum_items))
+        elif each.type == "STRING":
+            yield name, Text(may_be_empty=True)
+        elif each.type in {"BOOLEAN", "INT", "FLOAT"} and not each.is_array:
+            yield name, flag if each.type == "BOOLEAN" else _number(each)
+
+
+def _number(each: Any) -> Number:
+    whole, is_angle = each.type == "INT", each.unit == "ROTATION"
+    return Number(each.hard_min, each.hard_max, whole=whole, is_angle=is_angle)
+
+
+def with_gait(shot: ShotRequest) -> ShotRequest:
+    """The shot with the content of its gait file, if it has one.
+
+    Raises:
+        GaitError: it cannot be read, or is no gait.
+    """
+    if not isinstance(shot.gait, Path):
+        return shot
+    return replace(shot, gait=gait_to_json(read_gait_file(shot.gait)))
 
 
 def check_file(file: Path) -> None:

@@ -9,7 +9,6 @@ import shutil
 import sys
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,28 +20,13 @@ from .command_line import COMMAND
 from .outputs import remove_staged, write_json
 from .processes import dying_with_parent
 from .quality_limits import LimitError, quality
-from .shot_request import ShotEntry
+from .shot_request import ShotRequest
 from .shot_runner import AnySummary, perform
 
 RUN_SHOT: Final = "--run-shot"
 """First argument of a process that makes one shot; the paths of request and answer follow."""
 
 _PACKAGE: Final = __name__.removesuffix(".command_line.worker")
-
-
-@dataclass(frozen=True)
-class WorkerAnswer:
-    """What a process says about its shot."""
-
-    error: str = ""
-    frames: int | None = None
-    frame_start: int | None = None
-    frame_end: int | None = None
-    warnings: tuple[str, ...] = ()
-    libraries: tuple[str, ...] = ()
-    quality: dict[str, dict[str, Any]] = field(default_factory=dict)
-    keys: int | None = None
-    dense_keys: int | None = None
 
 
 def child_command(request: Path, answer: Path) -> list[str]:
@@ -52,16 +36,8 @@ def child_command(request: Path, answer: Path) -> list[str]:
         return [sys.executable, "-m", _PACKAGE, *arguments]
     factory = ["--factory-startup"] if bpy.app.factory_startup else []
     # Named once more: it may have been enabled for this session alone.
-    add_on = ["--addons", _PACKAGE]
-    return [
-        bpy.app.binary_path,
-        "--background",
-        *factory,
-        *add_on,
-        "--command",
-        COMMAND,
-        *arguments,
-    ]
+    command = [*factory, "--addons", _PACKAGE, "--command", COMMAND]
+    return [bpy.app.binary_path, "--background", *command, *arguments]
 
 
 def child_environment(scratch: Path) -> dict[str, str]:
@@ -77,25 +53,27 @@ def child_environment(scratch: Path) -> dict[str, str]:
     return {**os.environ, **temporary, **python}
 
 
-def write_request(path: Path, entry: ShotEntry, places: Mapping[Path, Path]) -> None:
+def write_request(path: Path, shot: ShotRequest, places: Mapping[Path, Path]) -> None:
     """Write down what a process is to do; ``run_shot`` does it."""
     plain = {str(output): str(place) for output, place in places.items()}
-    write_json(path, {"entry": entry.to_plain(), "places": plain})
+    write_json(path, {"shot": shot.to_plain(), "places": plain})
 
 
-def read_answer(path: Path) -> WorkerAnswer | None:
-    """What a process has said, or None if it ended before it could."""
+def read_answer(path: Path) -> dict[str, Any]:
+    """What a process has said of its shot, nothing if it ended before it could.
+
+    ``error`` if it failed, ``libraries`` that it has read, and what a report says of the motion.
+    """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        return None
-    return WorkerAnswer(**content)
+        return {}
 
 
 def run_shot(request: Path, answer: Path) -> int:
     """Make the shot that is asked for, in the process of its own; the exit status."""
     asked = json.loads(request.read_text(encoding="utf-8"))
-    entry = ShotEntry.from_plain(asked["entry"])
+    shot = ShotRequest.from_plain(asked["shot"])
     places = {Path(output): Path(place) for output, place in asked["places"].items()}
 
     def clean_up() -> None:
@@ -104,21 +82,20 @@ def run_shot(request: Path, answer: Path) -> int:
         # Requests, answers and logs of a run that is no more.
         shutil.rmtree(request.parent, ignore_errors=True)
 
+    said: dict[str, Any]
     try:
         with dying_with_parent(clean_up):
-            performed = perform(entry, places)
+            performed = perform(shot, places)
+        said = {**_said(performed.summary), "libraries": performed.libraries}
     except LimitError as error:
-        write_json(answer, {"error": str(error), **_said(error.summary)})
-        return 1
+        said = {"error": str(error), **_said(error.summary)}
     except OctoMotionError as error:
-        write_json(answer, {"error": str(error)})
-        return 1
+        said = {"error": str(error)}
     except Exception as error:  # noqa: BLE001 - a fault of ours is one shot's, and is told
         traceback.print_exc()
-        write_json(answer, {"error": f"{type(error).__name__}: {error}"})
-        return 1
-    write_json(answer, {**_said(performed.summary), "libraries": performed.libraries})
-    return 0
+        said = {"error": f"{type(error).__name__}: {error}"}
+    write_json(answer, said)
+    return 1 if "error" in said else 0
 
 
 def _said(summary: AnySummary) -> dict[str, Any]:

@@ -208,6 +208,21 @@ def test_motion_worse_than_its_limits_fails_its_shot_and_the_report_has_the_figu
     assert names(tmp_path / "out") == {"good.blend", "bad.blend"}
 
 
+def test_shot_of_a_job_may_be_posed_by_a_script(tmp_path: Path) -> None:
+    steps = '[{"do": "grab", "bone": "arm1.02.L", "at": 1.0}, {"do": "release"}, {"do": "key"}]'
+    script = f'{{"format": "octo_motion.pose", "version": 1, "steps": {steps}}}'
+    write(tmp_path / "wave.json", script)
+    shot = f'[[shots]]\nname = "a"\nkind = "pose"\noutput = "a.blend"\n{SMALL}'
+    job = write(tmp_path / "job.toml", f'{shot}script = "wave.json"\n')
+    assert run_here("bake", job) == 0
+    assert statuses(job) == {"a": "done"}
+    # Another script: the shot is made anew.
+    write(tmp_path / "wave.json", script.replace("1.0}", "0.5}"))
+    assert run_here("bake", job, "--check") == 0
+    assert run_here("bake", job) == 0
+    assert statuses(job) == {"a": "done"}
+
+
 def test_second_run_makes_only_what_is_new_or_changed(tmp_path: Path) -> None:
     text = f'[defaults]\noutput = "{{name}}.blend"\n{SMALL}{ROUTE}{RANGE}'
     shot = '[[shots]]\nname = "{}"\n'
@@ -496,13 +511,16 @@ def test_open_file_is_used_where_no_other_is_named(scene: Path, tmp_path: Path) 
         (("reef.blend", "--gait", "hop.json"), (2, "'hop.json' cannot be read: No such file")),
         (("reef.blend", "--set", "speeed=1"), (2, "There is no setting 'speeed'. Did you mean")),
         (("reef.blend", "--set", "speed"), (2, "'speed' sets nothing. Write --set name=value.")),
-        (("reef.blend", "--set", "burst=2"), (2, "The setting 'burst' cannot be '2'.")),
+        (("reef.blend", "--set", "burst=2"), (2, "burst must be a number from 0 to 1, not '2'.")),
         (("reef.blend", "--export", "a.obj"), (2, "'a.obj' is no format to export to.")),
         (
             ("reef.blend", "--export", "a.glb", "--export", "a.glb"),
             (2, "Two outputs have the same"),
         ),
-        (("reef.blend", "--output", "a.fbx"), (2, "The output 'a.fbx' is no .blend file.")),
+        (
+            ("reef.blend", "--output", "a.fbx"),
+            (2, "'a.fbx' is no format to save to. Valid: .blend."),
+        ),
         ((), (2, "No file is open. Give the .blend file to read.")),
     ],
 )

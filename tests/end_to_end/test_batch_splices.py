@@ -262,7 +262,10 @@ def test_a_short_base_is_repeated_and_a_long_one_cut(folder: Path) -> None:
         ),
         (("walk.bvh", "--splice", "arm", "throw.bvh"), (2, "splice 1: There is no part 'arm'.")),
         (("walk.bvh", *ARM, "a.bvh", "b.bvh"), (2, "has two files, 'a.bvh' and 'b.bvh'.")),
-        (("walk.bvh", *ARM, "throw.bvh", "rate=0"), (2, "Give a value from 0.01 to 100.")),
+        (
+            ("walk.bvh", *ARM, "throw.bvh", "rate=0"),
+            (2, "rate must be a number from 0.01 to 100, not '0'."),
+        ),
         (("walk.bvh", *ARM, "throw.bvh", "--set", "speed=1"), (2, "There is no setting 'speed'.")),
         (
             ("walk.bvh", *ARM, "throw.bvh", "--export", "a.abc"),
@@ -290,7 +293,7 @@ def test_motion_file_is_never_overwritten(folder: Path, capsys: pytest.CaptureFi
     before = digests(folder)
     arguments = ("splice", "walk.bvh", *ARM, "throw.bvh", "--overwrite")
     assert run_here(folder, *arguments) == 2
-    assert "The output 'walk.bvh' is no .blend file." in capsys.readouterr().err
+    assert "'walk.bvh' is no format to save to. Valid: .blend." in capsys.readouterr().err
     assert digests(folder) == before
 
 

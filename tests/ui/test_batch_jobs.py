@@ -9,10 +9,20 @@ from pathlib import Path
 import pytest
 
 from octo_motion.command_line.fingerprint import fingerprint, version
-from octo_motion.command_line.job_file import JobError, JobFile, Known, load_gait_file, read_job
-from octo_motion.command_line.setting_values import Setting, check_settings, parse_assignments
-from octo_motion.command_line.shot_request import NewRoute, ShotEntry, frame_rate
-from octo_motion.command_line.vocabulary import known
+from octo_motion.command_line.job_file import JobError, JobFile, read_job
+from octo_motion.command_line.schema import (
+    Choice,
+    Kind,
+    Known,
+    Number,
+    Reading,
+    Table,
+    Text,
+    flag,
+    parse_assignments,
+)
+from octo_motion.command_line.shot_request import NewRoute, ShotRequest, frame_rate
+from octo_motion.command_line.vocabulary import known, with_gait
 from octo_motion.core.errors import GaitError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.octopus.shape import OctopusShape
@@ -43,12 +53,11 @@ def test_shot_has_what_its_table_says_with_paths_beside_the_job(tmp_path: Path) 
         'settings = { seed = 3, table.stride = 2, sway = "30°" }\nexport = "out/walk.glb"\n'
     )
     (shot,) = read(tmp_path, text).shots
-    entry = shot.entry
-    assert (entry.name, entry.armature, entry.route, entry.fps) == ("walk", "Octopus", "Wall", 25.0)
-    assert entry.file == tmp_path / "reef.blend"
-    assert entry.outputs == (tmp_path / "out/walk.blend", tmp_path / "out/walk.glb")
-    assert gait.gait_from_json(entry.gait).name == "swim"
-    assert entry.settings == {
+    assert (shot.name, shot.armature, shot.route, shot.fps) == ("walk", "Octopus", "Wall", 25.0)
+    assert shot.file == tmp_path / "reef.blend"
+    assert shot.outputs == (tmp_path / "out/walk.blend", tmp_path / "out/walk.glb")
+    assert gait.gait_from_json(str(shot.gait)).name == "swim"
+    assert shot.settings == {
         "seed": 3,
         "table.stride": 2.0,
         "sway": pytest.approx(math.radians(30)),
@@ -63,7 +72,7 @@ def test_defaults_are_shared_and_each_shot_may_say_otherwise(tmp_path: Path) -> 
         '[[shots]]\nname = "a"\nsettings = { seed = 2 }\n'
         '[[shots]]\nname = "b"\nfps = 30\noctopus = { arms = 6 }\n' + ROUTE,
     )
-    a, b = (shot.entry for shot in job.shots)
+    a, b = (shot for shot in job.shots)
     assert (a.settings, b.settings) == ({"seed": 2, "burst": 0.5}, {"seed": 1, "burst": 0.5})
     assert (a.fps, b.fps) == (24.0, 30.0)
     assert (a.output, b.output) == (tmp_path / "a.blend", tmp_path / "b.blend")
@@ -81,7 +90,7 @@ def test_route_is_four_control_points_or_leads_through_points(tmp_path: Path) ->
         "route = { control_points = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]] }\n"
         f'[[shots]]\nname = "c"\nroute = {{ points = {points}, cyclic = true }}\n',
     )
-    a, b, c = (shot.entry.route for shot in job.shots)
+    a, b, c = (shot.route for shot in job.shots)
     assert a == b == NewRoute(((0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)), is_bezier=True)
     assert c == NewRoute(((0, 0, 0), (1, 0, 0), (1, 1, 0.5)), is_bezier=False, cyclic=True)
 
@@ -95,7 +104,7 @@ def test_limits_are_added_to_those_of_the_defaults_and_inf_lifts_one(tmp_path: P
         '[[shots]]\nname = "b"\nlimits = { slip = inf, overlap = 0.1 }\n'
         '[[shots]]\nname = "c"\nkind = "splice"\n',
     )
-    a, b, c = (shot.entry.limits for shot in job.shots)
+    a, b, c = (shot.limits for shot in job.shots)
     assert a == {"slip": 0.01, "turn": 45.0}
     assert b == {"turn": 45.0, "overlap": 0.1}
     assert c == {}
@@ -111,22 +120,19 @@ def test_ground_and_lists_are_what_the_table_says(tmp_path: Path) -> None:
         'heading = "90°"\n'
     )
     (shot,) = read(tmp_path, text).shots
-    entry = shot.entry
-    assert entry.ground == "Sea Floor"
-    assert entry.settings["change.gait"] == "jet_escape"
-    assert entry.lists == {
-        "changes": [{"gait": "swim", "position": 0.5}],
-        "reaches": [{"mode": "CURL", "arm": "Arm 1 L", "turns": 1.5, "frame_contact": 20}],
-        "contacts": [
-            {
-                "arm": "Arm 2 R",
-                "cycle": 3,
-                "position": [1.0, 0.5, 0.0],
-                "heading": pytest.approx(math.pi / 2.0),
-            }
-        ],
-    }
-    assert ShotEntry.from_plain(json.loads(json.dumps(entry.to_plain()))) == entry
+    assert shot.ground == "Sea Floor"
+    assert shot.settings["change.gait"] == "jet_escape"
+    assert shot.changes == [{"gait": "swim", "position": 0.5}]
+    assert shot.reaches == [{"mode": "CURL", "arm": "Arm 1 L", "turns": 1.5, "frame_contact": 20}]
+    assert shot.contacts == [
+        {
+            "arm": "Arm 2 R",
+            "cycle": 3,
+            "position": [1.0, 0.5, 0.0],
+            "heading": pytest.approx(math.pi / 2.0),
+        }
+    ]
+    assert ShotRequest.from_plain(json.loads(json.dumps(shot.to_plain()))) == shot
 
 
 def test_every_fault_of_a_list_is_told_with_its_place(tmp_path: Path) -> None:
@@ -136,13 +142,13 @@ def test_every_fault_of_a_list_is_told_with_its_place(tmp_path: Path) -> None:
         'contacts = [{ arm = "Arm 1 L", position = [1, 2] }]\n'
     )
     told = "\n".join(faults(tmp_path, text))
-    assert "changes 1: The setting 'position' cannot be 2." in told
+    assert "changes 1: position must be a number from 0 to 1, not 2." in told
     assert "changes 1: There is no gait 'hop'." in told
     assert "changes 2: It has no gait: write gait = …." in told
-    assert "reaches 1: The setting 'mode' cannot be 'juggle'." in told
+    assert "reaches 1: mode must be one of " in told
     assert "reaches 2: There is no setting 'traget'. Did you mean 'target'?" in told
     assert "contacts 1: It has no cycle" in told
-    assert "Give three numbers, [x, y, z]." in told
+    assert "position must be three numbers, [x, y, z], not [1, 2]." in told
     assert faults(tmp_path, WALK + "reaches = 3\n")[0].startswith(
         "shot 'walk': reaches must be a list of tables"
     )
@@ -157,7 +163,7 @@ def test_gait_file_is_read_beside_the_job(tmp_path: Path) -> None:
     table = gait.renamed_gait(gait.gait_presets()["swim"], "sneak")
     (tmp_path / "sneak.json").write_text(gait.gait_to_json(table), encoding="utf-8")
     (shot,) = read(tmp_path, WALK + 'gait = "sneak.json"\n').shots
-    assert gait.gait_from_json(load_gait_file(shot).gait).name == "sneak"
+    assert gait.gait_from_json(str(with_gait(shot).gait)).name == "sneak"
 
 
 @pytest.mark.parametrize(
@@ -176,7 +182,7 @@ def test_gait_file_that_is_none_is_told_by_its_path(
         (tmp_path / "sneak.json").write_bytes(content)
     (shot,) = read(tmp_path, WALK + 'gait = "sneak.json"\n').shots
     with pytest.raises(GaitError, match=r"sneak\.json") as caught:
-        load_gait_file(shot)
+        with_gait(shot)
     assert reason in str(caught.value)
 
 
@@ -204,8 +210,8 @@ def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
         '[[shots]]\nname = "loop"\noctopus = {}\noutput = "loop.blend"\n'
         'settings = { travel_on = "none", cycles = 2 }\n',
     ).shots
-    assert shot.entry.route == ""
-    assert shot.entry.settings == {"travel_on": "NONE", "cycles": 2}
+    assert shot.route == ""
+    assert shot.settings == {"travel_on": "NONE", "cycles": 2}
 
 
 @pytest.mark.parametrize(
@@ -222,7 +228,10 @@ def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
         ('[[shots]]\nname = "walk"\noutput = "w.blend"\n', "It has no creature: give file"),
         (WALK + "octopus = {}\n" + ROUTE, "It has a file and a new octopus"),
         ('[[shots]]\nname = "walk"\nfile = "x.blend"\n', "It writes nothing"),
-        (WALK.replace("out/walk.blend", "out/walk.abc"), "'walk.abc' must end in .blend."),
+        (
+            WALK.replace("out/walk.blend", "out/walk.abc"),
+            "'walk.abc' is no format to save to. Valid: .blend.",
+        ),
         (WALK.replace('"reef.blend"', "3"), "file must be a text, not 3."),
         (WALK.replace("reef.blend", ""), "file must be a text, not ''."),
         (WALK.replace("out/walk.blend", "reef.blend"), "is an input of shot 'walk'"),
@@ -235,7 +244,7 @@ def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
         (WALK + "fps = 0\n", "fps must be a number from 1 to 32767, not 0."),
         (WALK + "fps = true\n", "fps must be a number"),
         (WALK + "settings = 3\n", "settings must be a table, not 3."),
-        (WALK + "settings = { burst = 1.5 }\n", "'burst' cannot be 1.5. Give a value from 0 to 1."),
+        (WALK + "settings = { burst = 1.5 }\n", "burst must be a number from 0 to 1, not 1.5."),
         (WALK + 'settings = { gait = "swim" }\n', "There is no setting 'gait'."),
         (WALK + "settings = { route = 1 }\n", "There is no setting 'route'."),
         (WALK + "settings = { table.strid = 1 }\n", "Did you mean 'table.stride'?"),
@@ -273,7 +282,7 @@ def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
         ),
         (
             WALK + "limits = { slip = -0.01 }\n",
-            "slip must be a number of 0 or more, not -0.01. Valid: slip, depth",
+            "limits: slip must be a number of 0 or more, not -0.01.",
         ),
         (WALK + "limits = { turn = nan }\n", "turn must be a number of 0 or more, not nan."),
         (WALK + "limits = { turn = true }\n", "turn must be a number of 0 or more, not True."),
@@ -314,16 +323,16 @@ def test_entry_survives_its_way_to_another_process(tmp_path: Path) -> None:
         "output = 'b.blend'\n" + ROUTE,
     )
     for shot in job.shots:
-        text = json.dumps(shot.entry.to_plain())
-        assert ShotEntry.from_plain(json.loads(text)) == shot.entry
+        text = json.dumps(shot.to_plain())
+        assert ShotRequest.from_plain(json.loads(text)) == shot
 
 
 def test_example_of_the_documentation_is_in_order(tmp_path: Path) -> None:
     path = shutil.copy(REPOSITORY / "docs/examples/shots.toml", tmp_path)
     job = read_job(Path(path), known(), tmp_path / "report.json")
-    assert [shot.entry.name for shot in job.shots] == ["walk", "sideways", "swim", "loop"]
-    assert job.shots[2].entry.octopus
-    assert job.shots[2].entry.octopus.shape == OctopusShape(arm_length=0.4)
+    assert [shot.name for shot in job.shots] == ["walk", "sideways", "swim", "loop"]
+    assert job.shots[2].octopus
+    assert job.shots[2].octopus.shape == OctopusShape(arm_length=0.4)
 
 
 @pytest.mark.parametrize(
@@ -345,61 +354,73 @@ def test_frame_rate_is_kept_as_blender_and_broadcasters_have_it(
 # --- Values of settings ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("setting", "given", "value"),
-    [
-        (Setting("a", "FLOAT"), "0.5", 0.5),
-        (Setting("a", "FLOAT"), 2, 2.0),
-        (Setting("a", "FLOAT", is_angle=True), "90 deg", math.pi / 2),
-        (Setting("a", "FLOAT", is_angle=True), "-90°", -math.pi / 2),
-        (Setting("a", "FLOAT", is_angle=True), "0.5", 0.5),
-        (Setting("a", "INT"), "3", 3),
-        (Setting("a", "INT"), 3.0, 3),
-        (Setting("a", "BOOLEAN"), "Yes", True),
-        (Setting("a", "BOOLEAN"), "off", False),
-        (Setting("a", "BOOLEAN"), True, True),
-        (Setting("a", "ENUM", choices=("ALONG", "FIXED")), "fixed", "FIXED"),
-        (Setting("a", "STRING"), "0", "0"),
-    ],
-)
-def test_value_is_read_as_meant(setting: Setting, given: object, value: object) -> None:
-    read_value = setting.value(given)
-    assert read_value == pytest.approx(value) if isinstance(value, float) else read_value == value
-    assert type(read_value) is type(value)
+def values(kind: Kind, given: object) -> tuple[dict[str, object], list[str]]:
+    """What a table of one key is read to, and what is said to be wrong."""
+    reading = Reading(Known({}, gait.gait_presets().__getitem__), Path)
+    return Table({"a": kind})({"a": given}, reading), reading.faults
 
 
 @pytest.mark.parametrize(
-    ("setting", "given", "remedy"),
+    ("kind", "given", "value"),
     [
-        (Setting("a", "FLOAT"), "fast", "Give a number."),
-        (Setting("a", "FLOAT"), "30°", "Give a number."),
-        (Setting("a", "FLOAT"), math.nan, "Give a number."),
-        (Setting("a", "FLOAT"), "inf", "Give a number."),
-        (Setting("a", "FLOAT"), True, "Give a number."),
-        (Setting("a", "FLOAT", is_angle=True), "x°", "such as '30°'"),
-        (Setting("a", "FLOAT", minimum=0), -1, "Give 0 or more."),
-        (Setting("a", "FLOAT", maximum=1), 2, "Give 1 or less."),
-        (Setting("a", "FLOAT", 0, 2, is_angle=True), "180°", "a value from 0 to 2 radians."),
-        (Setting("a", "INT"), 2.5, "Give a whole number."),
-        (Setting("a", "BOOLEAN"), "maybe", "Give true or false."),
-        (Setting("a", "BOOLEAN"), 1, "Give true or false."),
-        (Setting("a", "ENUM", choices=("X", "Y")), "Z", "Choose one of X, Y."),
-        (Setting("a", "ENUM", choices=("X", "Y")), 1, "Choose one of X, Y."),
-        (Setting("a", "STRING"), 1, "Give a text."),
+        (Number(), "0.5", 0.5),
+        (Number(), 2, 2.0),
+        (Number(is_angle=True), "90 deg", math.pi / 2),
+        (Number(is_angle=True), "-90°", -math.pi / 2),
+        (Number(is_angle=True), "0.5", 0.5),
+        (Number(whole=True), "3", 3),
+        (Number(whole=True), 3.0, 3),
+        (flag, "Yes", True),
+        (flag, "off", False),
+        (flag, True, True),
+        (Choice(("ALONG", "FIXED")), "fixed", "FIXED"),
+        (Text(), "0", "0"),
+        (Text(may_be_empty=True), "", ""),
     ],
 )
-def test_value_that_makes_no_sense_is_refused(setting: Setting, given: object, remedy: str) -> None:
-    with pytest.raises(SettingsError, match="The setting 'a' cannot be") as caught:
-        setting.value(given)
-    assert remedy in str(caught.value)
+def test_value_is_read_as_meant(kind: Kind, given: object, value: object) -> None:
+    read_values, told = values(kind, given)
+    assert told == []
+    assert read_values == {"a": pytest.approx(value) if isinstance(value, float) else value}
+    assert type(read_values["a"]) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "wanted"),
+    [
+        (Number(), "fast", "a number, not 'fast'."),
+        (Number(), "30°", "a number, not '30°'."),
+        (Number(), math.nan, "a number, not nan."),
+        (Number(), "inf", "a number, not 'inf'."),
+        (Number(), True, "a number, not True."),
+        (Number(is_angle=True), "x°", "or degrees such as '30°', not 'x°'."),
+        (Number(minimum=0), -1, "a number of 0 or more, not -1."),
+        (Number(maximum=1), 2, "a number of 1 or less, not 2."),
+        (Number(0, 2, is_angle=True), "180°", "a number from 0 to 2 in radians, or degrees"),
+        (Number(whole=True), 2.5, "a whole number, not 2.5."),
+        (flag, "maybe", "true or false, not 'maybe'."),
+        (flag, 1, "true or false, not 1."),
+        (Choice(("X", "Y")), "Z", "one of X, Y, not 'Z'."),
+        (Choice(("X", "Y")), 1, "one of X, Y, not 1."),
+        (Text(), 1, "a text, not 1."),
+        (Text(), " ", "a text, not ' '."),
+    ],
+)
+def test_value_that_makes_no_sense_is_refused(kind: Kind, given: object, wanted: str) -> None:
+    read_values, (told,) = values(kind, given)
+    assert read_values == {}
+    assert told.startswith("a must be ")
+    assert wanted in told
 
 
 def test_every_setting_can_be_given_its_own_default() -> None:
-    settings = known().settings
+    settings = known().tables["generate"]
     assert {"speed", "timing", "heading_angle", "table.stride", "root_bone"} <= set(settings)
-    assert settings["heading_angle"].is_angle
+    angle, timing = settings["heading_angle"], settings["timing"]
+    assert isinstance(angle, Number)
+    assert angle.is_angle
     assert not {"name", "gait", "route", "result", "arms", "table.name"} & set(settings)
-    assert settings["timing"].choices == ("CADENCE", "SPEED", "RANGE")
+    assert timing == Choice(("CADENCE", "SPEED", "RANGE"))
 
 
 def test_assignments_of_the_command_line() -> None:
@@ -410,9 +431,11 @@ def test_assignments_of_the_command_line() -> None:
 
 
 def test_settings_of_groups_are_named_with_their_group() -> None:
-    one = {"table.stride": Setting("table.stride", "FLOAT")}
-    nested, dotted = {"table": {"stride": 2}}, {"table.stride": "2"}
-    assert check_settings(one, nested) == check_settings(one, dotted) == ({"table.stride": 2.0}, [])
+    table = Table({"table.stride": Number()})
+    for given in ({"table": {"stride": 2}}, {"table.stride": "2"}):
+        reading = Reading(Known({}, gait.gait_presets().__getitem__), Path)
+        assert table(given, reading) == {"table.stride": 2.0}
+        assert reading.faults == []
 
 
 # --- Fingerprints ----------------------------------------------------------------------------

@@ -5,7 +5,6 @@ import errno
 import json
 import math
 import os
-import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -27,15 +26,12 @@ from octo_motion.command_line.processes import (
     run_processes,
     stoppable,
 )
-from octo_motion.command_line.quality_limits import (
-    LimitError,
-    check_limits,
-    parse_limits,
-    quality,
-    told,
-)
+from octo_motion.command_line.quality_limits import LimitError, check_limits, quality, told
 from octo_motion.command_line.report import ShotRecord, Verdict, judge, read_report, write_report
+from octo_motion.command_line.schema import Known, Reading
+from octo_motion.command_line.shot_schema import KINDS, LIMITS
 from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError
+from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics.report import Figure
 
 # --- What is skipped -----------------------------------------------------------------------------
@@ -201,28 +197,41 @@ def test_figures_that_are_no_numbers_make_no_report_that_others_cannot_read(tmp_
     assert json.loads(path.read_text(encoding="utf-8"))["depth"]["value"] is None
 
 
+def given_limits(*texts: str) -> tuple[dict[str, float], list[str]]:
+    """What the command line's limits are read to, and what is said to be wrong."""
+    option = KINDS["generate"]["limits"].option
+    assert option
+    assert option.collect
+    reading = Reading(Known({}, gait_presets().__getitem__), Path)
+    return LIMITS(option.collect(list(texts)), reading), reading.faults
+
+
 def test_limits_of_the_command_line_are_numbers_by_name() -> None:
-    assert parse_limits(["slip=1", " turn = 45.5 ", "slip=0.01", "miss=inf"]) == {
-        "slip": 0.01,
-        "turn": 45.5,
-    }
+    limits, faults = given_limits("slip=1", " turn = 45.5 ", "slip=0.01", "miss=inf")
+    assert limits == {"slip": 0.01, "turn": 45.5, "miss": math.inf}
+    assert faults == []
 
 
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("slip", "'slip' limits nothing. Write --limit name=value."),
-        ("=3", "'=3' limits nothing."),
         ("slide=1", "There is no figure 'slide'. Did you mean 'slip'? Valid: slip, depth"),
-        ("slip=-1", "slip must be a number of 0 or more, not -1.0. Valid: slip, depth"),
-        ("slip=nan", "slip must be a number of 0 or more, not nan."),
+        ("slip=-1", "limits: slip must be a number of 0 or more, not '-1'."),
+        ("slip=nan", "slip must be a number of 0 or more, not 'nan'."),
         ("turn=45°", "turn must be a number of 0 or more, not '45°'."),
         ("turn=", "turn must be a number of 0 or more, not ''."),
     ],
 )
 def test_limit_that_makes_no_sense_is_told(text: str, fault: str) -> None:
-    with pytest.raises(SettingsError, match=re.escape(fault)):
-        parse_limits([text])
+    assert any(fault in each for each in given_limits(text)[1])
+
+
+def test_limit_that_limits_nothing_is_told() -> None:
+    for text in ("slip", "=3"):
+        with pytest.raises(
+            SettingsError, match=f"'{text}' sets nothing. Write --limit name=value."
+        ):
+            given_limits(text)
 
 
 # --- Outputs -------------------------------------------------------------------------------------
@@ -377,7 +386,7 @@ def test_what_blender_says_fits_one_line(said: str, reason: str) -> None:
         ([], "COMMAND"),
         (["dance"], "invalid choice: 'dance'"),
         (["bake"], "JOB.toml"),
-        (["bake", "x.toml", "--jobs", "0"], "'0' is not a whole number above 0"),
+        (["bake", "x.toml", "--jobs", "0"], "'0' is not a whole number of 1 or more"),
         (["generate", "x.blend", "--fps", "slow"], "'slow' is not a number from 1 to 32767"),
         (["generate"], "FILE"),
     ],

@@ -12,7 +12,7 @@ import pytest
 
 from octo_motion.command_line.commands import main
 from octo_motion.command_line.job_file import JobError, read_job
-from octo_motion.command_line.shot_request import ShotEntry
+from octo_motion.command_line.shot_request import ShotRequest
 from octo_motion.command_line.shot_runner import perform
 from octo_motion.command_line.vocabulary import known
 
@@ -72,7 +72,10 @@ def test_script_that_fails_writes_nothing(
     [
         (("--script", "nowhere.json", "-o", "posed.blend"), "There is no file"),
         (("--script", "{script}"), "There is nothing to write"),
-        (("--script", "{script}", "-o", "posed.fbx"), "is no .blend file"),
+        (
+            ("--script", "{script}", "-o", "posed.fbx"),
+            "'posed.fbx' is no format to save to. Valid: .blend.",
+        ),
         (("--script", "{script}", "-o", "posed.blend", "--armature", "Knight"), "Knight"),
     ],
 )
@@ -92,10 +95,10 @@ def test_arguments_that_make_no_sense_are_said(  # noqa: PLR0917
 
 
 def test_shot_with_a_script_survives_the_way_to_another_process(tmp_path: Path) -> None:
-    entry = ShotEntry(name="a", file=tmp_path / "a.blend", posing=tmp_path / "wave.json")
-    again = ShotEntry.from_plain(json.loads(json.dumps(entry.to_plain())))
-    assert again == entry
-    assert tmp_path / "wave.json" in entry.inputs
+    shot = ShotRequest("a", "pose", tmp_path / "a.blend", script=tmp_path / "wave.json")
+    again = ShotRequest.from_plain(json.loads(json.dumps(shot.to_plain())))
+    assert again == shot
+    assert tmp_path / "wave.json" in shot.inputs
 
 
 # --- Shots of a job ------------------------------------------------------------------------------
@@ -111,8 +114,8 @@ def test_shot_of_a_job_may_be_a_pose_script(file: Path, tmp_path: Path) -> None:
     script(tmp_path, *STEPS)
     path = job(tmp_path, f'file = "{file.name}"', 'script = "wave.json"', 'output = "{name}.blend"')
     (shot,) = read_job(path, known(), tmp_path / "report.json").shots
-    assert shot.entry.posing == tmp_path / "wave.json"
-    perform(shot.entry, {tmp_path / "wave.blend": tmp_path / "wave.blend"})
+    assert shot.script == tmp_path / "wave.json"
+    perform(shot, {tmp_path / "wave.blend": tmp_path / "wave.blend"})
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "wave.blend"))
     armature: Any = bpy.data.objects["Octopus"]
     assert armature.animation_data.action
@@ -127,7 +130,7 @@ def test_new_octopus_is_posed_too(tmp_path: Path) -> None:
         'output = "{name}.blend"',
     )
     (shot,) = read_job(path, known(), tmp_path / "report.json").shots
-    performed = perform(shot.entry, {tmp_path / "wave.blend": tmp_path / "wave.blend"})
+    performed = perform(shot, {tmp_path / "wave.blend": tmp_path / "wave.blend"})
     assert "bones keyed" in performed.summary.message
 
 

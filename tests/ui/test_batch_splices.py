@@ -10,8 +10,9 @@ import pytest
 
 from octo_motion.command_line.job_file import JobError, JobFile, read_job
 from octo_motion.command_line.motion_files import check_motion, files_within
-from octo_motion.command_line.shot_request import NewSplice, ShotEntry
-from octo_motion.command_line.splice_entries import parse_splice, read_splices
+from octo_motion.command_line.schema import Reading
+from octo_motion.command_line.shot_request import NewSplice, ShotRequest
+from octo_motion.command_line.shot_schema import SPLICES, parse_splices
 from octo_motion.command_line.splice_runner import import_base
 from octo_motion.command_line.vocabulary import check_file, known
 from octo_motion.core.errors import ClipError, SettingsError
@@ -37,8 +38,9 @@ def faults(folder: Path, text: str) -> tuple[str, ...]:
 PARTS = "right_arm, left_arm, legs, trunk, head, right_leg, left_leg, chain."
 
 
-def splices(given: Any) -> tuple[tuple[NewSplice, ...], list[str]]:
-    return read_splices(given, known().splice_settings, lambda text: Path("/clips", text))
+def splices(given: Any) -> tuple[list[NewSplice], list[str]]:
+    reading = Reading(known(), lambda text: Path("/clips", text))
+    return SPLICES(given, reading), reading.faults
 
 
 def test_splice_has_all_settings_that_the_list_has(tmp_path: Path) -> None:
@@ -52,9 +54,8 @@ def test_splice_has_all_settings_that_the_list_has(tmp_path: Path) -> None:
         '[[shots.splices]]\npart = "chain"\nbone = "tail"\nsource_bone = "Tail1"\naction = "Wag"\n'
     )
     (shot,) = read(tmp_path, text).shots
-    assert shot.entry.splicing
-    assert shot.entry.splicing.splices
-    arm, legs, tail = shot.entry.splicing.splices
+    assert shot.splices
+    arm, legs, tail = shot.splices
     assert (arm.clip, arm.action, arm.source) == (tmp_path / "a/punch.bvh", "Jab", "")
     assert arm.settings == {
         "part": "LEFT_ARM",
@@ -81,7 +82,7 @@ def test_nothing_that_the_list_has_is_left_out() -> None:
     from octo_motion.ui.splicing.splice_properties import SpliceItem
 
     pointers = {"source", "action"}
-    assert set(SpliceItem.__annotations__) - pointers <= set(known().splice_settings)
+    assert set(SpliceItem.__annotations__) - pointers <= set(known().tables["splices"])
 
 
 @pytest.mark.parametrize(
@@ -109,7 +110,10 @@ def test_nothing_that_the_list_has_is_left_out() -> None:
             WALK + 'splices = [{ part = "head", landmarks = { hnad_l = "x" } }]\n',
             "There is no setting 'landmarks.hnad_l'. Did you mean 'landmarks.hand_l'?",
         ),
-        (WALK + 'splices = [{ part = "head", rate = 0 }]\n', "Give a value from 0.01 to 100."),
+        (
+            WALK + 'splices = [{ part = "head", rate = 0 }]\n',
+            "rate must be a number from 0.01 to 100, not 0.",
+        ),
         (WALK + 'splices = [{ part = "head", clip = 3 }]\n', "clip must be a text, not 3."),
         (WALK + "splices = []\n", "splices is empty"),
         (WALK + "splices = 3\n", "splices must be a list of tables"),
@@ -146,27 +150,25 @@ def test_splices_survive_their_way_to_another_process(tmp_path: Path) -> None:
     asked = WALK + ARM + 'frames = 50\nbase = "Stroll"\nsettings = { visual = true }\n'
     listed = WALK.replace("walk", "b").replace(".bvh", ".blend").replace("out.", "b2.")
     for shot in read(tmp_path, asked + listed).shots:
-        text = json.dumps(shot.entry.to_plain())
-        assert ShotEntry.from_plain(json.loads(text)) == shot.entry
-        assert shot.entry.splicing
+        text = json.dumps(shot.to_plain())
+        assert ShotRequest.from_plain(json.loads(text)) == shot
+        assert shot.kind == "splice"
 
 
 def test_defaults_of_the_other_kind_do_not_concern_a_shot(tmp_path: Path) -> None:
     defaults = '[defaults]\noctopus = { arms = 4 }\ngait = "walk"\noutput = "{name}.blend"\n'
     swim = '[[shots]]\nname = "swim"\nroute = [[0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0]]\n'
     walk, creature = read(tmp_path, defaults + WALK + ARM + swim).shots
-    assert walk.entry.octopus is None
-    assert walk.entry.splicing
-    assert creature.entry.octopus
-    assert creature.entry.splicing is None
+    assert walk.octopus is None
+    assert walk.splices
+    assert creature.octopus
+    assert creature.splices is None
 
 
 def test_example_of_the_documentation_is_in_order(tmp_path: Path) -> None:
     text = (REPOSITORY / "docs/examples/splices.toml").read_text(encoding="utf-8")
     shots = read(tmp_path, text).shots
-    assert [len((each.entry.splicing and each.entry.splicing.splices) or ()) for each in shots] == [
-        *(1, 2, 2, 3)
-    ]
+    assert [len(each.splices or ()) for each in shots] == [1, 2, 2, 3]
     used = {path.name for shot in shots for path in shot.inputs}
     assert used == {path.name for path in CLIPS.iterdir()}
 
@@ -184,12 +186,12 @@ def test_example_of_the_documentation_is_in_order(tmp_path: Path) -> None:
     ],
 )
 def test_words_of_the_command_line_are_a_splice(words: list[str], table: dict[str, str]) -> None:
-    assert parse_splice(words) == table
+    assert parse_splices([words]) == [table]
 
 
 def test_two_files_for_one_splice_are_refused() -> None:
     with pytest.raises(SettingsError, match=r"has two files, 'a\.bvh' and 'b\.bvh'"):
-        parse_splice(["head", "a.bvh", "b.bvh"])
+        parse_splices([["head", "a.bvh", "b.bvh"]])
 
 
 def test_all_splices_are_looked_at() -> None:

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.command_line.shot_request import ShotEntry
+from octo_motion.command_line.shot_request import ShotRequest
 from octo_motion.command_line.shot_runner import perform
 from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.ui.locomotion.generate_motion import prepare
@@ -32,8 +32,8 @@ def octopus() -> Any:
     return armature
 
 
-def shot(**options: Any) -> ShotEntry:
-    return ShotEntry("shot", armature="Octopus", **options)
+def shot(**options: Any) -> ShotRequest:
+    return ShotRequest("shot", armature="Octopus", **options)
 
 
 def test_shot_walks_on_the_object_that_it_names(octopus: Any) -> None:
@@ -46,7 +46,7 @@ def test_shot_walks_on_the_object_that_it_names(octopus: Any) -> None:
 
 
 def test_ground_that_is_not_there_or_no_mesh_is_told(octopus: Any) -> None:
-    with pytest.raises(SettingsError, match=r"There is no object 'Moon'.*Sea Floor"):
+    with pytest.raises(SettingsError, match=r"There is no mesh 'Moon'.*Sea Floor"):
         perform(shot(ground="Moon"), {})
     with pytest.raises(SettingsError, match="'Route' is not a mesh"):
         perform(shot(ground="Route"), {})
@@ -59,7 +59,7 @@ def test_lists_take_the_place_of_those_in_the_file(octopus: Any) -> None:
     settings.change.places.add()
     settings.reaches.add()
     arm = settings.arms[2].name
-    lists = {
+    lists: dict[str, Any] = {
         "changes": [{"gait": "swim", "position": 0.6, "length": 1.0}],
         "reaches": [{"mode": "CURL", "arm": arm, "frame_start": 5, "frame_contact": 20}],
         "contacts": [
@@ -67,7 +67,7 @@ def test_lists_take_the_place_of_those_in_the_file(octopus: Any) -> None:
             {"arm": arm, "cycle": 2, "position": [0.2, -0.5, 0.0], "heading": 0.3},
         ],
     }
-    perform(shot(lists=lists), {})
+    perform(shot(**lists), {})
     assert settings.change.by == "MARKERS"
     assert [(each.gait, round(each.position, 3)) for each in settings.change.places] == [
         ("swim", 0.6)
@@ -80,7 +80,7 @@ def test_lists_take_the_place_of_those_in_the_file(octopus: Any) -> None:
         (arm, 1, True, False),
         (arm, 2, False, True),
     ]
-    perform(shot(lists={"changes": []}), {})
+    perform(shot(changes=[]), {})
     assert settings.change.by == "NONE"
     assert len(settings.reaches) == 1
 
@@ -94,14 +94,14 @@ def test_reach_finds_its_object_by_name(octopus: Any) -> None:
     ball.location = (0.25, -0.1, 0.15)
     bpy.context.view_layer.update()
     reach = {"mode": "TOUCH", "target": "Ball", "frame_start": 2, "frame_contact": 12}
-    performed = perform(shot(lists={"reaches": [{**reach, "frame_release": 16}]}), {})
+    performed = perform(shot(reaches=[{**reach, "frame_release": 16}]), {})
     assert octopus.octo_motion.locomotion.reaches[0].target == ball
     assert performed.summary.frames == 60
     with pytest.raises(SettingsError, match="There is no object 'Bell'"):
-        perform(shot(lists={"reaches": [{"target": "Bell"}]}), {})
+        perform(shot(reaches=[{"target": "Bell"}]), {})
 
 
 def test_contact_of_an_arm_that_is_not_there_is_told(octopus: Any) -> None:
     first = octopus.octo_motion.locomotion.arms[0].name
     with pytest.raises(RigError, match=f"There is no arm 'Arm 9'.*{first}"):
-        perform(shot(lists={"contacts": [{"arm": "Arm 9", "cycle": 1}]}), {})
+        perform(shot(contacts=[{"arm": "Arm 9", "cycle": 1}]), {})

@@ -1,0 +1,414 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a shot may say: each key declared once, for job files and for the command line."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from typing import Any, Final
+
+from ..core.errors import SettingsError
+from ..core.locomotion.gait import gait_to_json
+from ..core.locomotion.octopus import OctopusShape
+from ..core.posing.pose_script import parse_script
+from .motion_files import SUFFIXES, is_motion
+from .quality_limits import NAMES
+from .schema import (
+    Choice,
+    File,
+    Kind,
+    Number,
+    Reading,
+    Table,
+    Tables,
+    Text,
+    Unfit,
+    flag,
+    parse_assignments,
+    point,
+    read_value,
+)
+from .shot_request import HIGHEST_FPS, NewOctopus, NewRoute, NewSplice, Points, ShotRequest
+
+_EXPORT_SUFFIXES: Final = (".glb", ".fbx", ".abc")
+_MOST_FRAMES: Final = 1_000_000
+"""A little below Blender's last frame."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """How the command line says what a key says."""
+
+    help: str
+    metavar: str | tuple[str, ...] = "NAME"
+    """Two of an option that takes as many words as there are."""
+    flags: tuple[str, ...] = ()
+    """Without any: the key's name."""
+    collect: Callable[[list[Any]], Any] | None = None
+    """Of an option that may be repeated: what the key has for all that was given."""
+    required: bool = False
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a shot."""
+
+    kind: Kind
+    option: Option | None = None
+
+
+# --- Kinds of values that shots alone have -------------------------------------------------------
+
+
+def gait_name(given: Any, reading: Reading) -> str:
+    """The name of a gait."""
+    name = Text()(given, reading)
+    reading.known.gait(name)
+    return name
+
+
+def _gait(given: Any, reading: Reading) -> str | Path:
+    """A gait by name, read to its table as JSON, or a gait file."""
+    name = Text()(given, reading)
+    if name.lower().endswith(".json"):
+        return reading.resolve(name)
+    return gait_to_json(reading.known.gait(name))
+
+
+def _script(given: Any, reading: Reading) -> Path:
+    """A pose script, which is read to see whether it makes sense."""
+    path = File()(given, reading)
+    if not path.is_file():
+        raise SettingsError(f"There is no file '{path}'.", "Give the path of a pose script.")
+    try:
+        parse_script(path.read_text(encoding="utf-8"), path.name)
+    except (OSError, UnicodeDecodeError) as error:
+        raise SettingsError(f"The script '{path.name}' cannot be read: {error}.") from error
+    return path
+
+
+def _export(given: Any, reading: Reading) -> Path:
+    """A file to export to."""
+    name = Path(Text()(given, reading)).name
+    if name.lower().endswith(".gltf"):
+        raise SettingsError(f"'{name}' would be several files: export to .glb, the same in one.")
+    return File("format to export to", _EXPORT_SUFFIXES)(given, reading)
+
+
+def _exports(given: Any, reading: Reading) -> tuple[Path, ...] | None:
+    """A file to export to, or a list of them."""
+    listed = [given] if isinstance(given, str) else given
+    if not isinstance(listed, list) or not all(isinstance(each, str) for each in listed):
+        raise Unfit("a path or a list of paths")
+    paths = tuple(read_value("export", _export, each, reading) for each in listed)
+    return None if None in paths else paths
+
+
+def _points(given: Any, reading: Reading) -> Points:
+    """A list of points."""
+    try:
+        points = [point(each, reading) for each in given]
+    except (TypeError, Unfit):
+        points = []
+    if not isinstance(given, list) or not points:
+        raise SettingsError(
+            "its points must be a list of points, each of three numbers, [x, y, z]."
+        )
+    return tuple((x, y, z) for x, y, z in points)
+
+
+def _drawn(values: Mapping[str, Any], reading: Reading) -> NewRoute | None:
+    cyclic = bool(values.get("cyclic"))
+    if ("control_points" in values) == ("points" in values):
+        reading.fault("give either control_points (four) or points (that it leads through).")
+        return None
+    points = values.get("points") or values.get("control_points")
+    if points is None:
+        return None
+    if "points" in values:
+        least, told = (3, "three") if cyclic else (2, "two")
+        if len(set(points)) < least:
+            reading.fault(f"points must be at least {told} that lie apart.")
+        return NewRoute(points, is_bezier=False, cyclic=cyclic)
+    if cyclic:
+        reading.fault("four control points make no cyclic route: give points.")
+    if len(points) != 4:
+        reading.fault(
+            f"control points are four, not {len(points)}. For a route that leads through points "
+            "write route = { points = […] }."
+        )
+    elif len(set(points)) == 1:
+        reading.fault("its control points are all the same.")
+    return NewRoute(points, is_bezier=True)
+
+
+def _route(given: Any, reading: Reading) -> str | NewRoute | None:
+    """The name of a curve, four control points, or a table of points."""
+    table = {"control_points": given} if isinstance(given, list) else given
+    return (_ROUTE if isinstance(table, dict) else Text())(table, reading)
+
+
+_ROUTE: Final = Table(
+    {"control_points": _points, "points": _points, "cyclic": flag},
+    place="route",
+    what="key",
+    finish=_drawn,
+)
+
+
+# --- Tables within a shot ------------------------------------------------------------------------
+
+
+def _new_octopus(values: dict[str, Any], _reading: Reading) -> NewOctopus:
+    shape = {name: value for name, value in values.items() if value is not None}
+    with_mesh = shape.pop("with_mesh", True)
+    return NewOctopus(OctopusShape(**shape), with_mesh=with_mesh)
+
+
+OCTOPUS: Final = Table(
+    {
+        **{
+            each.name: Number(whole=isinstance(each.default, int))
+            for each in dataclasses.fields(OctopusShape)
+        },
+        "with_mesh": flag,
+    },
+    place="octopus",
+    what="parameter",
+    example="{ arms = 8 }",
+    finish=_new_octopus,
+)
+LIMITS: Final = Table(
+    dict.fromkeys(NAMES, Number(0.0, may_be_infinite=True)),
+    place="limits",
+    what="figure",
+    example="{ slip = 0.01 }",
+)
+"""How bad a motion may be."""
+
+
+def _new_splice(values: dict[str, Any], reading: Reading) -> NewSplice:
+    own = {key: values.pop(key) for key in ("clip", "source", "action") if values.get(key)}
+    if values.get("part") == "CHAIN" and not values.get("bone"):
+        reading.fault('A chain needs its first bone: write bone = "…".')
+    if "clip" in own and "source" in own:
+        reading.fault("It has a clip and a source: give the file, or the armature's name.")
+    return NewSplice(**own, settings=values)
+
+
+SPLICES: Final = Tables(
+    Table(
+        {"clip": File("motion file", SUFFIXES), "source": Text(), "action": Text()},
+        known="splices",
+        example='{ part = "right_arm", clip = "throw.bvh" }',
+        needed=("part",),
+        finish=_new_splice,
+    ),
+    "splice",
+    if_empty="splices is empty: write what to splice, or leave the key out.",
+)
+
+
+def parse_splices(options: Iterable[Sequence[str]]) -> list[dict[str, str]]:
+    """The tables that words of the command line mean: each a part, a motion file, NAME=VALUE.
+
+    Raises:
+        SettingsError: one has more than one file.
+    """
+    tables = []
+    for part, *words in options:
+        files = [word for word in words if "=" not in word]
+        values = (word for word in words if "=" in word)
+        table = {"part": part, **parse_assignments(values, f"--splice {part}")}
+        files += [table["clip"]] if files and "clip" in table else []
+        if len(files) > 1:
+            raise SettingsError(
+                f"--splice {part} has two files, '{files[0]}' and '{files[1]}'.",
+                "Write --splice PART FILE NAME=VALUE, with the file to read before it.",
+            )
+        tables.append(table | ({"clip": files[0]} if files else {}))
+    return tables
+
+
+def _items(name: str, example: str, *needed: str) -> Key:
+    """A list of what the panels keep in a list of that name."""
+    return Key(Tables(Table(known=name, example=example, needed=needed), name))
+
+
+# --- Shots ---------------------------------------------------------------------------------------
+
+
+def _file(help_: str) -> Key:
+    return Key(File(), Option(help_, "FILE"))
+
+
+def _named(help_: str, metavar: str = "NAME") -> Key:
+    return Key(Text(), Option(help_, metavar))
+
+
+def _settings(known: str, help_: str) -> Key:
+    option = Option(f"{help_}; may be repeated", "NAME=VALUE", ("--set",), parse_assignments)
+    return Key(Table(known=known), option)
+
+
+def _exported(what: str) -> Key:
+    help_ = f"export {what} as well ({', '.join(_EXPORT_SUFFIXES)}); may be repeated"
+    return Key(_exports, Option(help_, "FILE", collect=list))
+
+
+_NAME: Final = Key(Text())
+_KIND: Final = Key(Choice(("generate", "splice", "pose"), "kind"))
+_OUTPUT: Final = Key(
+    File("format to save to", (".blend",)),
+    Option("the .blend file to write", "FILE", ("-o", "--output")),
+)
+_FPS: Final = Key(Number(1.0, HIGHEST_FPS), Option("frames per second of the scene", "FPS"))
+
+KINDS: Final[dict[str, dict[str, Key]]] = {
+    "generate": {
+        "name": _NAME,
+        "kind": _KIND,
+        "file": _file("the .blend file to read"),
+        "octopus": Key(OCTOPUS),
+        "armature": _named("default: the one that has arms"),
+        "route": Key(_route, Option("the curve; default: the armature's own")),
+        "ground": _named("the mesh to walk on; default: its own"),
+        "gait": Key(_gait, Option("a gait by name, or a gait file (.json)")),
+        "changes": _items("changes", '{ gait = "swim", position = 0.5 }', "gait", "position"),
+        "reaches": _items("reaches", '{ target = "Ball", arm = "Arm 1 L", frame_contact = 40 }'),
+        "contacts": _items(
+            "contacts", '{ arm = "Arm 1 L", cycle = 2, shift = 0.1 }', "arm", "cycle"
+        ),
+        "settings": _settings(
+            "generate", "a setting, such as speed=0.4, sway=12° or table.stride=1.2"
+        ),
+        "limits": Key(
+            LIMITS,
+            Option(
+                f"write nothing if a figure of the motion ({', '.join(NAMES)}) is above; "
+                "may be repeated",
+                "NAME=VALUE",
+                ("--limit",),
+                partial(parse_assignments, option="--limit"),
+            ),
+        ),
+        "fps": _FPS,
+        "output": _OUTPUT,
+        "export": _exported("the creature"),
+    },
+    "splice": {
+        "name": _NAME,
+        "kind": _KIND,
+        "file": _file("the motion or .blend file to splice onto, before any --splice"),
+        "armature": _named("default: the one that has splices"),
+        "base": _named("default: the list's, or the armature's own", "ACTION"),
+        "frames": Key(
+            Number(2, _MOST_FRAMES, whole=True),
+            Option(
+                "how long the base lasts: a walk of one cycle is repeated, a longer one is cut", "N"
+            ),
+        ),
+        "splices": Key(
+            SPLICES,
+            Option(
+                "a part, the motion file that it is from, and settings; may be repeated",
+                ("PART", "FILE NAME=VALUE"),
+                ("--splice",),
+                parse_splices,
+            ),
+        ),
+        "settings": _settings(
+            "splice", "a setting of the base, such as visual=true or landmarks.chest=Spine2"
+        ),
+        "fps": _FPS,
+        "output": _OUTPUT,
+        "export": _exported("the armature and what hangs on it"),
+    },
+    "pose": {
+        "name": _NAME,
+        "kind": _KIND,
+        "file": _file("the .blend file to read"),
+        "octopus": Key(OCTOPUS),
+        "armature": _named("default: the only one, or the active one"),
+        "script": Key(_script, Option("the pose script (.json)", "FILE", required=True)),
+        "fps": _FPS,
+        "output": _OUTPUT,
+        "export": _exported("the figure"),
+    },
+}
+"""The keys of each kind of shot."""
+
+
+def kind_of(given: Mapping[str, Any]) -> str:
+    """The kind of shot that a table asks for, one of ``KINDS`` whatever it says."""
+    kind = str(given.get("kind", "")).strip().lower()
+    return kind if kind in KINDS else "generate"
+
+
+def read_shot(given: Mapping[str, Any], reading: Reading) -> ShotRequest:
+    """The shot that a table asks for; what is wrong with it is told to the reading."""
+    kind = kind_of(given)
+    own = dict(given)
+    for name in given:
+        others = [each for each in KINDS if name in KINDS[each]]
+        if others and kind not in others:
+            reading.fault(f'{name} is for shots with kind = "{others[0]}".')
+            del own[name]
+    table = Table(
+        {name: key.kind for name, key in KINDS[kind].items()},
+        what="key",
+        needed=("name",),
+        finish={"generate": _check_generate, "splice": _check_splice, "pose": _check_pose}[kind],
+    )
+    values = table(own, reading)
+    if "output" not in values and values.get("export", ()) == ():
+        reading.fault('It writes nothing: give output = "….blend", or export.')
+    # What is wrong was told: the rest is as if it had not been said.
+    said = {name: value for name, value in values.items() if value is not None}
+    return ShotRequest(**said)
+
+
+def _check_generate(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
+    _check_creature(values, reading)
+    if "octopus" in values:
+        route, ground = values.get("route"), values.get("ground")
+        travels = (values.get("settings") or {}).get("travel_on") != "NONE"
+        if isinstance(route, str):
+            reading.fault(f"A new octopus has no curve '{route}': give the route's points.")
+        elif "route" not in values and travels:
+            reading.fault("A new octopus has no route: give the route's points.")
+        if ground:
+            reading.fault(f"A new octopus has no ground '{ground}': leave it to walk on its route.")
+    limits = values.get("limits") or {}
+    return {**values, "limits": {name: each for name, each in limits.items() if isfinite(each)}}
+
+
+def _check_splice(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
+    file = values.get("file")
+    if "file" not in values and not reading.has_open_file:
+        reading.fault('It has no base: give file, a motion file or "….blend".')
+    if file is not None and is_motion(file) and "splices" not in values:
+        reading.fault("It splices nothing: give splices, a list of tables.")
+    return values
+
+
+def _check_pose(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
+    _check_creature(values, reading)
+    if "script" not in values:
+        reading.fault('It poses nothing: give script = "….json", a pose script.')
+    return values
+
+
+def _check_creature(values: Mapping[str, Any], reading: Reading) -> None:
+    """The file that has it, or the octopus that is to be made."""
+    file = values.get("file")
+    if file is not None and is_motion(file):
+        reading.fault(f"'{file.name}' is a motion file, which is for kind = \"splice\".")
+    if file is not None and values.get("octopus") is not None:
+        reading.fault("It has a file and a new octopus: give one of the two.")
+    elif not ({"file", "octopus"} & values.keys() or reading.has_open_file):
+        reading.fault('It has no creature: give file = "….blend", or octopus = {} for a new one.')
