@@ -4,7 +4,6 @@
 from .blas_threads import OneThread
 from .hand_spring import Coupling, Grab
 from .obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
-from .problem import Problem
 from .world import World, WorldSettings, WorldState
 
 __all__ = [
@@ -17,7 +16,6 @@ __all__ = [
     "Obstacle",
     "OneThread",
     "Plane",
-    "Problem",
     "Sphere",
     "World",
     "WorldSettings",

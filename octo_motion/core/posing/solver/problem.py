@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One step of the simulation as a question: which velocities, given all that acts on the figure?
 
-The fast solver (``newton``) and the source's own (``reference``) answer the same question.
+``newton`` answers it; tests hold its answer against that of the source's own solver.
 """
 
 from __future__ import annotations

@@ -20,9 +20,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..rotations import Floats
-from .puppet import skew
-from .solver import Problem
+from octo_motion.core.posing.puppet import skew
+from octo_motion.core.posing.solver.problem import Problem
+from octo_motion.core.rotations import Floats
 
 
 @dataclass(eq=False)
@@ -42,8 +42,8 @@ class _Block:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """Velocities after a step."""
+class Velocities:
+    """What a step leads to."""
 
     velocities: Floats
     """(bodies, 6) spatial, angular first, about the problem's origin."""
@@ -54,7 +54,7 @@ class Answer:
 
 def solve(
     problem: Problem, parents: Sequence[int], *, sweeps: int = 20_000, tolerance: float = 1e-12
-) -> Answer:
+) -> Velocities:
     """Velocities at the end of a step by Gauss–Seidel sweeps over all rows.
 
     Args:
@@ -74,7 +74,8 @@ def solve(
         *_joints(problem, parents),
         *_elements(problem, parents),
         *_stops(problem, parents),
-        *_rows(problem),
+        *_contacts(problem),
+        *_holds(problem),
     ]
     for block in blocks:
         pairs = list(zip(block.bodies, block.jacobians, strict=True))
@@ -104,7 +105,7 @@ def solve(
     result = np.empty((count, 6))
     result[:, :3] = velocities[:, 3:]
     result[:, 3:] = velocities[:, :3] + np.cross(problem.centres, velocities[:, 3:])
-    return Answer(result, done, change)
+    return Velocities(result, done, change)
 
 
 def _point(problem: Problem, body: int, place: Floats) -> Floats:
@@ -185,9 +186,8 @@ def _stops(problem: Problem, parents: Sequence[int]) -> list[_Block]:
     return blocks
 
 
-def _rows(problem: Problem) -> list[_Block]:
-    rows = problem.rows
-    contacts, holds = rows.contacts, rows.holds
+def _contacts(problem: Problem) -> list[_Block]:
+    rows, contacts = problem.rows, problem.rows.contacts
     blocks: list[_Block] = []
     for number in range(len(contacts)):
         normal, gain = contacts.normals[number], rows.gains[number]
@@ -220,6 +220,12 @@ def _rows(problem: Problem) -> list[_Block]:
         if other >= 0:
             bodies, jacobians = (body, other), (*jacobians, -_point(problem, other, place))
         blocks.append(_Block(bodies, jacobians, presses, rows.targets[number], np.zeros(3)))
+    return blocks
+
+
+def _holds(problem: Problem) -> list[_Block]:
+    rows, holds = problem.rows, problem.rows.holds
+    blocks: list[_Block] = []
     if holds is None:
         return blocks
     for number in range(len(holds)):
@@ -244,7 +250,7 @@ def _rows(problem: Problem) -> list[_Block]:
             return result
 
         body = int(holds.bodies[number])
-        jacobian = _point(problem, body, rows.places[len(contacts) + number])
+        jacobian = _point(problem, body, rows.places[rows.count + number])
         if holds.turns[number]:
             jacobian = _TURN
         blocks.append(_Block((body,), (jacobian,), pulls, np.zeros(3), np.zeros(3)))
