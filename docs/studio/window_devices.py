@@ -54,7 +54,7 @@ def four_moments() -> Taking:
     )
     pictures.append(screen.take_moment())
     yield from screen.press("K")
-    yield from screen.until(lambda: _hands().said.startswith("Keyed"), "A key")
+    yield from screen.until(lambda: _hands().message.startswith("Keyed"), "A key")
     yield from screen.drawn()
     pictures.append(screen.take_moment())
     yield from screen.press("ESC")
@@ -112,7 +112,7 @@ def _grab(screen: Screen, bone: str) -> Steps:
         yield from screen.until(lambda: _hands().holding, "What the simulated hand holds")
         if _held() == bone:
             # Nothing of trials that failed is to be read.
-            _hands().said = ""
+            _hands().message = ""
             return
         # Blender was slow, and the hand has gone by.
         for key in ("G", "R"):

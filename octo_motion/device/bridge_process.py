@@ -56,12 +56,12 @@ from .simulation import SimulatedPointer, Simulation
 
 log = logging.getLogger(__name__)
 
-_TELL_EVERY: Final = 1.0 / 60.0
+_SEND_EVERY: Final = 1.0 / 60.0
 _IDLE_PERIOD: Final = 2e-3
 _AWAKE: Final = 0.00015
 """s before a turn from which on the bridge does not sleep."""
 _LAG_SHARE: Final = 0.05
-"""Of a new lag, in what is told of it: so it tells of the last third of a second."""
+"""Of a new lag, in what is sent of it: so that is the last third of a second."""
 _STARTS: Final = 4
 _SETTLED: Final = 60.0
 """s after which a process at the devices counts as one that runs."""
@@ -77,7 +77,7 @@ class Bridge:
         self._starts = 0
         self._started = 0.0
         self._gave_up = False
-        self._told_hello = False
+        self._greeted = False
         self._figure: FigureMessage | None = None
         self._world = WorldSettings(step=WorldMessage.step)
         self._obstacles: dict[int, ObstacleMessage] = {}
@@ -86,7 +86,7 @@ class Bridge:
         self._workspaces: dict[int, Workspace] = {}
         self._heard: dict[int, HandMessage] = {}
         self.simulation: Simulation | None = None
-        self._told = 0.0
+        self._sent = 0.0
         self._lag = 0.0
         self._placed = 0
 
@@ -130,11 +130,11 @@ class Bridge:
             simulation.step(now)
             # A step that kept up leads to a moment to come; one that did not is over only now.
             true = max(now, time.perf_counter() - simulation.step_seconds)
-            for held in list(simulation.held(true)):  # saying may lose the devices
-                self._say_to_hands(held)
-        if now - self._told >= _TELL_EVERY:
-            self._told = now
-            self._tell_blender()
+            for held in list(simulation.held(true)):  # sending may lose the devices
+                self._send_to_hands(held)
+        if now - self._sent >= _SEND_EVERY:
+            self._sent = now
+            self._send_to_blender()
 
     # --- Blender ---------------------------------------------------------------------------------
 
@@ -158,7 +158,7 @@ class Bridge:
             case Pins():
                 if simulation is not None:
                     pins = {body: pin > 1 for body, pin in enumerate(message.pinned) if pin}
-                    if pins and max(pins) >= len(simulation.world.figure):
+                    if pins and max(pins) >= len(simulation.session.figure):
                         raise MessageError("a pin on a body that does not exist")
                     simulation.pin(pins)
             case WorldMessage():
@@ -181,7 +181,7 @@ class Bridge:
                 self._workspaces[message.pointer] = message
                 self._pass_on(message, message.pointer)
             case Grab() | Buzz() | Calibrate():
-                self._say_to_hands(message)
+                self._send_to_hands(message)
             case CalibrationMessage():
                 message.calibration()  # refused here if it is none
                 self._pass_on(message, message.pointer)
@@ -210,40 +210,40 @@ class Bridge:
 
     def _pass_on(self, message: Message, number: int) -> None:
         self._remembered[type(message), number] = message
-        self._say_to_hands(message)
+        self._send_to_hands(message)
 
-    def _tell_blender(self) -> None:
+    def _send_to_blender(self) -> None:
         simulation = self.simulation
         # Pointers first: who hears that a limb is held must not have seen yet that it moves.
-        for pointer, told in self._heard.items():
+        for pointer, message in self._heard.items():
             hand = simulation.hands.get(pointer) if simulation else None
-            if hand is not None and hand.handle is not None:
-                self._lag += _LAG_SHARE * (time.perf_counter() - told.time - self._lag)
-            self._blender.send(self._pointer(told, hand), droppable=True)
-        if simulation is not None and simulation.changed:
-            pose = simulation.world.pose()
-            # What was left out is said once Blender reads again: it may be the last for long.
-            simulation.changed = not self._blender.send(
+            if hand is not None and hand.spring is not None:
+                self._lag += _LAG_SHARE * (time.perf_counter() - message.time - self._lag)
+            self._blender.send(self._pointer(message, hand), droppable=True)
+        if simulation is not None and simulation.session.changed:
+            pose = simulation.session.pose
+            # What was left out is sent once Blender reads again: it may be the last for long.
+            simulation.session.changed = not self._blender.send(
                 PoseMessage(
-                    *(self._placed, simulation.steps, simulation.time),
+                    *(self._placed, simulation.steps, simulation.session.time),
                     *(pose.positions, pose.orientations),
                 ),
                 droppable=True,
             )
 
-    def _pointer(self, told: HandMessage, hand: SimulatedPointer | None) -> PointerMessage:
-        place, turn, body = told.position, told.orientation, -1
-        if hand is not None and hand.handle is not None and self.simulation is not None:
-            held, turned = self.simulation.coupled(hand.handle)
-            place, turn, body = tuple(held), tuple(turned), hand.handle.body
+    def _pointer(self, message: HandMessage, hand: SimulatedPointer | None) -> PointerMessage:
+        place, turn, body = message.position, message.orientation, -1
+        if hand is not None and hand.spring is not None and self.simulation is not None:
+            held, turned = self.simulation.coupled(hand.spring)
+            place, turn, body = tuple(held), tuple(turned), hand.spring.body
         return PointerMessage(
-            *(told.pointer, body, told.position, told.orientation, place, turn),
-            *(told.force, told.torque, told.buttons),
+            *(message.pointer, body, message.position, message.orientation, place, turn),
+            *(message.force, message.torque, message.buttons),
         )
 
     # --- The devices -----------------------------------------------------------------------------
 
-    def _say_to_hands(self, message: Message) -> None:
+    def _send_to_hands(self, message: Message) -> None:
         if self._hands is not None:
             try:
                 self._hands.channel.send(message)
@@ -265,9 +265,9 @@ class Bridge:
                 case DeviceMessage():
                     self._hear_device(message)
                 case LoopTimesMessage():
-                    self._tell_times(message)
+                    self._send_times(message)
                 case Hello():
-                    self._tell_hello(message)
+                    self._send_hello(message)
                 case Button() | Notice():
                     self._blender.send(message)
                 case CalibrationMessage():
@@ -292,12 +292,12 @@ class Bridge:
                 self.simulation.forget(message.pointer)
         self._blender.send(message)
 
-    def _tell_hello(self, message: Hello) -> None:
-        if not self._told_hello:
-            self._told_hello = True
+    def _send_hello(self, message: Hello) -> None:
+        if not self._greeted:
+            self._greeted = True
             self._blender.send(Hello(os.getpid(), platform.python_version(), message.priority))
 
-    def _tell_times(self, message: LoopTimesMessage) -> None:
+    def _send_times(self, message: LoopTimesMessage) -> None:
         if time.monotonic() - self._started > _SETTLED:
             self._starts = 1  # what was long ago does not count
         simulation = self.simulation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The puppet in the bridge: stepped in real time, held by the hands at the devices."""
+"""The session of posing in the bridge: in time with the clock, held by the hands at devices."""
 
 from __future__ import annotations
 
@@ -12,18 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from ..core.posing.picking import capsules_in_world
+from ..core.posing.picking import capsules_in_world, nearest_body
 from ..core.posing.puppet import Figure, Pose
-from ..core.posing.solver import Coupling, Obstacle, World, WorldSettings
-from ..core.posing.solver import Grab as Handle
-from ..core.rotations import (
-    Floats,
-    conjugate,
-    from_rotation_vector,
-    multiply,
-    rotate,
-    to_rotation_vector,
-)
+from ..core.posing.session import HandSample, Session
+from ..core.posing.solver import Coupling, HandSpring, Obstacle, World, WorldSettings
+from ..core.posing.step_length import StepLength
+from ..core.rotations import Floats, conjugate, multiply, rotate
 from .held_body import Pull
 from .ipc import DeviceMessage, HandMessage, HeldMessage, Settings
 from .spatial import IDENTITY, ZERO, Vector
@@ -39,8 +33,6 @@ FELT: Final = 0.1
 felt as a good part of that."""
 _SLACK: Final = 0.1
 """Of the puppet's size, by which a hand that lifts it all is ahead of it at most."""
-_STILL: Final = 2e-3
-_REST_SECONDS: Final = 0.3
 _PROBE: Final = 1e-3
 """Of the puppet's weight: the push with which a held body's mobility is measured."""
 _TOO_SLOW: Final = 0.05
@@ -63,55 +55,37 @@ _PAUSE: Final = 0.05
 class SimulatedPointer:
     """A pointer, as the simulation knows it."""
 
-    told: HandMessage
+    message: HandMessage
+    """The newest of the hand."""
     device: DeviceMessage | None = None
     scale: float = 1.0
     """m of the scene for a metre of the hand."""
-    handle: Handle | None = None
+    spring: HandSpring | None = None
+    """What it holds."""
     grab: int = 0
-    """The grab that the handle answers."""
+    """The grab that holds it."""
     refused: int = 0
     """The grab that found nothing near."""
     pull: Pull = field(default_factory=Pull)
     silence: float = 0.0
     """s that this process has run without a word from the hand."""
 
-
-@dataclass(frozen=True, eq=False)
-class _Way:
-    """What a hand's target does in one turn."""
-
-    handle: Handle
-    start: Floats
-    way: Floats
-    """(3,) m"""
-    turned: Floats
-    """(4,) at the start."""
-    swing: Floats
-    """(3,) rotation vector."""
-    velocity: Floats
-    """(6,)"""
-
-    @classmethod
-    def to(cls, handle: Handle, told: HandMessage, share: float, seconds: float) -> _Way:
-        """The way towards a hand; seconds that it takes, 0: the hand's own velocity holds."""
-        assert handle.target_orientation is not None
-        way = share * (np.array(told.position) - handle.target_position)
-        turned = handle.target_orientation
-        swing = share * to_rotation_vector(multiply(np.array(told.orientation), conjugate(turned)))
-        velocity = np.array((*told.velocity, *told.angular_velocity))
-        if seconds > 0.0:
-            velocity = np.concatenate([way, swing]) / seconds
-        return cls(handle, handle.target_position, way, turned, swing, velocity)
-
-    def go(self, world: World, share: float) -> None:
-        """Move the target along."""
-        turn = multiply(from_rotation_vector(share * self.swing), self.turned)
-        world.pull(self.handle, self.start + share * self.way, turn, self.velocity)
+    def sample(self) -> HandSample:
+        """Where the hand is."""
+        message = self.message
+        velocity = np.array((*message.velocity, *message.angular_velocity))
+        return HandSample(np.array(message.position), np.array(message.orientation), velocity)
 
 
 class Simulation:
-    """A world, and the hands in it."""
+    """A session of posing whose hands are at devices, kept in time with the clock of those.
+
+    Args:
+        figure: the puppet.
+        pose: where it starts.
+        settings: of the world; their step is the nominal one.
+        clock: seconds.
+    """
 
     def __init__(
         self,
@@ -120,48 +94,39 @@ class Simulation:
         settings: WorldSettings,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self.world = World(figure, pose, settings)
+        self.session = Session(figure, pose, settings, clock=None)
         self.hands: dict[int, SimulatedPointer] = {}
         self.reach = Settings.reach
         self.steps = 0
         self.cost = 0.0
         """s that a step takes to compute, of late."""
-        self.time = 0.0
-        """s simulated since the figure came."""
-        self.changed = True
-        """Whether something may have moved since the last time that the pose was told."""
-        self._nominal = settings.step
+        self._length = StepLength(settings.step, COARSEST, BUSY, 0.3, 0.05)
         self._clock = clock
-        self._load = 0.0
         self._due = 0.0
         self._simulated = 0.0
         self._turn = 0.0
         self._turns = 0
-        self._calm = 0.0
         self._now = -math.inf
         self._obstacles: dict[int, Obstacle] = {}
-        self._pins: dict[int, bool] = {}
 
     @property
-    def resting(self) -> bool:
-        """Whether nothing is held and nothing moves."""
-        return self._calm >= _REST_SECONDS and not any(each.handle for each in self.hands.values())
+    def world(self) -> World:
+        """What is stepped."""
+        return self.session.world
 
     @property
     def step_seconds(self) -> float:
         """Of one step, h."""
         return self.world.settings.step
 
-    # --- What is told ----------------------------------------------------------------------------
+    # --- What Blender and the devices say --------------------------------------------------------
 
     def place(self, pose: Pose) -> None:
         """Put the puppet into a pose, at rest; hands let go."""
         for hand in self.hands.values():
-            hand.refused = hand.told.grab  # let go is let go, until it grabs anew
+            hand.refused = hand.message.grab  # let go is let go, until it grabs anew
             self._release(hand)
-        self.world.set_pose(pose)
-        self._pin_again()
-        self._wake()
+        self.session.show(pose)
 
     def pin(self, pins: dict[int, bool]) -> None:
         """Pin these bodies where they are, and no others.
@@ -169,17 +134,12 @@ class Simulation:
         Args:
             pins: By body, whether its orientation is held as well.
         """
-        for body in self.world.pinned - pins.keys():
-            self.world.unpin(body)
+        before = self.session.pins
+        for body in before.keys() - pins.keys():
+            self.session.pin(body, state=False)
         for body, firm in sorted(pins.items()):
-            if body not in self.world.pinned or self._pins.get(body) != firm:
-                self.world.pin(body, firm=firm)
-        self._pins = dict(pins)
-        self._wake()
-
-    def _pin_again(self) -> None:
-        for body, firm in sorted(self._pins.items()):
-            self.world.pin(body, firm=firm)
+            if before.get(body) != firm:
+                self.session.pin(body, state=True, firm=firm)
 
     def put_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
         """Add, move or take away something solid."""
@@ -187,13 +147,12 @@ class Simulation:
             self._obstacles.pop(number, None)
         else:
             self._obstacles[number] = obstacle
-        self.world.obstacles = tuple(self._obstacles.values())
-        self._wake()
+        self.session.change_obstacles(tuple(self._obstacles.values()))
 
     def change(self, settings: WorldSettings) -> None:
         """Take other settings; motion goes on."""
-        self._nominal = settings.step
-        self._rebuild(settings)
+        self._length.nominal = settings.step
+        self.session.change(**vars(settings))
 
     def hear(
         self, message: HandMessage, device: DeviceMessage | None = None, scale: float = 1.0
@@ -201,17 +160,17 @@ class Simulation:
         """Take over where a hand is, what it wants, and grab or let go.
 
         Args:
-            message: The hand's newest word.
+            message: The hand's newest.
             device: What it holds in reality.
             scale: m of the scene for a metre of the hand.
         """
         hand = self.hands.setdefault(message.pointer, SimulatedPointer(message))
-        if message.time != hand.told.time:
+        if message.time != hand.message.time:
             hand.silence = 0.0
-        hand.told, hand.device, hand.scale = message, device, scale
-        if hand.handle is not None and message.grab != hand.grab:
+        hand.message, hand.device, hand.scale = message, device, scale
+        if hand.spring is not None and message.grab != hand.grab:
             self._release(hand)
-        if message.grab and hand.handle is None and message.grab != hand.refused:
+        if message.grab and hand.spring is None and message.grab != hand.refused:
             self._grab(hand)
 
     def forget(self, pointer: int) -> None:
@@ -221,59 +180,26 @@ class Simulation:
             self._release(hand)
 
     def _grab(self, hand: SimulatedPointer) -> None:
-        point, turn = np.array(hand.told.position), np.array(hand.told.orientation)
-        body, gap = nearest_body(self.world.figure, self.world.pose(), point)
+        message, session = hand.message, self.session
+        point = np.array(message.position)
+        body, gap = nearest_body(session.figure, session.pose, point)
         if gap > self.reach:
-            hand.refused = hand.told.grab
+            hand.refused = message.grab
             return
         # A machine too slow for the measurement goes on without: the body then keeps its velocity.
         mobility, angular = (0.0, 0.0) if self.cost > _TOO_SLOW else self._mobility(body, point)
-        coupling = self._coupling(hand)
-        hand.handle = self.world.grab(body, point, turn, coupling)
-        self.world.pull(hand.handle, point, turn)
-        hand.grab = hand.told.grab
+        coupling = coupling_for(session.figure, session.pose, hand.device, hand.scale)
+        hand.spring = session.grab(body, point, np.array(message.orientation), coupling)
+        hand.grab = message.grab
         hand.pull = Pull(
             *(coupling.stiffness, coupling.damping, coupling.turning_stiffness),
             *(coupling.turning_damping, mobility, angular),
         )
-        self._wake()
 
     def _release(self, hand: SimulatedPointer) -> None:
-        if hand.handle is not None:
-            self.world.release(hand.handle)
-        hand.handle, hand.grab = None, 0
-        self._wake()
-
-    def _coupling(self, hand: SimulatedPointer) -> Coupling:
-        """How firmly a hand holds: so that what it can feel fits the puppet's weight.
-
-        The hand feels its own spring over the way by which the body lags behind. A world's
-        spring r times as stiff then means that r newtons on the puppet are one on the hand. But
-        the softest device must still move the puppet: the world's spring lifts it all when it is
-        drawn out by a tenth of the puppet's size.
-        """
-        figure = self.world.figure
-        firm = Coupling.for_figure(figure)
-        device = hand.device
-        if device is None or device.force <= 0.0 or device.stiffness <= 0.0:
-            return firm
-        weight = float(figure.masses.sum()) * 9.81
-        size = float(np.ptp(capsules_in_world(figure, self.world.pose()), axis=(0, 1)).max())
-        arm = float(np.median(figure.lengths))
-        softest = weight / (_SLACK * size)
-        wanted = FELT * weight / device.force * device.stiffness / hand.scale
-        stiffness = min(firm.stiffness, max(softest, wanted))
-        turning = firm.turning_stiffness
-        if device.angular_stiffness > 0.0 and device.torque > 0.0:
-            wanted = FELT * weight * arm / device.torque * device.angular_stiffness
-            turning = min(turning, max(softest * arm * arm, wanted))
-        return replace(
-            firm,
-            stiffness=stiffness,
-            damping=firm.damping * math.sqrt(stiffness / firm.stiffness),
-            turning_stiffness=turning,
-            turning_damping=firm.turning_damping * math.sqrt(turning / firm.turning_stiffness),
-        )
+        if hand.spring is not None:
+            self.session.release(hand.spring)
+        hand.spring, hand.grab = None, 0
 
     def _mobility(self, body: int, point: Floats) -> tuple[float, float]:
         """How easily a body gives way at a point: 1/kg and 1/(kg·m²), averaged over directions.
@@ -285,9 +211,7 @@ class Simulation:
         before = world.state()
         h = world.settings.step
         size = _PROBE * float(world.figure.masses.sum()) * 9.81
-        pose = world.pose()
-        centre = pose.positions[body] + rotate(pose.orientations[body], world.figure.centres[body])
-        lever = point - centre
+        lever = point - self._centre(body)
 
         def after(force: Floats, torque: Floats) -> tuple[Floats, Floats]:
             kept = world.forces[body].copy()
@@ -316,7 +240,7 @@ class Simulation:
         what would take longer than there is time is left out, and simulated time falls behind.
         """
         for hand in self.hands.values():
-            if hand.handle is None:
+            if hand.spring is None:
                 continue
             hand.silence += min(now - self._now, _PAUSE)
             if hand.silence > _STALE:
@@ -324,39 +248,25 @@ class Simulation:
                 hand.refused = hand.grab  # let go is let go, until it grabs anew
                 self._release(hand)
         passed, self._now = now - self._now, now
-        if self.resting:
+        if self.session.resting:
             return
         h = self.step_seconds
         count = self._count(passed)
-        self._time(passed, count * h)
-        before = self._clock()
-        ways = self._ways(passed, count * h)
-        for number in range(1, count + 1):
-            for way in ways:
-                way.go(self.world, number / count)
-            self.world.step()
-        spent = (self._clock() - before) / max(count, 1)
-        self.steps += count
-        self.time += count * h
-        self.changed = True
-        calm = float(np.abs(self.world.velocities()).max(initial=0.0)) < _STILL
-        self._calm = self._calm + count * h if calm else 0.0
-        if count:
-            self.cost += (0.05 if self.cost > 0.0 else 1.0) * (spent - self.cost)
-
-    def _ways(self, passed: float, simulated: float) -> list[_Way]:
-        """Where the held bodies are drawn in this turn.
-
-        To where the hands are, as a rule. Where simulated time falls behind, only as much of the
-        way as is simulated of the time: a target that jumps would yank the puppet.
-        """
+        simulated = count * h
+        self._time(passed, simulated)
+        # Where simulated time falls behind, hands go only as much of their way as is simulated of
+        # the time.
         late = simulated < 0.7 * passed < math.inf
-        share = simulated / passed if late else 1.0
-        return [
-            _Way.to(hand.handle, hand.told, share, simulated if late else 0.0)
-            for hand in self.hands.values()
-            if hand.handle is not None
-        ]
+        before = self._clock()
+        self.session.advance(
+            count,
+            {hand.spring: hand.sample() for hand in self.hands.values() if hand.spring},
+            share=simulated / passed if late else 1.0,
+        )
+        self.steps += count
+        if count:
+            spent = (self._clock() - before) / count
+            self.cost += (0.05 if self.cost > 0.0 else 1.0) * (spent - self.cost)
 
     def _count(self, passed: float) -> int:
         """How many steps are due, and can be afforded; never more than real time asks for."""
@@ -395,88 +305,91 @@ class Simulation:
         """Lengthen steps if turns take too long, shorten them when there is time again.
 
         Args:
-            seconds: that a whole turn took to compute: the step, and all that is heard and told.
+            seconds: that a whole turn took to compute: the step, and all messages.
         """
-        if self.resting:
-            return
-        h = self.step_seconds
-        self._load += 0.05 * (seconds - self._load)
-        if self._load > BUSY * h and h < COARSEST:
-            self._rebuild(replace(self.world.settings, step=min(2.0 * h, COARSEST)))
-        elif self._load < 0.3 * BUSY * h and h > self._nominal:
-            self._rebuild(replace(self.world.settings, step=max(0.5 * h, self._nominal)))
+        if not self.session.resting:
+            step = self.step_seconds
+            self.session.change(step=self._length.after(seconds, step, step))
 
-    def _rebuild(self, settings: WorldSettings) -> None:
-        old = self.world
-        self.world = World(
-            *(old.figure, old.pose(), replace(settings, pinned=frozenset()), old.obstacles)
-        )
-        self.world.restore(old.state())
-        self._pin_again()
-        for hand in self.hands.values():
-            if hand.handle is not None:
-                held = hand.handle
-                hand.handle = self.world.grab(
-                    *(held.body, old.held_point(held), held.target_orientation, held.coupling)
-                )
-                hand.handle.point, hand.handle.grip = held.point, held.grip
-                hand.handle.wrench = held.wrench
-        self._wake()
-
-    def _wake(self) -> None:
-        self._calm = 0.0
-        self.changed = True
-
-    # --- What is told back -----------------------------------------------------------------------
+    # --- What the devices hear -------------------------------------------------------------------
 
     def held(self, now: float) -> Iterator[HeldMessage]:
         """For each hand that wants something: where what it holds is, which was true at ``now``."""
         for pointer, hand in self.hands.items():
-            if hand.told.grab:
+            if hand.message.grab:
                 yield self._held(pointer, hand, now)
 
     def _held(self, pointer: int, hand: SimulatedPointer, now: float) -> HeldMessage:
-        grab = hand.handle
-        if grab is None:
+        spring = hand.spring
+        if spring is None:
             return HeldMessage(
-                *(pointer, hand.told.grab, False, now, 0.0),
+                *(pointer, hand.message.grab, False, now, 0.0),
                 *(ZERO, IDENTITY, ZERO, ZERO, Pull(), ZERO, ZERO),
             )
-        place, turn = self.coupled(grab)
+        place, turn = self.coupled(spring)
         # What the hand sees: where simulated time is slow, all moves slowly and is hard to move.
         pace = self.pace
-        velocity = pace * self.world.velocities()[grab.body]
+        velocity = pace * self.world.velocities()[spring.body]
         pull = hand.pull._replace(
             mobility=pace * pace * hand.pull.mobility,
             angular_mobility=pace * pace * hand.pull.angular_mobility,
         )
-        pose = self.world.pose()
-        centre = pose.positions[grab.body] + rotate(
-            pose.orientations[grab.body], self.world.figure.centres[grab.body]
-        )
-        at_point = velocity[:3] + np.cross(velocity[3:], place - centre)
+        at_point = velocity[:3] + np.cross(velocity[3:], place - self._centre(spring.body))
         w, x, y, z = map(float, turn)
         return HeldMessage(
             *(pointer, hand.grab, True, now, self.holds, _tuple(place), (w, x, y, z)),
             *(_tuple(at_point), _tuple(velocity[3:]), pull),
-            *(_tuple(grab.wrench[:3]), _tuple(grab.wrench[3:])),
+            *(_tuple(spring.wrench[:3]), _tuple(spring.wrench[3:])),
         )
 
-    def coupled(self, grab: Handle) -> tuple[Floats, Floats]:
+    def coupled(self, spring: HandSpring) -> tuple[Floats, Floats]:
         """Where the held point is, and how a hand would be turned that held it without lag."""
-        turn = multiply(self.world.pose().orientations[grab.body], conjugate(grab.grip))
-        return self.world.held_point(grab), turn
+        turn = multiply(self.session.pose.orientations[spring.body], conjugate(spring.grip))
+        return self.world.held_point(spring), turn
+
+    def _centre(self, body: int) -> Floats:
+        """(3,) the centre of mass of a body, world."""
+        pose = self.session.pose
+        centre = self.session.figure.centres[body]
+        return pose.positions[body] + rotate(pose.orientations[body], centre)
 
 
-def nearest_body(figure: Figure, pose: Pose, point: Floats) -> tuple[int, float]:
-    """The body nearest to a point (3,), and how far its surface is; less than 0 within."""
-    ends = capsules_in_world(figure, pose)
-    axis = ends[:, 1] - ends[:, 0]
-    along = ((point - ends[:, 0]) * axis).sum(axis=1)
-    share = np.clip(along / np.maximum((axis * axis).sum(axis=1), 1e-12), 0.0, 1.0)
-    gaps = np.linalg.norm(ends[:, 0] + share[:, None] * axis - point, axis=1) - figure.radii
-    body = int(np.argmin(gaps))
-    return body, float(gaps[body])
+def coupling_for(
+    figure: Figure, pose: Pose, device: DeviceMessage | None, scale: float
+) -> Coupling:
+    """How firmly a hand at a device holds: so that what it can feel fits the puppet's weight.
+
+    The hand feels its own spring over the way by which the body lags behind. A world's spring r
+    times as stiff then means that r newtons on the puppet are one on the hand. But the softest
+    device must still move the puppet: the world's spring lifts it all when it is drawn out by a
+    tenth of the puppet's size.
+
+    Args:
+        figure: the puppet.
+        pose: where it is.
+        device: what the hand holds in reality.
+        scale: m of the scene for a metre of the hand.
+    """
+    firm = Coupling.for_figure(figure)
+    if device is None or device.force <= 0.0 or device.stiffness <= 0.0:
+        return firm
+    weight = float(figure.masses.sum()) * 9.81
+    size = float(np.ptp(capsules_in_world(figure, pose), axis=(0, 1)).max())
+    arm = float(np.median(figure.lengths))
+    softest = weight / (_SLACK * size)
+    wanted = FELT * weight / device.force * device.stiffness / scale
+    stiffness = min(firm.stiffness, max(softest, wanted))
+    turning = firm.turning_stiffness
+    if device.angular_stiffness > 0.0 and device.torque > 0.0:
+        wanted = FELT * weight * arm / device.torque * device.angular_stiffness
+        turning = min(turning, max(softest * arm * arm, wanted))
+    return replace(
+        firm,
+        stiffness=stiffness,
+        damping=firm.damping * math.sqrt(stiffness / firm.stiffness),
+        turning_stiffness=turning,
+        turning_damping=firm.turning_damping * math.sqrt(turning / firm.turning_stiffness),
+    )
 
 
 def _tuple(values: Floats) -> Vector:

@@ -104,7 +104,7 @@ def _ours(name: str, figure: Figure, steps: int) -> list[Measured]:
     def drag(number: int) -> None:
         angle = 2.0 * np.pi * number / 2000.0
         way = np.array([0.3 * np.sin(angle), 0.3 - 0.3 * np.cos(angle), 0.1])
-        world.pull(grab, start + way)
+        grab.pull(start + way)
 
     rows.append(_timed(world, f"{name}, dragged over the floor", steps, drag))
     return rows

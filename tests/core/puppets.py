@@ -14,6 +14,7 @@ from octo_motion.core.posing.puppet.kinematics import pose_of, product
 from octo_motion.core.posing.solver.hand_spring import Coupling
 from octo_motion.core.posing.solver.world import World
 from octo_motion.core.rotations import Floats, from_rotation_vector, normalized, rotate
+from tests.core.world_probes import energy_of
 
 DENSITY = 1000.0
 HANDS = 2
@@ -195,7 +196,7 @@ def torn(
     unrest = figure.rest * [1.0, -1.0, -1.0, -1.0]
     limited = np.array(figure.parents) >= 0
     least, most = np.moveaxis(figure.limits.ranges, -1, 0)
-    energy = world.energy().total
+    energy = energy_of(world).total
     for _ in range(steps):
         if len(world.grabs) < HANDS and rng.random() < 0.03:
             body = int(rng.integers(len(figure)))
@@ -206,15 +207,15 @@ def torn(
             world.release(world.grabs[int(rng.integers(len(world.grabs)))])
         for grab in world.grabs:
             turn = None if grab.target_orientation is None else rng.normal(size=4)
-            world.pull(grab, grab.target_position + 0.05 * rng.normal(size=3), turn)
+            grab.pull(grab.target_position + 0.05 * rng.normal(size=3), turn)
         if rng.random() < 0.01:
             body = int(rng.integers(len(figure)))
-            (world.unpin if body in world.pinned else world.pin)(body)
-        if len(world.pinned) > 2:
-            world.unpin(min(world.pinned))
+            (world.unpin if body in world.pins else world.pin)(body)
+        if len(world.pins) > 2:
+            world.unpin(min(world.pins))
         world.step()
         pose, velocities = world.pose(), world.velocities()
-        before, energy = energy, world.energy().total
+        before, energy = energy, energy_of(world).total
         assert world.last is not None
         bent = bends(product(unrest, world.joint_turns()))
         over = np.maximum(least - bent, bent - most)[limited]

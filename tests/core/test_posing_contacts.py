@@ -34,6 +34,7 @@ from octo_motion.core.rotations import (
     to_matrix,
 )
 from tests.core.puppets import chain, octopus, posed, puppet, soft
+from tests.core.world_probes import energy_of, set_velocities
 
 WEIGHT = (0.0, 0.0, -9.81)
 seeds = st.integers(0, 2**31)
@@ -248,7 +249,7 @@ def test_what_slides_neither_lifts_off_nor_digs_in():
         WorldSettings(gravity=WEIGHT, friction=0.5),
         [Plane()],
     )
-    world.set_velocities(np.tile([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], (2, 1)))
+    set_velocities(world, np.tile([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], (2, 1)))
     for number in range(250):
         world.step()
         # Within a twentieth of a millimetre of the floor, from the first moment to the last.
@@ -267,7 +268,7 @@ def test_a_blow_at_an_angle_slows_by_friction_as_newton_says():
         WorldSettings(friction=0.3),
         [Plane()],
     )
-    world.set_velocities(np.tile([0.0, 2.0, -1.0, 0.0, 0.0, 0.0], (2, 1)))
+    set_velocities(world, np.tile([0.0, 2.0, -1.0, 0.0, 0.0, 0.0], (2, 1)))
     for _ in range(5):
         world.step()
     # All of the fall and μ times as much of the slide are gone.
@@ -315,7 +316,7 @@ def test_a_fallen_chain_lies_on_every_kind_of_obstacle(obstacle: Obstacle):
     assert contacts is not None
     assert len(contacts) >= 2
     assert np.abs(contacts.gaps).min() < 1e-4
-    assert world.energy().kinetic < 1e-3
+    assert energy_of(world).kinetic < 1e-3
 
 
 def test_what_starts_inside_is_brought_out_slowly():
@@ -372,7 +373,7 @@ def test_limbs_collide_with_each_other_only_when_asked():
             share = number / 500.0
             angle = share * np.pi
             hand = np.array([0.0, 0.45 + 0.35 * np.cos(angle), 0.3 * np.sin(angle)])
-            world.pull(grab, hand - np.array([0.0, 0.3, 0.1]) * share)
+            grab.pull(hand - np.array([0.0, 0.3, 0.1]) * share)
             world.step()
         pose = world.pose()
         ends = pose.positions[:, None] + rotate(pose.orientations[:, None], figure.capsules)

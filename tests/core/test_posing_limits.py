@@ -27,6 +27,7 @@ from octo_motion.core.rotations import (
     rotate,
 )
 from tests.core.puppets import chain, doll, opening, posed, soft, tree
+from tests.core.world_probes import energy_of, set_velocities
 
 FREE = (-np.pi, np.pi)
 SLOP = np.radians(0.2)
@@ -58,7 +59,7 @@ def pulled(figure: Figure, angle: float, aside: float = 0.0, step: float = 1e-3)
         share = min(number * step / 0.8, 1.0)
         turn = from_axis_angle([1.0, 0.0, 0.0], share * np.radians(angle))
         place = joint + np.array([aside * share, 0.0, 0.0]) + rotate(turn, arm)
-        world.pull(grab, place)
+        grab.pull(place)
         world.step()
     assert opening(figure, world.pose()) < 1e-9
     return np.degrees(bends(world.joint_turns()[1]))
@@ -151,7 +152,7 @@ def test_a_fast_limb_does_not_jump_over_the_end_of_its_range():
     world.pin(0, firm=True)
     velocities = np.zeros((2, 6))
     velocities[1] = [0.0, 0.0, 6.0, 60.0, 0.0, 0.0]
-    world.set_velocities(velocities)
+    set_velocities(world, velocities)
     for _ in range(100):
         world.step()
         bend = np.degrees(bends(world.joint_turns()[1]))
@@ -176,12 +177,12 @@ def test_energy_never_grows_at_the_ends_of_ranges(seed: int, touching: bool):  #
         WorldSettings(step=float(np.exp(rng.uniform(-8.0, -5.5))), tolerance=1e-8, iterations=50),
         [Plane(position=np.array([0.0, 0.0, -0.5]))] if touching else [],
     )
-    world.set_velocities(2.0 * rng.normal(size=(count, 6)))
+    set_velocities(world, 2.0 * rng.normal(size=(count, 6)))
     world.step()
-    energy = start = world.energy().total
+    energy = start = energy_of(world).total
     for _ in range(80):
         world.step()
-        now = world.energy().total
+        now = energy_of(world).total
         # Of the contacts' give, and of joints that are led back slowly.
         assert now <= energy + 1e-4 * start
         energy = now
@@ -201,7 +202,7 @@ def test_a_limited_doll_that_is_thrown_about_stays_in_its_ranges():
         grab = world.grab(body, world.pose().positions[body], coupling=hand_for(figure))
         way = 0.5 * rng.normal(size=3)
         for _ in range(100):
-            world.pull(grab, grab.target_position + 0.01 * way)
+            grab.pull(grab.target_position + 0.01 * way)
             world.step()
             own = product(figure.rest * [1.0, -1.0, -1.0, -1.0], world.joint_turns())
             angles = bends(own)[1:]

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.picking import capsules_in_world, local_point, pick, world_point
+from octo_motion.core.posing.picking import capsules_in_world, pick
 from tests.core.puppets import doll, octopus, posed
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -49,10 +49,3 @@ def test_nothing_behind_the_eye_is_hit() -> None:
     figure = doll()
     pose = posed(figure)
     assert pick(figure, pose, 10.0 * UP, UP, margin=0.5) is None
-
-
-def test_point_of_a_body_goes_with_it() -> None:
-    figure = doll()
-    pose = posed(figure, at=(1.0, 2.0, 3.0))
-    point = np.array([0.3, 0.2, 0.1])
-    assert world_point(pose, 7, local_point(pose, 7, point)) == pytest.approx(point, abs=1e-12)

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.picking import Hit
 from octo_motion.core.posing.puppet.figure import Figure, Pose
 from octo_motion.core.posing.session import COARSEST, HandSample, Session, TickReport
 from octo_motion.core.posing.solver.world import WorldSettings
-from octo_motion.core.rotations import IDENTITY, angle_between, from_axis_angle
+from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle
 from tests.core.puppets import chain, posed, soft
 
 TICK = 1.0 / 60.0
@@ -42,24 +41,23 @@ def session_of(step: float = 4e-3, clock: Clock | None = None) -> Session:
 
 def ticks(session: Session, count: int, seconds: float = TICK) -> TickReport:
     """The last of several ticks."""
-    told = session.tick(seconds)
+    report = session.tick(seconds)
     for _ in range(count - 1):
-        told = session.tick(seconds)
-    return told
+        report = session.tick(seconds)
+    return report
 
 
-def tip(session: Session) -> Hit:
-    pose = session.pose
-    return Hit(len(session.figure) - 1, pose.positions[-1] + [0.0, 0.1, 0.0], 1.0)
+def tip(session: Session) -> tuple[int, Floats]:
+    return len(session.figure) - 1, session.pose.positions[-1] + [0.0, 0.1, 0.0]
 
 
 def pull(session: Session, way: tuple[float, float, float], seconds: float = 1.0) -> None:
-    hit = tip(session)
-    session.grab(hit)
+    body, point = tip(session)
+    hand = session.grab(body, point)
     count = round(seconds / TICK)
     for number in range(count):
-        target = hit.point + (number + 1) / count * np.array(way)
-        session.tick(TICK, HandSample(target, IDENTITY))
+        target = point + (number + 1) / count * np.array(way)
+        session.tick(TICK, {hand: HandSample(target, IDENTITY)})
 
 
 def same(first: Pose, second: Pose) -> bool:
@@ -75,8 +73,8 @@ def test_limb_follows_the_hand_and_stays_where_it_is_left() -> None:
     pull(session, (0.25, -0.1, 0.1))
     held = session.held_point()
     assert held is not None
-    assert session.grip is not None
-    assert np.linalg.norm(held - session.grip.position) < 0.1
+    assert session.held is not None
+    assert np.linalg.norm(held - session.held.target_position) < 0.1
     session.release()
     ticks(session, 60)
     left = session.pose
@@ -98,21 +96,21 @@ def test_same_hand_gives_the_same_pose_bit_by_bit() -> None:
 
 def test_puppet_that_nobody_touches_does_not_move_and_costs_nothing() -> None:
     session = session_of()
-    told = ticks(session, 60)
-    assert told.resting
-    assert told.steps == 0
+    report = ticks(session, 60)
+    assert report.resting
+    assert report.steps == 0
     assert session.touched() == []
 
 
 def test_time_that_blender_was_busy_is_not_made_up_for() -> None:
     session = session_of()
-    session.grab(tip(session))
+    session.grab(*tip(session))
     assert session.tick(5.0).simulated == pytest.approx(0.1)
 
 
 def test_ticks_of_any_length_add_up_to_the_time_that_has_passed() -> None:
     session = session_of(step=1e-3)
-    session.grab(tip(session))
+    session.grab(*tip(session))
     for seconds in (0.0004, 0.0004, 0.0004, 0.0173, 0.0085, 0.0002):
         session.tick(seconds)
     assert session.time == pytest.approx(0.027)
@@ -121,29 +119,29 @@ def test_ticks_of_any_length_add_up_to_the_time_that_has_passed() -> None:
 def test_steps_become_longer_while_the_computer_is_too_slow_and_shorter_again() -> None:
     clock = Clock(each_look=0.05)
     session = session_of(step=1e-3, clock=clock)
-    session.grab(tip(session))
-    told = ticks(session, 30)
-    assert told.step == COARSEST
+    session.grab(*tip(session))
+    report = ticks(session, 30)
+    assert report.step == COARSEST
     clock.each_look = 0.0
-    told = ticks(session, 60)
-    assert told.step == pytest.approx(1e-3)
+    report = ticks(session, 60)
+    assert report.step == pytest.approx(1e-3)
 
 
 def test_it_is_told_how_much_slower_than_real_time_the_puppet_is() -> None:
     session = session_of(clock=Clock())
-    session.grab(tip(session))
-    told = ticks(session, 40, 0.2)
-    assert told.ratio == pytest.approx(0.5, abs=0.02)
+    session.grab(*tip(session))
+    report = ticks(session, 40, 0.2)
+    assert report.ratio == pytest.approx(0.5, abs=0.02)
 
 
 def test_window_does_not_stand_still_while_a_large_figure_is_computed() -> None:
     # Each tick takes 0.4 seconds, however few its steps.
     session = session_of(clock=Clock(each_look=0.4))
-    session.grab(tip(session))
+    session.grab(*tip(session))
     assert session.tick(0.1).steps == 25
-    told = ticks(session, 20, 0.1)
-    assert told.steps <= 10
-    assert told.ratio < 0.5
+    report = ticks(session, 20, 0.1)
+    assert report.steps <= 10
+    assert report.ratio < 0.5
 
 
 def test_longer_steps_keep_what_is_held_and_pinned() -> None:
@@ -152,7 +150,7 @@ def test_longer_steps_keep_what_is_held_and_pinned() -> None:
     before = session.held_point()
     session.change(step=2e-3)
     assert session.held_point() == pytest.approx(before)
-    assert session.pins == {0}
+    assert session.pins.keys() == {0}
     session.tick(0.1)
     # The hand goes on pulling, but nothing jumps.
     assert session.held_point() == pytest.approx(before, abs=0.05)
@@ -169,12 +167,12 @@ def test_material_is_changed_in_the_hand() -> None:
 
 def test_turn_of_the_hand_turns_the_limb() -> None:
     session = session_of()
-    hit = tip(session)
+    body, point = tip(session)
     start = session.pose.orientations[-1]
-    session.grab(hit)
+    hand = session.grab(body, point)
     for number in range(60):
         turn = from_axis_angle([0.0, 1.0, 0.0], 0.02 * (number + 1))
-        session.tick(TICK, HandSample(hit.point, turn))
+        session.tick(TICK, {hand: HandSample(point, turn)})
     assert angle_between(start, session.pose.orientations[-1]) > 0.3
 
 
@@ -185,7 +183,7 @@ def test_pinned_limb_stays_while_its_neighbours_are_pulled() -> None:
     pull(session, (0.1, -0.1, 0.1))
     assert session.pose.positions[2] == pytest.approx(place, abs=1e-3)
     session.pin(2, state=False)
-    assert session.pins == {0}
+    assert session.pins.keys() == {0}
 
 
 def test_touched_are_the_joints_that_were_bent() -> None:
@@ -201,7 +199,7 @@ def test_restore_brings_back_the_pose_at_the_start() -> None:
     start = session.pose
     pull(session, (0.2, 0.0, 0.1))
     session.restore()
-    assert session.grip is None
+    assert session.held is None
     assert session.pose.positions == pytest.approx(start.positions, abs=1e-12)
     assert np.abs(session.world.velocities()).max() == 0.0
 
@@ -225,7 +223,7 @@ def test_pose_of_another_frame_is_taken_over_at_rest() -> None:
     pull(session, (0.2, 0.0, 0.1))
     other = posed(session.figure, np.tile([0.2, 0.0, 0.1], (4, 1)))
     session.adopt(other)
-    assert session.grip is None
+    assert session.held is None
     assert session.pose.positions == pytest.approx(other.positions, abs=1e-12)
     ticks(session, 30)
     assert session.pose.positions == pytest.approx(other.positions, abs=1e-4)
@@ -240,9 +238,27 @@ def test_pose_whose_joints_are_elsewhere_is_taken_over_as_it_is() -> None:
     other = posed(replace(longer, anchors=anchors), np.tile([0.2, 0.0, 0.1], (4, 1)))
     session.adopt(other)
     assert session.pose.positions == pytest.approx(other.positions, abs=1e-12)
-    assert session.pins == {0, 2}
+    assert session.pins.keys() == {0, 2}
     ticks(session, 30)
     assert session.pose.positions == pytest.approx(other.positions, abs=1e-4)
     pull(session, (0.1, 0.0, 0.0))
     ways = np.linalg.norm(np.diff(session.pose.positions, axis=0), axis=1)
     assert ways == pytest.approx(np.linalg.norm(np.diff(other.positions, axis=0), axis=1))
+
+
+def test_each_hand_leads_its_own_limb() -> None:
+    session = session_of()
+    start = session.pose.positions
+    hands = {
+        session.grab(2, start[2]): HandSample(start[2] + [0.1, 0.0, 0.0], IDENTITY),
+        session.grab(3, start[3]): HandSample(start[3] + [0.1, 0.0, 0.1], IDENTITY),
+    }
+    for _ in range(60):
+        session.tick(TICK, hands)
+    for hand, sample in hands.items():
+        assert session.world.held_point(hand) == pytest.approx(sample.position, abs=0.05)
+    first, second = hands
+    session.release(first)
+    assert session.world.grabs == (second,)
+    assert not session.resting
+    assert session.touched() == [1, 2, 3]

@@ -76,7 +76,7 @@ def test_fast_solver_gives_the_answer_of_gauss_seidel(seed: int):
             at = world.pose().positions[body]
             hand = None if seed % 2 else np.array([1.0, 0.0, 0.0, 0.0])
             grab = world.grab(body, at, hand)
-            world.pull(grab, at + 0.1 * rng.normal(size=3), hand)
+            grab.pull(at + 0.1 * rng.normal(size=3), hand)
         if number == 40:
             world.pin(0)
         if number % 20 == 0:

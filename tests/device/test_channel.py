@@ -260,18 +260,18 @@ def test_pose_in_which_a_puppet_came_to_rest_reaches_a_blender_that_was_busy(
     while len(server._stream.unsent) < 100_000:
         server.send(Notice("x" * 900, ""))
     assert bridge.simulation
-    bridge._tell_blender()
-    bridge.simulation.world.set_pose(Pose(pose.positions + 1.0, pose.orientations))
-    bridge._tell_blender()
+    bridge._send_to_blender()
+    bridge.simulation.session.world.set_pose(Pose(pose.positions + 1.0, pose.orientations))
+    bridge._send_to_blender()
     end = time.monotonic() + 10.0
     poses: list[PoseMessage] = []
     while not poses:
         poses += [each for each in client.receive() if isinstance(each, PoseMessage)]
         server.flush()
-        bridge._tell_blender()
+        bridge._send_to_blender()
         assert time.monotonic() < end
     np.testing.assert_allclose(poses[-1].positions, pose.positions + 1.0)
-    assert not bridge.simulation.changed
+    assert not bridge.simulation.session.changed
     client.close()
     server.close()
 

@@ -139,16 +139,16 @@ def test_two_hands_hold_two_limbs_at_once(desk: Desk) -> None:
     for pointer in (0, 1):
         simulation.hear(desk.last(pointer))
     simulation.step(desk.now)
-    held = {number: hand.handle.body for number, hand in simulation.hands.items() if hand.handle}
+    held = {number: hand.spring.body for number, hand in simulation.hands.items() if hand.spring}
     assert held == {0: 0, 1: 2}
     left.buttons = 0
     desk.ticks(5, left, right)
     for pointer in (0, 1):
         simulation.hear(desk.last(pointer))
-    assert simulation.hands[0].handle is None
-    assert simulation.hands[1].handle is not None
+    assert simulation.hands[0].spring is None
+    assert simulation.hands[1].spring is not None
     simulation.forget(1)
-    assert simulation.world.grabs == ()
+    assert simulation.session.world.grabs == ()
 
 
 def test_device_that_goes_leaves_the_other_alone_and_comes_back_as_itself(desk: Desk) -> None:

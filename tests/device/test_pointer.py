@@ -17,8 +17,7 @@ from octo_motion.device.driver import DeviceLostError, Kind, Sample
 from octo_motion.device.haptics.pointer import Pointer
 from octo_motion.device.held_body import Held, Pull
 from octo_motion.device.ipc.messages import DeviceMessage, Settings, Workspace
-from octo_motion.device.simulation import SimulatedPointer as HandInWorld
-from octo_motion.device.simulation import Simulation
+from octo_motion.device.simulation import Simulation, coupling_for
 from octo_motion.device.sources.simulated_hand import Hand, SimulatedHand
 from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector, length
 from tests.core.puppets import chain, posed, soft
@@ -404,7 +403,7 @@ class Bench:
         self.hand = Hand(tremor=0.0)
         self.driver = SimulatedHand(self.hand, clock=lambda: self.now)
         self.pointer = Pointer(0, self.driver, PERIOD)
-        x, y, z = map(float, self.simulation.world.pose().positions[2] + [0.0, 0.15, 0.0])
+        x, y, z = map(float, self.simulation.session.pose.positions[2] + [0.0, 0.15, 0.0])
         self.pointer.place(Workspace(0, (x, y, z)))
         self.every = every
         self.log: list[tuple[Vector, Vector]] = []
@@ -436,12 +435,12 @@ def test_puppet_follows_the_hand_and_the_hand_feels_it(every: int) -> None:
     bench.driver.buttons = 1
     bench.run(0.3)
     hand = bench.simulation.hands[0]
-    assert hand.handle
-    assert hand.handle.body == 2
+    assert hand.spring
+    assert hand.spring.body == 2
     bench.hand.wish = lambda _t: ((0.04, 0.0, 0.02), IDENTITY)
-    start = bench.simulation.world.pose().orientations[1:]
+    start = bench.simulation.session.pose.orientations[1:]
     bench.run(1.0)
-    assert np.abs(bench.simulation.world.pose().orientations[1:] - start).max() > 0.02
+    assert np.abs(bench.simulation.session.pose.orientations[1:] - start).max() > 0.02
     felt = max(length(force) for force, _ in bench.log)
     assert 0.05 < felt <= 8.0
     assert bench.work <= 0.02 + 1e-3, "no more than the store holds came out"
@@ -516,9 +515,9 @@ def test_steps_that_a_busy_machine_left_out_are_made_up_for_if_there_is_time(
     bench.driver.buttons = 1
     bench.run(1.0)
     assert bench.simulation.pace == pytest.approx(pace, abs=0.01)
-    assert bench.simulation.time == pytest.approx(pace, abs=0.1)
+    assert bench.simulation.session.time == pytest.approx(pace, abs=0.1)
     bench.simulation.step(bench.now + 0.2)
-    assert bench.simulation.time <= pace + 0.12, "after a long pause it is not hurried"
+    assert bench.simulation.session.time <= pace + 0.12, "after a long pause it is not hurried"
 
 
 @pytest.mark.parametrize("gaps", [(0.003, 0.001), (0.001,), (0.0025, 0.0035, 0.0001), (0.002,)])
@@ -527,14 +526,13 @@ def test_puppet_never_runs_ahead_of_the_clock_however_it_is_woken(gaps: tuple[fl
     simulation = Bench(2, cost=1e-5).simulation
     elapsed = 0.0
     simulation.step(100.0)
-    begun = simulation.time
+    begun = simulation.session.time
     for gap in itertools.islice(itertools.cycle(gaps), 150):
         elapsed += gap
         simulation.step(100.0 + elapsed)
-        assert simulation.time - begun <= elapsed + 0.5 * simulation.step_seconds + 1e-9
-        simulation.changed = False
-        simulation._calm = 0.0
-    assert simulation.time - begun >= elapsed - simulation.step_seconds
+        assert simulation.session.time - begun <= elapsed + 0.5 * simulation.step_seconds + 1e-9
+        simulation.session.wake()
+    assert simulation.session.time - begun >= elapsed - simulation.step_seconds
 
 
 def test_one_late_step_does_not_make_a_slow_simulation() -> None:
@@ -552,9 +550,8 @@ def test_softest_device_moves_the_puppet_and_the_stiffest_does_not_shake_it(
     stiffness: float, scale: float
 ) -> None:
     bench = Bench(4)
-    told = bench.pointer.message(0.0)
     device = DeviceMessage(*(0, True, 1, 8.0, 0.4, stiffness, 1.0, "Device", "1:2", ()))
-    coupling = bench.simulation._coupling(HandInWorld(told, device, scale))
+    coupling = coupling_for(bench.figure, posed(bench.figure), device, scale)
     weight = 9.81 * float(bench.figure.masses.sum())
     assert 0.1 * 0.7 * coupling.stiffness > 0.9 * weight  # drawn out by a tenth, it lifts all
     assert coupling.stiffness <= Coupling.for_figure(bench.figure).stiffness
@@ -583,7 +580,7 @@ def test_let_go_limb_keeps_its_pose() -> None:
     bench.run(1.0)
     bench.driver.buttons = 0
     bench.run(0.5)
-    kept = bench.simulation.world.pose().orientations
+    kept = bench.simulation.session.pose.orientations
     assert bench.pointer.force == ZERO
     bench.run(1.0)
-    assert np.abs(bench.simulation.world.pose().orientations - kept).max() < 0.02
+    assert np.abs(bench.simulation.session.pose.orientations - kept).max() < 0.02

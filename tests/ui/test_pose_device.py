@@ -95,7 +95,7 @@ def grabbed(hands: DeviceHands) -> None:
     hands.grab()
 
     def holds() -> bool:
-        if hands.said == NOTHING_NEAR:
+        if hands.message == NOTHING_NEAR:
             hands.grab()  # on a busy machine it had gone by
         return hands.holding
 
@@ -113,8 +113,8 @@ def turn_of(name: str) -> np.ndarray:
 
 def test_armature_follows_the_hand_at_the_device(hands: DeviceHands) -> None:
     grabbed(hands)
-    assert hands.hover
-    assert hands.session.bone(hands.hover.body) == "bone2"
+    assert hands.hover is not None
+    assert hands.session.bone(hands.hover) == "bone2"
     wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
     shown = hands.shown()[0]
     assert shown.name == "Simulated hand"
@@ -136,20 +136,20 @@ def test_hand_far_from_all_limbs_is_told_so(hands: DeviceHands) -> None:
         hands.tick(TOLD, far)
         assert time.monotonic() < end
     hands.grab()
-    while not hands.said:
+    while not hands.message:
         hands.tick(TOLD, far)
         assert time.monotonic() < end
-    assert hands.said == "No limb is near enough to grab"
+    assert hands.message == "No limb is near enough to grab"
     hands.client.send(say.Grab(0, grab=False))
     grabbed(hands)
-    assert hands.said == ""
+    assert hands.message == ""
 
 
 def test_enter_keeps_pose_and_keys_and_escape_takes_them_back(hands: DeviceHands) -> None:
     grabbed(hands)
     wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
     device_pose.OCTO_MOTION_OT_pose_device._key(hands, all_bones=False)
-    assert hands.said.startswith("Keyed")
+    assert hands.message.startswith("Keyed")
     armature = the_arm()
     assert armature.animation_data.action
     hands.stop()
@@ -269,7 +269,7 @@ def test_bridge_that_is_started_again_knows_force_floor_and_calibration(
             time.sleep(0.002)
 
     wait_gently(hands.shown, "the hand is there")
-    hands.calibrations = {"simulated": kept}
+    hands.calibrations.learned = {"simulated": kept}
     assert hands.client._child
     hands.client._child._process.kill()
     wait_gently(lambda: hands.lost, "it is noticed")
@@ -371,7 +371,7 @@ def test_space_mouse_that_blender_has_poses_without_a_bridge() -> None:
         assert device_pose.line(hands) == "Posing Arm    Space mouse, through Blender"
         hands.tick(TOLD)
         hands.grab()
-        assert hands.said == "Push the space mouse first"
+        assert hands.message == "Push the space mouse first"
         hands.move((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, room(), TOLD)
         assert hands.shown()[0].position == pytest.approx((0.0, 0.0, 1.3))
         hands.grab()
@@ -382,8 +382,8 @@ def test_space_mouse_that_blender_has_poses_without_a_bridge() -> None:
             hands.tick(TOLD)
         # Pushed to the right for a second: 0.4 of the view's width.
         assert hands.shown()[0].position == pytest.approx((0.4, 0.0, 1.3))
-        assert hands.hover
-        assert session.bone(hands.hover.body) == "bone2"
+        assert hands.hover is not None
+        assert session.bone(hands.hover) == "bone2"
         assert abs(turn_of("bone2")[1:]).max() > 0.02
         assert len(device_lines(hands, np.array([0.0, -1.0, 0.0]))) >= 4
         hands.grab()
@@ -446,7 +446,7 @@ def test_step_back_leads_to_before_the_last_grab(hands: DeviceHands) -> None:
     assert press(hands, Key("Z")) is Outcome.PASSED
     assert press(hands, Key("Z", ctrl=True, shift=True)) is Outcome.PASSED
     assert press(hands, undo) is Outcome.TAKEN
-    assert hands.said == "Nothing to take back"
+    assert hands.message == "Nothing to take back"
     grabbed(hands)
     wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
     hands.grab()
@@ -468,7 +468,7 @@ def test_step_back_leads_to_before_the_last_grab(hands: DeviceHands) -> None:
     hands.tick(TOLD, room())
     assert abs(turn_of("bone2")[1:]).max() < 1e-5
     press(hands, undo)
-    assert hands.said == "Nothing to take back"
+    assert hands.message == "Nothing to take back"
     # What was let go can be grabbed anew, by the same key.
     grabbed(hands)
 
@@ -487,7 +487,7 @@ def test_step_back_with_blenders_own_space_mouse() -> None:
             hands.tick(TOLD)
         assert abs(turn_of("bone2")[1:]).max() > 0.01
         press(hands, Key("Z", ctrl=True))
-        assert hands.said == "Back"
+        assert hands.message == "Back"
         assert not hands.holding
         hands.tick(TOLD)
         assert abs(turn_of("bone2")[1:]).max() < 1e-5
@@ -526,15 +526,15 @@ def test_room_of_a_device_is_learned_used_kept_and_forgotten(on_stage: DeviceHan
     wait(hands, has_gone_round, "the hand draws its circle")
     assert hands.client.pointers[0].body == -1
     calibrate("FINISH")
-    wait(hands, lambda: "simulated" in hands.calibrations, "it is learned")
-    assert hands.said == "Calibrated: Simulated hand"
-    learned = hands.calibrations["simulated"]
+    wait(hands, lambda: "simulated" in hands.calibrations.learned, "it is learned")
+    assert hands.message == "Calibrated: Simulated hand"
+    learned = hands.calibrations.learned["simulated"]
     assert 0.05 < learned.width < 0.2
     assert load_calibrations() == {"simulated": learned}
     wait(hands, lambda: 0 in hands._spaces, "its room is laid anew")
     # As wide as the view is now what the hand has shown, not a desktop device's quarter metre.
     assert hands._spaces[0].scale == pytest.approx(before * 0.25 / learned.width, rel=1e-6)
-    assert DeviceHands(hands.session, Client(), TOLD).calibrations == {"simulated": learned}
+    assert DeviceHands(hands.session, Client(), TOLD).calibrations.learned == {"simulated": learned}
 
     calibrate("RESET")
     assert load_calibrations() == {}
@@ -551,7 +551,7 @@ def test_calibration_that_was_kept_is_told_to_a_device_that_comes_again(
     hands = on_stage
     wait(hands, hands.shown, "the hand is there")
     kept = Calibration(least=(-0.1,) * 6, most=(0.1,) * 6)  # pyright: ignore[reportArgumentType]
-    hands.calibrations = {"simulated": kept}
+    hands.calibrations.learned = {"simulated": kept}
     sent: list[say.Message] = []
     send = hands.client.send
     monkeypatch.setattr(hands.client, "send", lambda each: (sent.append(each), send(each)))
@@ -580,7 +580,7 @@ def test_two_blenders_keep_what_each_has_learned(on_stage: DeviceHands) -> None:
     wait(hands, hands.shown, "the hand is there")
     other = Calibration(least=(-0.1,) * 6, most=(0.1,) * 6)  # pyright: ignore[reportArgumentType]
     device_store.save_calibrations({"another": other})  # as another Blender does meanwhile
-    hands._keep(hands.client.devices[0], Calibration())
+    hands.calibrations.keep(hands.client.devices[0], Calibration())
     assert load_calibrations() == {"another": other, "simulated": Calibration()}
     calibrate("RESET")
     assert load_calibrations() == {"another": other}
@@ -599,12 +599,12 @@ def test_calibration_that_is_given_up_or_learned_nothing_changes_nothing(
     wait(hands, lambda: 0 in hands.client.calibrating, "it has begun")
     calibrate("CANCEL")
     wait(hands, lambda: 0 not in hands.client.calibrating, "it is over")
-    assert hands.calibrations == {}
+    assert hands.calibrations.learned == {}
     hands.client.calibrate(0, say.Order.BEGIN)
     hands.client.calibrate(0, say.Order.FINISH)
     wait(hands, lambda: hands.client.notices, "it says that nothing moved")
     assert "was not moved" in hands.notices()[0].problem
-    assert hands.calibrations == {}
+    assert hands.calibrations.learned == {}
     grabbed(hands)
 
 

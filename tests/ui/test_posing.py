@@ -116,8 +116,8 @@ def test_hover_shows_what_would_be_grabbed(controls: PoseControls) -> None:
     x, y = over(controls.session, "arm2.03.R")
     assert controls.handle(MOVE, VIEW, x, y) is Outcome.PASSED
     assert controls.hover is not None
-    assert controls.session.bone(controls.hover.body) == "arm2.03.R"
-    assert "arm2.03.R" in controls.told()
+    assert controls.session.bone(controls.hover) == "arm2.03.R"
+    assert "arm2.03.R" in controls.status()
     controls.handle(MOVE, VIEW, 4000.0, 4000.0)
     assert controls.hover is None
 
@@ -191,7 +191,7 @@ def test_g_grabs_without_a_button_and_lets_go_again(controls: PoseControls) -> N
     assert controls.holding
     controls.handle(Event("G"), VIEW, x, y)
     assert not controls.holding
-    assert controls.session.core.grip is None
+    assert controls.session.core.held is None
 
 
 def test_p_pins_what_is_under_the_mouse_and_frees_it_again(
@@ -243,7 +243,7 @@ def test_k_keys_the_bones_that_were_touched(octopus: Any, controls: PoseControls
     bpy.context.scene.frame_set(17)
     assert controls.handle(Event("K"), VIEW) is Outcome.TAKEN
     assert keyed(octopus) == {}
-    assert "Nothing to key" in controls.told()
+    assert "Nothing to key" in controls.status()
     drag(controls, "arm1.04.L", (-60.0, 20.0))
     controls.handle(Event("K"), VIEW)
     bones = keyed(octopus)
@@ -320,7 +320,7 @@ def test_record_writes_the_motion_of_the_drag_as_few_keys(
     scene = bpy.context.scene
     scene.frame_set(10)
     controls.handle(Event("O"), VIEW)
-    assert "Recording" in controls.told()
+    assert "Recording" in controls.status()
     x, y = over(controls.session, "arm1.04.L")
     controls.handle(Event("LEFTMOUSE"), VIEW, x, y)
     shown = {}

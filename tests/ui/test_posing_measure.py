@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.rig.puppet_reading import MATERIAL, bone_materials
-from octo_motion.core.posing.picking import Hit
 from octo_motion.core.posing.puppet.materials import joint_loads
 from octo_motion.ui.posing.controls import MEASURING, Outcome, PoseControls
 from octo_motion.ui.posing.puppet_session import PuppetSession
@@ -95,7 +94,7 @@ def test_limb_that_is_measured_is_bent_without_resistance_and_stands_as_before_a
     assert controls.session.measuring is not None
     assert np.degrees(controls.session.measuring.angle) == pytest.approx(35.0, abs=1.0)
     assert np.linalg.norm(tip(octopus) - start) > 0.1
-    assert "Measuring arm1.02.L" in controls.told()
+    assert "Measuring arm1.02.L" in controls.status()
     assert controls.handle(Event("ESC"), VIEW) is Outcome.TAKEN
     assert controls.session.measuring is None
     assert not controls.session.ended
@@ -110,7 +109,7 @@ def test_what_was_shown_with_the_mouse_is_what_the_joint_then_does(
     lead(controls, 40.0, seconds=0.4, rest=0.0)
     lead(controls, -15.0, seconds=0.1)
     controls.handle(Event("M"), VIEW)
-    assert "K_f" in controls.told()
+    assert "K_f" in controls.status()
     settings = settings_of(octopus)
     assert settings.material == "CUSTOM"
     assert settings.custom_yields
@@ -124,7 +123,7 @@ def test_what_was_shown_with_the_mouse_is_what_the_joint_then_does(
 def test_wheel_says_how_hard_the_pull_is(controls: PoseControls) -> None:
     begin(controls)
     assert controls.handle(Event("WHEELUPMOUSE"), VIEW) is Outcome.TAKEN
-    assert "pulled by 2.25 of what hangs on it" in controls.told()
+    assert "pulled by 2.25 of what hangs on it" in controls.status()
     for _ in range(20):
         controls.handle(Event("WHEELDOWNMOUSE"), VIEW)
     assert controls.session.measuring is not None
@@ -172,36 +171,36 @@ def test_drag_that_bends_nothing_is_said_and_changes_nothing(
 ) -> None:
     begin(controls)
     controls.handle(Event("M"), VIEW)
-    assert "The drag has bent nothing" in controls.told()
+    assert "The drag has bent nothing" in controls.status()
     begin(controls)
     lead(controls, 0.2)
     controls.handle(Event("RET"), VIEW)
-    assert "The drag has bent nothing" in controls.told()
+    assert "The drag has bent nothing" in controls.status()
     begin(controls)
     lead(controls, 30.0)
     lead(controls, -20.0, seconds=0.2, rest=0.0)
     controls.handle(Event("M"), VIEW)
-    assert "still moving" in controls.told()
+    assert "still moving" in controls.status()
     assert settings_of(octopus).material == "CLAY"
 
 
 def test_limb_without_a_joint_is_not_measured(controls: PoseControls) -> None:
     session = controls.session
     body = session.body("body")
-    controls.hover = Hit(body, session.core.pose.positions[body], 1.0)
+    controls.hover = body
     controls.handle(Event("M"), VIEW)
     assert session.measuring is None
-    assert "hangs on no other limb" in controls.told()
+    assert "hangs on no other limb" in controls.status()
     controls.handle(MOVE, VIEW, 4000.0, 4000.0)
     controls.handle(Event("M"), VIEW, 4000.0, 4000.0)
-    assert "Point at a limb" in controls.told()
+    assert "Point at a limb" in controls.status()
 
 
 def test_another_limb_cannot_be_dragged_meanwhile(controls: PoseControls) -> None:
     begin(controls)
     controls.handle(Event("LEFTMOUSE"), VIEW, *over(controls.session, "arm2.03.R"))
     assert not controls.holding
-    assert "Drag arm1.02.L" in controls.told()
+    assert "Drag arm1.02.L" in controls.status()
     for kind in ("G", "K", "P", "O", "R"):
         assert controls.handle(Event(kind), VIEW) is Outcome.TAKEN
     assert not controls.session.recording
@@ -211,7 +210,7 @@ def test_recording_and_measuring_do_not_mix(controls: PoseControls) -> None:
     controls.handle(Event("O"), VIEW)
     begin(controls)
     assert controls.session.measuring is None
-    assert "A recording is going on" in controls.told()
+    assert "A recording is going on" in controls.status()
 
 
 def test_another_frame_ends_measuring(controls: PoseControls) -> None:

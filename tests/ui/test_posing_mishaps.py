@@ -194,10 +194,10 @@ def test_obstacle_that_goes_wrong_on_the_way_is_told_and_posing_goes_on(
     bpy.context.scene.frame_set(1)
     bpy.context.scene.frame_set(11)
     controls.tick(TICK)
-    assert "'Box' has no size" in controls.told()
+    assert "'Box' has no size" in controls.status()
     bpy.context.scene.frame_set(1)
     controls.tick(TICK)
-    assert "'Box'" not in controls.told()
+    assert "'Box'" not in controls.status()
 
 
 # --- Keys ------------------------------------------------------------------------------------
@@ -215,7 +215,7 @@ def test_key_that_cannot_be_made_is_said_and_nothing_else_is_lost(
     octopus.animation_data.use_tweak_mode = True
     assert octopus.animation_data.use_tweak_mode
     assert controls.handle(Event("K"), VIEW) is Outcome.TAKEN
-    assert "tweak mode" in controls.said
+    assert "tweak mode" in controls.message
     controls.tick(TICK)
     # It has only gone on to come to rest.
     assert close(pose_values(octopus), bent, 0.05)
@@ -223,12 +223,14 @@ def test_key_that_cannot_be_made_is_said_and_nothing_else_is_lost(
 
 def test_nothing_keyed_says_why(controls: PoseControls) -> None:
     controls.handle(Event("K"), VIEW)
-    assert controls.said == "Nothing to key: no bone was moved"
+    assert controls.message == "Nothing to key: no bone was moved"
     drag(controls, ARM, (-60.0, 20.0), ticks=10)
     scene = bpy.context.scene
     scene.keying_sets_all.active = scene.keying_sets_all["Available"]
     controls.handle(Event("K"), VIEW)
-    assert controls.said == "Nothing keyed: by the settings of keying, no bone needs or takes a key"
+    assert (
+        controls.message == "Nothing keyed: by the settings of keying, no bone needs or takes a key"
+    )
 
 
 def test_auto_keying_that_only_replaces_keys_makes_no_others(
@@ -355,7 +357,7 @@ def test_keys_of_the_session_with_others_do_nothing(
     assert not controls.holding
     assert controls.session.measuring is None
     assert controls.session.pins() == pins
-    assert controls.said == ""
+    assert controls.message == ""
 
 
 def test_motion_is_not_recorded_into_an_action_that_adds_to_others(
@@ -369,7 +371,7 @@ def test_motion_is_not_recorded_into_an_action_that_adds_to_others(
     data.action_blend_type = "ADD"
     controls.handle(Event("O"), VIEW)
     assert not controls.session.recording
-    assert "adds to" in controls.said
+    assert "adds to" in controls.message
     data.action_blend_type = "REPLACE"
     controls.handle(Event("O"), VIEW)
     assert controls.session.recording

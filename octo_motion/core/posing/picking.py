@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rotations import Floats, conjugate, rotate
+from ..rotations import Floats, rotate
 from .puppet import Figure, Pose
 
 _TINY = 1e-12
@@ -80,11 +80,12 @@ def _nearest(ends: Floats, origin: Floats, way: Floats) -> tuple[Floats, Floats,
     return along, gap, points
 
 
-def local_point(pose: Pose, body: int, point: Floats) -> Floats:
-    """A world point (3,) in a body's own frame."""
-    return rotate(conjugate(pose.orientations[body]), point - pose.positions[body])
-
-
-def world_point(pose: Pose, body: int, point: Floats) -> Floats:
-    """A point (3,) of a body's own frame in the world."""
-    return pose.positions[body] + rotate(pose.orientations[body], point)
+def nearest_body(figure: Figure, pose: Pose, point: Floats) -> tuple[int, float]:
+    """The body nearest to a point (3,), and how far its surface is; less than 0 within."""
+    ends = capsules_in_world(figure, pose)
+    axis = ends[:, 1] - ends[:, 0]
+    along = ((point - ends[:, 0]) * axis).sum(axis=1)
+    share = np.clip(along / np.maximum((axis * axis).sum(axis=1), 1e-12), 0.0, 1.0)
+    gaps = np.linalg.norm(ends[:, 0] + share[:, None] * axis - point, axis=1) - figure.radii
+    body = int(np.argmin(gaps))
+    return body, float(gaps[body])

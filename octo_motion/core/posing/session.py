@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A session of posing: a hand that holds a puppet, in simulated time that keeps up with the clock.
+"""A session of posing: hands that hold a puppet, in simulated time.
 
-Everything here is plain numbers. Whoever has a window, a device or a script calls ``tick`` with
-the time that has passed and where the hand is.
+Everything here is plain numbers. The mouse and scripts have one hand, and call ``tick`` with the
+time that has passed and where the hand is; the process at the devices has as many as there are
+devices, keeps time by itself, and calls ``advance``.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -22,9 +23,9 @@ from ..rotations import (
     multiply,
     to_rotation_vector,
 )
-from .picking import Hit
 from .puppet import Elements, Figure, Pose, joints_of, turned_bodies
-from .solver import Coupling, Grab, Obstacle, World, WorldSettings, WorldState
+from .solver import Coupling, HandSpring, Obstacle, World, WorldSettings, WorldState
+from .step_length import StepLength
 
 COARSEST: Final = 4e-3
 """Seconds: longer steps would let a fast hand shake the puppet."""
@@ -49,12 +50,14 @@ GENTLE: Final = 0.1
 
 @dataclass(frozen=True, eq=False)
 class HandSample:
-    """Where the hand is."""
+    """Where a hand is, and how fast."""
 
     position: Floats
     """(3,) to which the grabbed point is pulled, world."""
     orientation: Floats
-    """(4,) how the hand is turned since it grabbed."""
+    """(4,) how the hand is turned, seen as when it grabbed."""
+    velocity: Floats = field(default_factory=lambda: np.zeros(6))
+    """(6,) linear and angular."""
 
 
 @dataclass(frozen=True)
@@ -72,18 +75,44 @@ class TickReport:
     """Whether nothing moves, and nothing was computed."""
 
 
-@dataclass(eq=False)
-class Grip:
-    """What the hand holds."""
+@dataclass(frozen=True, eq=False)
+class _Sweep:
+    """What a hand's target does while some steps are taken."""
 
-    body: int
-    handle: Grab
-    position: Floats
-    """(3,) where the hand is, world."""
-    turn: Floats
-    """(4,) the hand's turn since it took hold."""
-    turns: bool = False
-    """Whether the hand has turned: only then does it keep the bone from turning by itself."""
+    spring: HandSpring
+    start: Floats
+    """(3,) world."""
+    way: Floats
+    """(3,) m"""
+    turned: Floats | None
+    """(4,) at the start; None while the hand has not turned, and the bone turns freely."""
+    swing: Floats
+    """(3,) rotation vector."""
+    velocity: Floats
+    """(6,)"""
+
+    @classmethod
+    def towards(cls, spring: HandSpring, hand: HandSample, share: float, seconds: float) -> _Sweep:
+        """A share of the way to where a hand is; if not the whole one, in so many seconds."""
+        way = hand.position - spring.target_position
+        turned = spring.target_orientation
+        swing = to_rotation_vector(
+            multiply(hand.orientation, conjugate(IDENTITY if turned is None else turned))
+        )
+        if turned is None and swing.any():
+            turned = IDENTITY
+        velocity = hand.velocity
+        if share < 1.0:
+            way, swing = share * way, share * swing
+            velocity = np.concatenate([way, swing]) / seconds
+        return cls(spring, spring.target_position, way, turned, swing, velocity)
+
+    def pull(self, share: float) -> None:
+        """Move the target to a share of the way."""
+        turn = self.turned
+        if turn is not None:
+            turn = multiply(from_rotation_vector(share * self.swing), turn)
+        self.spring.pull(self.start + share * self.way, turn, self.velocity)
 
 
 def hand_for(figure: Figure, strength: float = 1.0) -> Coupling:
@@ -97,7 +126,7 @@ def hand_for(figure: Figure, strength: float = 1.0) -> Coupling:
 
 
 class Session:
-    """A figure in a world, and a hand.
+    """A figure in a world, and hands that hold it.
 
     Args:
         figure: the puppet.
@@ -117,28 +146,29 @@ class Session:
         *,
         clock: Callable[[], float] | None = time.perf_counter,
     ) -> None:
-        self.figure = figure
         self.world = World(figure, pose, settings, obstacles)
-        self.grip: Grip | None = None
-        self.hand = hand_for(figure)
-        """How firmly the next grab holds."""
+        self.coupling = hand_for(figure)
+        """How firmly the next grab holds, if it does not say so itself."""
         self.time = 0.0
         """Simulated seconds."""
+        self.changed = True
+        """Whether something may have moved since someone last set this to false."""
         self._start = self.world.pose()
         self._reference = self._start
         self._touched: set[int] = set()
-        self._nominal = settings.step
         self._clock = clock
+        self._length = StepLength(settings.step, COARSEST, BUSY, 0.4, 0.2)
         self._left = 0.0
-        self._load = 0.0
         self._ratio = 1.0
         self._calm = 0.0
-        self._firm: dict[int, bool] = {}
         self._before: list[WorldState] = []
         for body in sorted(settings.pinned):
             self.pin(body, state=True)
 
-    # --- The hand -----------------------------------------------------------------------------
+    @property
+    def figure(self) -> Figure:
+        """The puppet."""
+        return self.world.figure
 
     @property
     def pose(self) -> Pose:
@@ -146,34 +176,122 @@ class Session:
         return self.world.pose()
 
     @property
-    def pins(self) -> frozenset[int]:
-        """Bodies that are nailed to their places."""
-        return self.world.pinned
+    def resting(self) -> bool:
+        """Whether nobody holds the puppet and nothing moves."""
+        return not self.world.grabs and self._calm >= REST_TIME
 
-    def grab(self, hit: Hit) -> None:
-        """Take hold of a body at a point; what was held is let go."""
-        self.release()
-        self._before.append(self.world.state())
-        del self._before[:-MOST_STEPS_BACK]
-        handle = self.world.grab(hit.body, hit.point, IDENTITY, self.hand)
-        self.grip = Grip(hit.body, handle, np.array(hit.point, dtype=np.float64), IDENTITY.copy())
+    def wake(self) -> None:
+        """Something was changed: there is something to compute again."""
         self._calm = 0.0
+        self.changed = True
 
-    def release(self) -> None:
-        """Let go."""
-        if self.grip is not None:
-            self.world.release(self.grip.handle)
-            self.grip = None
-            self._calm = 0.0
+    # --- Hands --------------------------------------------------------------------------------
+
+    @property
+    def held(self) -> HandSpring | None:
+        """What the first hand holds: of a mouse, the only one."""
+        return next(iter(self.world.grabs), None)
+
+    def grab(
+        self,
+        body: int,
+        point: Floats,
+        orientation: Floats | None = None,
+        coupling: Coupling | None = None,
+    ) -> HandSpring:
+        """Take hold of a body with one more hand.
+
+        Args:
+            body: its index.
+            point: (3,) where, world.
+            orientation: (4,) of the hand, world, where it keeps the body from turning from the
+                start; else it does so once it has turned, and its turns count from here.
+            coupling: how firmly; as all grabs do, by default.
+        """
+        self.remember()
+        turn = IDENTITY if orientation is None else orientation
+        spring = self.world.grab(body, point, turn, coupling or self.coupling)
+        if orientation is None:
+            spring.target_orientation = None
+        self.wake()
+        return spring
+
+    def release(self, spring: HandSpring | None = None) -> None:
+        """Let one hand go, or all of them."""
+        springs = self.world.grabs if spring is None else (spring,)
+        for each in springs:
+            self.world.release(each)
+        if springs:
             self._note_touched()
+            self.wake()
 
     def held_point(self) -> Floats | None:
-        """(3,) where the point in the hand is, world."""
-        return None if self.grip is None else self.world.held_point(self.grip.handle)
+        """(3,) where the point in the first hand is, world."""
+        return None if self.held is None else self.world.held_point(self.held)
 
     def force(self) -> Floats:
-        """(3,) with which the hand pulls, newton."""
-        return np.zeros(3) if self.grip is None else self.grip.handle.wrench[:3].copy()
+        """(3,) with which the first hand pulls, newton."""
+        return np.zeros(3) if self.held is None else self.held.wrench[:3].copy()
+
+    # --- Time -----------------------------------------------------------------------------------
+
+    def tick(
+        self, seconds: float, hands: Mapping[HandSpring, HandSample] | None = None
+    ) -> TickReport:
+        """Simulate what has passed, with hands on their way to where they are now.
+
+        Args:
+            seconds: real time since the last tick.
+            hands: by what they hold; who is not there stays where it was.
+        """
+        step = self.world.settings.step
+        if self.resting:
+            self._left, self._ratio = 0.0, 1.0
+            return TickReport(0.0, 0, 1.0, step, resting=True)
+        self._left += min(max(seconds, 0.0), LONGEST_TICK)
+        count = int(self._left / step + 1e-9)
+        self._left -= count * step
+        if self._clock and self._length.load > 0.0:
+            # Slower than real time is better than a window that stands still.
+            count = min(count, max(1, int(LONGEST_WORK / (self._length.load * step))))
+        before = self._clock() if self._clock else 0.0
+        self.advance(count, hands or {})
+        if self._clock and seconds > 0.0 and count:
+            simulated = count * step
+            self._ratio += 0.1 * (min(simulated / seconds, 1.0) - self._ratio)
+            self.change(step=self._length.after(self._clock() - before, simulated, step))
+        return TickReport(count * step, count, self._ratio, self.world.settings.step, resting=False)
+
+    def advance(
+        self, count: int, hands: Mapping[HandSpring, HandSample], *, share: float = 1.0
+    ) -> None:
+        """Take some steps, with hands going evenly from where they were to where they are now.
+
+        Args:
+            count: how many.
+            hands: by what they hold.
+            share: of the way that hands go meanwhile: less than 1 where simulated time falls
+                behind, for a target that jumps would yank the puppet.
+        """
+        world, passed = self.world, count * self.world.settings.step
+        sweeps = [
+            _Sweep.towards(spring, hand, share, passed) for spring, hand in hands.items() if count
+        ]
+        for number in range(1, count + 1):
+            for sweep in sweeps:
+                sweep.pull(number / count)
+            world.step()
+        self.time += passed
+        calm = float(np.abs(world.velocities()).max(initial=0.0)) < STILL
+        self._calm = self._calm + passed if calm else 0.0
+        self.changed = True
+
+    # --- What can be changed on the way ----------------------------------------------------------
+
+    @property
+    def pins(self) -> dict[int, bool]:
+        """Bodies that are nailed to their places, and whether their orientations are as well."""
+        return self.world.pins
 
     def pin(self, body: int, *, state: bool, firm: bool = True) -> None:
         """Nail a body to where it is, or take the nail out.
@@ -184,114 +302,28 @@ class Session:
             firm: whether it keeps its orientation as well as the place of its joint.
         """
         if state:
-            self._firm[body] = firm
             self.world.pin(body, firm=firm)
         else:
-            self._firm.pop(body, None)
             self.world.unpin(body)
-        self._calm = 0.0
-
-    def _pin_again(self) -> None:
-        """Pins hold where bodies are now: they were put elsewhere."""
-        for body, firm in sorted(self._firm.items()):
-            self.world.pin(body, firm=firm)
-
-    # --- Time -----------------------------------------------------------------------------------
-
-    def tick(self, seconds: float, sample: HandSample | None = None) -> TickReport:
-        """Simulate what has passed, with the hand on its way to where it is now.
-
-        Args:
-            seconds: real time since the last tick.
-            sample: the hand; where it was, if none is given. Without a grip it does nothing.
-        """
-        step = self.world.settings.step
-        if self.grip is None and self._calm >= REST_TIME:
-            self._left, self._ratio = 0.0, 1.0
-            return TickReport(0.0, 0, 1.0, step, resting=True)
-        self._left += min(max(seconds, 0.0), LONGEST_TICK)
-        count = int(self._left / step + 1e-9)
-        self._left -= count * step
-        if self._clock and self._load > 0.0:
-            # Slower than real time is better than a window that stands still.
-            count = min(count, max(1, int(LONGEST_WORK / (self._load * step))))
-        before = self._clock() if self._clock else 0.0
-        self._run(count, sample)
-        if self._clock and seconds > 0.0:
-            self._keep_up(self._clock() - before, count * step, seconds)
-        return TickReport(count * step, count, self._ratio, self.world.settings.step, resting=False)
-
-    def _run(self, count: int, sample: HandSample | None) -> None:
-        world, grip = self.world, self.grip
-        if grip is None:
-            for _ in range(count):
-                world.step()
-        elif count:
-            start, turned = grip.position, grip.turn
-            way, swing = np.zeros(3), np.zeros(3)
-            if sample is not None:
-                way = sample.position - start
-                swing = to_rotation_vector(multiply(sample.orientation, conjugate(turned)))
-                grip.turns = grip.turns or bool(np.linalg.norm(swing) > 0.0)
-            for number in range(1, count + 1):
-                # The hand moves evenly from where it was: a tick is many steps long.
-                share = number / count
-                grip.position = start + share * way
-                grip.turn = multiply(from_rotation_vector(share * swing), turned)
-                world.pull(grip.handle, grip.position, grip.turn if grip.turns else None)
-                world.step()
-        passed = count * world.settings.step
-        self.time += passed
-        speeds = world.velocities()
-        calm = float(np.abs(speeds).max(initial=0.0)) < STILL
-        self._calm = self._calm + passed if calm else 0.0
-
-    def _keep_up(self, spent: float, simulated: float, seconds: float) -> None:
-        """Lengthen steps that take too long, shorten them when there is time again."""
-        if simulated <= 0.0:
-            return
-        self._load += 0.2 * (spent / simulated - self._load)
-        self._ratio += 0.1 * (min(simulated / seconds, 1.0) - self._ratio)
-        step = self.world.settings.step
-        if self._load > BUSY and step < COARSEST:
-            self.change(step=min(2.0 * step, COARSEST))
-            self._load *= 0.5
-        elif self._load < 0.4 * BUSY and step > self._nominal:
-            self.change(step=max(0.5 * step, self._nominal))
-            self._load *= 2.0
-
-    # --- What can be changed on the way ----------------------------------------------------------
+        self.wake()
 
     def change(self, **settings: Any) -> None:
         """Take other settings of the world (see ``WorldSettings``); motion goes on."""
-        if all(getattr(self.world.settings, name) == value for name, value in settings.items()):
-            return
-        self._rebuild(replace(self.world.settings, **settings, pinned=frozenset()))
+        before = self.world.settings
+        wanted = replace(before, **{**settings, "pinned": before.pinned})
+        if wanted != before:
+            self.world.change(wanted)
+            self.wake()
 
     def change_elements(self, elements: Elements) -> None:
         """Take joints of another material; what is bent stays bent."""
-        self.figure = replace(self.figure, elements=elements)
         self.world.set_elements(elements)
-        self._calm = 0.0
+        self.wake()
 
     def change_obstacles(self, obstacles: Sequence[Obstacle]) -> None:
         """Take other obstacles, or the same ones elsewhere."""
         self.world.obstacles = tuple(obstacles)
-        self._calm = 0.0
-
-    def _rebuild(self, settings: WorldSettings) -> None:
-        old, grip = self.world, self.grip
-        self.world = World(self.figure, old.pose(), settings, old.obstacles)
-        self._pin_again()
-        self.world.restore(old.state())
-        if grip is not None:
-            held = grip.handle
-            grip.handle = self.world.grab(
-                grip.body, old.held_point(held), held.target_orientation, held.coupling
-            )
-            grip.handle.point, grip.handle.grip = held.point, held.grip
-            grip.handle.wrench = held.wrench
-        self._calm = 0.0
+        self.wake()
 
     # --- What has come of it ---------------------------------------------------------------------
 
@@ -301,41 +333,53 @@ class Session:
         return sorted(self._touched)
 
     def adopt(self, pose: Pose) -> None:
-        """Take a pose that was given from elsewhere, at rest; the hand lets go.
+        """Take a pose that was given from elsewhere, at rest; hands let go.
 
         It is where the figure is touched from: what was bent before is there no more.
         """
         self.release()
         self._touched.clear()
+        self._before.clear()
+        old = self.world
         anchors = joints_of(self.figure.parents, pose)
         apart = np.linalg.norm(anchors - self.figure.anchors, axis=1)
         if (apart > ELSEWHERE * self.figure.lengths).any():
-            # Bones are stretched there, or moved.
-            self.figure = replace(self.figure, anchors=anchors)
-            self._rebuild(replace(self.world.settings, pinned=frozenset()))
-        self.world.set_pose(pose)
-        self._pin_again()
+            # Bones are stretched there, or moved: another figure.
+            figure = replace(self.figure, anchors=anchors)
+            self.world = World(
+                figure, pose, replace(old.settings, pinned=frozenset()), old.obstacles
+            )
+            for body, firm in old.pins.items():
+                self.world.pin(body, firm=firm)
+        self.show(pose)
         self._reference = self.world.pose()
-        self._before.clear()
-        self._calm = 0.0
+
+    def show(self, pose: Pose) -> None:
+        """Stand in a pose at rest, pins where bodies are then; hands go on holding."""
+        self.world.set_pose(pose)
+        self.world.pin_here()
+        self.wake()
 
     def restore(self) -> None:
         """Back to the pose at the start."""
         self.release()
-        self._before.append(self.world.state())
-        self.world.set_pose(self._start)
-        self._pin_again()
-        self._calm = 0.0
+        self.remember()
+        self.show(self._start)
 
     def step_back(self) -> bool:
-        """Back to before the last grab; whether there was one."""
+        """Back to before the last grab or restoring; whether there was one."""
         self.release()
         if not self._before:
             return False
         self.world.restore(self._before.pop())
-        self._pin_again()
-        self._calm = 0.0
+        self.world.pin_here()
+        self.wake()
         return True
+
+    def remember(self) -> None:
+        """Let a step back lead to how all is now."""
+        self._before.append(self.world.state())
+        del self._before[:-MOST_STEPS_BACK]
 
     def _note_touched(self) -> None:
         self._touched |= set(turned_bodies(self.figure, self._reference, self.pose, TOUCHED))

@@ -90,8 +90,9 @@ class PoseControls:
 
     def __init__(self, session: PuppetSession) -> None:
         self.session = session
-        self.hover: Hit | None = None
-        self.said = ""
+        self.hover: int | None = None
+        """The body under the mouse."""
+        self.message = ""
         """The last thing worth telling."""
         self.hand: Floats | None = None
         """(3,) where the hand is while it holds, world."""
@@ -115,7 +116,7 @@ class PoseControls:
         if self.session.measuring is not None:
             self.session.tick(seconds, self.hand)
             return
-        if self.hand is not None and self.session.core.grip is None:
+        if self.hand is not None and self.session.held is None:
             # A change of frame has taken the puppet out of the hand.
             self._lose()
         self.session.tick(seconds, self.hand, self._turn)
@@ -160,39 +161,38 @@ class PoseControls:
         if kind == "LEFTMOUSE":
             hit = self._look(view, x, y)
             if hit is None or not measuring.takes(hit.body):
-                self.said = f"Drag {session.bone(measuring.body)}, which is measured"
+                self.message = f"Drag {session.bone(measuring.body)}, which is measured"
                 return Outcome.TAKEN
             measuring.grab(hit.point)
             self.hand, self._pixel = hit.point / session.unit, (x, y)
         elif kind in {"ESC", "RIGHTMOUSE"}:
             self.hand = None
             session.drop_measure()
-            self.said = "Not measured"
+            self.message = "Not measured"
         elif kind in {"M", "RET", "NUMPAD_ENTER"}:
             self.hand = None
             measuring.release()
             try:
-                self.said = session.take_measure(bone_only=kind == "M" and event.shift)
+                self.message = session.take_measure(bone_only=kind == "M" and event.shift)
             except OctoMotionError as error:
                 # Another drag may put it right.
                 session.drop_measure()
-                self.said = str(error)
+                self.message = str(error)
         elif kind not in _OWN:
             return Outcome.PASSED
         return Outcome.TAKEN
 
     def _measure(self) -> None:
-        grip = self.session.core.grip
-        body = grip.body if grip is not None else self.hover.body if self.hover else None
+        body = self._pointed_at()
         if body is None:
-            self.said = "Point at a limb to measure its joint"
+            self.message = "Point at a limb to measure its joint"
             return
         self._lose()
         try:
             self.session.measure(body)
-            self.said = ""
+            self.message = ""
         except OctoMotionError as error:
-            self.said = str(error)
+            self.message = str(error)
 
     def _press(self, event: Any, view: EyeOn, x: float, y: float) -> Outcome:
         kind = event.type
@@ -239,10 +239,10 @@ class PoseControls:
                 self._turning = True
             else:
                 session.restore()
-                self.said = "As at the start"
+                self.message = "As at the start"
         elif kind == "Z" and _modified(event) and not event.alt and not event.shift:
             self._lose()
-            self.said = "Back" if session.step_back() else "Nothing to take back"
+            self.message = "Back" if session.step_back() else "Nothing to take back"
         else:
             return Outcome.PASSED
         return Outcome.TAKEN
@@ -253,12 +253,12 @@ class PoseControls:
         hit = self._look(view, x, y)
         if hit is None:
             return Outcome.PASSED
-        self.session.grab(hit)
+        self.session.grab(hit.body, hit.point)
         self.hand = hit.point / self.session.unit
         self._turn = IDENTITY.copy()
         self._pixel = x, y
         self._turning = False
-        self.said = ""
+        self.message = ""
         return Outcome.TAKEN
 
     def _lose(self) -> None:
@@ -276,13 +276,19 @@ class PoseControls:
         else:
             self.session.step_back()
 
+    def _pointed_at(self) -> int | None:
+        """The body that the hand holds, or else the one under the mouse."""
+        held = self.session.held
+        return self.hover if held is None else held.body
+
     def _look(self, view: EyeOn, x: float, y: float) -> Hit | None:
         origin, way = view.ray(x, y)
         return self.session.pick(origin, way, margin=MARGIN)
 
     def _move(self, view: EyeOn, x: float, y: float, *, fine: bool) -> None:
         if not self.holding or self._pixel is None:
-            self.hover = self._look(view, x, y)
+            hit = self._look(view, x, y)
+            self.hover = None if hit is None else hit.body
             return
         assert self.hand is not None
         (old_x, old_y), self._pixel = self._pixel, (x, y)
@@ -311,52 +317,45 @@ class PoseControls:
         if event.ctrl:
             self._turn = multiply(from_axis_angle(towards, share * TURN_STEP), self._turn)
         else:
-            size = float(np.ptp(self.session.capsules()[0].reshape(-1, 3), axis=0).max())
-            self.hand = self.hand - share * DEPTH_STEP * size * towards
+            self.hand = self.hand - share * DEPTH_STEP * self.session.size * towards
         return Outcome.TAKEN
 
     def _pin(self) -> None:
-        grip = self.session.core.grip
-        body = grip.body if grip is not None else self.hover.body if self.hover else None
+        body = self._pointed_at()
         if body is None:
-            self.said = "Point at a limb to pin it"
+            self.message = "Point at a limb to pin it"
             return
-        pinned = self.session.toggle_pin(body)
-        self.said = f"{self.session.bone(body)} {'pinned' if pinned else 'free again'}"
+        self.message = self.session.toggle_pin(body)
 
     def _record(self) -> None:
-        if self.session.recording:
-            try:
-                bones, count = self.session.stop_record()
-            except OctoMotionError as error:
-                self.said = str(error)
-                return
-            self.said = f"Recorded {_counted(bones, 'bone')} on {_counted(count, 'key frame')}"
-            return
         try:
-            self.session.record()
-            self.said = "Recording while the frames go by: play, and drag"
+            if self.session.recording:
+                bones, count = map(_counted, self.session.stop_record(), ("bone", "key frame"))
+                self.message = f"Recorded {bones} on {count}"
+            else:
+                self.session.record()
+                self.message = "Recording while the frames go by: play, and drag"
         except OctoMotionError as error:
-            self.said = str(error)
+            self.message = str(error)
 
     def _say_keys(self, key: Callable[[], list[str]], *, quiet: bool = False) -> None:
         try:
             names = key()
         except OctoMotionError as error:
             # Nothing was keyed, and nothing else is lost.
-            self.said = str(error)
+            self.message = str(error)
             return
         if names:
             frame = self.session.scene().frame_current
-            self.said = f"Keyed {_counted(len(names), 'bone')} at frame {frame}"
+            self.message = f"Keyed {_counted(len(names), 'bone')} at frame {frame}"
         elif quiet:
             return
         elif self.session.core.touched():
-            self.said = "Nothing keyed: by the settings of keying, no bone needs or takes a key"
+            self.message = "Nothing keyed: by the settings of keying, no bone needs or takes a key"
         else:
-            self.said = "Nothing to key: no bone was moved"
+            self.message = "Nothing to key: no bone was moved"
 
-    def told(self) -> str:
+    def status(self) -> str:
         """One line about the session, for the header."""
         session = self.session
         parts = [f"Posing {session.puppet.name}"]
@@ -368,17 +367,17 @@ class PoseControls:
                 f"Measuring {bone}: pulled by {measuring.pull:.2f} of what hangs on it,"
                 f" {step} {angle:.0f}°"
             )
-        elif self.holding and session.core.grip is not None:
-            bone = session.bone(session.core.grip.body)
+        elif self.holding and session.held is not None:
+            bone = session.bone(session.held.body)
             parts.append(f"{bone}: pulled by {session.pull():.2f} of the figure's weight")
         elif self.hover is not None:
-            parts.append(session.bone(self.hover.body))
+            parts.append(session.bone(self.hover))
         if session.recording:
             parts.append("● Recording")
-        told = session.told
-        if told is not None and not told.resting and told.ratio < SLOW:
-            parts.append(f"slower than real time: {100.0 * told.ratio:.0f} %")
-        parts += [each for each in (self.said, session.warning) if each]
+        report = session.report
+        if report is not None and not report.resting and report.ratio < SLOW:
+            parts.append(f"slower than real time: {100.0 * report.ratio:.0f} %")
+        parts += [each for each in (self.message, session.warning) if each]
         return "    ".join(parts)
 
 

@@ -86,7 +86,7 @@ def draw_calibration(layout: Any, hands: DeviceHands, number: int, device: Devic
     if learning is None:
         row = layout.row(align=True)
         button(row, "BEGIN", text="Calibrate")
-        if device.identity in hands.calibrations:
+        if device.identity in hands.calibrations.learned:
             button(row, "RESET", text="", icon="LOOP_BACK")
         return
     column = layout.column(align=True)

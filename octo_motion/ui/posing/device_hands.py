@@ -12,19 +12,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...blender.files import load_calibrations, save_calibrations
-from ...core.errors import SettingsError, WriteError
-from ...core.posing.picking import Hit
 from ...core.posing.puppet import Pose
-from ...core.posing.session import MOST_STEPS_BACK
 from ...core.posing.solver import Obstacle
 from ...core.rotations import Floats, from_matrix
-from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
 from ...device.ipc import (
     Button,
     Buzz,
-    CalibrationMessage,
     Client,
     ClientState,
     DeviceMessage,
@@ -36,6 +30,7 @@ from ...device.ipc import (
     WorldMessage,
 )
 from ...device.ipc import Settings as DeviceSettings
+from .device_calibrations import Calibrations
 from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25
@@ -47,6 +42,7 @@ RATE_WIDTH: Final = 1.0
 _ANSWER: Final = 0.4
 """s after which a grab that holds nothing has found nothing."""
 NOTHING_NEAR: Final = "No limb is near enough to grab"
+HOLD_TO_PIN: Final = "Hold a limb to pin it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,25 +84,21 @@ class DeviceHands:
     def __init__(self, session: PuppetSession, client: Client, settings: DeviceSettings) -> None:
         self.session = session
         self.client = client
-        self.hover: Hit | None = None
+        self.hover: int | None = None
         """The limb that is held, for the overlay."""
         self.hand: Floats | None = None
-        self.said = ""
+        self.message = ""
         self._asked: float | None = None
-        self._start = session.core.pose
         self._figure: Any = None
         self._world: Any = None
         self._obstacles: tuple[Obstacle, ...] = ()
         self._pins: dict[int, bool] = {}
         self._settings: DeviceSettings | None = None
         self._spaces: dict[int, Workspace] = {}
-        self._ours: Pose = self._start
-        self._before: list[Pose] = []
+        self._ours: Pose = session.core.pose
         self._held: set[int] = set()
-        self.calibrations = load_calibrations()
-        """By a device's identity: what was learned of it, on this computer."""
-        self._corrected: dict[int, str] = {}
-        self._tell(settings)
+        self.calibrations = Calibrations(client)
+        self._send_changes(settings)
 
     def restart(self) -> None:
         """Start the bridge again, and tell it all that the one before it knew.
@@ -115,13 +107,14 @@ class DeviceHands:
             DeviceError: it cannot be started; pose and keys are as they were.
         """
         self.client.restart()
-        told, self._settings = self._settings, None
-        self._world, self._obstacles, self._corrected = None, (), {}
+        settings, self._settings = self._settings, None
+        self._world, self._obstacles = None, ()
+        self.calibrations.forget_sent()
         self._held.clear()
         self._asked = None
         self.recentre()
-        if told is not None:
-            self._tell(told)
+        if settings is not None:
+            self._send_changes(settings)
 
     # --- What is there --------------------------------------------------------------------------
 
@@ -158,7 +151,7 @@ class DeviceHands:
         """Grab with the first device what is near, or let go."""
         number = min(self.client.pointers, default=None)
         if number is None:
-            self.said = "No device is there"
+            self.message = "No device is there"
             return
         held = self.client.pointers[number].body >= 0
         self.client.send(Grab(number, grab=not held))
@@ -167,34 +160,26 @@ class DeviceHands:
 
     def pin(self) -> None:
         """Pin what is held, or take the pin out."""
-        body = self.hover.body if self.hover else None
-        if body is None:
-            self.said = "Hold a limb to pin it"
-            return
-        pinned = self.session.toggle_pin(body)
-        self.said = f"{self.session.bone(body)} {'pinned' if pinned else 'free again'}"
+        held = self.hover
+        self.message = HOLD_TO_PIN if held is None else self.session.toggle_pin(held)
 
     def restore(self) -> None:
         """Back to the pose at the start; hands let go."""
-        self._remember(self.session.core.pose)
-        self._put(self._start)
+        self.session.restore()
+        self._let_go()
 
     def step_back(self) -> bool:
         """Back to before the last grab or restoring, hands let go; whether there was one."""
-        if not self._before:
-            return False
-        self._put(self._before.pop())
-        return True
+        done = self.session.step_back()
+        if done:
+            self._let_go()
+        return done
 
-    def _put(self, pose: Pose) -> None:
-        self.session.core.world.set_pose(pose)
+    def _let_go(self) -> None:
+        """The session has taken the puppet out of the hands."""
         self._give(self.session.core.pose)
-        # A hand that still holds is told to let go: that is no grab of its own.
+        # A hand that still holds will let go: that is no grab of its own.
         self._held = set(self.client.pointers)
-
-    def _remember(self, pose: Pose) -> None:
-        self._before.append(pose)
-        del self._before[:-MOST_STEPS_BACK]
 
     def test(self, number: int) -> None:
         """Let a device push gently each way."""
@@ -207,12 +192,12 @@ class DeviceHands:
     def begin_calibration(self, number: int) -> None:
         """Begin to learn a device's zero and range."""
         self.client.calibrate(number, Order.BEGIN)
-        self.said = f"Calibrating: {self.client.devices[number].name}"
+        self.message = f"Calibrating: {self.client.devices[number].name}"
 
     def end_calibration(self, number: int, *, keep: bool) -> None:
         """Use what was learned, or go on as before."""
         self.client.calibrate(number, Order.FINISH if keep else Order.CANCEL)
-        self.said = ""
+        self.message = ""
 
     def reset_calibration(self, number: int) -> None:
         """Forget what was learned of a device.
@@ -221,16 +206,9 @@ class DeviceHands:
             SettingsError: nothing was.
             WriteError: the file of calibrations cannot be written.
         """
-        identity = self.client.devices[number].identity
-        if identity not in self.calibrations:
-            raise SettingsError("This device was not calibrated.", "It is as its maker says.")
-        kept = self._all_calibrations()
-        left = {name: each for name, each in kept.items() if name != identity}
-        save_calibrations(left)
-        self.calibrations = left
-        self.client.send(CalibrationMessage.of(number, NONE))
+        self.calibrations.reset(number)
         self._fit(number, self.client.devices[number])
-        self.said = "As its maker says"
+        self.message = "As its maker says"
 
     # --- Time -----------------------------------------------------------------------------------
 
@@ -252,13 +230,12 @@ class DeviceHands:
         self._note_grabs()
         if not _same(core.pose, self._ours):
             # A change of frame, or a script, has posed the armature: that counts.
-            self._before.clear()
             self._give(core.pose)
         elif self.client.pose is not None and self.client.steps > 0:
-            core.world.set_pose(self.client.pose)
+            core.show(self.client.pose)
             self._ours = core.pose
         self.session.tick(0.0)
-        self._tell(settings)
+        self._send_changes(settings)
         self._correct()
         if room is not None:
             self._place(room)
@@ -267,14 +244,14 @@ class DeviceHands:
             self._asked = time.monotonic()
         if self.holding:
             self._asked = None
-            self.said = "" if self.said == NOTHING_NEAR else self.said
+            self.message = "" if self.message == NOTHING_NEAR else self.message
         elif self._asked is not None and time.monotonic() - self._asked > _ANSWER:
             self._asked = None
-            self.said = NOTHING_NEAR
+            self.message = NOTHING_NEAR
         return buttons
 
     def notices(self) -> list[Notice]:
-        """What the user should be told, each once."""
+        """What is to be shown to the user, each once."""
         notices, self.client.notices = self.client.notices, []
         return notices
 
@@ -282,54 +259,31 @@ class DeviceHands:
         """Before the first pose that follows from a grab: that is what a step back leads to."""
         held = {number for number, each in self.client.pointers.items() if each.body >= 0}
         if held - self._held:
-            self._remember(self._ours)
+            self.session.core.remember()
         self._held = held
 
     def _correct(self) -> None:
         """Tell devices their own zero and range, and keep what was learned."""
-        client = self.client
-        for number, learned in client.calibrated.items():
-            device = client.devices.get(number)
-            if device is not None:
-                self._keep(device, learned.calibration())
-                self._fit(number, device)
-        client.calibrated.clear()
-        present = {number: device.identity for number, device in client.devices.items()}
-        for number, identity in present.items():
-            if self._corrected.get(number) != identity:
-                # Also where none was learned: another device may have had its number.
-                wanted = self.calibrations.get(identity, NONE)
-                client.send(CalibrationMessage.of(number, wanted))
-        self._corrected = present
+        for number, device in self.calibrations.keep_learned():
+            self.message = f"Calibrated: {device.name}"
+            self._fit(number, device)
+        self.calibrations.send()
 
     def _fit(self, number: int, device: DeviceMessage) -> None:
         """Lay the room of a device anew, whose own is another one now."""
         if device.kind == Kind.POSE:
             self._spaces.pop(number, None)
 
-    def _keep(self, device: DeviceMessage, calibration: Calibration) -> None:
-        self.calibrations = {**self._all_calibrations(), device.identity: calibration}
-        self.said = f"Calibrated: {device.name}"
-        try:
-            save_calibrations(self.calibrations)
-        except WriteError as error:
-            # It holds for now all the same.
-            self.client.notices.append(Notice(error.problem, error.remedy))
-
-    def _all_calibrations(self) -> dict[str, Calibration]:
-        """Those known here, and what another Blender may have learned since they were read."""
-        return {**self.calibrations, **load_calibrations()}
-
     def _look_at_held(self) -> None:
         held = [each.body for each in self.client.pointers.values() if each.body >= 0]
-        self.hover = Hit(held[0], np.zeros(3), 0.0) if held else None
+        self.hover = held[0] if held else None
 
     def _give(self, pose: Pose) -> None:
         self._ours = pose
         self.client.send_pose(pose)
         self.client.steps = 0
 
-    def _tell(self, settings: DeviceSettings) -> None:
+    def _send_changes(self, settings: DeviceSettings) -> None:
         session = self.session
         world = session.core.world
         wanted = WorldMessage(
@@ -342,7 +296,7 @@ class DeviceHands:
             self._world = wanted
             self.client.send(wanted)
         if world.obstacles != self._obstacles:
-            self._tell_obstacles(world.obstacles)
+            self._send_obstacles(world.obstacles)
         if session.figure is not self._figure:
             # Another material: the puppet is another one, in the pose that it has.
             self._figure = session.figure
@@ -356,9 +310,9 @@ class DeviceHands:
             self._settings = settings
             self.client.send(settings)
 
-    def _tell_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def _send_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
         for number, obstacle in enumerate(obstacles):
-            # All of them are read anew at each frame; what has not moved need not be told again.
+            # All of them are read anew at each frame; what has not moved need not be sent again.
             if number >= len(self._obstacles) or not _alike(obstacle, self._obstacles[number]):
                 self.client.send_obstacle(number, obstacle)
         for number in range(len(obstacles), len(self._obstacles)):
@@ -388,7 +342,7 @@ class DeviceHands:
             if rate and before is not None:
                 # A space mouse has its pointer where it was pushed to, whatever the view does.
                 middle = np.array(before.origin)
-            learned = self.calibrations.get(device.identity)
+            learned = self.calibrations.learned.get(device.identity)
             own = RATE_WIDTH if rate else max(learned.width, _NARROWEST) if learned else _WIDTH
             scale = room.width * unit / own
             a, b, c = (float(each) for each in middle)

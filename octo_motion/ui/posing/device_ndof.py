@@ -13,12 +13,11 @@ from typing import Final
 import numpy as np
 
 from ...blender.versions import ndof_sensitivities
-from ...core.posing.picking import Hit
+from ...core.posing.picking import nearest_body
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
 from ...device.ipc import Button, Client, Notice
 from ...device.ipc import Settings as DeviceSettings
-from ...device.simulation import nearest_body
-from .device_hands import NOTHING_NEAR, RATE_WIDTH, Room, Shown
+from .device_hands import HOLD_TO_PIN, NOTHING_NEAR, RATE_WIDTH, Room, Shown
 from .puppet_session import PuppetSession
 
 NAME: Final = "Space mouse, through Blender"
@@ -42,9 +41,9 @@ class NdofHands:
         self.session = session
         self.client = Client()
         """Off: there is no bridge."""
-        self.hover: Hit | None = None
+        self.hover: int | None = None
         self.hand: Floats | None = None
-        self.said = ""
+        self.message = ""
         self.position: Floats | None = None
         """(3,) of the pointer, world; none before the first push."""
         self._turn = IDENTITY.copy()
@@ -57,15 +56,15 @@ class NdofHands:
     @property
     def holding(self) -> bool:
         """Whether the pointer holds a limb."""
-        return self.session.core.grip is not None
+        return self.session.held is not None
 
     def shown(self) -> list[Shown]:
         """The pointer."""
         if self.position is None:
             return []
-        grip, held = self.session.core.grip, self.session.held_point()
-        body = -1 if grip is None else grip.body
-        place = self.position if held is None else held
+        held, point = self.session.held, self.session.held_point()
+        body = -1 if held is None else held.body
+        place = self.position if point is None else point
         return [Shown(0, self.position, place, body, min(1.0, self.session.pull()), NAME)]
 
     def move(
@@ -105,25 +104,21 @@ class NdofHands:
             self.session.release()
             return
         if self.position is None:
-            self.said = "Push the space mouse first"
+            self.message = "Push the space mouse first"
             return
         point = self.position * self.session.unit
         body, gap = nearest_body(self.session.figure, self.session.core.pose, point)
         if gap > self._reach:
-            self.said = NOTHING_NEAR
+            self.message = NOTHING_NEAR
             return
-        self.said = ""
+        self.message = ""
         self._turn = IDENTITY.copy()
-        self.session.grab(Hit(body, point, 0.0))
+        self.session.grab(body, point)
 
     def pin(self) -> None:
         """Pin what is held, or take the pin out."""
-        grip = self.session.core.grip
-        if grip is None:
-            self.said = "Hold a limb to pin it"
-            return
-        pinned = self.session.toggle_pin(grip.body)
-        self.said = f"{self.session.bone(grip.body)} {'pinned' if pinned else 'free again'}"
+        held = self.session.held
+        self.message = HOLD_TO_PIN if held is None else self.session.toggle_pin(held.body)
 
     def restore(self) -> None:
         """Back to the pose at the start; the pointer lets go."""
@@ -145,12 +140,12 @@ class NdofHands:
         now = self._clock()
         seconds, self._last = now - self._last, now
         self._reach = settings.reach
-        grip = self.session.core.grip
-        if grip is None or self.position is None:
+        held = self.session.held
+        if held is None or self.position is None:
             self.session.tick(seconds)
         else:
             self.session.tick(seconds, self.position, self._turn)
-        self.hover = None if grip is None else Hit(grip.body, np.zeros(3), 0.0)
+        self.hover = None if held is None else held.body
         return []
 
     def notices(self) -> list[Notice]:

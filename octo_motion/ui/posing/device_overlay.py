@@ -22,8 +22,7 @@ _SIZE: Final = 0.03
 def device_lines(hands: DeviceHands | NdofHands, eye: Floats, *, loads: bool = True) -> Lines:
     """All lines of a session with devices, in the world; as ``overlay_lines``."""
     found = overlay_lines(hands, eye, loads=loads)  # type: ignore[arg-type]
-    ends, _ = hands.session.capsules()
-    size = _SIZE * float(np.ptp(ends.reshape(-1, 3), axis=0).max())
+    size = _SIZE * hands.session.size
     for each in hands.shown():
         cross = np.stack([each.position - size * np.eye(3), each.position + size * np.eye(3)], 1)
         colour = _FREE if each.body < 0 else _HOLDING

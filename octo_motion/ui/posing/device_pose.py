@@ -134,7 +134,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         client = start_bridge(settings)
         self._size = session.size * session.unit
         try:
-            self._hands = DeviceHands(session, client, self._told(settings))
+            self._hands = DeviceHands(session, client, self._device_settings(settings))
         except BaseException:
             client.stop()
             raise
@@ -158,16 +158,16 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             _going_on.remove(hands)
             hands.stop()
 
-    def _told(self, settings: Any) -> Any:
+    def _device_settings(self, settings: Any) -> Any:
         assert self._session is not None
         return message(settings, self._size)
 
     def _tick(self, context: bpy.types.Context, hands: Hands) -> None:
         settings = device_settings(context.window_manager)
         was_holding = hands.holding
-        told = self._told(settings)
-        for button in hands.tick(told, room_of(context, settings.scale, hands.session)):
-            if button.pressed and button.button == told.key_button:
+        now = self._device_settings(settings)
+        for button in hands.tick(now, room_of(context, settings.scale, hands.session)):
+            if button.pressed and button.button == now.key_button:
                 self._key(hands, all_bones=False)
         if was_holding and not hands.holding:
             self._let_go(context, hands)
@@ -184,7 +184,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
     def _key(hands: Hands, *, all_bones: bool) -> None:
         names = hands.session.key(all_bones=all_bones)
         frame = hands.session.scene().frame_current
-        hands.said = f"Keyed {len(names)} bones at frame {frame}" if names else "Nothing to key"
+        hands.message = f"Keyed {len(names)} bones at frame {frame}" if names else "Nothing to key"
 
     def _push(self, context: bpy.types.Context, hands: Hands, event: Any) -> Outcome:
         """Blender has a space mouse itself: without a force device, that one poses."""
@@ -198,14 +198,14 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             assert self._session is not None
             hands = self.replace(hands, NdofHands(self._session))
         settings = device_settings(context.window_manager)
-        told = self._told(settings)
+        now = self._device_settings(settings)
         if event.type == "NDOF_MOTION":
             room = room_of(context, settings.scale, hands.session)
             motion = event.ndof_motion
             if room is not None and motion is not None:
-                hands.move(*(motion.translation, motion.rotation, motion.time_delta, room, told))
+                hands.move(*(motion.translation, motion.rotation, motion.time_delta, room, now))
         elif event.type in GRAB_BUTTONS:
-            if event.value == "PRESS" or (not told.toggle and hands.holding):
+            if event.value == "PRESS" or (not now.toggle and hands.holding):
                 hands.grab()
                 if not hands.holding:
                     self._let_go(context, hands)
@@ -242,9 +242,9 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
                 self._record(hands)
             case "R":
                 hands.restore()
-                hands.said = "As at the start"
+                hands.message = "As at the start"
             case "Z":
-                hands.said = "Back" if hands.step_back() else "Nothing to take back"
+                hands.message = "Back" if hands.step_back() else "Nothing to take back"
             case "HOME":
                 hands.recentre()
             case _ if isinstance(hands, DeviceHands):
@@ -261,16 +261,16 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             # The session goes on without: what was posed and keyed must not be lost for that.
             hands.client.notices.append(Notice(error.problem, error.remedy))
             return
-        hands.said = "Started again"
+        hands.message = "Started again"
 
     @staticmethod
     def _record(hands: Hands) -> None:
         if hands.session.recording:
             bones, count = hands.session.stop_record()
-            hands.said = f"Recorded {bones} bones on {count} key frames"
+            hands.message = f"Recorded {bones} bones on {count} key frames"
         else:
             hands.session.record()
-            hands.said = "Recording while the frames go by: play, and drag"
+            hands.message = "Recording while the frames go by: play, and drag"
 
 
 def _is_undo(event: Any) -> bool:
@@ -296,8 +296,8 @@ def line(hands: Hands) -> str:
         parts.append(f"{each.name}: {what}")
     if hands.session.recording:
         parts.append("● Recording")
-    if hands.said:
-        parts.append(hands.said)
+    if hands.message:
+        parts.append(hands.message)
     return "    ".join(parts)
 
 

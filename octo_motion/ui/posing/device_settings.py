@@ -74,7 +74,7 @@ def device_settings(window_manager: bpy.types.WindowManager) -> Any:
 
 
 def message(settings: Any, size: float) -> Settings:
-    """What the bridge is told of them.
+    """What the bridge hears of them.
 
     Args:
         settings: the property group.

@@ -44,17 +44,17 @@ def overlay_lines(controls: PoseControls, eye: Floats, *, loads: bool = True) ->
         )
         each = np.repeat(colours, 2 * lines.shape[1], axis=0)
         found.append((lines.reshape(-1, 3), each, 1.0))
-    grip = session.core.grip
-    if grip is not None:
-        found.append(_one_colour(lines[grip.body], _HELD, 2.0))
+    held = session.held
+    if held is not None:
+        found.append(_one_colour(lines[held.body], _HELD, 2.0))
         point = session.held_point()
         if point is not None and controls.hand is not None:
             found.append(_one_colour(arrow_lines(point, controls.hand, eye), _ARROW, 3.0))
     elif controls.hover is not None:
-        found.append(_one_colour(lines[controls.hover.body], _HOVERED, 2.0))
+        found.append(_one_colour(lines[controls.hover], _HOVERED, 2.0))
     pins = session.pins()
     if pins:
-        size = 0.012 * float(np.ptp(ends.reshape(-1, 3), axis=0).max())
+        size = 0.012 * session.size
         joints = session.core.pose.positions[pins] / session.unit
         found.append(_one_colour(pin_lines(joints, size), _PIN, 2.0))
     return found

@@ -138,7 +138,7 @@ class Player:
             self._tick()
 
     def _held(self) -> None:
-        if self._session.core.grip is None:
+        if self._session.held is None:
             self._hand = None
 
 

@@ -44,7 +44,7 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
         if driven:
             self.report({"WARNING"}, f"Constraints or drivers move {driven} of its bones")
         self._last = time.perf_counter()
-        tell(context, self._controls.told(), self._controls.help)
+        tell(context, self._controls.status(), self._controls.help)
         return Overlay(self._controls)
 
     def turn(self, context: bpy.types.Context, event: bpy.types.Event) -> Outcome:
@@ -55,12 +55,12 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
         now = time.perf_counter()
         controls.tick(now - self._last)
         self._last = now
-        state = controls.session.told
-        shown = controls.told(), controls.hover and controls.hover.body
+        report = controls.session.report
+        shown = controls.status(), controls.hover
         # A puppet at rest lets Blender rest.
-        if shown != self._shown or state is None or not state.resting:
+        if shown != self._shown or report is None or not report.resting:
             self._shown = shown
-            tell(context, controls.told(), controls.help)
+            tell(context, controls.status(), controls.help)
         return Outcome.PASSED
 
     def put_down(self) -> None:

@@ -9,88 +9,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
-from typing import Any, Final
+from typing import Any
 
 import bpy
-import numpy as np
 
 from ...blender.animation import (
     Keyed,
     PoseKeys,
-    PoseValues,
     pose_values,
     restore_pose,
     writable_armature,
 )
-from ...blender.rig import Puppet, bone_materials, is_part_of, read_rig
-from ...blender.scene import read_obstacle
 from ...core.errors import OctoMotionError, RigError, SettingsError
-from ...core.posing.picking import Hit, capsules_in_world, pick
-from ...core.posing.puppet import Figure, Material, Pose, elements_for, joint_loads, turned_bodies
-from ...core.posing.session import TOUCHED, HandSample, Session, TickReport, hand_for
-from ...core.posing.solver import Obstacle, OneThread, Plane, WorldSettings
+from ...core.posing.session import HandSample, TickReport
+from ...core.posing.solver import HandSpring, OneThread
 from ...core.rotations import IDENTITY, Floats
-from .custom_material import (
-    chosen_material,
-    coefficients,
-    keep_material,
-    kept_before,
-    measured_joint,
-)
-from .measuring_hand import MeasuringHand
-from .properties import marked_obstacles, posing_settings
-
-GRAVITY: Final = (0.0, 0.0, -9.81)
-_CALMING: Final = 3.0
-"""1/s: how fast a free puppet without weight comes to rest."""
-_LOCATION_SHARE: Final = 0.002
-"""Of the figure's size: how far a recorded location's keys may be off."""
-
-
-@dataclass(frozen=True)
-class _Shown:
-    """The settings that may be changed in the panel while the session goes on."""
-
-    material: str
-    strength: float
-    custom_yields: bool
-    custom_bears: float
-    custom_springs: float
-    custom_settles: float
-    custom_gives: float
-    root: str
-    gravity: bool
-    floor: bool
-    floor_height: float
-    use_obstacles: bool
-    self_collision: bool
-    friction: float
-
-    @classmethod
-    def of(cls, settings: Any) -> _Shown:
-        return cls(**{each.name: getattr(settings, each.name) for each in fields(cls)})
-
-    @property
-    def joints(self) -> tuple[Any, float]:
-        """What decides on the joints."""
-        return chosen_material(self), self.strength
-
-    @property
-    def ground(self) -> tuple[bool, float, bool]:
-        """What decides on obstacles."""
-        return self.floor, self.floor_height, self.use_obstacles
-
-
-@dataclass(frozen=True, eq=False)
-class _Moment:
-    """One frame of a recording."""
-
-    pose: Pose
-    rotations: Floats
-    """(bodies, 4) of the bones, from rest."""
-    locations: Floats
-    """(bodies, 3)"""
+from .posed_puppet import PosedPuppet
+from .properties import posing_settings
+from .recording import Recording
 
 
 @contextmanager
@@ -117,7 +53,7 @@ def active_session() -> PuppetSession | None:
     return _active[0] if _active else None
 
 
-class PuppetSession:
+class PuppetSession(PosedPuppet):
     """An armature in a hand, from start to end.
 
     Args:
@@ -143,156 +79,42 @@ class PuppetSession:
                 "End that session first, with Enter or Esc over its viewport.",
             )
         writable_armature(armature)
+        super().__init__(armature, scene, clock)
         settings: Any = posing_settings(armature)
-        self.puppet = Puppet(armature, read_rig(armature, smallest=settings.smallest))
         self.keys = PoseKeys(armature, settings.keys_to, settings.action)
-        self._scene = scene.session_uid
-        self._shown = _Shown.of(settings)
-        self._materials = self._bone_materials(armature)
-        self._measured: list[Callable[[bpy.types.Object], None]] = []
-        self.measuring: MeasuringHand | None = None
-        figure = replace(self.puppet.figure, elements=self._elements(self.puppet.figure))
-        self.core = Session(
-            figure,
-            self.puppet.rig.pose,
-            self._world_settings(),
-            self._obstacles(),
-            clock=clock,
-        )
-        self.core.hand = hand_for(figure, settings.strength)
-        self._weights = joint_loads(figure)
-        self._hold_root()
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
-        self._recorded: dict[float, _Moment] | None = None
-        self._own: PoseValues = {}
-        """Of the bones, when a recording was begun."""
+        self._recording: Recording | None = None
         self._down = False
-        self.told: TickReport | None = None
-        self.warning = ""
-        """What is wrong with the scene, and keeps nobody from posing."""
+        self.report: TickReport | None = None
         self._trouble: OctoMotionError | None = None
         self._one_thread = OneThread()
         for called, handler in self._handlers():
             called.append(handler)
         _active.append(self)
 
-    # --- What is there --------------------------------------------------------------------------
-
-    @property
-    def unit(self) -> float:
-        """Puppet metres of one unit of the world."""
-        return self.puppet.rig.unit
-
-    @property
-    def figure(self) -> Figure:
-        """The puppet."""
-        return self.core.figure
-
-    @property
-    def shown_pose(self) -> Pose:
-        """Where the bodies are, with the joint bent that is being measured."""
-        return self.core.pose if self.measuring is None else self.measuring.pose()
-
-    def scene(self) -> bpy.types.Scene:
-        """The scene of the session.
-
-        Raises:
-            RigError: it is gone.
-        """
-        found = next((each for each in bpy.data.scenes if each.session_uid == self._scene), None)
-        if found is None:
-            raise RigError("The scene of the session is gone.", "Start posing again.")
-        return found
-
-    def bone(self, body: int) -> str:
-        """The bone of a body."""
-        return self.figure.names[body]
-
-    def body(self, bone: str) -> int:
-        """The body of a bone, or the one that a helper bone follows.
-
-        Raises:
-            RigError: there is no such bone, or it follows nothing.
-        """
-        return self.puppet.rig.body(bone, self.puppet.name)
-
-    def capsules(self) -> tuple[Floats, Floats]:
-        """Ends (bodies, 2, 3) and radii (bodies,) of the limbs in the world."""
-        return (
-            capsules_in_world(self.figure, self.shown_pose) / self.unit,
-            self.figure.radii / self.unit,
-        )
-
-    def held_point(self) -> Floats | None:
-        """(3,) the point in the hand, world."""
-        point = self.core.held_point()
-        return None if point is None else point / self.unit
-
-    def loads(self) -> Floats:
-        """(bodies,) what each joint bears: 1 where it gives way, or bears all that hangs on it."""
-        loads = np.linalg.norm(self.core.world.joint_loads(), axis=1)
-        limit = self.figure.elements.yield_torque
-        limit = np.where(np.isfinite(limit) & (limit > 0.0), limit, self._weights)
-        return loads / limit
-
-    def pull(self) -> float:
-        """How hard the hand pulls, in weights of the whole figure."""
-        weight = -GRAVITY[2] * float(self.figure.masses.sum())
-        return float(np.linalg.norm(self.core.force())) / weight
-
-    def pins(self) -> list[int]:
-        """Bodies that the artist has nailed to their places, or that are by the settings."""
-        return sorted(self.core.pins)
-
-    @property
-    def size(self) -> float:
-        """The largest extent of the puppet as it stands, in units of the world."""
-        return float(np.ptp(self.capsules()[0].reshape(-1, 3), axis=0).max())
-
-    @property
-    def root_is_held(self) -> bool:
-        """Whether the root neither moves nor turns."""
-        return self._shown.root == "HELD"
-
     # --- The hand -------------------------------------------------------------------------------
 
-    def pick(self, origin: Floats, direction: Floats, *, margin: float = 0.0) -> Hit | None:
-        """The body that a ray of the world meets; the hit's point is in the puppet's metres."""
-        return pick(self.figure, self.shown_pose, origin * self.unit, direction, margin=margin)
-
-    def grab(self, hit: Hit) -> None:
-        """Take hold of a body."""
-        self.core.grab(hit)
+    def grab(self, body: int, point: Floats) -> None:
+        """Take hold of a body at a point (3,) in the puppet's metres; what was held is let go."""
+        self.core.release()
+        self.core.grab(body, point)
 
     def grab_bone(self, bone: str, share: float) -> Floats:
         """Take hold of a bone by name, at a share of its length; the point (3,) in the world."""
-        body = self.body(bone)
-        pose = self.core.pose
-        start, end = capsules_in_world(self.figure, pose)[body]
-        # Capsules end a radius before the limb does.
-        way = end - start
-        size = float(np.linalg.norm(way))
-        radius = self.figure.radii[body] * (way / size if size > 0.0 else way)
-        point = (start - radius) + share * (way + 2.0 * radius) if size > 1e-9 else start
-        self.core.grab(Hit(body, point, 0.0))
+        body, point = self.point_on(bone, share)
+        self.grab(body, point)
         return point / self.unit
 
     def release(self) -> list[str]:
         """Let go; with auto keying, what the hand has moved gets keys. The keyed bones."""
-        if self.core.grip is None:
+        if self.held is None:
             return []
         self.core.release()
         tools = self.scene().tool_settings
-        if tools.use_keyframe_insert_auto and self._recorded is None:
+        if tools.use_keyframe_insert_auto and self._recording is None:
             return self._insert(self._touched(), auto=True)
         return []
-
-    def toggle_pin(self, body: int) -> bool:
-        """Nail a body to its place or take the nail out; whether it is pinned now."""
-        state = body not in self.core.pins
-        self.core.pin(body, state=state)
-        return state
 
     # --- Time -----------------------------------------------------------------------------------
 
@@ -315,31 +137,29 @@ class PuppetSession:
         armature = self.puppet.armature()
         if armature.mode == "EDIT":
             raise RigError(f"'{armature.name}' is in edit mode.", "Leave it and start again.")
-        self._apply_settings(armature)
-        if self._recorded is None and self.puppet.is_moved():
+        self.apply_settings(armature)
+        if self._recording is None and self.puppet.is_moved():
             # By hand, at the same frame.
             self.measuring = None
-            self.puppet.forget()
-            self.core.adopt(self.puppet.read())
-        sample = None
+            self._adopt()
         if self.measuring is not None:
             if position is not None:
                 self.measuring.tick(seconds, position * self.unit)
             self.puppet.write(self.measuring.pose())
             # Time stands still meanwhile.
-            self.told = TickReport(0.0, 0, 1.0, self.core.world.settings.step, resting=False)
-            return self.told
-        if position is not None:
-            sample = HandSample(position * self.unit, IDENTITY if turn is None else turn)
-        self.told = self.core.tick(seconds, sample)
-        if not self.told.resting:
+            self.report = TickReport(0.0, 0, 1.0, self.core.world.settings.step, resting=False)
+            return self.report
+        hands: dict[HandSpring, HandSample] = {}
+        if self.held is not None and position is not None:
+            turned = IDENTITY if turn is None else turn
+            hands[self.held] = HandSample(position * self.unit, turned)
+        self.report = self.core.tick(seconds, hands)
+        if not self.report.resting:
             self.puppet.write(self.core.pose)
-        return self.told
-
-    # --- Measuring ------------------------------------------------------------------------------
+        return self.report
 
     def measure(self, body: int) -> None:
-        """From now on the hand shows how the joint of a limb is to bend, and nothing resists.
+        """As ``PosedPuppet.measure``.
 
         Raises:
             RigError: the limb has no joint.
@@ -347,56 +167,7 @@ class PuppetSession:
         """
         if self.recording:
             raise SettingsError("A recording is going on.", "End it before you measure.")
-        self.core.release()
-        self.measuring = MeasuringHand(self.figure, self.core.pose, body)
-
-    def drop_measure(self) -> None:
-        """End measuring without a result; the figure stands as before."""
-        if self.measuring is not None:
-            self.measuring = None
-            self.puppet.forget()
-            self.puppet.write(self.core.pose)
-
-    def take_measure(self, *, bone_only: bool = False) -> str:
-        """End measuring, and let the figure be of what was shown; the coefficients, in words.
-
-        Args:
-            bone_only: whether only the joint that was bent is.
-
-        Raises:
-            SettingsError: what was shown makes no sense; measuring goes on.
-            WriteError: the bones are linked; likewise.
-        """
-        assert self.measuring is not None
-        body, bend = self.measuring.body, self.measuring.bend()
-        strength = self._shown.strength
-        measured, material = measured_joint(self.figure, body, strength, bend)
-        self.take_material(material, self.bone(body) if bone_only else "")
-        self.drop_measure()
-        return coefficients(self.bone(body), measured)
-
-    def take_material(self, material: Material, bone: str) -> None:
-        """Let the figure, or one bone's joint, be of a material; taken back by ``cancel``.
-
-        Raises:
-            WriteError: the bones are linked.
-        """
-        armature = self.puppet.armature()
-        settings: Any = posing_settings(armature)
-        self._measured.append(kept_before(armature, settings, bone))
-        keep_material(armature, settings, material, bone)
-        self.read_materials()
-
-    def read_materials(self) -> None:
-        """Take the materials of single bones anew."""
-        self._materials = self._bone_materials(self.puppet.armature())
-        self._shown = _Shown.of(posing_settings(self.puppet.armature()))
-        self.core.change_elements(self._elements(self.figure))
-
-    def _bone_materials(self, armature: bpy.types.Object) -> dict[int, Material]:
-        own = bone_materials(armature)
-        names = self.puppet.figure.names
-        return {body: own[name] for body, name in enumerate(names) if name in own}
+        super().measure(body)
 
     # --- Keys -----------------------------------------------------------------------------------
 
@@ -426,7 +197,7 @@ class PuppetSession:
     @property
     def recording(self) -> bool:
         """Whether the motion of the drag is kept while the frames go by."""
-        return self._recorded is not None
+        return self._recording is not None
 
     def record(self) -> None:
         """Begin to keep the pose at each frame, from this one on.
@@ -435,68 +206,19 @@ class PuppetSession:
             WriteError: a motion could not be written.
         """
         self.keys.check_motion(self.puppet.armature())
-        self._own = pose_values(self.puppet.armature())
-        self._recorded = {self.scene().frame_current_final: self._moment()}
+        self._recording = Recording(self.puppet, self.scene().frame_current_final, self.core.pose)
 
     def stop_record(self) -> tuple[int, int]:
         """Write what was kept as few keys; number of bones and of key frames."""
-        armature = self.puppet.armature()
-        with _pose_kept(armature):
-            bones, count = self._write_record()
-        if self._go_along(armature, bones) and bpy.context.view_layer is not None:
+        recording, self._recording = self._recording, None
+        if recording is None:
+            return 0, 0
+        with _pose_kept(self.puppet.armature()):
+            bones, count = recording.write(self.keys)
+        if recording.go_along(bones) and bpy.context.view_layer is not None:
             bpy.context.view_layer.update()
-            self.puppet.forget()
-            self.core.adopt(self.puppet.read())
+            self._adopt()
         return len(bones), count
-
-    def _go_along(self, armature: bpy.types.Object, recorded: Iterable[str]) -> bool:
-        """Let what stood still in the recording go on with what carries it; whether anything did.
-
-        While a root bone travels, the figure's own root is held back to stay in its place, and is
-        to be no further off once that is over: unless it was moved, it has got no keys.
-        """
-        loose = {self.bone(body) for body in range(len(self.figure)) if self.puppet.places(body)}
-        now = pose_values(armature)
-        back = {
-            bone: own
-            for bone, own in self._own.items()
-            if bone in loose.difference(recorded) and now.get(bone) != own
-        }
-        restore_pose(armature, back)
-        return bool(back)
-
-    def _write_record(self) -> tuple[list[str], int]:
-        """Names of the bones that got keys, and the number of key frames."""
-        recorded, self._recorded = self._recorded, None
-        if recorded is None or len(recorded) < 2:
-            return [], 0
-        frames = np.array(sorted(recorded))
-        moments = [recorded[frame] for frame in frames]
-        moved: set[int] = set()
-        for each in moments[1:]:
-            moved |= set(turned_bodies(self.figure, moments[0].pose, each.pose, TOUCHED))
-        if not moved:
-            return [], 0
-        bodies = self.puppet.with_followers(moved)
-        rotations = {
-            self.bone(body): np.stack([each.rotations[body] for each in moments]) for body in bodies
-        }
-        locations = {
-            self.bone(body): np.stack([each.locations[body] for each in moments])
-            for body in bodies
-            if self.puppet.places(body)
-        }
-        settings: Any = posing_settings(self.puppet.armature())
-        size = float(np.ptp(self.puppet.rig.skeleton.heads, axis=0).max())
-        count = self.keys.insert_motion(
-            self.puppet.armature(),
-            frames,
-            rotations,
-            locations,
-            angle=settings.record_angle,
-            distance=_LOCATION_SHARE * size,
-        )
-        return list(rotations), count
 
     # --- Ends -----------------------------------------------------------------------------------
 
@@ -523,7 +245,7 @@ class PuppetSession:
         try:
             self.drop_measure()
             self.release()
-            if self._recorded is not None:
+            if self._recording is not None:
                 self.stop_record()
         finally:
             self._leave()
@@ -540,8 +262,7 @@ class PuppetSession:
         except OctoMotionError:
             return
         with _pose_kept(armature):
-            for take_back in reversed(self._measured):
-                take_back(armature)
+            self.materials.take_back(armature)
             self.keys.take_back(armature)
         restore_pose(armature, self._values)
         if scene.frame_current_final != self._started:
@@ -590,7 +311,7 @@ class PuppetSession:
 
     def _undone(self, *_: object) -> None:
         """Blender has put the file into another state: a recording of this one is over."""
-        self._recorded = None
+        self._recording = None
         try:
             self._see(self.scene())
         except OctoMotionError as error:
@@ -602,95 +323,28 @@ class PuppetSession:
         try:
             self.measuring = None
             self.puppet.forget()
-            if self._recorded is None:
+            if self._recording is None:
                 self.core.adopt(self.puppet.read())
             else:
-                self._record_frame(self._frame)
+                self._record_frame(self._recording, self._frame)
         except OctoMotionError as error:
             # The next tick says so.
             self._trouble = error
-        if self._marked or marked_obstacles(scene):
-            self._see_obstacles()
+        if self.settings.use_obstacles:
+            self.see_obstacles()
 
-    def _see_obstacles(self) -> None:
-        """Take obstacles as they are now; with one that is damaged, they stay as they were."""
-        try:
-            self.core.change_obstacles(self._obstacles())
-            self.warning = ""
-        except OctoMotionError as error:
-            self.warning = str(error)
+    def _adopt(self) -> None:
+        """Go on from what the armature shows."""
+        self.puppet.forget()
+        self.core.adopt(self.puppet.read())
 
-    def _moment(self) -> _Moment:
-        pose = self.core.pose
-        return _Moment(pose, *self.puppet.local(pose))
-
-    def _record_frame(self, frame: float) -> None:
-        assert self._recorded is not None
-        if self._recorded and frame < max(self._recorded):
+    def _record_frame(self, recording: Recording, frame: float) -> None:
+        if recording.is_past(frame):
             # Playback has come round, or someone has gone back: the take is complete.
-            bones, _ = self._write_record()
-            self._go_along(self.puppet.armature(), bones)
+            self._recording = None
+            bones, _ = recording.write(self.keys)
+            recording.go_along(bones)
             self.core.adopt(self.puppet.read())
             return
-        self._recorded[frame] = self._moment()
+        recording.keep(frame, self.core.pose)
         self.puppet.write(self.core.pose)
-
-    def _apply_settings(self, armature: bpy.types.Object) -> None:
-        settings: Any = posing_settings(armature)
-        shown = _Shown.of(settings)
-        if shown == self._shown:
-            return
-        before, self._shown = self._shown, shown
-        if before.joints != shown.joints:
-            self.core.change_elements(self._elements(self.figure))
-            self.core.hand = hand_for(self.figure, shown.strength)
-        if before.ground != shown.ground:
-            self._see_obstacles()
-        wanted = self._world_settings()
-        self.core.change(
-            gravity=wanted.gravity,
-            self_collision=wanted.self_collision,
-            friction=wanted.friction,
-            drag=wanted.drag,
-        )
-        if before.root != shown.root:
-            self._hold_root()
-
-    def _elements(self, figure: Figure) -> Any:
-        return elements_for(figure, *self._shown.joints, own=self._materials)
-
-    def _world_settings(self) -> WorldSettings:
-        shown = self._shown
-        calm = shown.root == "FREE" and not shown.gravity
-        return WorldSettings(
-            gravity=GRAVITY if shown.gravity else (0.0, 0.0, 0.0),
-            self_collision=shown.self_collision,
-            friction=shown.friction,
-            drag=_CALMING if calm else 0.0,
-        )
-
-    def _hold_root(self) -> None:
-        pose = self.puppet.armature().pose
-        assert pose is not None
-        for body, parent in enumerate(self.figure.parents):
-            if parent < 0:
-                locked = all(np.array(pose.bones[self.bone(body)].lock_location))
-                if self._shown.root == "FREE" and not locked:
-                    self.core.pin(body, state=False)
-                else:
-                    self.core.pin(body, state=True, firm=self._shown.root == "HELD")
-
-    def _obstacles(self) -> list[Obstacle]:
-        obstacles: list[Obstacle] = []
-        if self._shown.floor:
-            height = self._shown.floor_height * self.unit
-            obstacles.append(Plane(position=np.array([0.0, 0.0, height])))
-        armature = self.puppet.found()
-        marked = marked_obstacles(self.scene()) if self._shown.use_obstacles else []
-        self._marked = bool(marked)
-        obstacles += [
-            read_obstacle(item, kind, self.unit)
-            for item, kind in marked
-            if not is_part_of(item, armature)
-        ]
-        return obstacles

@@ -103,8 +103,6 @@ def build_figure(
     """
     bones = list(roles.bodies)
     parents = np.array(roles.parents)
-    count = len(bones)
-    hanging = parents >= 0
     heads, rotations = posed.heads[bones], posed.rotations[bones]
     clouds = _clouds(roles, skin or {})
     ends = _ends(roles, posed, clouds)
@@ -112,9 +110,7 @@ def build_figure(
     lengths = np.linalg.norm(axes, axis=1)
 
     anchors = joints_of(roles.parents, Pose(heads, rotations))
-    at_rest = multiply(posed.turn, skeleton.rest_rotations[bones])
-    rest = at_rest.copy()
-    rest[hanging] = multiply(conjugate(at_rest[parents[hanging]]), at_rest[hanging])
+    rest = _in_parents(parents, multiply(posed.turn, skeleton.rest_rotations[bones]))
 
     radius = _radii(roles, heads, ends, clouds)
     along = axes / lengths[:, None]
@@ -135,12 +131,7 @@ def build_figure(
         capsules=capsules,
         radii=radius,
         limits=_limits(skeleton, bones, limits or {}, _from_rest(parents, rest, rotations)),
-        elements=Elements(
-            stiffness=np.zeros((count, 3)),
-            damping=np.zeros((count, 3)),
-            flow=np.zeros((count, 3)),
-            yield_torque=np.zeros(count),
-        ),
+        elements=Elements.limp(len(bones)),
     )
     return figure, Pose(heads.copy(), rotations.copy())
 
@@ -254,10 +245,15 @@ def _bulk(
 
 def _from_rest(parents: np.ndarray, rest: Floats, rotations: Floats) -> Floats:
     """How far each body is turned from rest now, (bodies, 4) in its own frame at rest."""
+    return multiply(conjugate(rest), _in_parents(parents, rotations))
+
+
+def _in_parents(parents: np.ndarray, rotations: Floats) -> Floats:
+    """Orientations (bodies, 4) in the parents' frames, of roots in the world's."""
     seen = rotations.copy()
     hanging = parents >= 0
     seen[hanging] = multiply(conjugate(rotations[parents[hanging]]), rotations[hanging])
-    return multiply(conjugate(rest), seen)
+    return seen
 
 
 def _limits(

@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...rotations import Floats
 
 
@@ -71,6 +74,22 @@ class Elements:
     """(bodies, 3) D_d, in series, N·m·s/rad: how fast the joint gives way."""
     yield_torque: Floats
     """(bodies,) N·m: below it the series damper holds; 0 lets it creep always, as in the source."""
+
+    @classmethod
+    def limp(cls, count: int) -> Elements:
+        """Joints that resist nothing."""
+        nothing = np.zeros((count, 3))
+        return cls(nothing, nothing, nothing, np.zeros(count))
+
+    def where(self, works: NDArray[np.bool_]) -> Elements:
+        """These in the joints (bodies,) of a mask, and others limp."""
+        mask = works[:, None]
+        return Elements(
+            np.where(mask, self.stiffness, 0.0),
+            np.where(mask, self.damping, 0.0),
+            np.where(mask, self.flow, 0.0),
+            self.yield_torque,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 """What moves a puppet: one step of a rigid-body world with plastic joints and contacts."""
 
 from .blas_threads import OneThread
-from .hand_spring import Coupling, Grab
+from .hand_spring import Coupling, HandSpring
 from .obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from .world import World, WorldSettings, WorldState
 
@@ -10,7 +10,7 @@ __all__ = [
     "Box",
     "Capsule",
     "Coupling",
-    "Grab",
+    "HandSpring",
     "Hull",
     "Mesh",
     "Obstacle",

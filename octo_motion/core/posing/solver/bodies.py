@@ -22,6 +22,7 @@ from ..puppet import (
     product_inverse,
     transforms,
 )
+from .state import BodiesState
 from .tree import Tree
 
 Integers = NDArray[np.int64]
@@ -118,6 +119,18 @@ class Bodies:
 
     # How they move
 
+    def state(self) -> BodiesState:
+        """All that changes from step to step."""
+        parts = (self.roots, self.orientations, self.rest, self.linear, self.angular, self.spin)
+        return BodiesState(*(each.copy() for each in parts))
+
+    def restore(self, state: BodiesState) -> None:
+        """Go back to what was."""
+        self.roots, self.orientations = state.roots.copy(), state.orientations.copy()
+        self.rest, self.spin = state.rest.copy(), state.spin.copy()
+        self.linear, self.angular = state.linear.copy(), state.angular.copy()
+        self.refresh()
+
     def stop(self) -> None:
         """Take all velocities away."""
         for array in (self.linear, self.angular, self.spin):
@@ -131,6 +144,14 @@ class Bodies:
         share = np.maximum(before, 0.0) / (now + 1e-300)
         share = np.sqrt(np.minimum(share, 1.0))
         return self.spin * share[:, None]
+
+    def velocities(self, skewed: Floats) -> Floats:
+        """(bodies, 6) spatial velocities; ``skewed`` as in ``take_velocities``."""
+        now = np.empty((len(self.linear), 6))
+        now[:, :3] = self.angular
+        around = (skewed @ self.angular[:, :, None])[:, :, 0]
+        np.add(self.linear, around, out=now[:, 3:])
+        return now
 
     def take_velocities(self, velocities: Floats, skewed: Floats) -> None:
         """Take over spatial velocities (bodies, 6).

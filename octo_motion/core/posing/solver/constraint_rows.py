@@ -73,7 +73,7 @@ _Touch = tuple[Flags, Flags | None, Floats, Floats, Floats | Flags]
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class RowImpulses:
     """What the rows do at some velocities, and what is needed for their slopes."""
 
     wanted: Floats
@@ -107,7 +107,7 @@ class Tangent:
     sticks: bytes
     """Which contacts stick."""
 
-    def same(self, answer: Answer) -> bool:
+    def same(self, answer: RowImpulses) -> bool:
         """Whether these planes are the law at another place, where nothing slips."""
         if self.planes is not None or self.sticks != answer.sticks.tobytes():
             return False
@@ -228,7 +228,7 @@ class Rows:
             self.reach[pattern.turning] = _TURNS
         self._step = step
         self._followed: Floats | None = None
-        self._slip_of: Answer | None = None
+        self._slip_of: RowImpulses | None = None
         self._slip = _NO_ONES
         self._closing = np.maximum(contacts.gaps / step, pattern.deepest)
         self.rates = self._closing
@@ -277,7 +277,7 @@ class Rows:
             own[self.paired] -= velocities[self.others[self.paired]]
         return (self.reach @ own[:, :, None])[:, :, 0]
 
-    def slip(self, answer: Answer) -> Floats:
+    def slip(self, answer: RowImpulses) -> Floats:
         """(contacts,) μ |w_t|, m/s: what slipping as then adds to the rates."""
         if self._slip_of is not answer:
             # y_t = b − a w_t.
@@ -307,26 +307,26 @@ class Rows:
         """Whether any slip was taken over."""
         return self._followed is not None
 
-    def answer(self, speeds: Floats) -> Answer:
+    def answer(self, speeds: Floats) -> RowImpulses:
         """Impulses at w (rows, 3)."""
         moving = speeds if self.still else speeds + self.targets
         return self.respond(self.asked - self.pattern.column * moving)
 
-    def respond(self, wanted: Floats) -> Answer:
+    def respond(self, wanted: Floats) -> RowImpulses:
         """Impulses at y (rows, 3)."""
         count, holds = self.count, self.holds
         impulses = np.empty_like(wanted)
         if holds is None:
-            return Answer(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
+            return RowImpulses(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
         pulls = wanted[count:]
         held = np.minimum(holds.bounds / (np.sqrt((pulls * pulls) @ _ONES) + _TINY), 1.0)
         np.multiply(pulls, held[:, None], out=impulses[count:])
         if not count:
-            return Answer(wanted, impulses, _NOBODY, None, _NO_ROWS, _NO_ONES, _NO_ONES, held)
-        return Answer(wanted, impulses, *self._touch(wanted[:count], impulses[:count]), held)
+            return RowImpulses(wanted, impulses, _NOBODY, None, _NO_ROWS, _NO_ONES, _NO_ONES, held)
+        return RowImpulses(wanted, impulses, *self._touch(wanted[:count], impulses[:count]), held)
 
     def _touch(self, y: Floats, impulses: Floats) -> _Touch:
-        """Contacts' impulses (contacts, 3) at y, and what ``Answer`` tells of how they come."""
+        """Contacts' impulses (contacts, 3) at y, and what ``RowImpulses`` tells of them."""
         normals, friction = self.contacts.normals, self.contacts.friction
         push = (y * normals) @ _ONES
         across = y - push[:, None] * normals
@@ -344,7 +344,7 @@ class Rows:
         impulses += shares[:, None] * across
         return sticks, slips, across, size, shares
 
-    def tangent(self, answer: Answer) -> Tangent:
+    def tangent(self, answer: RowImpulses) -> Tangent:
         """The laws as planes that touch them at y."""
         holds, count = self.holds, self.count
         sticks = answer.sticks.tobytes()
@@ -371,7 +371,7 @@ class Rows:
                 rest[count:] = np.where((held < 1.0)[:, None], pulls, 0.0)
         return Tangent(None, planes, rest, sticks)
 
-    def _cones(self, answer: Answer) -> Floats:
+    def _cones(self, answer: RowImpulses) -> Floats:
         """P′ of the contacts (contacts, 3, 3)."""
         if answer.slips is None:
             return answer.sticks[:, None, None] * _UNIT
@@ -388,7 +388,7 @@ class Rows:
         planes += answer.sticks[:, None, None] * _UNIT
         return planes
 
-    def slopes(self, answer: Answer) -> Floats:
+    def slopes(self, answer: RowImpulses) -> Floats:
         """−∂p/∂w (rows, 3, 3), symmetric and positive semidefinite."""
         return self.pattern.gains[:, None, None] * self.tangent(answer).blocks()
 

@@ -181,12 +181,7 @@ class Detector:
         margin: float,
         label: int,
     ) -> Contacts | None:
-        low, high = boxes
-        box = self._world_box(obstacle)
-        if box is None:
-            near = np.arange(len(low))
-        else:
-            near = np.flatnonzero(((low <= box[1]) & (high >= box[0])).all(axis=1))
+        near = self._around(obstacle, boxes)
         if not len(near):
             return None
         frame = to_matrix(obstacle.orientation)
@@ -199,18 +194,14 @@ class Detector:
         distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
         rows = np.arange(len(near))
         limits = self._radii[near] + margin
-        bodies: list[Integers] = []
-        gaps: list[Floats] = []
-        normals: list[Floats] = []
-        centres: list[Floats] = []
-        labels: list[Integers] = []
+        # Bodies, labels, distances, directions and places, each in parts.
+        found: list[tuple[Integers, Integers, Floats, Floats, Floats]] = []
 
         def add(which: Integers, sample: Integers | int, place: int) -> None:
-            bodies.append(near[which])
-            labels.append(3 * near[which] + place + label)
-            gaps.append(distances[which, sample])
-            normals.append(outs[which, sample])
-            centres.append(start[which, 0] + shares[which, sample, None] * along[which, 0])
+            centres = start[which, 0] + shares[which, sample, None] * along[which, 0]
+            labels = 3 * near[which] + place + label
+            apart, outward = distances[which, sample], outs[which, sample]
+            found.append((near[which], labels, apart, outward, centres))
 
         for end, sample in ((0, 0), (1, self._samples - 1)):
             kept = self._keep[near, end] & (distances[:, sample] < limits)
@@ -223,10 +214,10 @@ class Detector:
         inner &= least < np.minimum(distances[:, 0], distances[:, -1]) - slack
         picked = np.flatnonzero(inner)
         if len(picked):
-            width = 1.0 / (self._samples - 1)
             middle = _middle(shares[picked], distances[picked], slack[picked])
             start, along = start[picked], along[picked]
             rows, near, slack = np.arange(len(picked)), near[picked], slack[picked]
+            width = 1.0 / (self._samples - 1)
             for _ in range(3):
                 shares = np.clip(middle[:, None] + width * _AROUND, 0.0, 1.0)
                 distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
@@ -235,14 +226,21 @@ class Detector:
             shares = middle[:, None]
             distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
             add(rows, 0, 2)
-        chosen = np.concatenate(bodies)
-        if not len(chosen):
+        bodies, labels, apart, outward, centres = map(np.concatenate, zip(*found, strict=True))
+        if not len(bodies):
             return None
-        radii = self._radii[chosen]
-        way = np.concatenate(normals) @ frame.T
-        points = np.concatenate(centres) @ frame.T + obstacle.position - radii[:, None] * way
-        gap = np.concatenate(gaps) - radii
-        return self._contacts(chosen, points, way, gap, obstacle, np.concatenate(labels))
+        radii = self._radii[bodies]
+        normals = outward @ frame.T
+        points = centres @ frame.T + obstacle.position - radii[:, None] * normals
+        return self._contacts(bodies, points, normals, apart - radii, obstacle, labels)
+
+    def _around(self, obstacle: Obstacle, boxes: tuple[Floats, Floats]) -> Integers:
+        """The bodies whose boxes touch that of an obstacle."""
+        low, high = boxes
+        box = self._world_box(obstacle)
+        if box is None:
+            return np.arange(len(low))
+        return np.flatnonzero(((low <= box[1]) & (high >= box[0])).all(axis=1))
 
     def _on_itself(
         self, ends: Floats, boxes: tuple[Floats, Floats], margin: float

@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from ...rotations import Floats
+from ...rotations import Floats, normalized
 from ..puppet import Figure
 
 _GRAVITY: Final = 9.81
@@ -66,8 +66,8 @@ class Coupling:
 
 
 @dataclass(eq=False)
-class Grab:
-    """A bone in a hand; ``World.pull`` moves its target, ``World.release`` lets go."""
+class HandSpring:
+    """A bone in a hand, from ``World.grab`` until ``World.release``."""
 
     body: int
     coupling: Coupling
@@ -84,6 +84,22 @@ class Grab:
     wrench: Floats = field(default_factory=lambda: np.zeros(6))
     """(6,) force N and torque N·m on the bone in the last step, about the point held, world axes.
     The hand feels the opposite."""
+
+    def pull(
+        self, position: Floats, orientation: Floats | None = None, velocity: Floats | None = None
+    ) -> None:
+        """Draw the bone towards where the hand is now.
+
+        Args:
+            position: (3,) where the held point is drawn to, world.
+            orientation: (4,) of the hand; None leaves the bone free to turn.
+            velocity: (6,) linear and angular, of the hand; at rest by default.
+        """
+        self.target_position = np.array(position, dtype=np.float64)
+        self.target_orientation = None if orientation is None else normalized(orientation)
+        self.target_velocity = (
+            np.zeros(6) if velocity is None else np.array(velocity, dtype=np.float64)
+        )
 
 
 def _extent(figure: Figure) -> float:

@@ -12,7 +12,7 @@ from ...rotations import Floats
 from ..puppet import logarithm, product, product_inverse
 from .bodies import Bodies
 from .constraint_rows import Holds
-from .hand_spring import Coupling, Grab
+from .hand_spring import HandSpring
 
 _PIN_GAIN = 1e5
 """Of pins, in masses of the figure: they give way by h·g/10⁵ a second before they are put right."""
@@ -40,16 +40,21 @@ class Holding:
         self._step = step
         self._key: tuple[object, ...] = ()
 
-    def rows(self, bodies: Bodies, pins: Sequence[Pin], grabs: Sequence[Grab]) -> Holds | None:
+    def rows(
+        self, bodies: Bodies, pins: Sequence[Pin], springs: Sequence[HandSpring]
+    ) -> Holds | None:
         """What holds the bodies where they are now; None where nothing does."""
-        if not (pins or grabs):
+        if not (pins or springs):
             return None
         key: tuple[object, ...] = (
             tuple((pin.body, pin.firm) for pin in pins),
-            tuple((grab.body, grab.coupling, grab.target_orientation is None) for grab in grabs),
+            tuple(
+                (spring.body, spring.coupling, spring.target_orientation is None)
+                for spring in springs
+            ),
         )
         if key != self._key:
-            self._arrange(pins, grabs)
+            self._arrange(pins, springs)
             self._key = key
         # Points: where they are, where they are wanted, and how fast that moves.
         locals_, targets, speeds = [], [], []
@@ -61,20 +66,20 @@ class Holding:
                 locals_.append(_NOTHING)
                 targets.append(_NOTHING)
                 speeds.append(_NOTHING)
-        for grab in grabs:
-            locals_.append(grab.point)
-            targets.append(grab.target_position)
-            speeds.append(grab.target_velocity[:3])
-            if grab.target_orientation is not None:
+        for spring in springs:
+            locals_.append(spring.point)
+            targets.append(spring.target_position)
+            speeds.append(spring.target_velocity[:3])
+            if spring.target_orientation is not None:
                 locals_.append(_NOTHING)
                 targets.append(_NOTHING)
-                speeds.append(grab.target_velocity[3:])
+                speeds.append(spring.target_velocity[3:])
         held = self._bodies
         arms = (bodies.matrices.take(held, 0) @ np.array(locals_)[:, :, None])[:, :, 0]
         points = bodies.positions.take(held, 0) + arms
         ways = np.array(targets) - points
         if len(self._turning):
-            ways[self._turning] = self._turns(bodies, pins, grabs)
+            ways[self._turning] = self._turns(bodies, pins, springs)
         return Holds(
             held,
             points,
@@ -85,20 +90,32 @@ class Holding:
             self._pinned * ways,
         )
 
-    def _turns(self, bodies: Bodies, pins: Sequence[Pin], grabs: Sequence[Grab]) -> Floats:
+    def _turns(self, bodies: Bodies, pins: Sequence[Pin], springs: Sequence[HandSpring]) -> Floats:
         """(turns, 3) rotation vectors from where bodies are to where they are wanted."""
         firm = [(pin.orientation, _UNTURNED) for pin in pins if pin.firm]
         hands = [
-            (grab.target_orientation, grab.grip)
-            for grab in grabs
-            if grab.target_orientation is not None
+            (spring.target_orientation, spring.grip)
+            for spring in springs
+            if spring.target_orientation is not None
         ]
         pairs = np.array(firm + hands)
         wanted = product(pairs[:, 0], pairs[:, 1])
         now = bodies.orientations.take(self._bodies[self._turning], 0)
         return logarithm(product_inverse(wanted, now))
 
-    def _arrange(self, pins: Sequence[Pin], grabs: Sequence[Grab]) -> None:
+    def take(self, springs: Sequence[HandSpring], impulses: Floats) -> None:
+        """Let hands feel the impulses (rows, 3) of the last ``rows``."""
+        if not springs:
+            return
+        hands = impulses[len(self._bodies) - sum(map(_rows_of, springs)) :] / self._step
+        row = 0
+        for spring in springs:
+            count = _rows_of(spring)
+            spring.wrench = np.zeros(6)
+            spring.wrench[: 3 * count] = hands[row : row + count].ravel()
+            row += count
+
+    def _arrange(self, pins: Sequence[Pin], springs: Sequence[HandSpring]) -> None:
         """What stays the same as long as the same bodies are held."""
         h = self._step
         # Body, whether a turn, gain, stiffness, bound, whether a pin.
@@ -107,15 +124,15 @@ class Holding:
             rows.append((pin.body, False, self._pin_gains[0], 0.0, np.inf, True))
             if pin.firm:
                 rows.append((pin.body, True, self._pin_gains[1], 0.0, np.inf, True))
-        for grab in grabs:
-            coupling: Coupling = grab.coupling
+        for spring in springs:
+            coupling = spring.coupling
             stiffness, damping = h * coupling.stiffness, coupling.damping
             gain = h * (stiffness + damping)
-            rows.append((grab.body, False, gain, stiffness, h * coupling.force_limit, False))
-            if grab.target_orientation is not None:
+            rows.append((spring.body, False, gain, stiffness, h * coupling.force_limit, False))
+            if spring.target_orientation is not None:
                 stiffness, damping = h * coupling.turning_stiffness, coupling.turning_damping
                 gain = h * (stiffness + damping)
-                rows.append((grab.body, True, gain, stiffness, h * coupling.torque_limit, False))
+                rows.append((spring.body, True, gain, stiffness, h * coupling.torque_limit, False))
         held, turns, gains, stiff, bounds, pinned = zip(*rows, strict=True)
         self._bodies = np.array(held)
         self._turns_held = np.array(turns)
@@ -124,6 +141,10 @@ class Holding:
         self._stiffness = np.array(stiff)[:, None]
         self._bounds = np.array(bounds)
         self._pinned = np.array(pinned, dtype=np.float64)[:, None]
+
+
+def _rows_of(spring: HandSpring) -> int:
+    return 1 if spring.target_orientation is None else 2
 
 
 _NOTHING = np.zeros(3)

@@ -28,7 +28,7 @@ import numpy as np
 
 from ...rotations import Floats
 from ..puppet import ElementResponse
-from .constraint_rows import Answer, Flags, Pattern, Rows, Tangent
+from .constraint_rows import Flags, Pattern, RowImpulses, Rows, Tangent
 from .problem import SPATIAL, Problem, Stops
 from .tree import Tree
 
@@ -48,7 +48,7 @@ class Solution:
     """Loads and flow of the elements, in the problem's axes."""
     pressed: Flags | None
     """(stops,) which ends of ranges bear; None where none is near."""
-    rows: Answer | None
+    rows: RowImpulses | None
     """What the rows do; None where there are none."""
     iterations: int
     """Linear systems solved."""
@@ -67,7 +67,7 @@ class Start:
 
     speeds: Floats
     """(slots, 3) u."""
-    rows: Answer | None = None
+    rows: RowImpulses | None = None
     """What the rows did then, as they are now; None begins at ``speeds`` and nothing else."""
     response: ElementResponse | None = None
     """What the elements did then; None where none flowed, and then it begins as if none will."""
@@ -89,7 +89,7 @@ class _Point:
     """(bodies, 3) of elements and stops, world axes."""
     response: ElementResponse
     pressed: Flags | None
-    rows: Answer | None
+    rows: RowImpulses | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,7 @@ class Newton:
             response, _ = self._elements(problem, speeds)
             return None, self._bent(problem, response, speeds, pressed, rows)
         if response is None:
-            return None, self._planes(problem, law.held, self._held, pressed, rows)
+            return None, _planes(problem, law.held, self._held, pressed, rows)
         # The speeds at which they would bear now what they bore then.
         speeds = (self._base - response.trial) * law.mobility
         return None, self._bent(problem, response, speeds, pressed, rows)
@@ -237,7 +237,7 @@ class Newton:
         """All laws as planes that touch them at a point."""
         rows = None if point.rows is None else problem.rows.tangent(point.rows)
         if point.response.flows is None and problem.frames is None:
-            return self._planes(problem, problem.law.held, self._held, point.pressed, rows)
+            return _planes(problem, problem.law.held, self._held, point.pressed, rows)
         return self._bent(problem, point.response, point.joint_speeds, point.pressed, rows)
 
     def _bent(
@@ -255,26 +255,7 @@ class Newton:
             slopes = frames @ slopes @ frames.transpose(0, 2, 1)
             loads = (frames @ loads[:, :, None])[:, :, 0]
         right = loads + (slopes @ speeds[:, :, None])[:, :, 0]
-        return self._planes(problem, slopes, right, pressed, rows, linear=response.flows is None)
-
-    @staticmethod
-    def _planes(
-        problem: Problem,
-        slopes: Floats,
-        right: Floats,
-        pressed: Flags | None,
-        rows: Tangent | None,
-        *,
-        linear: bool = True,
-    ) -> _Tangents:
-        """Planes of elements and of stops that bear."""
-        if pressed is not None and pressed.any():
-            stops = problem.stops[0]
-            stiff = (pressed * stops.gains)[:, None] * stops.axes
-            right = right - stops.spread @ (stops.rates[:, None] * stiff)
-            blocks = stiff[:, :, None] * stops.axes[:, None, :]
-            slopes = slopes + (stops.spread @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
-        return _Tangents(slopes, right, linear and pressed is None, rows)
+        return _planes(problem, slopes, right, pressed, rows, linear=response.flows is None)
 
     def _stack(self, problem: Problem, columns: int) -> Floats:
         """(bodies and rows, 6, 6 + columns) inertias and momenta; those of rows are left open."""
@@ -436,6 +417,25 @@ def _lowered(rows: Rows, planes: Tangent, corrections: Floats | None, columns: i
     if len(rows.paired):
         whole[rows.paired, :, :6] = 0.0
     return whole
+
+
+def _planes(
+    problem: Problem,
+    slopes: Floats,
+    right: Floats,
+    pressed: Flags | None,
+    rows: Tangent | None,
+    *,
+    linear: bool = True,
+) -> _Tangents:
+    """Planes of elements and of stops that bear."""
+    if pressed is not None and pressed.any():
+        stops = problem.stops[0]
+        stiff = (pressed * stops.gains)[:, None] * stops.axes
+        right = right - stops.spread @ (stops.rates[:, None] * stiff)
+        blocks = stiff[:, :, None] * stops.axes[:, None, :]
+        slopes = slopes + (stops.spread @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
+    return _Tangents(slopes, right, linear and pressed is None, rows)
 
 
 def _predicted(tangents: _Tangents, end: _Point) -> tuple[Floats, Floats | None]:

@@ -52,15 +52,14 @@ class WorldSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class WorldState:
-    """All that a simulation remembers from step to step, as copies; holds are not part of it."""
+class BodiesState:
+    """Where bodies are and how they move, as copies."""
 
-    time: float
     roots: Floats
     """(roots, 3) positions of the roots' joints, world."""
     orientations: Floats
     """(bodies, 4)"""
-    plastic_rest: Floats
+    rest: Floats
     """(bodies, 4) where each joint's spring has its rest, in the parent's frame."""
     linear: Floats
     """(bodies, 3) velocity of the centres of mass."""
@@ -68,8 +67,14 @@ class WorldState:
     """(bodies, 3)"""
     spin: Floats
     """(bodies, 3) angular momentum about the centre of mass, world axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class StartState:
+    """Where the solver begins, as copies."""
+
     speeds: Floats
-    """(slots, 3) where the solver begins."""
+    """(slots, 3)"""
     trial: Floats
     """(bodies, 3) load that the elements would have borne without flow, N·m, in the problem's axes;
     empty where none flowed."""
@@ -79,24 +84,17 @@ class WorldState:
     """(contacts, 3) friction of the last step, N·s."""
     wanted: Floats
     """(rows, 3) impulses that contacts and holds would have given without their bounds, N·s (or
-    N·m·s): where the solver begins as well."""
+    N·m·s)."""
     slips: Floats
     """(contacts,) how fast they slipped times friction, m/s; empty where none did."""
     labels: NDArray[np.int64]
     """(contacts,) to know them by."""
 
 
-@dataclass(frozen=True)
-class Energy:
-    """Joules."""
+@dataclass(frozen=True, eq=False)
+class WorldState:
+    """All that a simulation remembers from step to step; holds are not part of it."""
 
-    kinetic: float
-    elastic: float
-    """In the springs of the elements."""
-    weight: float
-    """In the height of the centres of mass, against the origin."""
-
-    @property
-    def total(self) -> float:
-        """Their sum."""
-        return self.kinetic + self.elastic + self.weight
+    time: float
+    bodies: BodiesState
+    start: StartState

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What contacts remember from one step to the next: their friction, and what they asked for."""
+"""Where the solver begins: with what joints, contacts and holds did in the step before."""
 
 from __future__ import annotations
 
@@ -7,8 +7,90 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats
-from .constraint_rows import Answer, Rows
+from ..puppet import ElementResponse, PlasticLaw
+from .bodies import Bodies
+from .constraint_rows import RowImpulses, Rows
 from .contact_detection import Contacts
+from .newton import Solution, Start
+from .problem import Problem
+from .state import StartState
+from .tree import Tree
+
+
+class WarmStart:
+    """What one step leaves to the next."""
+
+    def __init__(self, tree: Tree) -> None:
+        self._tree = tree
+        self.contacts = ContactMemory()
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew, from rest."""
+        self.speeds: Floats = np.zeros((len(self._tree.layout.bodies), 3))
+        """(slots, 3) u."""
+        self._response: ElementResponse | None = None
+        self._pressed = _NOBODY
+        self.contacts.forget()
+
+    def use_law(self, law: PlasticLaw) -> None:
+        """What elements bore without flow is seen with another law."""
+        if self._response is not None:
+            self._response = law.answer(self._response.trial)
+
+    def start(self, problem: Problem, bodies: Bodies) -> Start:
+        """Where to begin with a step's problem; its rows are told how fast they slip."""
+        rows = self._rows(problem, bodies) if len(problem.rows.bodies) else None
+        pressed = None
+        if problem.stops:
+            pressed = (problem.stops[0].labels[:, None] == self._pressed).any(axis=1)
+        return Start(self.speeds, rows, self._response, pressed)
+
+    def _rows(self, problem: Problem, bodies: Bodies) -> RowImpulses:
+        """What the rows of this step did in the step before."""
+        rows, memory = problem.rows, self.contacts
+        before = memory.before(rows)
+        if before is None:
+            # New rows begin with what they would do at the velocities of before.
+            self._tree.place(problem.joints)
+            there = rows.wanted(self._tree.velocities(self.speeds))
+            before = memory.before_or(rows, there)
+            rows.follow(rows.slip_at(bodies.velocities(problem.skewed)), 0.0)
+        elif before.slips is not None:
+            known = len(memory.slips) == rows.count
+            slip = memory.slips if known else rows.slip_at(bodies.velocities(problem.skewed))
+            rows.follow(slip, 0.0)
+        return before
+
+    def keep(self, problem: Problem, solution: Solution, most: Floats) -> None:
+        """Remember a step; ``most`` is the friction (contacts,) that is held on to, N·s."""
+        self.speeds = solution.speeds
+        self._response = None if solution.response.flows is None else solution.response
+        self._pressed = _NOBODY
+        if solution.pressed is not None:
+            self._pressed = problem.stops[0].labels[solution.pressed]
+        self.contacts.keep(problem.rows, solution.rows, most)
+
+    def state(self) -> StartState:
+        """All of it."""
+        contacts = self.contacts
+        return StartState(
+            self.speeds.copy(),
+            _NO_ROWS if self._response is None else self._response.trial.copy(),
+            self._pressed.copy(),
+            contacts.grips.copy(),
+            contacts.wanted.copy(),
+            contacts.slips.copy(),
+            contacts.labels.copy(),
+        )
+
+    def restore(self, state: StartState, law: PlasticLaw) -> None:
+        """Go back to what was."""
+        self.speeds, self._pressed = state.speeds.copy(), state.pressed.copy()
+        self._response = law.answer(state.trial.copy()) if len(state.trial) else None
+        self.contacts.set(
+            state.labels.copy(), state.grips.copy(), state.wanted.copy(), state.slips.copy()
+        )
 
 
 class ContactMemory:
@@ -31,7 +113,7 @@ class ContactMemory:
         """(rows, 3) y of the step before, see ``rows``."""
         self.slips = slips
         """(contacts,) μ |w_t| at its end, m/s; none where it is not known, or nothing slipped."""
-        self._answer: Answer | None = None
+        self._answer: RowImpulses | None = None
         self._normals: Floats | None = None
 
     def grips_of(self, contacts: Contacts) -> Floats | None:
@@ -47,7 +129,7 @@ class ContactMemory:
         """Whether these are the contacts of the step before."""
         return contacts.labels.tobytes() == self._key
 
-    def before(self, rows: Rows) -> Answer | None:
+    def before(self, rows: Rows) -> RowImpulses | None:
         """What these rows did in the step before; None where some are new."""
         if len(self.wanted) != len(rows) or not self.knows(rows.contacts):
             return None
@@ -55,7 +137,7 @@ class ContactMemory:
             return self._answer
         return rows.respond(self.wanted)
 
-    def before_or(self, rows: Rows, there: Floats) -> Answer:
+    def before_or(self, rows: Rows, there: Floats) -> RowImpulses:
         """The same, with y (rows, 3) for those that are new."""
         count = rows.count
         if len(self.labels) and count:
@@ -70,7 +152,7 @@ class ContactMemory:
         place = np.minimum(ordered.searchsorted(contacts.labels), len(order) - 1)
         return order.take(place), (ordered.take(place) == contacts.labels)[:, None]
 
-    def keep(self, rows: Rows, answer: Answer | None, most: Floats | float) -> None:
+    def keep(self, rows: Rows, answer: RowImpulses | None, most: Floats | float) -> None:
         """Remember a step.
 
         Args:
@@ -95,3 +177,4 @@ class ContactMemory:
 
 _NO_ROWS = np.zeros((0, 3))
 _NO_ONES = np.zeros(0)
+_NOBODY = np.zeros(0, np.int64)

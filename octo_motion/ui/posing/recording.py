@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion of a drag, kept while the frames go by and written as few keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from ...blender.animation import PoseKeys, pose_values, restore_pose
+from ...blender.rig import Puppet
+from ...core.posing.puppet import Pose, turned_bodies
+from ...core.posing.session import TOUCHED
+from ...core.rotations import Floats
+from .properties import posing_settings
+
+_LOCATION_SHARE: Final = 0.002
+"""Of the figure's size: how far a recorded location's keys may be off."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    """One frame of a recording."""
+
+    pose: Pose
+    rotations: Floats
+    """(bodies, 4) of the bones, from rest."""
+    locations: Floats
+    """(bodies, 3)"""
+
+
+class Recording:
+    """The poses of a puppet, frame by frame.
+
+    Args:
+        puppet: what is posed.
+        frame: where it begins.
+        pose: of the puppet there.
+    """
+
+    def __init__(self, puppet: Puppet, frame: float, pose: Pose) -> None:
+        self._puppet = puppet
+        self._own = pose_values(puppet.armature())
+        """Of the bones, at the beginning."""
+        self._moments: dict[float, _Moment] = {}
+        self.keep(frame, pose)
+
+    def keep(self, frame: float, pose: Pose) -> None:
+        """One frame more, or another pose at one."""
+        self._moments[frame] = _Moment(pose, *self._puppet.local(pose))
+
+    def is_past(self, frame: float) -> bool:
+        """Whether a frame lies before the last one: playback has come round."""
+        return frame < max(self._moments)
+
+    def write(self, keys: PoseKeys) -> tuple[list[str], int]:
+        """Set keys; names of the bones that got some, and the number of key frames."""
+        puppet = self._puppet
+        frames = np.array(sorted(self._moments))
+        moments = [self._moments[frame] for frame in frames]
+        moved: set[int] = set()
+        for each in moments[1:]:
+            moved |= set(turned_bodies(puppet.figure, moments[0].pose, each.pose, TOUCHED))
+        if not moved:
+            return [], 0
+        names = puppet.figure.names
+        bodies = puppet.with_followers(moved)
+        rotations = {
+            names[body]: np.stack([each.rotations[body] for each in moments]) for body in bodies
+        }
+        locations = {
+            names[body]: np.stack([each.locations[body] for each in moments])
+            for body in bodies
+            if puppet.places(body)
+        }
+        armature = puppet.armature()
+        settings: Any = posing_settings(armature)
+        size = float(np.ptp(puppet.rig.skeleton.heads, axis=0).max())
+        count = keys.insert_motion(
+            armature,
+            frames,
+            rotations,
+            locations,
+            angle=settings.record_angle,
+            distance=_LOCATION_SHARE * size,
+        )
+        return list(rotations), count
+
+    def go_along(self, recorded: Iterable[str]) -> bool:
+        """Let what stood still in the recording go on with what carries it; whether anything did.
+
+        While a root bone travels, the figure's own root is held back to stay in its place, and is
+        to be no further off once that is over: unless it was moved, it has got no keys.
+
+        Args:
+            recorded: bones that got keys.
+        """
+        puppet, armature = self._puppet, self._puppet.armature()
+        loose = {name for body, name in enumerate(puppet.figure.names) if puppet.places(body)}
+        now = pose_values(armature)
+        back = {
+            bone: own
+            for bone, own in self._own.items()
+            if bone in loose.difference(recorded) and now.get(bone) != own
+        }
+        restore_pose(armature, back)
+        return bool(back)

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel says of a session of posing, as the simulation takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Final
+
+import bpy
+import numpy as np
+
+from ...blender.rig import Puppet, bone_materials, is_part_of
+from ...blender.scene import read_obstacle
+from ...core.posing.puppet import Elements, Figure, Material, elements_for
+from ...core.posing.session import Session
+from ...core.posing.solver import Obstacle, Plane, WorldSettings
+from .custom_material import chosen_material, keep_material, kept_before
+from .properties import marked_obstacles, posing_settings
+
+GRAVITY: Final = (0.0, 0.0, -9.81)
+_CALMING: Final = 3.0
+"""1/s: how fast a free puppet without weight comes to rest."""
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """The settings that may be changed in the panel while a session goes on."""
+
+    material: str
+    strength: float
+    custom_yields: bool
+    custom_bears: float
+    custom_springs: float
+    custom_settles: float
+    custom_gives: float
+    root: str
+    gravity: bool
+    floor: bool
+    floor_height: float
+    use_obstacles: bool
+    self_collision: bool
+    friction: float
+
+    @classmethod
+    def of(cls, armature: bpy.types.Object) -> SessionSettings:
+        """As they are now."""
+        settings: Any = posing_settings(armature)
+        return cls(**{each.name: getattr(settings, each.name) for each in fields(cls)})
+
+    @property
+    def joints(self) -> tuple[Any, float]:
+        """What decides on the joints."""
+        return chosen_material(self), self.strength
+
+    @property
+    def ground(self) -> tuple[bool, float, bool]:
+        """What decides on obstacles."""
+        return self.floor, self.floor_height, self.use_obstacles
+
+    @property
+    def world(self) -> dict[str, Any]:
+        """What decides on the world, by names of ``WorldSettings``."""
+        calm = self.root == "FREE" and not self.gravity
+        return {
+            "gravity": GRAVITY if self.gravity else (0.0, 0.0, 0.0),
+            "self_collision": self.self_collision,
+            "friction": self.friction,
+            "drag": _CALMING if calm else 0.0,
+        }
+
+    def world_settings(self) -> WorldSettings:
+        """Of a session that begins."""
+        return WorldSettings(**self.world)
+
+    def elements(self, figure: Figure, own: Mapping[int, Material]) -> Elements:
+        """Of the joints; some bodies may have a material of their own."""
+        return elements_for(figure, *self.joints, own=own)
+
+    def obstacles(self, puppet: Puppet, scene: bpy.types.Scene) -> list[Obstacle]:
+        """What the puppet can touch.
+
+        Raises:
+            RigError: an obstacle is damaged.
+        """
+        unit, armature = puppet.rig.unit, puppet.found()
+        obstacles: list[Obstacle] = []
+        if self.floor:
+            obstacles.append(Plane(position=np.array([0.0, 0.0, self.floor_height * unit])))
+        marked = marked_obstacles(scene) if self.use_obstacles else []
+        obstacles += [
+            read_obstacle(item, kind, unit)
+            for item, kind in marked
+            if not is_part_of(item, armature)
+        ]
+        return obstacles
+
+    def hold_root(self, puppet: Puppet, session: Session) -> None:
+        """Pin the roots, or free those that nothing locks."""
+        pose = puppet.armature().pose
+        assert pose is not None
+        for body, parent in enumerate(session.figure.parents):
+            if parent < 0:
+                locked = all(np.array(pose.bones[session.figure.names[body]].lock_location))
+                free = self.root == "FREE" and not locked
+                session.pin(body, state=not free, firm=self.root == "HELD")
+
+
+class BoneMaterials:
+    """Materials of single joints, and what was measured in a session, to be taken back.
+
+    Args:
+        puppet: whose.
+    """
+
+    def __init__(self, puppet: Puppet) -> None:
+        self._puppet = puppet
+        self._before: list[Callable[[bpy.types.Object], None]] = []
+        self.read()
+
+    def read(self) -> None:
+        """Take what the bones have now."""
+        own = bone_materials(self._puppet.armature())
+        names = self._puppet.figure.names
+        self.by_body = {body: own[name] for body, name in enumerate(names) if name in own}
+
+    def take(self, material: Material, bone: str) -> None:
+        """Let the figure, or one bone's joint, be of a material.
+
+        Raises:
+            WriteError: the bones are linked.
+        """
+        armature = self._puppet.armature()
+        settings: Any = posing_settings(armature)
+        self._before.append(kept_before(armature, settings, bone))
+        keep_material(armature, settings, material, bone)
+        self.read()
+
+    def take_back(self, armature: bpy.types.Object) -> None:
+        """As they were at the start."""
+        for put_back in reversed(self._before):
+            put_back(armature)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What tests alone ask of a simulated puppet: its energy, and a push to begin with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from octo_motion.core.posing.solver.world import World
+from octo_motion.core.rotations import Floats
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Joules."""
+
+    kinetic: float
+    elastic: float
+    """In the springs of the elements."""
+    weight: float
+    """In the height of the centres of mass, against the origin."""
+
+    @property
+    def total(self) -> float:
+        """Their sum."""
+        return self.kinetic + self.elastic + self.weight
+
+
+def energy_of(world: World) -> Energy:
+    """What the figure holds now."""
+    bodies, masses = world._bodies, world.figure.masses
+    kinetic = 0.5 * float(
+        (masses[:, None] * bodies.linear**2).sum() + (bodies.angular * bodies.spin).sum()
+    )
+    springs = world.joint_springs()
+    elastic = 0.5 * float((world._law.stiffness * springs * springs).sum())
+    weight = -float(masses @ (bodies.centres() @ world.settings.gravity))
+    return Energy(kinetic, elastic, weight)
+
+
+def set_velocities(world: World, velocities: Floats) -> None:
+    """Give the bodies velocities (bodies, 6) as ``World.velocities`` reports them.
+
+    The next step takes from them what the joints allow.
+    """
+    bodies, tree, warm = world._bodies, world._tree, world._warm
+    bodies.linear = np.array(velocities[:, :3], dtype=np.float64)
+    bodies.angular = np.array(velocities[:, 3:], dtype=np.float64)
+    bodies.spin = (bodies.inertias() @ bodies.angular[:, :, None])[:, :, 0]
+    warm.contacts.slips = np.zeros(0)
+    # Where the solver begins; it ends in the same place from anywhere.
+    before = np.where(bodies.is_root[:, None], 0.0, bodies.angular[bodies.parent_or_self])
+    warm.speeds = np.zeros_like(warm.speeds)
+    warm.speeds[tree.joint_slot] = bodies.angular - before
+    lever = bodies.positions[tree.roots] - bodies.centres()[tree.roots]
+    warm.speeds[tree.shift_slot] = bodies.linear[tree.roots] + np.cross(
+        bodies.angular[tree.roots], lever
+    )
