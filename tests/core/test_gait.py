@@ -236,3 +236,47 @@ def test_a_damaged_gait_file_says_what_is_wrong_with_it(text: str, message: str)
         gait.gait_from_json(text)
 
     assert message in str(caught.value)
+
+
+CREATURES = {
+    3: [("LEFT", 1), ("RIGHT", 1), ("CENTER", 2)],
+    6: [(side, pair) for pair in (1, 2, 3) for side in ("LEFT", "RIGHT")],
+    8: [(side, pair) for pair in (1, 2, 3, 4) for side in ("LEFT", "RIGHT")],
+    12: [(side, pair) for pair in range(1, 7) for side in ("LEFT", "RIGHT")],
+}
+
+
+@pytest.mark.parametrize("arms", CREATURES)
+def test_a_gait_by_halves_and_from_the_rear_fits_any_number_of_arms(arms: int) -> None:
+    text = """{"format": "octo_motion.gait", "version": 1, "name": "halves", "manner": "walk",
+        "spread": {"sides": 0.5, "halves": 0.25}, "offsets": {"-1 left": 90, "-6 right": 45},
+        "pairs": {"all": {"phase": [0, 360], "head": [[0, 0], [0, 0], [0, 0]]},
+                  "-1": {"phase": [0, 360], "head": [[9, 9], [0, 0], [0, 0]], "free": true}}}"""
+    written = gait.gait_from_json(text)
+    assert gait.gait_from_json(gait.gait_to_json(written)).offsets == written.offsets
+    assert gait.gait_from_json(gait.gait_to_json(written)).spread_halves == 0.25
+    creature = CREATURES[arms]
+    pairs = max(pair for _, pair in creature)
+    table = written.for_pairs(pairs)
+    # The last pair, whichever it is, has its own curve, and no other.
+    assert [pair for pair in range(1, pairs + 1) if table.curve(pair).free] == [pairs]
+    side_share = {"LEFT": 0.0, "CENTER": 0.5, "RIGHT": 1.0}
+    for side, pair in creature:
+        cycles = table.offset(side, pair, pairs) / (2.0 * np.pi)
+        if (side, pair) == ("LEFT", pairs):
+            assert cycles == pytest.approx(0.25)
+        elif (side, pair) == ("RIGHT", pairs - 5):
+            assert cycles == pytest.approx(0.125)
+        else:
+            half = {True: 0.0, False: 0.25}[pair <= pairs // 2]
+            half = 0.125 if 2 * pair == pairs + 1 else half
+            assert cycles == pytest.approx(0.5 * side_share[side] + half)
+
+
+def test_where_a_pair_is_told_both_ways_the_number_from_the_front_counts() -> None:
+    table = dataclasses.replace(PRESETS["walk"], offsets={(-1, "LEFT"): 1.0, (3, "LEFT"): 2.0})
+    assert table.for_pairs(3).offsets == {(3, "LEFT"): 2.0}
+    assert table.for_pairs(4).offsets == {(4, "LEFT"): 1.0, (3, "LEFT"): 2.0}
+    # A body that has fewer pairs does without.
+    far = dataclasses.replace(PRESETS["walk"], offsets={(-4, "LEFT"): 1.0})
+    assert far.for_pairs(3).offsets == {}

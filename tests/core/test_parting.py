@@ -301,7 +301,7 @@ def test_a_part_of_the_motion_is_made_like_the_whole() -> None:
         replace(
             group,
             joints=group.joints[some],
-            lying=group.in_contact[some],
+            in_contact=group.in_contact[some],
             kept=group.kept[some],
             up=group.up[some],
         ),

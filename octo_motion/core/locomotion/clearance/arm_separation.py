@@ -102,15 +102,12 @@ def separate_arms(
         cyclic: whether the last frame is the first again.
     """
     ends = np.cumsum([0, *(len(arm.bones) for arm in bulk.arms)])
-    some = [joints_that_count(len(arm.bones)) for arm in bulk.arms]
-    most = max(len(each) for each in some)
-    # Arms with fewer joints than others end in the same one several times.
-    chosen = [np.append(each, np.repeat(each[-1:], most - len(each))) for each in some]
+    some, chosen = _joints_chosen(bulk.arms)
     posed = [
         _Posed.of(numbers, together, ends, rotations)
         for numbers, together in batches_by_bones(bulk.arms)
     ]
-    joints = np.empty((len(rotations), len(bulk.arms), most, 3))
+    joints = np.empty((len(rotations), len(bulk.arms), len(chosen[0]), 3))
     for each in posed:
         joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
     locations, orientations = travel
@@ -136,6 +133,16 @@ def separate_arms(
     for each in posed:
         each.turn(result, crowd.joints, moved, some[each.numbers[0]])
     return result
+
+
+def _joints_chosen(arms: Sequence[ArmFrames]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """For each arm the joints that stand for all, and as many of them for every arm.
+
+    Arms with fewer joints than others end in the same one several times.
+    """
+    some = [joints_that_count(len(arm.bones)) for arm in arms]
+    most = max(len(each) for each in some)
+    return some, [np.append(each, np.repeat(each[-1:], most - len(each))) for each in some]
 
 
 @dataclass(frozen=True, eq=False)

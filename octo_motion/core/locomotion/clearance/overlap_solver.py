@@ -22,6 +22,7 @@ from ...easing import smooth_step
 from ...rotations import Floats
 from ...temporal_filter import blur_reach, blurred, covered, widened
 from ..ground import drawn
+from ..rig import TOLERATED, lowest_allowed
 from .capsule_overlap import Capsules
 from .chain_solver import joints_of, turned_towards
 from .overlap_contacts import Crowd, Touches, Touching, aside
@@ -53,8 +54,6 @@ _SWIFT: Final = 1.2
 """How much faster than anything before an arm may turn to make way …"""
 _UNSEEN: Final = 0.4
 """… or radians from one frame to the next, if that is more: a walk has as much."""
-_SUNK: Final = 2e-3
-"""Arm lengths that an arm may be pushed below where it was above the ground."""
 _REPEATS: Final = 3
 """How often arms that could not make way well are looked for."""
 _LITTLE: Final = 0.02
@@ -183,7 +182,7 @@ class _Parting:
             points = self._crowd.joints[frames].reshape(-1, shape[2], 3)
             height = self._floor.clearance(np.repeat(frames, shape[1]), points)
             height = height.reshape(len(frames), *shape[1:])
-            allowed[frames] = np.minimum(height, self._crowd.radii)
+            allowed[frames] = lowest_allowed(height, self._crowd.radii)
             room[frames] = height - allowed[frames]
         return allowed, room
 
@@ -340,7 +339,7 @@ class _Parting:
         ends = self._directions[:-1][anew], self._directions[1:][anew]
         swift[anew] = _turns(*ends) > most
         result[1:][swift] = result[:-1][swift] = 1.0
-        result[self._room.min(axis=2) < -_SUNK * self._length] = 1.0
+        result[self._room.min(axis=2) < -TOLERATED * self._length] = 1.0
         return np.where(changed | (result < 1.0), result, 0.0)
 
     def _changed(self) -> np.ndarray:

@@ -21,12 +21,10 @@ from ...batched import turned
 from ...rotations import Floats, rotate
 from ...temporal_filter import covered
 from ..ground import Ground
-from ..rig import ArmBatch, ArmFrames, Poses, batches_by_bones, halfway_automatic
+from ..rig import TOLERATED, ArmBatch, ArmFrames, Poses, batches_by_bones, halfway_automatic
 
-_TOLERATED: Final = 0.002
-"""Arm lengths that a joint may be below the ground half way between frames …"""
 _SPARE: Final = 0.003
-"""… and by which one that was deeper is raised above it."""
+"""Arm lengths above the ground that a joint is raised to which dips into it between frames."""
 _ROUNDS: Final = 4
 _BETTER: Final = 0.9
 """Share of a dip that may be left after a round for another to be worth its while."""
@@ -108,7 +106,7 @@ class ArmsOverGround:
             astray = _bends(rotations).reshape(frames, len(own), -1).sum(axis=2)
             least = np.minimum(clear[:-1, own], clear[1:, own])
             # Half way between which frames, and which arm.
-            moment, arm = np.nonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + _TOLERATED)
+            moment, arm = np.nonzero(_ASTRAY * (astray[:-1] + astray[1:]) > least + TOLERATED)
             if not len(moment):
                 continue
             half = halfway_automatic(
@@ -162,7 +160,7 @@ def raise_between_frames(
         last, deep = tried[-1]
         # What dips no less for having been raised is not raised any further.
         before = tried[-2][1] if len(tried) > 1 else np.zeros_like(deep)
-        worth = (deep > _TOLERATED) & ((before <= _TOLERATED) | (deep < _BETTER * before))
+        worth = (deep > TOLERATED) & ((before <= TOLERATED) | (deep < _BETTER * before))
         asked = _at_frames(np.where(worth, deep + _SPARE, 0.0), cyclic=course.cyclic)
         more = covered(asked, _WIDTH, cyclic=course.cyclic)
         chosen = np.flatnonzero(np.any(more > 0.0, axis=1))
@@ -207,7 +205,7 @@ def _best(
                 for poses, _ in tried
             ]
             jerky = np.array(turns) > turns[0] + _JERK
-            badness = np.where(jerky, np.inf, np.maximum(depths, _TOLERATED))
+            badness = np.where(jerky, np.inf, np.maximum(depths, TOLERATED))
             poses, _ = tried[int(np.argmin(badness))]
             rotations[first:end, bones] = poses.rotations[first:end, bones]
             strains[first:end, bones] = poses.strains[first:end, bones]

@@ -16,16 +16,12 @@ import numpy as np
 from ...easing import smooth_step
 from ...rotations import Floats, conjugate, multiply, rotate, shortest_arc
 from ..ground import raise_over_ground
-from ..rig import Poses
+from ..rig import JointRoom, Poses, loose_from_root, room_needed
 from .subframe_clearance import ArmsOverGround
 
-_OVER: Final = 0.03
-"""Arm lengths that joints keep between their skin and the ground."""
 _ROUNDS: Final = 6
 _SOFT: Final = 0.5
 """Share of the height that a joint needs within which it begins to be raised."""
-_OUT: Final = 0.15
-"""Share of an arm from its root on which is not raised all the way."""
 _RAMP: Final = 0.15
 """Share of the way from one gait to another within which arms come to be raised, or are no more."""
 _ALONG: Final = np.array([1.0, 0.0, 0.0])
@@ -37,8 +33,8 @@ def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
     Those that walk see to it themselves; all that swim or go over from one gait to another do not.
 
     Args:
-        swims: whether each leg of the journey is swum, one leg at least.
-        shares: for each change from one leg to the next, how far each arm (frames, arms) has gone
+        swims: whether each segment of the route is swum, one at least.
+        shares: for each change from one to the next, how far each arm (frames, arms) has gone
             over.
     """
     result = np.full(shares[0].shape if shares else (1, 1), float(swims[0]))
@@ -71,18 +67,21 @@ def keep_off_ground(
         directions = rotate(multiply(facing, frames), _ALONG)
         roots = poses.locations[chosen] + rotate(facing[:, 0], course.scale * arm.root)
         reach = np.concatenate([np.zeros((len(chosen), 1)), np.cumsum(lengths, axis=1)], axis=1)
-        needed = radii[number] + _OVER * reach[:, -1:]
-        out = smooth_step(reach / (_OUT * reach[:, -1:])) * loose[chosen, number, None]
+        needed = room_needed(radii[number], reach[:, -1:])
+        own = loose_from_root(reach, reach[:, -1:]) * loose[chosen, number, None]
+        room = JointRoom(
+            np.ascontiguousarray(needed.T),
+            np.ascontiguousarray(own.T),
+            _SOFT * needed.max(axis=1),
+        )
         turned = raise_over_ground(
             np.ascontiguousarray(np.moveaxis(directions, 0, -1)),
             np.ascontiguousarray(lengths.T),
+            room,
             free=np.ones_like(lengths.T),
             roots=np.ascontiguousarray(roots.T),
-            needed=np.ascontiguousarray(needed.T),
-            loose=np.ascontiguousarray(out.T),
             ground=course.ground,
             iterations=_ROUNDS,
-            soft=_SOFT * needed.max(axis=1),
         )
         back = conjugate(facing)
         before, after = (rotate(back, each) for each in (directions, np.moveaxis(turned, -1, 0)))

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The free arm: gait table → pseudo-targets → weighted CCD."""
 
+from .builds import Build, bone_twists
 from .ccd import close_group
-from .gait_poser import MOST_STEADY, Arm, Build, GaitPoser, GaitSettings, bone_twists
+from .gait_poser import MOST_STEADY, Arm, GaitPoser, GaitSettings
 from .joint_groups import diameters
 from .table import (
     ANGLES,

@@ -23,6 +23,7 @@ import numpy as np
 
 from ...batched import running, smallest_arc, turned
 from ...rotations import Floats
+from ..rig import lift_to_floor
 
 SWEEPS: Final = 4
 SOFTENINGS: Final = 4
@@ -44,7 +45,7 @@ _MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
 _NEWTON_STEPS: Final = 6
 _NEWTON_STEPS_BETWEEN: Final = 2
 # Arm lengths within which a joint comes to rest on a floor.
-_FLOOR_ROUNDING: Final = 0.1
+FLOOR_ROUNDING: Final = 0.1
 _SHORT: Final = 1e-9
 _OPPOSITE: Final = 1e-4
 """Where a group has to be turned with more care: a chord of hardly any length, of the unit that
@@ -304,20 +305,11 @@ def softened(directions: Floats, amount: float) -> Floats:
     return _made_unit(mean)
 
 
-def clamp_to_floor(heights: Floats, floor: Floats) -> Floats:
-    """Heights (…, batch) that are never below the floor (batch,), with a smooth passage.
-
-    Differences never grow: what is within reach of each other stays so.
-    """
-    above = heights - floor
-    return floor + 0.5 * (above + np.sqrt(above * above + _FLOOR_ROUNDING**2))
-
-
 def lifted(directions: Floats, lengths: Floats, floor: Floats) -> Floats:
     """An arm whose joints below a floor are raised to it; lengths are kept, ends may move."""
     above = running(lengths[:, None] * directions[:, 2])
     above -= floor
-    lift = 0.5 * (np.sqrt(above * above + _FLOOR_ROUNDING**2) - above)
+    lift = lift_to_floor(above, FLOOR_ROUNDING)
     lift[1:] -= lift[:-1].copy()
     result = directions.copy()
     result[:, 2] += lift / lengths[:, None]

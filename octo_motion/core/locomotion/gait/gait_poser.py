@@ -29,11 +29,13 @@ from ..rig import (
     chain_of,
     joint_positions,
     rotate_bones,
+    smooth_floor,
 )
-from .ccd import JointChain, asked_shape, clamp_to_floor, overreach, solve_ccd
-from .joint_groups import GROUPS, group_lengths, split_groups
+from .builds import Build, bone_twists, builds_of
+from .ccd import FLOOR_ROUNDING, asked_shape, overreach, solve_ccd
+from .joint_groups import GROUPS
 from .pseudo_targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
-from .swim_spread import swim_azimuths
+from .swim_spread import swim_azimuths, trailing_asides, trailing_beside
 from .table import GaitCurve, GaitTable, gait_angles, variation
 
 MOST_STEADY: Final = 0.25
@@ -51,10 +53,6 @@ _STANDING: Final = 0.3
 """Share of a cycle in which an arm would reach deeper than the floor."""
 _LEAST_DEPTH: Final = 0.1
 """Arm lengths: a gait that reaches less deep moves its arms level, and stands on nothing."""
-_ROOM: Final = 0.1
-"""Arm lengths beside the way of a swimming body at which its arms trail, at least."""
-_TRAILING: Final = 0.75
-"""Share of its length that the first group of an arm that trails spans: such a group is bent."""
 
 
 @dataclass(frozen=True)
@@ -165,16 +163,6 @@ class ArmPoses:
     what the setting ``stretch_slack`` lets it and those before it reach beyond."""
 
 
-@dataclass(frozen=True, eq=False)
-class Build:
-    """Arms whose segments have the same proportions, solved together."""
-
-    arms: tuple[int, ...]
-    chain: JointChain
-    widths: Floats
-    """(links,) rest lengths H_g, in arm lengths."""
-
-
 class GaitPoser:
     """Moves the arms of one body.
 
@@ -182,47 +170,65 @@ class GaitPoser:
         RigError: there are no arms, arms share bones, or a bone does not exist.
     """
 
+    arms: Final[tuple[Arm, ...]]
+    """The arms as they were given."""
+    builds: Final[tuple[Build, ...]]
+    """The arms, by how they are built."""
+    settings: Final[GaitSettings]
+    """How the arms move."""
+    offsets: Final[Floats]
+    """(arms,) radians that each arm's phase is ahead of the body's."""
+    roots: Final[Floats]
+    """(arms, 3) P₀ in the body's frame, armature units."""
+    lengths: Final[Floats]
+    """(arms,) armature units."""
+    outward: Final[Floats]
+    """(arms, 4) from an arm's own frame, x outward and z up, to the body's."""
+    rests: Final[tuple[ArmRest, ...]]
+    """Each arm at rest."""
+
     def __init__(
         self, skeleton: Skeleton, arms: Sequence[Arm], body: BodyFrame, settings: GaitSettings
     ) -> None:
         if not arms:
             raise RigError("The list of arms is empty.", "Detect the arms, or add one.")
-        self._arms = tuple(arms)
-        gait = settings.gait.for_pairs(max(arm.pair for arm in self._arms))
-        self._settings = settings = replace(settings, gait=gait)
-        _check_disjoint(self._arms)
-        for arm in self._arms:
+        self.arms = tuple(arms)
+        gait = settings.gait.for_pairs(max(arm.pair for arm in self.arms))
+        settings = replace(settings, gait=gait)
+        self.settings = settings
+        _check_disjoint(self.arms)
+        for arm in self.arms:
             chain_of(skeleton, arm.bones)
-        joints = [body.to_body(joint_positions(skeleton, arm.bones)) for arm in self._arms]
+        joints = [body.to_body(joint_positions(skeleton, arm.bones)) for arm in self.arms]
         segments = [np.linalg.norm(np.diff(each, axis=0), axis=1) for each in joints]
-        self._lengths = np.array([float(each.sum()) for each in segments])
-        self._roots = np.array([each[0] for each in joints])
+        self.lengths = np.array([float(each.sum()) for each in segments])
+        self.roots = np.array([each[0] for each in joints])
         # From an arm's own frame to the body's: azimuth counts from the front, −Y.
-        bones = [arm.bones for arm in self._arms]
+        bones = [arm.bones for arm in self.arms]
         lean = 0.0 if gait.on_ground else settings.swim_lean
         find = partial(swim_azimuths, lean=lean) if lean else arm_azimuths
         azimuths = find(skeleton, bones, body)
         # The same to a body whose +Z is the way that it swims along.
         self._round = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
-        self._outward = self._round
+        self.outward = self._round
         if lean:
-            self._outward = multiply(from_axis_angle(_SIDEWAYS, -lean), self._round)
+            self.outward = multiply(from_axis_angle(_SIDEWAYS, -lean), self._round)
         # From an arm's own frame to armature space.
-        self._to_armature = multiply(from_matrix(body.rotation), self._outward)
-        self._rests = [
+        self._to_armature = multiply(from_matrix(body.rotation), self.outward)
+        self.rests = tuple(
             replace(arm_rest(skeleton, arm.bones), outward=outward)
-            for arm, outward in zip(self._arms, self.opens_to, strict=True)
-        ]
-        self._hands = np.array([arm.handedness for arm in self._arms])
-        self._pairs = tuple(arm.pair for arm in self._arms)
-        spread = [gait.offset(arm.side, arm.pair, max(self._pairs)) for arm in self._arms]
+            for arm, outward in zip(self.arms, self.opens_to, strict=True)
+        )
+        self._hands = np.array([arm.handedness for arm in self.arms])
+        self._pairs = tuple(arm.pair for arm in self.arms)
+        spread = [gait.offset(arm.side, arm.pair, max(self._pairs)) for arm in self.arms]
         if gait.on_ground and settings.heading != 0.0:
             spread = [spread[other] for other in _instead(azimuths, settings.heading)]
-        self._offsets = settings.phase_spread * np.array(spread) + [arm.phase for arm in arms]
+        self.offsets = settings.phase_spread * np.array(spread) + [arm.phase for arm in arms]
         sway = np.array([_across(gait.curve(pair)) for pair in self._pairs])
         sway[:, PITCH] *= self._hands
         self._sway = settings.lateral_bend * sway
-        self._builds = self._group(segments)
+        self.builds = builds_of(segments, settings.weights, on_ground=gait.on_ground)
         self._floor = -np.inf
         self._few: ContentCache[tuple[Floats, Floats]] = ContentCache()
         if settings.raise_to_floor and gait.on_ground:
@@ -233,12 +239,12 @@ class GaitPoser:
     @property
     def bones(self) -> tuple[str, ...]:
         """Names of the bones that are turned, in the order of ``ArmPoses.rotations``."""
-        return tuple(bone for arm in self._arms for bone in arm.bones)
+        return tuple(bone for arm in self.arms for bone in arm.bones)
 
     @property
     def arm_length(self) -> float:
         """Mean length of the arms, in the armature's units: what strides are counted in."""
-        return float(self._lengths.mean())
+        return float(self.lengths.mean())
 
     @cached_property
     def clearance(self) -> float:
@@ -259,31 +265,31 @@ class GaitPoser:
         same heights, whichever side they are on, so one of them is looked at. The shapes
         (segments, 3) are those of each arm half way through its hold.
         """
-        gait = self._settings.gait
+        gait = self.settings.gait
         phases = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
         phases = np.append(phases, gait.power_phase)
-        heights = self._roots[:, 2] / self._lengths
-        depths = np.empty((_CYCLE_SAMPLES, len(self._arms)))
+        heights = self.roots[:, 2] / self.lengths
+        depths = np.empty((_CYCLE_SAMPLES, len(self.arms)))
         middles: dict[int, Floats] = {}
-        for build in self._builds:
-            alike: dict[tuple[int, float], list[int]] = {}
+        for build in self.builds:
+            same: dict[tuple[int, float], list[int]] = {}
             for arm in build.arms:
                 curve = self._pairs[arm] if self._pairs[arm] in gait.curves else 0
-                alike.setdefault((curve, round(float(heights[arm]), 6)), []).append(arm)
-            chosen = [arms[0] for arms in alike.values()]
+                same.setdefault((curve, round(float(heights[arm]), 6)), []).append(arm)
+            chosen = [arms[0] for arms in same.values()]
             part = Build(tuple(chosen), build.chain, build.widths)
             own = np.repeat(phases[:, None], len(chosen), axis=1)
             pairs = tuple(self._pairs[arm] for arm in chosen)
-            angles = gait_angles(gait, own, pairs, smoothing_cycles=self._settings.smoothing_cycles)
+            angles = gait_angles(gait, own, pairs, smoothing_cycles=self.settings.smoothing_cycles)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
             directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
             # Up is the same for the arm's frame and the body's.
             climbs = running(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)
-            for place, arms in enumerate(alike.values()):
+            for place, arms in enumerate(same.values()):
                 low = lowest[:_CYCLE_SAMPLES, place, None]
-                depths[:, arms] = self._roots[arms, 2] + self._lengths[arms] * low
+                depths[:, arms] = self.roots[arms, 2] + self.lengths[arms] * low
                 for arm in arms:
                     middles[arm] = directions[:, :, -1, place].copy()
                     # The other side is its mirror image.
@@ -299,7 +305,7 @@ class GaitPoser:
 
     def arm_phases(self, phase: Floats) -> Floats:
         """Each arm's own phase (frames, arms) at the body's phases (frames,)."""
-        return phase[:, None] + self._offsets
+        return phase[:, None] + self.offsets
 
     def pose(self, phase: Floats, turn: Floats) -> ArmPoses:
         """The arms at some frames.
@@ -309,7 +315,7 @@ class GaitPoser:
             turn: (frames, 2) turn that lies ahead, in the body's XY plane (``Travel.turn``).
         """
         angles, steering = self.asked(phase, turn)
-        step = max(1, _CHUNK // len(self._arms))
+        step = max(1, _CHUNK // len(self.arms))
         parts = [
             self._pose(angles[start : start + step], steering[start : start + step])
             for start in range(0, len(angles), step)
@@ -338,7 +344,7 @@ class GaitPoser:
             cycle_period: each arm's cycles after which random additions come again, if that is not
                 the same for all.
         """
-        settings = self._settings
+        settings = self.settings
         steady = settings.smoothing_cycles
         angles = gait_angles(
             settings.gait, phases, self._pairs, smoothing_cycles=steady
@@ -352,103 +358,34 @@ class GaitPoser:
             smoothing_cycles=steady,
         )
         if not settings.gait.on_ground:
-            angles = self._beside(angles)
+            angles = trailing_beside(angles, self._asides)
         # Towards the goal: by the part of the turn that lies across the arm.
         across = rotate(self._round, np.array([0.0, 1.0, 0.0]))[:, :2]
         steering = settings.turning * np.asarray(turn, dtype=np.float64) @ across.T
-        return self._mirrored(angles), steering
-
-    def _beside(self, angles: Floats) -> Floats:
-        """Angles (frames, arms, links, 3) with which no arm trails in the line of all others.
-
-        Arms that spring from one point would all come to lie in it as they close. They turn in
-        less far with their first links, and what is left with their second ones: so they trail
-        side by side.
-        """
-        off = self._asides > 0.0
-        if not np.any(off):
-            return angles
-        result = angles.copy()
-        head, aside = angles[:, off, 0, HEAD], self._asides[off]
-        # All of it where an arm trails in the line of the others, little before.
-        closed = head / (0.5 * np.pi)
-        short = -aside * closed * np.abs(closed)
-        result[:, off, 0, HEAD] += short
-        result[:, off, 1, HEAD] -= short
-        return result
+        # Turns anticlockwise for every arm.
+        angles[..., [PITCH, BANK]] *= self._hands[:, None, None]
+        return angles, steering
 
     @cached_property
     def _asides(self) -> Floats:
         """By how far the first link of each arm (arms,) has to point beside the way, radians."""
-        result = np.zeros(len(self._arms))
-        if len(self._arms) < 2:
-            return result
-        out = rotate(self._outward, np.array([1.0, 0.0, 0.0]))
-        roots = np.sum(self._roots * out, axis=-1) / self._lengths
-        for build in self._builds:
-            columns = list(build.arms)
-            short = np.maximum(_ROOM - roots[columns], 0.0) / (_TRAILING * build.widths[0])
-            result[columns] = np.arcsin(np.minimum(short, 1.0))
-        return result
-
-    @property
-    def arms(self) -> tuple[Arm, ...]:
-        """The arms as they were given."""
-        return self._arms
-
-    @property
-    def builds(self) -> tuple[Build, ...]:
-        """The arms, by how they are built."""
-        return self._builds
-
-    @property
-    def settings(self) -> GaitSettings:
-        """How the arms move."""
-        return self._settings
-
-    @property
-    def offsets(self) -> Floats:
-        """(arms,) radians that each arm's phase is ahead of the body's."""
-        return self._offsets
-
-    @property
-    def roots(self) -> Floats:
-        """(arms, 3) P₀ in the body's frame, armature units."""
-        return self._roots
-
-    @property
-    def lengths(self) -> Floats:
-        """(arms,) armature units."""
-        return self._lengths
-
-    @property
-    def outward(self) -> Floats:
-        """(arms, 4) from an arm's own frame, x outward and z up, to the body's."""
-        return self._outward
+        out = rotate(self.outward, _SIDEWAYS)
+        roots = np.sum(self.roots * out, axis=-1) / self.lengths
+        firsts = {arm: build.widths[0] for build in self.builds for arm in build.arms}
+        return trailing_asides(roots, np.array([firsts[arm] for arm in range(len(roots))]))
 
     @property
     def opens_to(self) -> Floats:
         """(arms, 3) unit: where each arm leads out of the body, armature space."""
-        return rotate(self._to_armature, np.array([1.0, 0.0, 0.0]))
-
-    @property
-    def rests(self) -> tuple[ArmRest, ...]:
-        """Each arm at rest."""
-        return tuple(self._rests)
-
-    def _mirrored(self, angles: Floats) -> Floats:
-        """The same angles (frames, arms, links, 3), but with turns anticlockwise for every arm."""
-        hands = np.ones((len(self._arms), 1, 3))
-        hands[..., [PITCH, BANK]] = self._hands[:, None, None]
-        return angles * hands
+        return rotate(self._to_armature, _SIDEWAYS)
 
     def _pose(self, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
         """Rotations and misses from angles (frames, arms, links, 3) and steering (frames, arms)."""
         frames = len(angles)
-        ends = np.cumsum([0] + [len(arm.bones) for arm in self._arms])
+        ends = np.cumsum([0] + [len(arm.bones) for arm in self.arms])
         rotations = np.empty((frames, ends[-1], 4))
-        misses = np.empty((frames, len(self._arms), GROUPS))
-        for build in self._builds:
+        misses = np.empty((frames, len(self.arms), GROUPS))
+        for build in self.builds:
             columns = list(build.arms)
             own = angles[:, columns]
             directions, misses[:, columns] = self.shapes(build, own, steering[:, columns])
@@ -456,7 +393,7 @@ class GaitPoser:
             to_armature = np.tile(self._to_armature[columns].T, (1, frames))
             in_armature = turned(to_armature, directions.reshape(count, 3, size))
             posed = rotate_bones(
-                [self._rests[arm] for arm in columns],
+                [self.rests[arm] for arm in columns],
                 in_armature.reshape(directions.shape),
                 bone_twists(build, own),
             )
@@ -481,7 +418,7 @@ class GaitPoser:
     def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
         frames, arms = angles.shape[:2]
         batch = frames * arms
-        width = build.widths * (1.0 + contraction(angles, self._settings.contraction)) ** (
+        width = build.widths * (1.0 + contraction(angles, self.settings.contraction)) ** (
             # A group of a single bone cannot shorten.
             np.array(build.chain.sizes) > 1
         )
@@ -493,9 +430,9 @@ class GaitPoser:
         # Two targets raised to one height come nearer to each other, which a single bone cannot.
         if np.isfinite(self._floor) and min(build.chain.sizes) > 1:
             columns = list(build.arms)
-            own = (self._floor - self._roots[columns, 2]) / self._lengths[columns]
+            own = (self._floor - self.roots[columns, 2]) / self.lengths[columns]
             floor = np.tile(own, frames)
-            targets[1:, 2] = clamp_to_floor(targets[1:, 2], floor)
+            targets[1:, 2] = smooth_floor(targets[1:, 2], floor, FLOOR_ROUNDING)
         sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
         shape = asked_shape(build.chain, _batch_last(steered[..., [HEAD, PITCH]], batch), sway.T)
         directions = solve_ccd(
@@ -503,54 +440,23 @@ class GaitPoser:
             shape,
             _batch_last(links, batch),
             targets,
-            softness=self._settings.softness,
-            stretch_slack=self._settings.stretch_slack,
+            softness=self.settings.softness,
+            stretch_slack=self.settings.stretch_slack,
             floor=floor,
         )
         joints = running(build.chain.lengths[:, None, None] * directions)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
         missed = np.linalg.norm(ends - targets[1:], axis=1)
-        if self._settings.stretch_slack > 0.0:
+        if self.settings.stretch_slack > 0.0:
             roots = np.concatenate([np.zeros_like(ends[:1]), ends[:-1]])
             chords = np.linalg.norm(targets[1:] - roots, axis=1)
-            beyond = overreach(chords, build.widths[:, None], self._settings.stretch_slack)
+            beyond = overreach(chords, build.widths[:, None], self.settings.stretch_slack)
             # A group of a single bone begins where the one before has ended, and ends as far off.
             missed = np.maximum(missed - beyond.cumsum(axis=0), 0.0)
         return (
             directions.reshape(len(directions), 3, frames, arms),
             np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1),
         )
-
-    def _group(self, segments: Sequence[Floats]) -> tuple[Build, ...]:
-        """Arms that are built alike, so that one solution in batch serves them."""
-        alike: dict[tuple[float, ...], list[int]] = {}
-        for arm, lengths in enumerate(segments):
-            shares = lengths / self._lengths[arm]
-            # Bones' lengths are single precision.
-            alike.setdefault(tuple(np.round(shares, 6).tolist()), []).append(arm)
-        builds = []
-        weights = self._settings.weights
-        for arms in alike.values():
-            shares = segments[arms[0]] / self._lengths[arms[0]]
-            sizes = split_groups(shares)
-            along = np.cumsum(shares) - shares
-            sampled = np.interp(along, np.linspace(0.0, 1.0, len(weights)), weights)
-            afloat = not self._settings.gait.on_ground
-            chain = JointChain(shares, sizes, sampled, pairs_as_asked=afloat)
-            builds.append(Build(tuple(arms), chain, group_lengths(shares, sizes)))
-        return tuple(builds)
-
-
-def bone_twists(build: Build, angles: Floats) -> Floats:
-    """Radians (segments, frames, arms) by which each bone is twisted against the one before.
-
-    Args:
-        build: which arms.
-        angles: (frames, arms, links, 3) of these; bank is spread evenly over its group.
-    """
-    sizes = build.chain.sizes
-    shares = np.moveaxis(angles[..., BANK], -1, 0) / np.array(sizes)[:, None, None]
-    return np.repeat(shares, sizes, axis=0)
 
 
 def _batch_last(values: Floats, batch: int) -> Floats:

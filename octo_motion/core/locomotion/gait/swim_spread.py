@@ -21,11 +21,16 @@ from ...easing import smooth_step
 from ...rotations import Floats, from_axis_angle, less_whole_turns, to_matrix
 from ...skeleton import Skeleton
 from ..rig import BodyFrame, arm_azimuths
+from .pseudo_targets import HEAD
 
 _OPEN: Final = np.radians(45.0)
 """Lean from which on arms have opened all the way."""
 _WIDEST: Final = np.radians(140.0)
 """Arms that leave no gap as wide as this stand all round."""
+_ROOM: Final = 0.1
+"""Arm lengths beside the way of a swimming body at which its arms trail, at least."""
+_TRAILING: Final = 0.75
+"""Share of its length that the first group of an arm that trails spans: such a group is bent."""
 _SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
 
 
@@ -48,6 +53,42 @@ def swim_azimuths(
         apart = 2.0 * np.pi / (len(fan) + 1)
         found[order] = (np.arange(len(fan)) - 0.5 * (len(fan) - 1)) * apart
     return fan + smooth_step(lean / _OPEN) * less_whole_turns(found - fan)
+
+
+def trailing_asides(roots: Floats, first_groups: Floats) -> Floats:
+    """By how far the first link of each arm (arms,) has to point beside the way, radians.
+
+    Args:
+        roots: (arms,) arm lengths from the way to where each arm begins.
+        first_groups: (arms,) arm lengths that the first group of each is long.
+    """
+    if len(roots) < 2:
+        return np.zeros(len(roots))
+    short = np.maximum(_ROOM - roots, 0.0) / (_TRAILING * first_groups)
+    return np.arcsin(np.minimum(short, 1.0))
+
+
+def trailing_beside(angles: Floats, asides: Floats) -> Floats:
+    """Angles (frames, arms, links, 3) with which no arm trails in the line of all others.
+
+    Arms that spring from one point would all come to lie in it as they close. They turn in less
+    far with their first links, and what is left with their second ones: so they trail side by
+    side.
+
+    Args:
+        angles: (frames, arms, links, 3) as the gait has them.
+        asides: (arms,) as of :func:`trailing_asides`.
+    """
+    off = asides > 0.0
+    if not np.any(off):
+        return angles
+    result = angles.copy()
+    # All of it where an arm trails in the line of the others, little before.
+    closed = angles[:, off, 0, HEAD] / (0.5 * np.pi)
+    short = -asides[off] * closed * np.abs(closed)
+    result[:, off, 0, HEAD] += short
+    result[:, off, 1, HEAD] -= short
+    return result
 
 
 def _gap(azimuths: Floats) -> float:

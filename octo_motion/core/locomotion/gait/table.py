@@ -87,13 +87,17 @@ class GaitTable:
     """Whether the body walks (upright, all arms in step), crawls (upright, each arm in its own
     time) or swims (mantle ahead)."""
     curves: dict[int, GaitCurve]
-    """By arm pair, 1 in front; 0 serves every pair that has none of its own."""
+    """By arm pair, 1 in front, −1 the last one, counted from the rear; 0 serves every pair that has
+    none of its own."""
     spread_pairs: float = 0.0
     """Cycles by which a pair after the last would be ahead of the first."""
     spread_sides: float = 0.0
     """Cycles by which the right side is ahead of the left."""
+    spread_halves: float = 0.0
+    """Cycles by which the rear half of the pairs is ahead of the front half."""
     offsets: dict[tuple[int, str], float] = field(default_factory=dict)
-    """Radians by which single arms, by pair and side, are ahead; they replace the spread."""
+    """Radians by which single arms, by pair, as of ``curves``, and side, are ahead; they replace
+    the spread."""
     stride: float = 1.0
     """Distance travelled in one cycle, in arm lengths: what the gait looks right with."""
     power_phase: float = 0.0
@@ -111,25 +115,46 @@ class GaitTable:
         return self.curves.get(pair, self.curves[0])
 
     def for_pairs(self, pairs: int) -> GaitTable:
-        """The table for a body of so many pairs of arms.
+        """The table for a body of so many pairs of arms, all of them counted from the front.
 
-        Pairs count from the front. Where a gait lets some arms hold no ground, those of its last
-        pair are the ones that do, and so are the rear arms of a body that has fewer: else nothing
-        would carry it.
+        Where a gait lets some arms hold no ground, those of its last pair are the ones that do,
+        and so are the rear arms of a body that has fewer: else nothing would carry it.
         """
-        if not any(curve.free for curve in self.curves.values()):
+        curves, offsets = self.curves, self.offsets
+        front = {pair: curve for pair, curve in curves.items() if pair >= 0}
+        known = [*front, *(pair for pair, _ in offsets if pair > 0)]
+        beyond = max(known) - pairs if any(curve.free for curve in front.values()) else 0
+        if beyond > 0:
+            curves = {
+                pair - beyond if pair > 0 else pair: curve
+                for pair, curve in curves.items()
+                if pair <= 0 or pair > beyond
+            }
+            offsets = {
+                (pair - beyond if pair > 0 else pair, side): offset
+                for (pair, side), offset in offsets.items()
+                if pair < 0 or pair > beyond
+            }
+        elif not any(pair < 0 for pair in (*curves, *(pair for pair, _ in offsets))):
             return self
-        known = [*self.curves, *(pair for pair, _ in self.offsets)]
-        beyond = max(known) - pairs
-        if beyond <= 0:
-            return self
-        curves = {pair - beyond: curve for pair, curve in self.curves.items() if pair > beyond}
-        offsets = {
-            (pair - beyond, side): offset
-            for (pair, side), offset in self.offsets.items()
-            if pair > beyond
-        }
-        return replace(self, curves={0: self.curves[0], **curves}, offsets=offsets)
+
+        def placed(pair: int) -> int:
+            return pair if pair >= 0 else pairs + 1 + pair
+
+        # Those counted from the front come later, and count where a pair is told both ways.
+        return replace(
+            self,
+            curves={
+                placed(pair): curve
+                for pair, curve in sorted(curves.items())
+                if pair == 0 or placed(pair) > 0
+            },
+            offsets={
+                (placed(pair), side): offset
+                for (pair, side), offset in sorted(offsets.items())
+                if placed(pair) > 0
+            },
+        )
 
     def offset(self, side: str, pair: int, pairs: int) -> float:
         """Radians that an arm is ahead of the body's phase, for a body of so many pairs.
@@ -141,9 +166,11 @@ class GaitTable:
         if (pair, side) in self.offsets:
             return self.offsets[pair, side]
         side_share = {"LEFT": 0.0, "CENTER": 0.5, "RIGHT": 1.0}[side]
-        return CYCLE * (
-            self.spread_pairs * (pair - 1) / max(pairs, 1) + self.spread_sides * side_share
-        )
+        cycles = self.spread_pairs * (pair - 1) / max(pairs, 1) + self.spread_sides * side_share
+        if self.spread_halves != 0.0:
+            # A pair in the middle is half way, as an arm in the middle is.
+            cycles += self.spread_halves * 0.5 * (1.0 + np.sign(2 * pair - pairs - 1))
+        return float(CYCLE * cycles)
 
 
 def gait_angles(
@@ -208,39 +235,61 @@ def variation(
         return result
     cycles = np.floor_divide(phases, CYCLE).astype(np.int64)
     periods = np.broadcast_to(np.asarray(cycle_period, dtype=np.int64), phases.shape[1:])
-    first, last = int(cycles.min()) - 1, int(cycles.max()) + 2
-    every = np.arange(first, last + 1)[:, None]
+    first = int(cycles.min()) - 1
+    every = np.arange(first, int(cycles.max()) + 3)[:, None]
     # (cycles, arms) numbers of the cycles whose draws count.
-    drawn = np.where(periods > 0, every % np.maximum(periods, 1), every)
-    kept = {int(each) for each in np.unique(drawn)}
+    numbers = np.where(periods > 0, every % np.maximum(periods, 1), every)
     for pair, columns in _columns_by_curve(table, pairs).items():
         curve, own = table.curve(pair), phases[:, columns]
         knots = len(curve.phases) - 1
-        draws = {each: _draw_cycle(seed, each, columns, knots) for each in kept}
-        values = np.array(
-            [
-                [draws[number][place] for place, number in enumerate(numbers)]
-                for numbers in drawn[:, columns].tolist()
-            ]
-        )
-        # One cycle after the other, (knots, arms, links, 2).
-        values = np.moveaxis(low + (high - low) * values, 2, 1).reshape(-1, len(columns), LINKS, 2)
+        values = low + (high - low) * _draws(seed, numbers[:, columns], columns, knots)
         knot, share = curve.locate(own)
         place = (cycles[:, columns] - first) * knots + knot
-        arms = np.arange(len(columns))
-        share = share[..., None, None]
+        arms, share = np.arange(len(columns)), share[..., None, None]
         result[:, columns, :, :2] = (1.0 - share) * values[place, arms]
         result[:, columns, :, :2] += share * values[place + 1, arms]
         if smoothing_cycles > 0.0:
-            apart = np.tile(np.diff(curve.phases), len(every))[:-1, None, None, None]
-            slopes = np.diff(values, axis=0) / apart
-            corners = np.zeros_like(values)
-            corners[1:-1] = np.diff(slopes, axis=0)
-            rounding = curve.rounding(own, smoothing_cycles)
-            for number in range(knots):
-                nearest = np.rint((own - curve.phases[number]) / CYCLE).astype(np.int64) - first
-                corner = corners[nearest * knots + number, arms]
-                result[:, columns, :, :2] += rounding[..., number, None, None] * corner
+            result[:, columns, :, :2] += _rounded_off(curve, values, own, first, smoothing_cycles)
+    return result
+
+
+def _draws(seed: int, numbers: np.ndarray, arms: np.ndarray, knots: int) -> Floats:
+    """Uniform in [0, 1), one cycle after the other (cycles × knots, arms, links, 2).
+
+    Args:
+        seed: of the numbers.
+        numbers: (cycles, arms) of the cycles whose draws count.
+        arms: (arms,) their numbers in the body.
+        knots: of their curve.
+    """
+    drawn = {int(each): _draw_cycle(seed, int(each), arms, knots) for each in np.unique(numbers)}
+    values = np.array(
+        [[drawn[each][arm] for arm, each in enumerate(row)] for row in numbers.tolist()]
+    )
+    return np.moveaxis(values, 2, 1).reshape(-1, len(arms), LINKS, 2)
+
+
+def _rounded_off(
+    curve: GaitCurve, values: Floats, phases: Floats, first: int, smoothing_cycles: float
+) -> Floats:
+    """What rounds the corners of random additions off (frames, arms, links, 2).
+
+    Args:
+        curve: whose knots they are.
+        values: (cycles × knots, arms, links, 2) at these.
+        phases: (frames, arms) radians.
+        first: number of the first cycle.
+        smoothing_cycles: as of :func:`gait_angles`.
+    """
+    knots, arms = len(curve.phases) - 1, np.arange(phases.shape[1])
+    apart = np.tile(np.diff(curve.phases), len(values) // knots)[:-1, None, None, None]
+    corners = np.zeros_like(values)
+    corners[1:-1] = np.diff(np.diff(values, axis=0) / apart, axis=0)
+    rounding = curve.rounding(phases, smoothing_cycles)
+    result = np.zeros((*phases.shape, LINKS, 2))
+    for number in range(knots):
+        nearest = np.rint((phases - curve.phases[number]) / CYCLE).astype(np.int64) - first
+        result += rounding[..., number, None, None] * corners[nearest * knots + number, arms]
     return result
 
 
@@ -292,7 +341,8 @@ def check_gait(table: GaitTable) -> GaitTable:
     if 0 not in table.curves:
         raise GaitError(f"{where} has no curve for all arms.", "Give it a curve for pair 0.")
     scalars = (
-        *(table.spread_pairs, table.spread_sides, table.stride, table.power_phase),
+        *(table.spread_pairs, table.spread_sides, table.spread_halves),
+        *(table.stride, table.power_phase),
         *table.offsets.values(),
     )
     if not np.isfinite(scalars).all():
@@ -342,7 +392,11 @@ def gait_to_json(table: GaitTable) -> str:
         "name": table.name,
         "description": table.description,
         "manner": table.manner.lower(),
-        "spread": {"pairs": table.spread_pairs, "sides": table.spread_sides},
+        "spread": {
+            "pairs": table.spread_pairs,
+            "sides": table.spread_sides,
+            **({"halves": table.spread_halves} if table.spread_halves else {}),
+        },
         "offsets": {
             f"{pair} {side.lower()}": _rounded(np.degrees([offset]))[0]
             for (pair, side), offset in sorted(table.offsets.items())
@@ -370,22 +424,7 @@ def gait_from_json(text: str, source: str = "The gait file") -> GaitTable:
     Raises:
         GaitError: no JSON, not a gait, from a newer version, or damaged (see ``check_gait``).
     """
-    try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise GaitError(
-            f"{source} is not JSON (line {error.lineno}: {error.msg}).", "Choose a gait file."
-        ) from error
-    except (ValueError, RecursionError) as error:
-        # A number of thousands of digits, or brackets in brackets without end.
-        raise GaitError(f"{source} is not JSON ({error}).", "Choose a gait file.") from error
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise GaitError(f"{source} is not a gait of Octo Motion.", "Choose a gait file.")
-    if content.get("version") != FORMAT_VERSION:
-        raise GaitError(
-            f"{source} has format version {content.get('version')!r}, not {FORMAT_VERSION}.",
-            "Update Octo Motion, or save the gait anew.",
-        )
+    content = _content(text, source)
     try:
         manner = str(content["manner"]).upper()
         known: dict[str, Manner] = {each: each for each in MANNERS}
@@ -405,6 +444,7 @@ def gait_from_json(text: str, source: str = "The gait file") -> GaitTable:
             curves=curves,
             spread_pairs=float(spread.get("pairs", 0.0)),
             spread_sides=float(spread.get("sides", 0.0)),
+            spread_halves=float(spread.get("halves", 0.0)),
             offsets={
                 _arm_of(key): float(np.radians(float(value)))
                 for key, value in content.get("offsets", {}).items()
@@ -423,8 +463,29 @@ def gait_from_json(text: str, source: str = "The gait file") -> GaitTable:
     return check_gait(table)
 
 
+def _content(text: str, source: str) -> dict[str, Any]:
+    """What a gait file of this version says, not yet looked into; arguments as above."""
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise GaitError(
+            f"{source} is not JSON (line {error.lineno}: {error.msg}).", "Choose a gait file."
+        ) from error
+    except (ValueError, RecursionError) as error:
+        # A number of thousands of digits, or brackets in brackets without end.
+        raise GaitError(f"{source} is not JSON ({error}).", "Choose a gait file.") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise GaitError(f"{source} is not a gait of Octo Motion.", "Choose a gait file.")
+    if content.get("version") != FORMAT_VERSION:
+        raise GaitError(
+            f"{source} has format version {content.get('version')!r}, not {FORMAT_VERSION}.",
+            "Update Octo Motion, or save the gait anew.",
+        )
+    return content
+
+
 def _arm_of(key: str) -> tuple[int, str]:
-    """Pair and side from a text such as "1 left"."""
+    """Pair and side from a text such as "1 left", or "-1 left" of the last pair."""
     pair, side = key.upper().split()
     if side not in SIDES:
         raise ValueError(f"no side is called {side!r}")

@@ -7,10 +7,11 @@ from .contact_timing import EvenTiming, crawling, crawling_in_place, timing_at_r
 from .crawl_planner import CrawlSettings
 from .foothold_reach import easy_height, span
 from .footholds import ContactOverride
+from .grounded_poses import GroundedPoses, Raise
 from .stance_settings import StanceSettings
 from .surface import Ground, LevelGround, ground_along_path, passes_over_itself, sample_ground
 from .swing_smoothing import SwingSmoothing, frames_around
-from .walk import GroundedPoses, GroundedWalk, Raise
+from .walk import GroundedWalk
 
 __all__ = [
     "BodyLine",

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...batched import dot, running, smallest_arc, turned
 from ...rotations import Floats
+from ..rig import JointRoom
 from .surface import Ground
 
 _WEAK: Final = 0.02
@@ -254,14 +255,12 @@ def evened(directions: Floats, share: Floats) -> Floats:
 def raise_over_ground(
     directions: Floats,
     lengths: Floats,
+    room: JointRoom,
     *,
     free: Floats,
     roots: Floats,
-    needed: Floats,
-    loose: Floats,
     ground: Ground,
     iterations: int,
-    soft: Floats,
 ) -> Floats:
     """Directions (segments, 3, batch) of arms whose joints are not too near to the ground.
 
@@ -271,59 +270,54 @@ def raise_over_ground(
     Args:
         directions: (segments, 3, batch) unit.
         lengths: (segments, batch)
-        free: (segments, batch) how far each is free to turn, 0…1.
+        room: what the joints are to have.
+        free: (segments, batch) how far each segment is free to turn, 0…1.
         roots: (3, batch) world.
-        needed: (segments + 1, batch) how high above the ground each joint should be.
-        loose: (segments + 1, batch) how far each is to be raised, 0…1.
         ground: what they should be above of.
         iterations: how often the lowest of them are raised.
-        soft: (…, batch) how much above what is needed they begin to be raised.
     """
-    least = (1e-4 * np.max(np.broadcast_to(soft, needed.shape), axis=0)) ** 2
-    gentle, loosened = 0.25 / soft, free * lengths
-    weak = _WEAK * lengths[0] ** 2
-    joints = np.empty((len(lengths) + 1, *roots.shape))
-    result = directions
+    result = directions.copy()
+    below = room.lacking(_heights(directions, lengths, roots, ground))
+    low = np.flatnonzero(below.any(axis=0))
+    if not len(low):
+        return result
+    # Those that are high enough stay as they are, if they are many.
+    chosen = low if len(low) < _MANY * len(below[0]) else slice(None)
+    own, lengths, free, roots = (
+        result[..., chosen],
+        lengths[:, chosen],
+        free[:, chosen],
+        roots[:, chosen],
+    )
+    room, below = room.part(chosen), below[:, chosen]
+    least = (1e-4 * np.max(np.broadcast_to(room.soft, room.needed.shape), axis=0)) ** 2
+    loosened, weak = free * lengths, _WEAK * lengths[0] ** 2
     for number in range(iterations):
-        joints[0] = roots
-        np.multiply(lengths[:, None], result, out=joints[1:])
-        running(joints)
-        below = ground.height(np.moveaxis(joints, 1, -1)) - joints[:, 2]
-        below += needed
-        near = np.maximum(below + soft, 0.0)
-        below = np.where(below > soft, below, near * near * gentle)
-        below *= loose
-        if number == 0:
-            low = np.flatnonzero(below.any(axis=0))
-            if len(low) < _MANY * len(below[0]):
-                # Those that are high enough stay as they are, in all rounds.
-                result = directions.copy()
-                result[..., low] = raise_over_ground(
-                    directions[..., low],
-                    lengths[:, low],
-                    free=free[:, low],
-                    roots=roots[:, low],
-                    needed=needed[:, low],
-                    loose=loose[:, low],
-                    ground=ground,
-                    iterations=iterations if len(low) else 0,
-                    soft=soft[..., low],
-                )
-                return result
-            result = directions.copy()
+        if number:
+            below = room.lacking(_heights(own, lengths, roots, ground))
         weights = below * below
         weights *= 1.0 / (np.sum(weights, axis=0) + least)
         wanted = np.einsum("sb,sb->b", weights, below)
         # Share of the weights beyond each segment: what is raised by turning it.
         carried = running(weights[:0:-1].copy())[::-1]
-        z = result[:, 2]
+        z = own[:, 2]
         level = 1.0 - z * z
         turn = loosened * carried
         carried = carried * lengths
         carried *= level
         turn *= wanted / (np.einsum("sb,sb->b", turn, carried) + weak)
-        _turn_up(result, turn, level)
+        _turn_up(own, turn, level)
+    result[..., chosen] = own
     return result
+
+
+def _heights(directions: Floats, lengths: Floats, roots: Floats, ground: Ground) -> Floats:
+    """Metres (segments + 1, batch) that joints are above the ground."""
+    joints = np.empty((len(lengths) + 1, *roots.shape))
+    joints[0] = roots
+    np.multiply(lengths[:, None], directions, out=joints[1:])
+    running(joints)
+    return joints[:, 2] - ground.height(np.moveaxis(joints, 1, -1))
 
 
 def _turn_up(directions: Floats, turn: Floats, level: Floats) -> None:

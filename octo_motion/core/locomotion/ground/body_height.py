@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...rotations import Floats, continuous, multiply, normalized, rotate, shortest_arc
+from ...rotations import Floats, continuous, multiply, normalized, shortest_arc
 from ..path import Bearings, Route, TravelSettings, walked_at
 from .surface import Ground
 
@@ -114,8 +114,8 @@ def body_line(
         smoothing: reaches over which the ground is evened out along the way (standard deviation).
         under: metres from the body's centre to its lowest skin.
     """
-    spacing = reach / _PER_REACH
-    margin = 2.0 * settings.stride + 4.0 * smoothing * reach + reach
+    spacing, width = reach / _PER_REACH, smoothing * reach
+    margin = 2.0 * settings.stride + 4.0 * width + reach
     count = int(np.ceil((route.length + 2.0 * margin) / spacing)) + 1
     distance = -margin + spacing * np.arange(count)
     positions, turns = walked_at(route, settings, bearings, distance)
@@ -123,15 +123,11 @@ def body_line(
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
     left = np.stack([-along[:, 1], along[:, 0]], axis=1)
     felt = ground.height(positions[:, None, :2] + reach * _ACROSS[:, None] * left[:, None])
-    kernel = _bell(smoothing * reach / spacing)
-    level = _evened(felt @ _SHARES, kernel)
-    near = np.abs(_ACROSS) <= _UNDER
-    top = _highest(felt[:, near].max(axis=1), int(np.ceil(_UNDER * _PER_REACH)))
+    kernel = _bell(width / spacing)
     headroom = max(_HEADROOM * clearance, min(under, _MOST_HEADROOM * clearance))
-    rounded = _bell(0.5 * smoothing * reach / spacing)
-    for _ in range(_LIFTS):
-        short = np.maximum(top + headroom - (level + clearance), 0.0)
-        level = level + _evened(short, rounded)
+    level = _over_bumps(
+        _evened(felt @ _SHARES, kernel), felt, (clearance, headroom), _bell(0.5 * width / spacing)
+    )
     ahead = np.gradient(level, spacing)
     # Least squares through the heights across the way.
     sideways = _evened(felt @ _ACROSS / (_ACROSS @ _ACROSS * reach), kernel)
@@ -152,10 +148,23 @@ def body_line(
     )
 
 
-def roots_at(line: BodyLine, distance: Floats, roots: Floats) -> Floats:
-    """World positions (…, 3) of points (…, 3) of the body, seen from its centre, in metres."""
-    centre, rotations = line.at(distance)
-    return centre + rotate(rotations, roots)
+def _over_bumps(
+    level: Floats, felt: Floats, heights: tuple[float, float], kernel: Floats
+) -> Floats:
+    """Heights (n,) raised where a bump right under the body would come too near to it.
+
+    Args:
+        level: (n,) metres, the ground as it is evened out.
+        felt: (n, places across the way) metres, the ground as it is.
+        heights: metres of the body's centre above the level, and at least above the bump.
+        kernel: by which what is lacking is evened out.
+    """
+    clearance, headroom = heights
+    near = np.abs(_ACROSS) <= _UNDER
+    top = _highest(felt[:, near].max(axis=1), int(np.ceil(_UNDER * _PER_REACH)))
+    for _ in range(_LIFTS):
+        level = level + _evened(np.maximum(top + headroom - (level + clearance), 0.0), kernel)
+    return level
 
 
 def _bell(deviation: float) -> Floats:

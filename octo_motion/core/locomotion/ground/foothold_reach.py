@@ -115,7 +115,7 @@ def easy_height(
     return float(np.sqrt(max(level, 0.0)) + radii[joint])
 
 
-def hold_times(settings: StanceSettings) -> tuple[tuple[float, float, float], ...]:
+def stance_times(settings: StanceSettings) -> tuple[tuple[float, float, float], ...]:
     """Times that :func:`spots` wants to know the roots at, for holds cut down more and more."""
     return tuple(
         (-0.5 * width, (0.5 - PEELING) * width, 0.5 * width)
@@ -138,7 +138,7 @@ def spots(
         limbs: the arms.
         ground: what they touch.
         settings: how they hold on.
-        passings: the body's, for each of :func:`hold_times`.
+        passings: the body's, for each of :func:`stance_times`.
         aim: (arms, cycles, 2) unit vectors in which the arms are to touch, world.
         away: (arms, cycles) metres from the root, seen from above, at which they are to do so if
             they can; nan for where it is easy.
@@ -147,7 +147,7 @@ def spots(
     shape = aim.shape[:2]
     distance, half, short = np.zeros(shape), np.zeros(shape), np.full(shape, np.inf)
     undecided = np.ones(shape, dtype=bool)
-    for times, passing in zip(hold_times(settings), passings, strict=False):
+    for times, passing in zip(stance_times(settings), passings, strict=False):
         found, lack = _spot(ground, reach, passing, aim, away)
         better = undecided & (lack < short)
         distance = np.where(better, found, distance)

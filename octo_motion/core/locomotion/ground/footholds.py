@@ -20,7 +20,7 @@ from ..gait import CYCLE
 from ..path import Line
 from .contact_curve import laid
 from .contact_timing import ContactTiming
-from .foothold_reach import PEELING, Passing, hold_times, peeled_to, spots
+from .foothold_reach import PEELING, Passing, Spots, peeled_to, spots, stance_times
 from .foothold_relaxation import settled
 from .stance_settings import Limbs, StanceSettings
 from .surface import Ground, normals
@@ -130,67 +130,98 @@ def lay(
         cyclic: whether there are none, so that each cycle is like the one before.
     """
     first, last = cycles
-    shape = len(limbs.arms), last - first + 1
     numbers = np.arange(first, last + 1)
+    shape = len(limbs.arms), len(numbers)
     overridden = _overridden(limbs, shape, first, contact_overrides)
-    shift = overridden.shift
-
-    # Cycles of each arm at the middles that the gait gives to its holds.
-    given: Floats = np.broadcast_to(middle / CYCLE + numbers.astype(np.float64), shape)
-
-    def roots_at(since: Floats) -> tuple[Floats, Floats]:
-        """World positions of the arms' roots, and the body's orientations, at such times."""
-        centres, rotations = line.at(timing.distances(limbs.arms, given + since))
-        return centres + rotate(rotations, limbs.roots[:, None]), rotations
-
-    roots, rotations = roots_at(shift)
-    asked, away = timing.aims(limbs.arms, numbers)
-    aim, lie = (rotate_in_plane(each, asked) for each in _ahead(limbs, rotations))
+    roots = _RootPath(limbs, line, timing, numbers, middle / CYCLE)
+    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed)
     joint = limbs.touching(settings.planted)
-    sizes = np.stack([limbs.reach[-1], limbs.reach[-1] - limbs.reach[joint]], axis=-1)
-    aside, farther = settled(ground, roots, aim, lie, away, sizes=sizes)
-    aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
-    away = away + farther
-    # One after the other, for the first will do for nearly all.
-    passings = (
-        Passing(roots, [roots_at(shift + each)[0] for each in times])
-        for times in hold_times(settings)
-    )
-    found = spots(limbs, ground, settings, passings, aim=aim, away=away)
-    spot = roots.copy()
-    spot[..., :2] += found.distance[..., None] * aim
-    side = _hash(np.array(limbs.arms)[:, None], 0 * numbers if cyclic else numbers, seed)
-    heading = np.where(overridden.turned, overridden.headings, np.arctan2(lie[..., 1], lie[..., 0]))
-    curl: Floats = np.broadcast_to(_CURL * (side - 0.5), shape)
-    round_about = limbs.radii[joint:].T[:, None]
-    skins = np.broadcast_to(round_about, (*shape, round_about.shape[-1]))
+    spot, lie, found = _places(roots, overridden.shift, ground, settings)
     spot = np.where(overridden.moved[..., None], overridden.places, spot)
+    heading = np.where(overridden.turned, overridden.headings, np.arctan2(lie[..., 1], lie[..., 0]))
+    skins = _round_skins(limbs, joint, len(numbers))
     joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
-    touch_down = np.maximum(shift - found.half, -_EARLIEST)
-    lift_off = np.minimum(shift + found.half, _EARLIEST)
-    # Shifted holds are told from the middle that the gait gives them.
-    roots_at_touch_down, roots_at_lift_off = roots_at(touch_down)[0], roots_at(lift_off)[0]
+    touch_down, lift_off, middles = _times(overridden.shift, found.half)
+    at_touch_down, at_lift_off = roots.at(touch_down)[0], roots.at(lift_off)[0]
     return Footholds(
         first=first,
         touching=joint,
         touch_down=touch_down,
         lift_off=lift_off,
-        middle=0.5
-        * (
-            (touch_down + UNROLLING * (lift_off - touch_down))
-            + (lift_off - PEELING * (lift_off - touch_down))
-        ),
+        middle=middles,
         present=overridden.present,
         joints=joints,
         normals=normals(ground, joints),
         skins=skins,
         headings=heading,
         curls=curl,
-        peeled_to=peeled_to(limbs, joint, joints, roots_at_lift_off),
-        roots_at_touch_down=roots_at_touch_down,
-        roots_at_lift_off=roots_at_lift_off,
+        peeled_to=peeled_to(limbs, joint, joints, at_lift_off),
+        roots_at_touch_down=at_touch_down,
+        roots_at_lift_off=at_lift_off,
         short=found.short,
     )
+
+
+def _times(shift: Floats, half: Floats) -> tuple[Floats, Floats, Floats]:
+    """When stances begin and end, and half way between unrolled and peeling, (arms, cycles) each.
+
+    Stances that are shifted are told from the middle that the gait gives them.
+    """
+    touch_down = np.maximum(shift - half, -_EARLIEST)
+    lift_off = np.minimum(shift + half, _EARLIEST)
+    unrolled = touch_down + UNROLLING * (lift_off - touch_down)
+    peeling = lift_off - PEELING * (lift_off - touch_down)
+    return touch_down, lift_off, 0.5 * (unrolled + peeling)
+
+
+@dataclass(frozen=True, eq=False)
+class _RootPath:
+    """Where the body carries the roots of its arms."""
+
+    limbs: Limbs
+    line: Line
+    timing: ContactTiming
+    numbers: np.ndarray
+    """(cycles,) of each arm …"""
+    middle: float
+    """… and by how much its stance's middle is later, as the gait has it, in cycles."""
+
+    def at(self, since: Floats) -> tuple[Floats, Floats]:
+        """World positions (arms, cycles, 3) and the body's orientations, at times since then."""
+        middles = self.middle + self.numbers.astype(np.float64)
+        distances = self.timing.distances(self.limbs.arms, middles + since)
+        centres, rotations = self.line.at(distances)
+        return centres + rotate(rotations, self.limbs.roots[:, None]), rotations
+
+
+def _places(
+    path: _RootPath, shift: Floats, ground: Ground, settings: StanceSettings
+) -> tuple[Floats, Floats, Spots]:
+    """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), for how long.
+
+    Args:
+        path: of the arms' roots.
+        shift: (arms, cycles) by how much stances are later than the gait has them.
+        ground: what they touch.
+        settings: how arms hold on.
+    """
+    limbs = path.limbs
+    turns, away = path.timing.aims(limbs.arms, path.numbers)
+    joint = limbs.touching(settings.planted)
+    roots, rotations = path.at(shift)
+    aim, lie = (rotate_in_plane(each, turns) for each in _ahead(limbs, rotations))
+    sizes = np.stack([limbs.reach[-1], limbs.reach[-1] - limbs.reach[joint]], axis=-1)
+    aside, farther = settled(ground, roots, aim, lie, away, sizes=sizes)
+    aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
+    # One after the other, for the first will do for nearly all.
+    passings = (
+        Passing(roots, [path.at(shift + each)[0] for each in times])
+        for times in stance_times(settings)
+    )
+    found = spots(limbs, ground, settings, passings, aim=aim, away=away + farther)
+    spot = roots.copy()
+    spot[..., :2] += found.distance[..., None] * aim
+    return spot, lie, found
 
 
 def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) -> Footholds:
@@ -253,6 +284,17 @@ def _ahead(limbs: Limbs, rotations: Floats) -> tuple[Floats, Floats]:
     ahead = rotate(rotations[:, :, None], ahead[:, None])[..., :2]
     ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
     return ahead[:, :, 0], ahead[:, :, 1]
+
+
+def _round_skins(limbs: Limbs, joint: int, cycles: int) -> Floats:
+    """Metres (arms, cycles, segments + 1 − c) from joints to the skin below, if it is round."""
+    own = limbs.radii[joint:].T[:, None]
+    return np.broadcast_to(own, (len(limbs.arms), cycles, own.shape[-1]))
+
+
+def _curls(limbs: Limbs, cycles: np.ndarray, seed: int) -> Floats:
+    """Radians (arms, cycles) by which arms are bent to one side on the way to the tip."""
+    return _CURL * (_hash(np.array(limbs.arms)[:, None], cycles, seed) - 0.5)
 
 
 def _hash(arms: np.ndarray, cycles: np.ndarray, seed: int) -> Floats:

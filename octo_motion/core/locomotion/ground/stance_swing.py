@@ -21,6 +21,7 @@ import numpy as np
 from ...batched import dot
 from ...easing import least_jerk, smooth_step
 from ...rotations import Floats
+from ..rig import MARGIN, JointRoom, loose_from_root, room_needed
 from .arm_curves import (
     bent,
     curve,
@@ -84,9 +85,6 @@ _GOING: Final = 0.12
 """Cycles within which an arm in the air comes to go along with its body."""
 _SOFT: Final = 0.25
 """Share of the height that it needs within which a joint begins to be raised."""
-_OVER: Final = 0.03
-"""Arm lengths that joints which do not lie keep between their skin and the ground: between two of
-them the skin is lower, where the ground is bent upwards or the arm sideways."""
 _AT_ONCE: Final = 40.0
 """How much faster than its hold an arm loses its stiffness against the ground: so it does not pass
 through it …"""
@@ -184,6 +182,11 @@ class Stance:
             self.skins[:, chosen],
             self.touching,
         )
+
+    @property
+    def place(self) -> Floats:
+        """(3, batch) where the joint lies that the ground holds, world."""
+        return np.where(self.by_tip, self.joints[-1], self.joints[0])
 
     def upwards(self, segments: int) -> Floats:
         """Which way is up for each segment (segments, 3, batch): what lies, lies on its ground."""
@@ -298,29 +301,27 @@ def kept_over_ground(
         free = _freedom(part, own)
         whole = part.reach[-1]
         # What has lain is as high as its skin is thick, and no higher yet.
-        rising = (settings.lift * away**2 + _OVER * off_ground) * whole + part.lift
+        rising = (settings.lift * away**2 + MARGIN * off_ground) * whole + part.lift
         # In the air an arm may roll: any side of it may come to be below.
         rolled = smooth_step(np.cbrt(away / _STARTING) / _ROLLED)
         near = part.radii.copy()
         near[own.touching :] = own.skins + rolled * (near[own.touching :] - own.skins)
         near[own.touching :] += own.weight * _crested(own, ground)
         most = np.max(part.radii, axis=0) + rising
+        loose = at_once * loose_from_root(part.reach, whole)
         soft = _SOFT * (part.radii + off_ground * (most - part.radii)) + _TINY
         directions = directions.copy()
         directions[..., swinging] = raise_over_ground(
             directions[..., swinging],
             lengths[:, swinging],
+            JointRoom(near + rising - (1.0 - off_ground) * soft, loose, soft),
             free=free + (1.0 - free) * at_once,
             roots=part.roots,
-            needed=near + rising - (1.0 - off_ground) * soft,
-            loose=at_once * _out(part.reach),
             ground=ground,
             iterations=_RAISES,
-            soft=soft,
         )
     joints = np.concatenate([batch.roots[None], lengths[:, None] * directions]).cumsum(axis=0)
-    goal = np.where(stance.by_tip, stance.joints[-1], stance.joints[0])
-    missed = np.where(stance.by_tip, joints[-1], joints[stance.touching]) - goal
+    missed = np.where(stance.by_tip, joints[-1], joints[stance.touching]) - stance.place
     slack = 1e-9 * reach[-1]
     lying = (
         (reach >= stance.contact_from - slack)
@@ -355,68 +356,85 @@ def _in_stance(
     if len(chosen) == 0:
         return strains, directions
     batch, stance, shapes = batch.part(chosen), stance.part(chosen), shapes[..., chosen]
-    free, loose = _freedom(batch, stance), _loose(batch, stance)
     strain, guess, chord = _asked(batch, stance, settings)
-    strain = strain * free
-    lengths = batch.lengths * (1.0 + strain)
-    # What is out of reach is pointed at: at full stretch no solver has a definite answer.
-    ratio = np.sqrt(dot(chord, chord)) / (
-        stance.contact_from + np.sum(batch.lengths * strain, axis=0)
-    )
-    over = np.maximum(ratio - _NEARLY, 0.0)
-    short = (over - _REST * np.tanh(over / _REST)) / np.maximum(ratio, _TINY)
-    goal = (
-        stance.carried
-        + np.where(stance.by_tip, stance.joints[-1], stance.joints[0])
-        - short * chord
-    )
+    strain = strain * _freedom(batch, stance)
     # Some of the gait stays, but for what lies or unrolls.
     kept = np.where(_kneed(batch, stance), 0.0, _KEPT)
-    own = unit(guess + (kept * free)[:, None] * (shapes - guess))
-    before = np.arange(len(lengths))[:, None] < stance.touching
-    to_goal = (before | stance.by_tip).astype(np.float64)
+    own = unit(guess + (kept * _freedom(batch, stance))[:, None] * (shapes - guess))
+    own = _drawn_to_foothold(batch, own, stance, ground, strain=strain, chord=chord)
+    own = _laid_on_ground(batch, own, strain, stance, ground)
+    strains[:, chosen], directions[..., chosen] = strain * stance.weight, own
+    return strains, directions
 
+
+def _drawn_to_foothold(
+    batch: Batch, own: Floats, stance: Stance, ground: Ground, *, strain: Floats, chord: Floats
+) -> Floats:
+    """Directions (segments, 3, batch) of arms in stance that meet their footholds.
+
+    Args:
+        batch: the arms.
+        own: (segments, 3, batch) what they begin with.
+        stance: how each holds on.
+        ground: what it must not pass through.
+        strain: (segments, batch) by how much their bones are longer than at rest, as a share.
+        chord: (3, batch) from each one's root to where it meets the ground.
+    """
+    free, lengths = _freedom(batch, stance), batch.lengths * (1.0 + strain)
+    # What is out of reach is pointed at: at full stretch no solver has a definite answer.
+    stretched = stance.contact_from + np.sum(batch.lengths * strain, axis=0)
+    ratio = np.sqrt(dot(chord, chord)) / stretched
+    over = np.maximum(ratio - _NEARLY, 0.0)
+    short = (over - _REST * np.tanh(over / _REST)) / np.maximum(ratio, _TINY)
+    goal = stance.carried + stance.place - short * chord
+    to_goal = _to_goal(batch, stance)
+    needed = room_needed(batch.radii, batch.reach[-1], batch.lift)
+    soft = _SOFT * np.max(batch.radii, axis=0) + _TINY
+    room = JointRoom(needed, _loose(batch, stance), soft)
     for number, steps in enumerate(_STEPS):
         # The last time it only has to meet its goal.
         softer = evened(own, _EVENED * free) if number < len(_STEPS) - 1 else own
         own = raise_over_ground(
             softer,
             lengths,
+            room,
             free=free,
             roots=batch.roots,
-            needed=batch.radii + (_OVER * batch.reach[-1] + batch.lift),
-            loose=loose,
             ground=ground,
             iterations=_RAISES_BETWEEN,
-            soft=_SOFT * np.max(batch.radii, axis=0) + _TINY,
         )
         own = drawn(
-            own,
-            lengths,
-            free=free,
-            chosen=to_goal,
-            roots=batch.roots,
-            goal=goal,
-            steps=steps,
+            own, lengths, free=free, chosen=to_goal, roots=batch.roots, goal=goal, steps=steps
         )
-    # What is beyond the joint that is held can be raised without letting go; where it comes to
-    # lie it needs no raising, or it would stay up until the last moment and then drop.
-    beyond = (1.0 - to_goal) * smooth_step((batch.reach[1:] - stance.contact_to) / batch.lengths)
+    return own
+
+
+def _laid_on_ground(
+    batch: Batch, own: Floats, strain: Floats, stance: Stance, ground: Ground
+) -> Floats:
+    """The same without what lies beyond the joint that is held in the ground.
+
+    It can be raised without letting go; where it comes to lie it needs no raising, or it would
+    stay up until the last moment and then drop.
+    """
+    beyond = smooth_step((batch.reach[1:] - stance.contact_to) / batch.lengths)
     skins = np.concatenate([batch.radii[: stance.touching], stance.skins])
     soft = _SOFT * skins + _TINY
-    own = raise_over_ground(
+    return raise_over_ground(
         own,
-        lengths,
-        free=beyond,
+        batch.lengths * (1.0 + strain),
+        JointRoom(skins - soft, _loose(batch, stance), soft),
+        free=(1.0 - _to_goal(batch, stance)) * beyond,
         roots=batch.roots,
-        needed=skins - soft,
-        loose=loose,
         ground=ground,
         iterations=_RAISES_BETWEEN,
-        soft=soft,
     )
-    strains[:, chosen], directions[..., chosen] = strain * stance.weight, own
-    return strains, directions
+
+
+def _to_goal(batch: Batch, stance: Stance) -> Floats:
+    """1 for segments (segments, batch) before the joint that is held, else 0."""
+    before = np.arange(len(batch.lengths))[:, None] < stance.touching
+    return (before | stance.by_tip).astype(np.float64)
 
 
 def _kneed(batch: Batch, stance: Stance) -> np.ndarray:
@@ -465,12 +483,9 @@ def _loose(batch: Batch, stance: Stance) -> Floats:
     reach, width = batch.reach, batch.reach[1]
     before = smooth_step((stance.contact_from - reach) / width)
     after = smooth_step((reach - stance.contact_to) / width)
-    return np.maximum(before, np.where(stance.by_tip, 0.0, after)) * _out(reach)
-
-
-def _out(reach: Floats) -> Floats:
-    """0 at the root, which the body carries, 1 a little further out."""
-    return smooth_step(reach / (0.15 * reach[-1]))
+    return np.maximum(before, np.where(stance.by_tip, 0.0, after)) * loose_from_root(
+        reach, reach[-1]
+    )
 
 
 def _asked(batch: Batch, stance: Stance, settings: StanceSettings) -> tuple[Floats, Floats, Floats]:

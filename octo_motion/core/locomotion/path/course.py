@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from ...easing import least_jerk
 from ...rotations import Floats
 from ..gait import CYCLE
+from ..rig import lift_to_floor
 from .burst_glide import stroke_distance
 from .gait_changes import GaitTransition, sense_of, slerp_rotations
 from .heading import Bearings
@@ -83,9 +84,7 @@ class SwumLine:
         positions = travel.positions + np.array([0.0, 0.0, self.height])
         if self.floor is not None:
             over = positions[:, 2] - self.floor.at(travel.distance)[0][:, 2] - self.room
-            # The greater of 0 and what it is over, without a corner.
-            higher = 0.5 * (np.sqrt(over * over + self.softness * self.softness) - over)
-            positions[:, 2] += higher
+            positions[:, 2] += lift_to_floor(over, self.softness)
         return positions.reshape(*wanted.shape, 3), travel.rotations.reshape(*wanted.shape, 4)
 
 

@@ -10,6 +10,7 @@ along the axis: a bottle's neck stays narrow. Across the axis hollows count as f
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -313,7 +314,6 @@ def _wound(
     profile, radii = skins.profile, skins.radii
     # Of the longer of the two bones that meet at a joint.
     half = 0.5 * np.maximum(np.append(lengths[0], lengths), np.append(lengths, lengths[-1]))
-    heights = profile.heights
 
     def point(joint: int, angle: float, height: float) -> Floats:
         clear = skins.radius(joint, angle, height)
@@ -321,37 +321,16 @@ def _wound(
         out = max(clear, float(np.hypot(pressed, half[joint]))) + float(lift[joint])
         return np.array([out * np.cos(angle), out * np.sin(angle), height])
 
-    distance, bearing = float(np.hypot(root[0], root[1])), float(np.arctan2(root[1], root[0]))
     skin = float(radii[first])
-    limits = (
-        heights[0] + min(skin, 0.5 * np.ptp(heights)),
-        heights[-1] - min(skin, 0.5 * np.ptp(heights)),
-    )
-    widths = profile.support.mean(axis=1)
-    if np.ptp(heights) < 2.0 * _ROUND * widths.max():
-        wide = heights[widths > _WIDE * widths.max()]
-        limits = max(limits[0], float(wide[0])), min(limits[1], float(wide[-1]))
+    limits = _height_limits(profile, skin)
     level = float(np.clip(root[2], *limits))
-    beside = heights[0] < root[2] < heights[-1]
     climb = 1.0 if limits[1] - level >= level - limits[0] else -1.0
     room = max(limits[1] - level, level - limits[0])
     wanted = 2.0 * skin * winding.turns
     if room < wanted:
         # Begin far enough from the end for all turns, as far as the object is long enough.
         level = float(np.clip(level - climb * (wanted - room), *limits))
-    angle = bearing
-    for _ in range(8):
-        out = float(np.hypot(*point(first, angle, level)[:2]))
-        if out >= distance:
-            if beside or out >= 1.5 * distance:
-                raise RigError(
-                    "The arm starts within the object to grasp.",
-                    "Move the body or the object until they are apart.",
-                )
-            # From above or below: there is no line past it; touch the near side.
-            angle = bearing
-            break
-        angle = bearing + winding.sense * np.arccos(out / distance)
+    angle = _touching_angle(lambda at: point(first, at, level), root, winding, profile)
     joints = [point(first, angle, level)]
     wound = 0.0
     for segment in segments:
@@ -378,3 +357,45 @@ def _wound(
     inward[:, 2] = 0.0
     facing = normalized(inward) @ profile.axes.T
     return Coil(first, profile.to_object(local), facing, wound)
+
+
+def _height_limits(profile: Profile, skin: float) -> tuple[float, float]:
+    """Heights between which an arm with such a skin winds: on an object, and where it is wide."""
+    heights = profile.heights
+    inset = min(skin, 0.5 * np.ptp(heights))
+    low, high = heights[0] + inset, heights[-1] - inset
+    widths = profile.support.mean(axis=1)
+    if np.ptp(heights) < 2.0 * _ROUND * widths.max():
+        wide = heights[widths > _WIDE * widths.max()]
+        return max(low, float(wide[0])), min(high, float(wide[-1]))
+    return low, high
+
+
+def _touching_angle(
+    point: Callable[[float], Floats], root: Floats, winding: Winding, profile: Profile
+) -> float:
+    """In which direction from the axis the line from an arm's root only just passes the object.
+
+    Args:
+        point: where the arm's joint is that touches in a direction.
+        root: (3,) as the profile has it.
+        winding: which way.
+        profile: the object.
+
+    Raises:
+        RigError: the arm starts within the object.
+    """
+    distance, bearing = float(np.hypot(root[0], root[1])), float(np.arctan2(root[1], root[0]))
+    angle = bearing
+    for _ in range(8):
+        out = float(np.hypot(*point(angle)[:2]))
+        if out >= distance:
+            if profile.heights[0] < root[2] < profile.heights[-1] or out >= 1.5 * distance:
+                raise RigError(
+                    "The arm starts within the object to grasp.",
+                    "Move the body or the object until they are apart.",
+                )
+            # From above or below: there is no line past it; touch the near side.
+            return bearing
+        angle = bearing + winding.sense * np.arccos(out / distance)
+    return angle

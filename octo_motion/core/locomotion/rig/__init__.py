@@ -24,12 +24,24 @@ from .arm_frames import (
 )
 from .bone_rotations import ArmRest, Facing, arm_rest, carried_to, rotate_bones, sucker_sides
 from .detection import Detection, detect_arms
+from .joint_room import (
+    MARGIN,
+    TOLERATED,
+    JointRoom,
+    lift_to_floor,
+    loose_from_root,
+    lowest_allowed,
+    room_needed,
+    smooth_floor,
+)
 from .mantle import find_mantle, lies_back, stretch_mantle
 from .placement import carried_by_root_bone, object_transforms, root_bone_transforms
 from .poses import Poses, halfway_automatic, halfway_linear
 from .skin_offset import ArmSkin, arm_skin, nearest_bones
 
 __all__ = [
+    "MARGIN",
+    "TOLERATED",
     "ArmBatch",
     "ArmChain",
     "ArmFrames",
@@ -38,6 +50,7 @@ __all__ = [
     "BodyFrame",
     "Detection",
     "Facing",
+    "JointRoom",
     "Poses",
     "Side",
     "arm_azimuths",
@@ -59,12 +72,17 @@ __all__ = [
     "joint_positions",
     "lerp_rotation_vectors",
     "lies_back",
+    "lift_to_floor",
+    "loose_from_root",
+    "lowest_allowed",
     "nearest_axis",
     "nearest_bones",
     "object_transforms",
     "place_added",
+    "room_needed",
     "root_bone_transforms",
     "rotate_bones",
+    "smooth_floor",
     "stretch_mantle",
     "sucker_sides",
     "transport_frames",

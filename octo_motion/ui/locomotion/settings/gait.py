@@ -121,7 +121,8 @@ class OCTO_MOTION_PG_gait_curve(bpy.types.PropertyGroup):
     pair: IntProperty(
         name="Pair",
         description="Pair of arms that these angles are for, 1 in front; 0 is for all others",
-        min=0,
+        min=-50,
+        soft_min=0,
         override=OVERRIDE,
     )
     knots: CollectionProperty(
@@ -143,7 +144,12 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
     """How far one arm is ahead, in place of the spread."""
 
     pair: IntProperty(
-        name="Pair", description="Pair of the arm, 1 in front", min=1, default=1, override=OVERRIDE
+        name="Pair",
+        description="Pair of the arm, 1 in front",
+        min=-50,
+        soft_min=1,
+        default=1,
+        override=OVERRIDE,
     )
     side: EnumProperty(name="Side", description="Side of the arm", items=SIDES, override=OVERRIDE)
     phase: FloatProperty(
@@ -225,6 +231,13 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         step=5,
         override=OVERRIDE,
     )
+    spread_halves: FloatProperty(
+        name="Halves",
+        description="Cycles that the rear half of the arms is ahead of the front half",
+        default=_DEFAULT.spread_halves,
+        options={"HIDDEN"},
+        override=OVERRIDE,
+    )
     offsets: CollectionProperty(
         name="Offsets",
         description="Arms that keep a phase of their own, whatever the spread says",
@@ -289,7 +302,10 @@ def used(collection: Any) -> list[Any]:
 
 def fill_table(group: OCTO_MOTION_PG_gait_table, table: GaitTable) -> None:
     """Make the properties say what the table says."""
-    for name in ("name", "description", "manner", "stride", "spread_pairs", "spread_sides"):
+    for name in (
+        *("name", "description", "manner", "stride"),
+        *("spread_pairs", "spread_sides", "spread_halves"),
+    ):
         assign(group, name, getattr(table, name))
     assign(group, "power_phase", table.power_phase)
     assign(group, "active_curve", 0)
@@ -355,6 +371,7 @@ def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None
         curves=curves,
         spread_pairs=_number(group.spread_pairs),
         spread_sides=_number(group.spread_sides),
+        spread_halves=_number(group.spread_halves),
         offsets={**offsets, **own},
         stride=_number(group.stride),
         power_phase=_angle(group.power_phase),
