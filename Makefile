@@ -9,7 +9,7 @@ WITH_LINT = python=$$(.ci/venv lint) && bin=$${python%/*} &&
 # The Blender with a window that takes pictures of itself; options may follow it.
 BLENDER ?= blender
 
-.PHONY: help test lint demo bench build pictures window experiment setups clean
+.PHONY: help test lint demo bench build pictures diagram window experiment setups clean
 
 help: ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
@@ -34,6 +34,9 @@ build: ## make the extension's zip in dist with Blender's own packer, and valida
 
 pictures: ## render the pictures of the documentation anew
 	@$(WITH_BPY) $$python .ci/check_rendering.py && $$python docs/studio/pictures.py $(ARGS)
+
+diagram: ## draw which package imports which anew, from the sources
+	@$(WITH_LINT) $$python docs/studio/packages.py $(ARGS)
 
 window: ## take the documentation's pictures of Blender's own window; needs a Blender with a window
 	@BLENDER="$(BLENDER)" .ci/window $(ARGS)

@@ -8,6 +8,7 @@ import atexit
 import os
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,6 +17,8 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 WITHOUT_BLENDER = {"core", "device"}
+LACKING_DATA = "lacking data"
+"""How tests are counted that were skipped because the collection of rigs and clips is not here."""
 
 # No deadline: a test must not depend on the clock. Derandomized: the same examples on each run.
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
@@ -51,6 +54,24 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["BLENDER_USER_RESOURCES"] = user_folder.name
 
 
+def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:
+    """Count tests without their data apart, so that one line tells of them and not hundreds."""
+    if report.skipped and isinstance(report.longrepr, tuple) and LACKING_DATA in report.longrepr[2]:
+        return LACKING_DATA, "s", "SKIPPED"
+    return None
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say which tests were skipped because a clone lacks the collection of rigs and clips."""
+    if lacking := terminalreporter.stats.get(LACKING_DATA):
+        files = Counter(report.location[0] for report in lacking)
+        named = ", ".join(f"{file} ({count})" for file, count in sorted(files.items()))
+        terminalreporter.write_line(
+            f"{len(lacking)} tests need rigs and clips that are not here; $OCTO_MOTION_DATA names "
+            f"their folder: {named}"
+        )
+
+
 @pytest.fixture
 def shared_data() -> Callable[[str], Path]:
     """Path of a file of the real-world collection, or a skip where the collection is absent.
@@ -62,7 +83,7 @@ def shared_data() -> Callable[[str], Path]:
     def locate(relative_path: str) -> Path:
         path = folder / relative_path
         if not path.exists():
-            pytest.skip(f"real-world data is not here: {path} (set OCTO_MOTION_DATA)")
+            pytest.skip(f"{LACKING_DATA}: {path}")
         return path
 
     return locate

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import math
 import re
 import subprocess
@@ -13,7 +14,10 @@ from typing import Any
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+PAGES = [
+    *(REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+    *sorted((REPOSITORY / "docs").glob("*.md")),
+]
 SCRIPTING = REPOSITORY / "docs" / "scripting.md"
 BATCH = REPOSITORY / "docs" / "batch.md"
 
@@ -407,7 +411,7 @@ NOT_IN_THE_PANELS = (
     # Limits of a splice's properties, and what is asked for before.
     *("The timing has values that are no numbers.", "The rate of a splice must be above zero."),
     *("The length of a splice must be above zero.", "Easing cannot be below zero."),
-    *("… is no ending.", "The part … has no legs to travel with."),
+    *("… is no ending.", "The part … has no legs to travel with.", "There is no part …."),
     "It is not known which bones of … are arms and legs.",
     # Whose it is, or which line, before a problem that is explained.
     *("…: …", "……."),
@@ -549,6 +553,29 @@ def test_every_make_target_that_is_named_exists(page: Path) -> None:
     targets = {line.split()[1] for line in listed.stdout.splitlines()}
     code = re.findall(r"^```.*?^```$|`[^`\n]+`", text_of(page), re.MULTILINE | re.DOTALL)
     assert set(re.findall(r"\bmake ([a-z]+)", "\n".join(code))) <= targets
+
+
+def test_the_diagram_of_packages_shows_the_sources_as_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(str(REPOSITORY / "docs" / "studio"))
+    packages = importlib.import_module("packages")
+    assert text_of(packages.PICTURE) == packages.drawn(), "make diagram"
+
+
+def test_every_source_file_that_a_page_names_is_there() -> None:
+    there = [
+        "/" + path.relative_to(REPOSITORY).as_posix()
+        for folder in ("octo_motion", "tests", "docs", ".ci")
+        for path in (REPOSITORY / folder).rglob("*.py")
+    ]
+    missing = [
+        f"{name_of(page)}: {name}"
+        for page in PAGES
+        for name in re.findall(r"`([\w./]+\.py)`", text_of(page))
+        if not any(path.endswith("/" + name) for path in there)
+    ]
+    assert missing == []
 
 
 def test_every_picture_is_made_by_a_target_or_said_to_be_made_by_hand() -> None:

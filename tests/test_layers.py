@@ -4,6 +4,7 @@
 import ast
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -93,6 +94,46 @@ def test_device_imports_hidapi_numpy_and_the_standard_library_alone() -> None:
     assert offences(sources(PACKAGE / "device"), allowed) == []
 
 
+def doors() -> list[Path]:
+    """The packages that say what they hand out."""
+    return [
+        path
+        for path in sources(PACKAGE)
+        if path.name == "__init__.py" and "__all__" in path.read_text(encoding="utf-8")
+    ]
+
+
+def protected() -> list[str]:
+    """The packages that the contracts let others enter by their door alone."""
+    settings = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
+    return [
+        modules.removesuffix(".*")
+        for contract in settings["tool"]["importlinter"]["contracts"]
+        if contract["type"] == "protected"
+        for modules in contract["protected_modules"]
+    ]
+
+
+def test_every_package_that_is_entered_by_its_door_says_what_it_hands_out() -> None:
+    with_door = {".".join(path.parent.relative_to(REPOSITORY).parts) for path in doors()}
+    assert set(protected()) - with_door == set()
+
+
+@pytest.mark.parametrize("door", doors(), ids=lambda path: path.parent.name)
+def test_everything_that_a_door_hands_out_is_there_and_named_once(door: Path) -> None:
+    tree = ast.parse(door.read_text(encoding="utf-8"))
+    (named,) = (
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        if node.value is not None and "__all__" in ast.unparse(node).partition("=")[0]
+    )
+    there = {name.rpartition(".")[2] for _, name in imports(door)}
+    there |= {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    assert len(set(named)) == len(named)
+    assert set(named) <= there
+
+
 def test_package_never_names_itself_because_blender_installs_it_under_another_name() -> None:
     assert [
         f"{path.relative_to(REPOSITORY)}:{line} imports {name}"
@@ -109,7 +150,7 @@ def test_tests_of_core_and_device_need_no_blender() -> None:
         for path in sources(tests / "core", tests / "device")
         for line, name in imports(path)
         if name.partition(".")[0] in BLENDER_MODULES
-        or name.startswith(("octo_motion.blender", "octo_motion.ui"))
+        or name.startswith(("octo_motion.blender", "octo_motion.ui", "octo_motion.command_line"))
     ] == []
 
 

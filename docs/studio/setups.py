@@ -229,6 +229,11 @@ def add_bumps(points: Points, unit: float, height: float = BUMPS) -> bpy.types.O
     return ground
 
 
+def shown() -> str:
+    """The names of the set-ups that the gallery shows, a line each, in its order."""
+    return "".join(f"{name}\n" for name in ours.ORDER)
+
+
 def gallery() -> Pixels:
     """All set-ups that come with the add-on, four phases of each, two to a row."""
     strips = []

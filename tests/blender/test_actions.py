@@ -13,7 +13,7 @@ from octo_motion.blender.animation import actions
 from octo_motion.core import rotations
 from octo_motion.core.errors import RigError
 from octo_motion.core.keyframes.channel import Channel
-from octo_motion.core.locomotion.metrics import report as figures
+from octo_motion.core.locomotion.rig.poses import Poses, halfway_automatic
 from octo_motion.core.rotations import EULER_ORDERS, Floats
 
 ROTATION_MODES = ("QUATERNION", "AXIS_ANGLE", *EULER_ORDERS)
@@ -179,8 +179,8 @@ def test_with_automatic_handles_it_plays_half_way_between_frames_what_is_measure
     action = actions.write_action(
         obj, "Walk", frames, channels, previous=None, automatic=True, repeats=cyclic
     )
-    poses = figures.Poses(turns[:, None], np.zeros((30, 1)), places, turns)
-    half = figures.automatic(poses, cyclic=cyclic)
+    poses = Poses(turns[:, None], np.zeros((30, 1)), places, turns)
+    half = halfway_automatic(poses, cyclic=cyclic)
     curves = {(each.data_path, each.array_index): each for each in channelbag(action).fcurves}
     path = 'pose.bones["Arm 1"].'
     for component in range(3):

@@ -82,11 +82,11 @@ def figures_on_bumps(armature: Any, setup: str) -> dict[str, float]:
     return found
 
 
-def hold_up(found: dict[str, float]) -> None:
+def hold_up(found: dict[str, float], slip: float = 0.0025) -> None:
     """The limits that a motion on bumps is held to, in arm lengths and degrees per frame."""
-    assert found["SLIP"] <= 0.01
-    assert found["DEPTH"] <= 0.005
-    assert found["TURN"] <= 45.0
+    assert found["SLIP"] <= slip  # measured: 0.0003 to 0.0012
+    assert found["DEPTH"] <= 0.0015  # measured: 0, and 0.0008 where a rig of few bones hurries
+    assert found["TURN"] <= 45.0  # measured: 17 to 28 on rigs made here, up to 38 on artists' own
 
 
 @pytest.mark.parametrize("setup", ["walk", "crawl"])
@@ -113,7 +113,9 @@ def test_six_unequal_arms_that_hang_at_rest_neither_snap_nor_slide(setup: str) -
 def test_rigs_of_artists_go_over_bumps(
     shared_data: Callable[[str], Path], file: str, name: str, setup: str
 ) -> None:
-    hold_up(figures_on_bumps(opened(shared_data(f"octo/{file}"), name), setup))
+    found = figures_on_bumps(opened(shared_data(f"octo/{file}"), name), setup)
+    # Who hurries on bones this long slides more: 0.0055.
+    hold_up(found, slip=0.011 if setup == "hurry" else 0.0025)
 
 
 def test_on_six_arms_too_the_rear_pair_tiptoes() -> None:

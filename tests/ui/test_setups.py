@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Set-ups: one click makes a creature move in another way, and one's own are kept."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from octo_motion.ui.locomotion.settings.properties import locomotion_settings, r
 from octo_motion.ui.plain import plain
 from tests.ui.rig import click, make_octopus
 
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 SHIPPED = sorted(path.stem for path in (setups.PACKAGE / "presets" / setups.FOLDER).glob("*.py"))
 
 
@@ -38,6 +40,24 @@ def state(settings: Any) -> dict[str, Any]:
 def test_there_are_ways_to_walk_run_sneak_crawl_rest_swim_and_flee() -> None:
     assert set(SHIPPED) == set(setups.ORDER)
     assert list(setups.setup_paths())[: len(SHIPPED)] == list(setups.ORDER)
+
+
+def test_every_setup_has_its_row_in_the_guide_with_its_name_and_its_picture() -> None:
+    guide = (DOCS / "guide.md").read_text(encoding="utf-8")
+    row = re.compile(r"^\| !\[(.+)\]\(\.\./(.+)\) \| (.+?) \| (.+) \|$", re.MULTILINE)
+    rows = [found.groups() for found in row.finditer(guide) if "/setups/" in found[2]]
+    expected = []
+    for name in setups.ORDER:
+        title = name.replace("_", " ").title()
+        picture = setups.setup_paths()[name].with_suffix(".png")
+        expected.append((title, picture.relative_to(DOCS.parent).as_posix(), title))
+    assert [found[:3] for found in rows] == expected
+
+
+def test_the_gallery_shows_the_setups_that_there_are() -> None:
+    # Written by `make pictures ARGS=setups` together with the picture.
+    shown = (DOCS / "images" / "setups.txt").read_text(encoding="utf-8").split()
+    assert shown == list(setups.ORDER), "make pictures ARGS=setups"
 
 
 @pytest.mark.parametrize("name", SHIPPED)
