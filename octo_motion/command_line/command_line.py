@@ -175,7 +175,7 @@ def _add_option(
 def _number(kind: Number) -> Callable[[str], float]:
     def number(text: str) -> float:
         try:
-            return kind.value(text)
+            return kind(text)
         except Unfit as unfit:
             raise argparse.ArgumentTypeError(f"'{text}' is not {unfit}") from None
 

@@ -3,14 +3,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import bpy
 
 from ..core.errors import RigError, WriteError
 from .operator_errors import blender_said
+
+_EXPORTERS: Final[Mapping[str, tuple[str, str, Mapping[str, Any]]]] = {
+    ".glb": (
+        "export_scene",
+        "gltf",
+        {
+            "export_format": "GLB",
+            "use_selection": True,
+            "export_animation_mode": "ACTIVE_ACTIONS",
+            "export_yup": True,
+        },
+    ),
+    ".fbx": (
+        "export_scene",
+        "fbx",
+        {
+            "use_selection": True,
+            "add_leaf_bones": False,
+            "bake_anim": True,
+            "bake_anim_use_all_actions": False,
+            "bake_anim_use_nla_strips": False,
+            "bake_anim_simplify_factor": 0.0,
+        },
+    ),
+    ".abc": ("wm", "alembic_export", {"selected": True, "as_background_job": False}),
+}
+"""The operator of each format, by its group and name, and its options."""
 
 
 def check_export(path: Path, armature: bpy.types.Object, scene: bpy.types.Scene) -> None:
@@ -20,7 +47,7 @@ def check_export(path: Path, armature: bpy.types.Object, scene: bpy.types.Scene)
         RigError: there is nothing that the format could keep.
         WriteError: Blender's exporter is switched off or not there.
     """
-    group, name, _exporter = _EXPORTERS[path.suffix.lower()]
+    group, name, _options = _EXPORTERS[path.suffix.lower()]
     if name not in dir(getattr(bpy.ops, group)):
         raise WriteError(
             f"This Blender has no exporter for {path.suffix}.",
@@ -49,12 +76,14 @@ def export(
     Raises:
         WriteError: the file cannot be written, or the armature is hidden.
     """
+    # What is exported is the scene's range.
     scene.frame_start, scene.frame_end = first, last
     scene.frame_set(first)
     _select(list(_creature(armature, scene)), armature)
-    _group, _name, exporter = _EXPORTERS[path.suffix.lower()]
+    group, name, options = _EXPORTERS[path.suffix.lower()]
+    exporter: Any = getattr(getattr(bpy.ops, group), name)
     try:
-        exporter(path, first, last)
+        exporter(filepath=str(path), check_existing=False, **options)
     except RuntimeError as error:
         raise WriteError(
             f"The export to {path.suffix} failed: {blender_said(error)}",
@@ -84,46 +113,3 @@ def _select(creature: list[bpy.types.Object], armature: bpy.types.Object) -> Non
             f"'{armature.name}' is hidden and cannot be exported.", "Show it and its collection."
         )
     layer.objects.active = armature
-
-
-def _gltf(path: Path, _first: int, _last: int) -> None:
-    bpy.ops.export_scene.gltf(
-        filepath=str(path),
-        check_existing=False,
-        export_format="GLB",
-        use_selection=True,
-        export_animation_mode="ACTIVE_ACTIONS",
-        export_yup=True,
-    )
-
-
-def _fbx(path: Path, _first: int, _last: int) -> None:
-    bpy.ops.export_scene.fbx(
-        filepath=str(path),
-        check_existing=False,
-        use_selection=True,
-        add_leaf_bones=False,
-        bake_anim=True,
-        bake_anim_use_all_actions=False,
-        bake_anim_use_nla_strips=False,
-        bake_anim_simplify_factor=0.0,
-    )
-
-
-def _alembic(path: Path, first: int, last: int) -> None:
-    bpy.ops.wm.alembic_export(
-        filepath=str(path),
-        check_existing=False,
-        start=first,
-        end=last,
-        selected=True,
-        as_background_job=False,
-    )
-
-
-_EXPORTERS: Final[dict[str, tuple[str, str, Callable[[Path, int, int], None]]]] = {
-    ".glb": ("export_scene", "gltf", _gltf),
-    ".fbx": ("export_scene", "fbx", _fbx),
-    ".abc": ("wm", "alembic_export", _alembic),
-}
-"""The operator of each format, by its group and name, and what calls it."""

@@ -14,9 +14,9 @@ from typing import Any
 from ..core.errors import OctoMotionError
 from .fingerprint import digest, fingerprint
 from .job_file import JobError, JobFile, read_job
+from .job_report import ShotRecord, count, judge, read_report, write_report
 from .outputs import commit, staged
 from .processes import Ended, Task, check_jobs, last_lines, run_processes
-from .report import ShotRecord, count, judge, read_report, write_report
 from .schema import unknown
 from .shot_request import ShotRequest
 from .vocabulary import check_file, known, with_gait

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..ui.posing.pose_script import play_file
-from .report import ShotSummary
+from .job_report import ShotSummary
 
 
 def is_posable(armature: bpy.types.Object) -> bool:

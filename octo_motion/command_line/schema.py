@@ -107,15 +107,7 @@ class Number:
     is_angle: bool = False
     may_be_infinite: bool = False
 
-    def __call__(self, given: Any, _reading: Reading) -> float:
-        return self.value(given)
-
-    def value(self, given: Any) -> float:
-        """The number that is meant.
-
-        Raises:
-            Unfit: it is none, or out of range.
-        """
+    def __call__(self, given: Any, _reading: Reading | None = None) -> float:
         number = self._number(given)
         fits = self.minimum <= number <= self.maximum  # which what is no number does not
         endless = math.isinf(number) and not self.may_be_infinite

@@ -23,11 +23,11 @@ from ..ui.locomotion.settings.contact_overrides import once_called, store
 from ..ui.locomotion.settings.properties import locomotion_settings, set_gait
 from ..ui.locomotion.writing import Summary
 from .exports import check_export, export
+from .job_report import ShotSummary
 from .motion_files import is_motion
 from .operator_errors import blender_said
 from .pose_runner import is_posable, pose
 from .quality_limits import check_limits
-from .report import ShotSummary
 from .schema import set_values
 from .shot_request import NewRoute, ShotRequest, frame_rate
 from .splice_runner import Clips, has_splices, import_base, splice

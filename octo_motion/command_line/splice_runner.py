@@ -15,8 +15,8 @@ from ..core.errors import ClipError, OctoMotionError
 from ..ui.splicing.properties import splicing_settings
 from ..ui.splicing.splice_properties import PARTS
 from ..ui.splicing.stack import ClipReader, prepare_splices, write
+from .job_report import ShotSummary
 from .motion_files import check_motion, files_within
-from .report import ShotSummary
 from .schema import set_values, unknown
 from .shot_request import HIGHEST_FPS, NewSplice, ShotRequest, frame_rate
 

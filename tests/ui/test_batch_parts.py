@@ -15,6 +15,13 @@ from types import SimpleNamespace
 import pytest
 
 from octo_motion.command_line.command_line import parse
+from octo_motion.command_line.job_report import (
+    ShotRecord,
+    Verdict,
+    judge,
+    read_report,
+    write_report,
+)
 from octo_motion.command_line.operator_errors import blender_said
 from octo_motion.command_line.outputs import commit, remove_staged, staged, write_json
 from octo_motion.command_line.processes import (
@@ -27,7 +34,6 @@ from octo_motion.command_line.processes import (
     stoppable,
 )
 from octo_motion.command_line.quality_limits import LimitError, check_limits, quality, told
-from octo_motion.command_line.report import ShotRecord, Verdict, judge, read_report, write_report
 from octo_motion.command_line.schema import Known, Reading
 from octo_motion.command_line.shot_schema import KINDS, LIMITS
 from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError

@@ -64,7 +64,7 @@ def load_gait(name: str) -> GaitTable:
     if name in built_in:
         return built_in[name]
     path = _path_of(name)
-    if not name or not path.is_file():
+    if not path.is_file():
         raise GaitError(f"There is no gait '{name}'.", f"Choose one of {', '.join(gait_names())}.")
     return renamed_gait(read_gait_file(path), name)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import gc
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,11 +104,7 @@ def import_clip(
         ClipError: the file cannot be read or has no motion; nothing has changed.
         WriteError: the scene is linked.
     """
-    importer = _IMPORTERS.get(path.suffix.lower())
-    if importer is None:
-        raise ClipError(f"'{path.suffix}' files are no motion that can be imported.", _ANOTHER)
-    if not path.is_file():
-        raise ClipError("There is no such file.", _ANOTHER)
+    importer = _importer(path)
     before = _data_blocks()
     scene = context.scene
     assert scene is not None
@@ -129,9 +125,7 @@ def import_clip(
             for number, action in enumerate(actions, 1):
                 _place_keys(action, rate / result.placed_by, starts[action.name], frame_start)
                 progress(_IMPORTED + (1.0 - _IMPORTED) * number / len(actions))
-                action.use_fake_user = True
-                action[NOTE] = {"file": path.name, "rate": own_rate}
-            _name(path.stem, armatures, actions)
+            _label(path, own_rate, armatures, actions)
             _collect(made, clips_collection(scene))
             clip = ImportedClip(
                 file=path.name,
@@ -223,12 +217,22 @@ def _import_gltf(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa
     return _Result(float(scene.render.fps), None)
 
 
-_IMPORTERS: Final[Mapping[str, Callable[[Path, bpy.types.Scene, Up], _Result]]] = {
+_Importer = Callable[[Path, bpy.types.Scene, Up], _Result]
+_IMPORTERS: Final[Mapping[str, _Importer]] = {
     ".bvh": _import_bvh,
     ".fbx": _import_fbx,
     ".glb": _import_gltf,
     ".gltf": _import_gltf,
 }
+
+
+def _importer(path: Path) -> _Importer:
+    importer = _IMPORTERS.get(path.suffix.lower())
+    if importer is None:
+        raise ClipError(f"'{path.suffix}' files are no motion that can be imported.", _ANOTHER)
+    if not path.is_file():
+        raise ClipError("There is no such file.", _ANOTHER)
+    return importer
 
 
 def _content(path: Path) -> bytes:
@@ -419,16 +423,22 @@ def _place_keys(action: bpy.types.Action, factor: float, start: float, frame_sta
     action.frame_start, action.frame_end = first, last
 
 
-def _name(stem: str, armatures: list[bpy.types.Object], actions: list[bpy.types.Action]) -> None:
+def _label(
+    path: Path,
+    rate: float,
+    armatures: Iterable[bpy.types.Object],
+    actions: Sequence[bpy.types.Action],
+) -> None:
     """Call everything after the file; of several actions each keeps its own name behind it."""
     for each in armatures:
-        each.name = stem
+        each.name = path.stem
         if each.data is not None:
-            each.data.name = stem
+            each.data.name = path.stem
     for action in actions:
-        # FBX: "Armature|Take 1|Layer".
-        own = action.name.split("|", 1)[-1]
-        action.name = stem if len(actions) == 1 else f"{stem} {own}"
+        several = len(actions) > 1
+        action.name = f"{path.stem} {_take(action.name)}" if several else path.stem
+        action.use_fake_user = True
+        action[NOTE] = {"file": path.name, "rate": rate}
 
 
 def _collect(made: Iterable[bpy.types.ID], collection: bpy.types.Collection) -> None:
