@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from .content_cache import content_key
-from .rotations import Floats, from_matrix, multiply, rotate
+from .rotations import Floats, conjugate, from_matrix, multiply, rotate
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Skeleton:
 
     @cached_property
     def content(self) -> bytes:
-        """A key of all of it (``remembered.key_of``)."""
+        """A key of all of it (:func:`content_key`)."""
         return content_key(*(getattr(self, each.name) for each in fields(self)))
 
     @cached_property
@@ -97,7 +97,7 @@ class Skeleton:
                 # How the parent has moved from its rest pose moves its children.
                 turn = multiply(
                     rotations[..., parent, :],
-                    _inverse(self.rest_rotations[parent]),
+                    conjugate(self.rest_rotations[parent]),
                 )
                 position = heads[..., parent, :] + rotate(turn, head - self.heads[parent])
                 carried = multiply(turn, rest)
@@ -109,7 +109,3 @@ class Skeleton:
             heads[..., bone, :] = position
             rotations[..., bone, :] = multiply(carried, basis[..., bone, :])
         return rotations, heads
-
-
-def _inverse(quaternion: Floats) -> Floats:
-    return quaternion * np.array([1.0, -1.0, -1.0, -1.0])

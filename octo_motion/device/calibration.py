@@ -16,9 +16,9 @@ from math import isfinite
 from typing import Final
 
 from ..core.errors import DeviceError
+from ..core.rotations.scalars import subtract
 from .driver import Axes, Kind, Sample
 from .response import Response
-from .spatial import subtract
 
 _NOTHING: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _FULL: Final[Axes] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final, NamedTuple
 
-from .spatial import IDENTITY, ZERO, Quaternion, Vector
+from ..core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector
 
 Axes = tuple[float, float, float, float, float, float]
 """Along X, Y, Z, then about X, Y, Z; Blender's axes."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .spatial import ZERO, Quaternion, Vector
+from ..core.rotations.scalars import ZERO, Quaternion, Vector
 
 
 class Pull(NamedTuple):

@@ -18,9 +18,9 @@ from ..core.posing.session import HandSample, Session
 from ..core.posing.solver import Coupling, HandSpring, Obstacle, World, WorldSettings
 from ..core.posing.step_length import StepLength
 from ..core.rotations import Floats, conjugate, multiply, rotate
+from ..core.rotations.scalars import IDENTITY, ZERO, Vector
 from .held_body import Pull
 from .ipc import DeviceMessage, HandMessage, HeldMessage, Settings
-from .spatial import IDENTITY, ZERO, Vector
 
 log = logging.getLogger(__name__)
 

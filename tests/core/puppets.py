@@ -10,10 +10,10 @@ import numpy as np
 
 from octo_motion.core.posing.puppet.figure import Elements, Figure, JointRanges, Pose
 from octo_motion.core.posing.puppet.joint_limits import bends
-from octo_motion.core.posing.puppet.kinematics import pose_of, product
+from octo_motion.core.posing.puppet.kinematics import pose_of
 from octo_motion.core.posing.solver.hand_spring import Coupling
 from octo_motion.core.posing.solver.world import World
-from octo_motion.core.rotations import Floats, from_rotation_vector, normalized, rotate
+from octo_motion.core.rotations import Floats, from_rotation_vector, multiply, normalized, rotate
 from tests.core.world_probes import energy_of
 
 DENSITY = 1000.0
@@ -145,7 +145,7 @@ def posed(
     """The figure with its joints turned from rest by rotation vectors in the parents' frames."""
     own = figure.rest
     if turns is not None:
-        own = product(from_rotation_vector(turns), own)
+        own = multiply(from_rotation_vector(turns), own)
     return pose_of(figure, own, np.tile(np.array(at, dtype=np.float64), (len(figure), 1)))
 
 
@@ -217,7 +217,7 @@ def torn(
         pose, velocities = world.pose(), world.velocities()
         before, energy = energy, energy_of(world).total
         assert world.last is not None
-        bent = bends(product(unrest, world.joint_turns()))
+        bent = bends(multiply(unrest, world.joint_turns()))
         over = np.maximum(least - bent, bent - most)[limited]
         found.steps += 1
         found.widest = max(found.widest, opening(figure, pose))

@@ -10,12 +10,11 @@ from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.path.gait_changes import (
     GaitTransition,
     check_transitions,
-    slerp_rotations,
     transition_windows,
     transitions_by_height,
     way_weights,
 )
-from octo_motion.core.rotations import angle_between, normalized
+from octo_motion.core.rotations import normalized
 
 unit = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).map(np.array)
 quaternions = unit.filter(lambda each: np.linalg.norm(each) > 0.1).map(normalized)
@@ -91,16 +90,6 @@ def test_no_arm_goes_over_while_it_holds_on(
         (_, off), (on, _) = before[arm], after[arm]
         assert np.all(off[~found.dropped_before[arm]] <= found.start[arm] + 1e-9)
         assert np.all(on[~found.dropped_after[arm]] >= found.end[arm] - 1e-9)
-
-
-@given(quaternions, quaternions, st.floats(0.0, 1.0))
-def test_between_two_poses_a_bone_takes_the_shortest_way(
-    first: np.ndarray, second: np.ndarray, share: float
-) -> None:
-    there = slerp_rotations(first, second, np.array(share))
-    whole = angle_between(first, second)
-    assert angle_between(first, there) == pytest.approx(share * whole, abs=1e-6)
-    assert angle_between(there, second) == pytest.approx((1.0 - share) * whole, abs=1e-6)
 
 
 @pytest.mark.parametrize(

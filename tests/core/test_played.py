@@ -2,11 +2,9 @@
 """What few keys play is what was asked of them, and on the keys themselves exactly."""
 
 import numpy as np
-import pytest
 
 from octo_motion.core.keyframes import LOCATION, Limb, Track, reduce_keys
-from octo_motion.core.keyframes.playback import rotations_of, values_at
-from octo_motion.core.rotations import from_euler
+from octo_motion.core.keyframes.playback import values_at
 
 FRAMES = np.arange(1.0, 61.0)
 
@@ -36,15 +34,3 @@ def test_one_key_holds_still() -> None:
     values = np.ones((1, 3))
     ((keys,),) = reduce_keys(FRAMES[:1], [Limb([Track(values, LOCATION)], np.pi, 0.01)])
     np.testing.assert_array_equal(values_at(keys, np.array([0.0, 9.0])), np.ones((2, 3)))
-
-
-def test_values_of_every_rotation_mode_are_rotations() -> None:
-    expected = np.array([np.cos(0.25), np.sin(0.25), 0.0, 0.0])
-    # Blender plays quaternions of any length.
-    np.testing.assert_allclose(rotations_of(2.0 * expected, "QUATERNION"), expected, atol=1e-12)
-    np.testing.assert_allclose(
-        rotations_of(np.array([0.5, 3.0, 0.0, 0.0]), "AXIS_ANGLE"), expected, atol=1e-12
-    )
-    euler = np.array([0.5, 0.2, -0.1])
-    np.testing.assert_allclose(rotations_of(euler, "ZXY"), from_euler(euler, "ZXY"))
-    assert rotations_of(euler, "XYZ") != pytest.approx(rotations_of(euler, "ZYX"))

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from octo_motion.core.posing.puppet.figure import Figure, JointRanges
 from octo_motion.core.posing.puppet.joint_limits import bends, slopes
-from octo_motion.core.posing.puppet.kinematics import product
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.session import hand_for
 from octo_motion.core.posing.solver.hand_spring import Coupling
@@ -204,7 +203,7 @@ def test_a_limited_doll_that_is_thrown_about_stays_in_its_ranges():
         for _ in range(100):
             grab.pull(grab.target_position + 0.01 * way)
             world.step()
-            own = product(figure.rest * [1.0, -1.0, -1.0, -1.0], world.joint_turns())
+            own = multiply(figure.rest * [1.0, -1.0, -1.0, -1.0], world.joint_turns())
             angles = bends(own)[1:]
             worst = max(worst, float(np.maximum(ends[:, 0] - angles, angles - ends[:, 1]).max()))
         world.release(grab)

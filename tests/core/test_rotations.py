@@ -293,3 +293,25 @@ def test_plane_vectors_turn_as_they_do_about_the_vertical(vector: Floats, angle:
     about = rotations.from_axis_angle(np.array([0.0, 0.0, 1.0]), angle)
     expected = rotations.rotate(about, np.append(vector, 0.0))[:2]
     np.testing.assert_allclose(rotations.rotate_in_plane(vector, angle), expected, atol=1e-12)
+
+
+@given(quaternions, quaternions, st.floats(0.0, 1.0))
+def test_between_two_poses_a_bone_takes_the_shortest_way(
+    first: np.ndarray, second: np.ndarray, share: float
+) -> None:
+    there = rotations.slerp(first, second, np.array(share))
+    whole = rotations.angle_between(first, second)
+    assert rotations.angle_between(first, there) == pytest.approx(share * whole, abs=1e-6)
+    assert rotations.angle_between(there, second) == pytest.approx((1.0 - share) * whole, abs=1e-6)
+
+
+def test_values_of_every_rotation_mode_are_rotations() -> None:
+    expected = np.array([np.cos(0.25), np.sin(0.25), 0.0, 0.0])
+    decode = rotations.from_mode_values
+    # Blender plays quaternions of any length.
+    np.testing.assert_allclose(decode(2.0 * expected, "QUATERNION"), expected, atol=1e-12)
+    axis_angle = np.array([0.5, 3.0, 0.0, 0.0])
+    np.testing.assert_allclose(decode(axis_angle, "AXIS_ANGLE"), expected, atol=1e-12)
+    euler = np.array([0.5, 0.2, -0.1])
+    np.testing.assert_allclose(decode(euler, "ZXY"), rotations.from_euler(euler, "ZXY"))
+    assert decode(euler, "XYZ") != pytest.approx(decode(euler, "ZYX"))

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass
 
+from octo_motion.core.rotations.scalars import Quaternion, Vector
 from octo_motion.device.driver import Dynamics
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.sources import network
 from octo_motion.device.sources.network import NetworkFeatures, NetworkState
-from octo_motion.device.spatial import Quaternion, Vector
 
 # --- The HID profile -----------------------------------------------------------------------------
 

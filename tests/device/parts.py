@@ -12,10 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from octo_motion.core.rotations.scalars import ZERO, Vector
 from octo_motion.device.driver import Description, DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hid.system import Found
 from octo_motion.device.sources.websocket import accept_key, frame, masked
-from octo_motion.device.spatial import ZERO, Vector
 
 SPACE_MOUSE = bytes.fromhex(
     # A space mouse with separate reports 1 and 2 of ±350, and 32 buttons in report 3.

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
+from octo_motion.core.rotations.scalars import from_rotation_vector
 from octo_motion.device.driver import DeviceLostError, Dynamics, Sample
 from octo_motion.device.hid import force_device
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.force_device import ForceDevice, is_force_device
-from octo_motion.device.spatial import from_rotation_vector
 from tests.device import firmware
 from tests.device.parts import FakeHandle, found
 

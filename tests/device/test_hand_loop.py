@@ -12,6 +12,7 @@ import pytest
 
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.posing.solver.world import WorldSettings
+from octo_motion.core.rotations.scalars import IDENTITY
 from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.driver import Driver, Sample
 from octo_motion.device.hand_process import HandLoop
@@ -24,7 +25,6 @@ from octo_motion.device.ipc.message_channel import (
     connect,
 )
 from octo_motion.device.simulation import Simulation
-from octo_motion.device.spatial import IDENTITY
 from tests.core.puppets import chain, posed, soft
 from tests.device.parts import FakeDriver
 

@@ -11,6 +11,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from octo_motion.core.rotations.scalars import (
+    IDENTITY,
+    ZERO,
+    Vector,
+    add,
+    clamp_length,
+    dot,
+    from_rotation_vector,
+    length,
+    scale,
+    subtract,
+    to_rotation_vector,
+)
 from octo_motion.device.driver import FRESH_SECONDS, Dynamics
 from octo_motion.device.haptics.coupling import DAMPER_SHARE, SHARE, gains_for, stiffest, wrench
 from octo_motion.device.haptics.durations import Histogram
@@ -20,19 +33,6 @@ from octo_motion.device.haptics.safety import FALL, RISE, ForceLimits, Shaper, f
 from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.held_body import Held, Pull
 from octo_motion.device.sources.simulated_hand import Hand, rest
-from octo_motion.device.spatial import (
-    IDENTITY,
-    ZERO,
-    Vector,
-    add,
-    dot,
-    from_rotation_vector,
-    length,
-    scale,
-    shortened,
-    subtract,
-    to_rotation_vector,
-)
 
 PERIOD = 0.001
 DEVICE = Dynamics(force=8.0, torque=0.4, damping=0.5, angular_damping=0.0012)
@@ -84,7 +84,7 @@ def against_a_rock(
         observer.observe(force, moved)
         velocity = scale(moved, 1.0 / PERIOD)
         force, _ = wrench(gains, scale(place, -1.0), ZERO, scale(velocity, -1.0), ZERO)
-        force = shortened(add(force, observer.damping(force, velocity, PERIOD)), device.force)
+        force = clamp_length(add(force, observer.damping(force, velocity, PERIOD)), device.force)
         hand.feel(force, ZERO)
         hand.move(PERIOD)
         off = length(hand.position)

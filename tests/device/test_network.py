@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
+from octo_motion.core.rotations.scalars import IDENTITY
 from octo_motion.device.driver import DeviceLostError, Dynamics, Kind, Sample
 from octo_motion.device.sources import haply, network
 from octo_motion.device.sources.haply import Haply
@@ -34,7 +35,6 @@ from octo_motion.device.sources.websocket import (
     frame,
     masked,
 )
-from octo_motion.device.spatial import IDENTITY
 from tests.device.firmware import Force, pack_packet, parse_force
 from tests.device.parts import HaplyService
 

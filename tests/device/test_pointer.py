@@ -12,6 +12,7 @@ import pytest
 from octo_motion.core.posing.solver.hand_spring import Coupling
 from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.core.rotations import from_rotation_vector
+from octo_motion.core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, length
 from octo_motion.device.calibration import Calibration
 from octo_motion.device.driver import DeviceLostError, Kind, Sample
 from octo_motion.device.haptics.pointer import Pointer
@@ -19,7 +20,6 @@ from octo_motion.device.held_body import Held, Pull
 from octo_motion.device.ipc.messages import DeviceMessage, Settings, Workspace
 from octo_motion.device.simulation import Simulation, coupling_for
 from octo_motion.device.sources.simulated_hand import Hand, SimulatedHand
-from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector, length
 from tests.core.puppets import chain, posed, soft
 from tests.device.parts import FakeDriver
 

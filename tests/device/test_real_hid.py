@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from octo_motion.core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector
 from octo_motion.device.driver import DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
@@ -26,7 +27,6 @@ from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.client import Client, ClientState
 from octo_motion.device.ipc.message_channel import Listener, MessageChannel, connect
 from octo_motion.device.sources.discovery import Discovery, Sources
-from octo_motion.device.spatial import IDENTITY, ZERO, Quaternion, Vector
 from tests.core.puppets import chain, posed, soft
 from tests.device import firmware, uhid
 from tests.device.parts import SPACE_MOUSE

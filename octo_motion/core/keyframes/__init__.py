@@ -2,7 +2,7 @@
 """Keys of Bézier curves: how they are fitted to a motion, few or many, and what they play."""
 
 from .channel import Channel
-from .playback import rotations_of, values_at
+from .playback import values_at
 from .reduction import check_bounds, reduce_keys, reducing
 from .residuals import Residuals
 from .subframes import halfway_values
@@ -22,6 +22,5 @@ __all__ = [
     "halfway_values",
     "reduce_keys",
     "reducing",
-    "rotations_of",
     "values_at",
 ]

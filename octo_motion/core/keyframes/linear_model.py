@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rotations import Floats, conjugate, multiply, to_matrix
-from .residuals import rotations_of_mode, turns, walked
+from ..rotations import Floats, conjugate, from_mode_values, multiply, to_matrix
+from .residuals import turns, walked
 from .tracks import SCALE, Booleans, Integers, Limb, LimbChain
 
 Singles = NDArray[np.float32]
@@ -51,7 +51,7 @@ class LinearModel:
             self.targets[: each.shape[1], place] = each.T
         self._own = np.zeros((3, 4, len(values), frames), dtype=np.float32)
         decoded = [
-            rotations_of_mode(each, kind) if turns(kind) else each
+            from_mode_values(each, kind) if turns(kind) else each
             for each, kind in zip(values, kinds, strict=True)
         ]
         world: dict[int, Floats] = {}
@@ -203,7 +203,7 @@ def _carried(moved: Sequence[int], on: Sequence[bool], tracks: int) -> Singles:
 
 def _turned(kind: str, values: Floats) -> Floats:
     """How values (frames, components) turn a bone in its own axes: (frames, 3, 4)."""
-    exact = rotations_of_mode(values, kind)
+    exact = from_mode_values(values, kind)
     if kind == "QUATERNION":
         w, x, y, z = exact.T
         rows = ((-x, w, z, -y), (-y, -z, w, x), (-z, y, -x, w))
@@ -212,7 +212,7 @@ def _turned(kind: str, values: Floats) -> Floats:
     for component in range(values.shape[1]):
         moved = values.copy()
         moved[:, component] += _STEP
-        turned = multiply(conjugate(exact), rotations_of_mode(moved, kind))
+        turned = multiply(conjugate(exact), from_mode_values(moved, kind))
         turned *= np.where(turned[:, :1] < 0.0, -1.0, 1.0)
         result[..., component] = 2.0 * turned[:, 1:] / _STEP
     return result

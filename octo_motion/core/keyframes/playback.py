@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What keys play: values of Bézier curves, and the rotations that they mean."""
+"""What keys play: values of Bézier curves."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..rotations import Floats, from_axis_angle, from_euler, normalized
+from ..rotations import Floats
 from .reduction import BezierKeys
 
 
@@ -31,12 +31,3 @@ def values_at(keys: BezierKeys, times: Floats) -> Floats:
         + 3.0 * share**2 * rest * into
         + share**3 * values[span + 1]
     )
-
-
-def rotations_of(values: Floats, mode: str) -> Floats:
-    """Unit quaternions (…, 4) of values (…, 3 or 4) of one of Blender's rotation modes."""
-    if mode == "QUATERNION":
-        return normalized(values)
-    if mode == "AXIS_ANGLE":
-        return from_axis_angle(normalized(values[..., 1:]), values[..., 0])
-    return from_euler(values, mode)

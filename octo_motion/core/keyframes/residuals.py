@@ -10,17 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..rotations import Floats, from_axis_angle, from_euler, multiply, normalized, rotate, to_matrix
+from ..rotations import (
+    Floats,
+    from_mode_values,
+    multiply,
+    rotate,
+    to_matrix,
+)
 from .tracks import LOCATION, SCALE, Limb, LimbChain
-
-
-def rotations_of_mode(values: Floats, kind: str) -> Floats:
-    """Unit quaternions (…, 4) of values (…, 3 or 4) of one of Blender's rotation modes."""
-    if kind == "QUATERNION":
-        return normalized(values)
-    if kind == "AXIS_ANGLE":
-        return from_axis_angle(normalized(values[..., 1:]), values[..., 0])
-    return from_euler(values, kind)
 
 
 def turns(kind: str) -> bool:
@@ -108,7 +105,7 @@ class Residuals:
 
     def _decoded(self, values: Sequence[Floats]) -> list[Floats]:
         return [
-            rotations_of_mode(each, kind) if turns(kind) else each
+            from_mode_values(each, kind) if turns(kind) else each
             for each, kind in zip(values, self._kinds, strict=True)
         ]
 

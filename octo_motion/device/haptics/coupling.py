@@ -22,8 +22,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from ...core.rotations.scalars import Vector, add_scaled, scale
 from ..driver import Dynamics
-from ..spatial import Vector, add_scaled, scale
 
 SHARE: Final = 0.8
 """Of the largest stiffness that is passive on paper, this is used: no device is what it says."""

@@ -16,8 +16,7 @@ from dataclasses import dataclass, field
 from math import exp
 from typing import Final
 
-from ..held_body import Held, Pull
-from ..spatial import (
+from ...core.rotations.scalars import (
     IDENTITY,
     ZERO,
     Quaternion,
@@ -26,12 +25,13 @@ from ..spatial import (
     add_scaled,
     conjugate,
     from_rotation_vector,
+    integrate,
     multiply,
     scale,
     subtract,
     to_rotation_vector,
-    turned,
 )
+from ..held_body import Held, Pull
 
 _FADE: Final = 0.004
 """s in which a difference falls to a third."""
@@ -62,7 +62,7 @@ class LocalModel:
         before, turn_before = self.felt()
         self._take(held)
         self.position = add_scaled(self.position, self.velocity, age)
-        self.orientation = turned(self.orientation, self.angular_velocity, age)
+        self.orientation = integrate(self.orientation, self.angular_velocity, age)
         self._off = subtract(before, self.position)
         self._twisted = to_rotation_vector(multiply(turn_before, conjugate(self.orientation)))
 
@@ -112,7 +112,7 @@ class LocalModel:
                 self.angular_velocity, subtract(now, self._torque), softened
             )
         self.position = add_scaled(self.position, self.velocity, period)
-        self.orientation = turned(self.orientation, self.angular_velocity, period)
+        self.orientation = integrate(self.orientation, self.angular_velocity, period)
         left = exp(-period / _FADE)
         self._off = scale(self._off, left)
         self._twisted = scale(self._twisted, left)

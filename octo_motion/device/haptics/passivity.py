@@ -20,7 +20,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ..spatial import ZERO, Vector, dot, scale
+from ...core.rotations.scalars import ZERO, Vector, dot, scale
 
 DAMPING: Final = 10.0
 """Times the device's own damping, the most that the controller adds."""

@@ -7,11 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from ..calibration import NONE, Calibration, Calibrator, corrected
-from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
-from ..held_body import Held
-from ..ipc import HandMessage, Settings, Workspace
-from ..spatial import (
+from ...core.rotations.scalars import (
     IDENTITY,
     ZERO,
     Quaternion,
@@ -19,15 +15,19 @@ from ..spatial import (
     add,
     add_scaled,
     conjugate,
+    integrate,
     length,
     multiply,
+    normalized,
     rotate,
     scale,
     subtract,
     to_rotation_vector,
-    turned,
-    unit,
 )
+from ..calibration import NONE, Calibration, Calibrator, corrected
+from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
+from ..held_body import Held
+from ..ipc import HandMessage, Settings, Workspace
 from .coupling import Gains, gains_for, wrench
 from .local_model import LocalModel
 from .passivity import DAMPING, STORED, Observer
@@ -279,10 +279,10 @@ class Pointer:
                 space.origin, scale(rotate(space.orientation, sample.position), space.scale)
             )
             turn = multiply(space.orientation, sample.orientation)
-            self.orientation = unit(turn) or self.orientation
+            self.orientation = normalized(turn) or self.orientation
         elif now - sample.time < _FULL_PUSH:
             self.position = add_scaled(self.position, self.velocity, self.period)
-            self.orientation = turned(self.orientation, self.angular_velocity, self.period)
+            self.orientation = integrate(self.orientation, self.angular_velocity, self.period)
 
     def _leaps(self, sample: Sample) -> bool:
         """Whether a device is where no hand can have brought it: it was reset, or is damaged."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Final
 
+from ...core.rotations.scalars import ZERO, Vector, add, clamp_length, dot, scale, subtract
 from ..driver import FRESH_SECONDS
-from ..spatial import ZERO, Vector, add, dot, scale, shortened, subtract
 
 RISE: Final = 0.2
 """s from nothing to all of the force after a grab."""
@@ -81,5 +81,5 @@ class Shaper:
 
 
 def _toward(now: Vector, asked: Vector, part: float, most: float, step: float) -> Vector:
-    wanted = scale(shortened(asked, most), part)
-    return add(now, shortened(subtract(wanted, now), step))
+    wanted = scale(clamp_length(asked, most), part)
+    return add(now, clamp_length(subtract(wanted, now), step))

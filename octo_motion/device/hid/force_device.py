@@ -8,8 +8,8 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ...core.errors import DeviceError
+from ...core.rotations.scalars import ZERO, Vector
 from ..driver import Description, DeviceLostError, Driver, Kind, Sample, numbered_buttons
-from ..spatial import ZERO, Vector
 from . import force_profile as profile
 from .system import Found, Handle, HidReports, claim, open_device
 

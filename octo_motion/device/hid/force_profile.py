@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Final
 
+from ...core.rotations.scalars import ZERO, Vector, normalized
 from ..driver import Dynamics, Sample, is_possible
-from ..spatial import ZERO, Vector, unit
 from .descriptor import item
 
 VERSION: Final = 1
@@ -169,7 +169,7 @@ def parse_state(report: bytes, time: float) -> Sample:
     _sequence, _clock, _answered, buttons, flags, *rest = unpack(STATE, report)
     w, x, y, z = rest[3:7]
     size = (w * w + x * x + y * y + z * z) * ORIENTATION**2
-    orientation = unit((float(w), float(x), float(y), float(z)))
+    orientation = normalized((float(w), float(x), float(y), float(z)))
     if orientation is None or not 0.9 < size < 1.1:
         raise ReportError("the orientation is no unit quaternion")
     sample = Sample(

@@ -6,8 +6,8 @@ from __future__ import annotations
 import time
 from typing import Final
 
+from ...core.rotations.scalars import Vector
 from ..driver import Description, Driver, Kind, Sample, numbered_buttons
-from ..spatial import Vector
 from .descriptor import DescriptorError, ReportLayout, parse_descriptor
 from .models import USAGE, USAGE_PAGE, model_of
 from .multi_axis import MultiAxis, classic_layout

@@ -18,11 +18,11 @@ from ...core.errors import DeviceError, OctoMotionError
 from ...core.posing.puppet import Elements, Figure, JointRanges
 from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
 from ...core.rotations import Floats
+from ...core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized
 from ..calibration import Calibration, Phase
 from ..driver import Axes
 from ..held_body import Held, Pull
 from ..response import Response
-from ..spatial import IDENTITY, ZERO, Quaternion, Vector, unit
 from .codec import (
     F64,
     FLAG,
@@ -402,7 +402,7 @@ class ObstacleMessage(Message):
         Raises:
             MessageError: it makes no sense.
         """
-        turn = unit(self.orientation)
+        turn = normalized(self.orientation)
         if turn is None or self.size < 0.0:
             raise MessageError("an obstacle that cannot be")
         place = _Placed(

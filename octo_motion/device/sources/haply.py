@@ -20,8 +20,8 @@ import time
 from typing import Any, Final
 
 from ...core.errors import DeviceError
+from ...core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized, subtract
 from ..driver import Description, DeviceLostError, Driver, Dynamics, Kind, Sample, is_possible
-from ..spatial import IDENTITY, ZERO, Quaternion, Vector, subtract, unit
 from .websocket import WebSocket, WebSocketError
 
 HOST: Final = "127.0.0.1"
@@ -228,7 +228,7 @@ def _grip(message: dict[str, Any]) -> tuple[Quaternion, int]:
             if "button" in state:  # the wired grip has one
                 pressed = {"a": state["button"]}
             buttons = sum(bool(pressed.get(name)) << bit for bit, name in enumerate(_BUTTONS))
-            return unit((w, x, y, z)) or IDENTITY, buttons
+            return normalized((w, x, y, z)) or IDENTITY, buttons
     return IDENTITY, 0
 
 

@@ -17,6 +17,7 @@ import time
 from dataclasses import astuple, dataclass
 from typing import Any, Final, NamedTuple
 
+from ...core.rotations.scalars import ZERO, Vector, normalized
 from ..driver import (
     Description,
     DeviceLostError,
@@ -27,7 +28,6 @@ from ..driver import (
     is_possible,
     numbered_buttons,
 )
-from ..spatial import ZERO, Vector, unit
 from ..stream import Stream
 
 log = logging.getLogger(__name__)
@@ -117,7 +117,7 @@ def parse_datagram(data: bytes, key: bytes) -> NetworkFeatures | NetworkState:
 
 def _state(values: tuple[Any, ...]) -> NetworkState:
     sequence, buttons, held, x, y, z, *turn, vx, vy, vz, wx, wy, wz = values
-    orientation = unit((turn[0], turn[1], turn[2], turn[3]))
+    orientation = normalized((turn[0], turn[1], turn[2], turn[3]))
     if orientation is None:
         raise PacketError("a pose that cannot be")
     sample = Sample(

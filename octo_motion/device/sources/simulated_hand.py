@@ -15,8 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ..driver import Description, Driver, Dynamics, Kind, Sample
-from ..spatial import (
+from ...core.rotations.scalars import (
     IDENTITY,
     ZERO,
     Quaternion,
@@ -26,13 +25,14 @@ from ..spatial import (
     conjugate,
     dot,
     from_rotation_vector,
+    integrate,
     length,
     multiply,
     scale,
     subtract,
     to_rotation_vector,
-    turned,
 )
+from ..driver import Description, Driver, Dynamics, Kind, Sample
 
 Wish = Callable[[float], tuple[Vector, Quaternion]]
 """Where the hand wants to be at a time (s)."""
@@ -134,7 +134,7 @@ class Hand:
         self.angular_velocity = add_scaled(
             self.angular_velocity, add(twist, self._torque), step / self.inertia
         )
-        self.orientation = turned(self.orientation, self.angular_velocity, step)
+        self.orientation = integrate(self.orientation, self.angular_velocity, step)
         self.seconds += step
 
     def _tremble(self) -> Vector:

@@ -20,9 +20,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from octo_motion.core.posing.puppet import skew
 from octo_motion.core.posing.solver.problem import Problem
 from octo_motion.core.rotations import Floats
+from octo_motion.core.rotations.small_batches import skew
 
 
 @dataclass(eq=False)

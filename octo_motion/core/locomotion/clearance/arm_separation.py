@@ -13,8 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import product
-from ...rotations import Floats, conjugate, normalized, rotate, shortest_arc
+from ...rotations import Floats, components_first, conjugate, normalized, rotate, shortest_arc
 from ..ground import Ground
 from ..rig import ArmBatch, ArmFrames, batches_by_bones
 from .capsule_overlap import Capsules
@@ -204,7 +203,12 @@ class _Posed:
         turns = shortest_arc(first[turned], second[turned])
         per_bone = np.repeat(np.moveaxis(turns, 0, 2), np.diff(which), axis=0)
         own = self.orientations[..., frame * count + arm]
-        moved = np.stack([product(turn, each) for turn, each in zip(per_bone, own, strict=True)])
+        moved = np.stack(
+            [
+                components_first.multiply(turn, each)
+                for turn, each in zip(per_bone, own, strict=True)
+            ]
+        )
         fresh = self.together.rotations(moved, arm)
         rotations[frame[:, None], self.columns[arm]] = np.moveaxis(fresh, 2, 0)
 

@@ -17,8 +17,8 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import dot
 from ...rotations import Floats
+from ...rotations.components_first import dot
 
 _TINY: Final = 1e-30
 """Squares of lengths that are none, however small a rig's unit makes its bones."""

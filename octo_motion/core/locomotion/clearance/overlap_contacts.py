@@ -16,9 +16,9 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import dot
 from ...easing import smooth_step
 from ...rotations import Floats
+from ...rotations.components_first import dot
 from .capsule_overlap import Capsules, near, nearest, pairs_of, parts_of
 
 GIVEN: Final = 0.05

@@ -17,9 +17,9 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from ...batched import dot
 from ...easing import smooth_step
 from ...rotations import Floats
+from ...rotations.components_first import dot
 from ...temporal_filter import blur_reach, blurred, covered, widened
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed

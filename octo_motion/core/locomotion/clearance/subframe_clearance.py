@@ -17,8 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import turned
-from ...rotations import Floats, rotate
+from ...rotations import Floats, components_first, rotate
 from ...temporal_filter import covered
 from ..ground import Ground
 from ..rig import TOLERATED, ArmBatch, ArmFrames, Poses, batches_by_bones, halfway_automatic
@@ -119,7 +118,9 @@ class ArmsOverGround:
             which = place[arm]
             there = together.orientations(np.moveaxis(turns, 0, 2), which)
             joints = self.scale * together.joints(there, which, strains.T)[1:]
-            world = turned(np.ascontiguousarray(half.orientations[moment].T), joints)
+            world = components_first.rotate(
+                np.ascontiguousarray(half.orientations[moment].T), joints
+            )
             world += half.locations[moment].T
             below = self.ground.height(np.moveaxis(world, 1, -1)) - world[:, 2]
             lengths = np.array([self.arms[each].length for each in own])[arm]

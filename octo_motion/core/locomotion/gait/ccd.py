@@ -21,8 +21,8 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import running, smallest_arc, turned
-from ...rotations import Floats
+from ...rotations import Floats, components_first
+from ...rotations.components_first import cumulative_sum
 from ..rig import lift_to_floor
 
 SWEEPS: Final = 4
@@ -115,7 +115,7 @@ def solve_ccd(
     root = np.zeros_like(targets[0])
     for group, segments in enumerate(chain.groups):
         lengths, goal = chain.lengths[segments], targets[group + 1] - root
-        own = aimed(turned(links[group], shape[segments]), lengths, goal)
+        own = aimed(components_first.rotate(links[group], shape[segments]), lengths, goal)
         for _ in range(SWEEPS if len(own) > 1 else 0):
             own = swept(own, lengths, chain.weights[segments], goal)
         directions[segments] = close_group(own, lengths, goal, stretch_slack=stretch_slack)
@@ -202,11 +202,11 @@ def aimed(directions: Floats, lengths: Floats, goal: Floats) -> Floats:
     end = chord(directions, lengths)
     sizes = _size(end), _size(goal)
     if min(float(each.min(initial=1.0)) for each in sizes) < _SHORT:
-        return turned(smallest_arc(end, goal), directions)
+        return components_first.rotate(components_first.shortest_arc(end, goal), directions)
     ends = np.stack([end / sizes[0], goal / sizes[1]])
     facing = 1.0 + np.einsum("cb,cb->b", ends[0], ends[1])
     if float(facing.min(initial=1.0)) < _OPPOSITE:
-        return turned(smallest_arc(end, goal), directions)
+        return components_first.rotate(components_first.shortest_arc(end, goal), directions)
     # Two reflections make the turn from one to the other: in the first, in what lies half way.
     shares = np.einsum("xcb,scb->xsb", ends, directions)
     half = (shares[0] + shares[1]) / facing
@@ -307,7 +307,7 @@ def softened(directions: Floats, amount: float) -> Floats:
 
 def lifted(directions: Floats, lengths: Floats, floor: Floats) -> Floats:
     """An arm whose joints below a floor are raised to it; lengths are kept, ends may move."""
-    above = running(lengths[:, None] * directions[:, 2])
+    above = cumulative_sum(lengths[:, None] * directions[:, 2])
     above -= floor
     lift = lift_to_floor(above, FLOOR_ROUNDING)
     lift[1:] -= lift[:-1].copy()

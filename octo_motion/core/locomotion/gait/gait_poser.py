@@ -15,10 +15,18 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import running, turned
 from ...content_cache import ContentCache, content_key
 from ...errors import RigError, SettingsError
-from ...rotations import Floats, from_axis_angle, from_matrix, less_whole_turns, multiply, rotate
+from ...rotations import (
+    Floats,
+    components_first,
+    from_axis_angle,
+    from_matrix,
+    less_whole_turns,
+    multiply,
+    rotate,
+)
+from ...rotations.components_first import cumulative_sum
 from ...skeleton import Skeleton
 from ..rig import (
     ArmRest,
@@ -285,7 +293,7 @@ class GaitPoser:
             # Not from what is kept: that does not know the floor.
             directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
             # Up is the same for the arm's frame and the body's.
-            climbs = running(build.chain.lengths[:, None, None] * directions[:, 2])
+            climbs = cumulative_sum(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)
             for place, arms in enumerate(same.values()):
                 low = lowest[:_CYCLE_SAMPLES, place, None]
@@ -391,7 +399,7 @@ class GaitPoser:
             directions, misses[:, columns] = self.shapes(build, own, steering[:, columns])
             count, size = len(directions), frames * len(columns)
             to_armature = np.tile(self._to_armature[columns].T, (1, frames))
-            in_armature = turned(to_armature, directions.reshape(count, 3, size))
+            in_armature = components_first.rotate(to_armature, directions.reshape(count, 3, size))
             posed = rotate_bones(
                 [self.rests[arm] for arm in columns],
                 in_armature.reshape(directions.shape),
@@ -444,7 +452,7 @@ class GaitPoser:
             stretch_slack=self.settings.stretch_slack,
             floor=floor,
         )
-        joints = running(build.chain.lengths[:, None, None] * directions)
+        joints = cumulative_sum(build.chain.lengths[:, None, None] * directions)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
         missed = np.linalg.norm(ends - targets[1:], axis=1)
         if self.settings.stretch_slack > 0.0:

@@ -2,7 +2,7 @@
 """Shapes of arms as a whole: along a curve, between two others, off the ground, onto a goal.
 
 A shape is the directions of an arm's segments, (segments, 3, batch), unit vectors; the batch comes
-last, as in ``batched``. Every function is smooth in what it is given, so that what it makes of a
+last, components first. Every function is smooth in what it is given, so that what it makes of a
 motion that is continuous is continuous.
 """
 
@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import dot, running, smallest_arc, turned
-from ...rotations import Floats
+from ...rotations import Floats, components_first
+from ...rotations.components_first import cumulative_sum, dot
 from ..rig import JointRoom
 from .surface import Ground
 
@@ -59,8 +59,8 @@ def spread_chain(
         upward: (3, batch) unit: which way it is to rise.
         ratio: (batch,) of the chord to its length.
     """
-    along = unit(chord)
-    up = unit(upward - dot(upward, along) * along)
+    along = components_first.normalized(chord)
+    up = components_first.normalized(upward - dot(upward, along) * along)
     apart = 0.5 * (_between(ways[0], along) + _between(ways[1], along))
     lack = _OPEN * np.sqrt(6.0 * np.maximum(1.0 - ratio, 0.0)) - apart
     near = np.maximum(lack + _OPENING, 0.0)
@@ -138,7 +138,7 @@ def curve(
     above, below = np.maximum(excess(low), 0.0), np.maximum(-excess(high), 0.0)
     handle = low + (high - low) * above / np.maximum(above + below, _TINY)
     amounts[1:] *= handle
-    return unit(np.einsum("xsb,xcb->scb", amounts, ways))
+    return components_first.normalized(np.einsum("xsb,xcb->scb", amounts, ways))
 
 
 def bent(directions: Floats, parts: Floats, chord: Floats, share: Floats) -> Floats:
@@ -153,7 +153,7 @@ def bent(directions: Floats, parts: Floats, chord: Floats, share: Floats) -> Flo
         chord: (3, batch)
         share: (batch,) of how far they have led, 0…1.
     """
-    along = unit(chord)
+    along = components_first.normalized(chord)
     cosines = np.einsum("scb,cb->sb", directions, along)
     across = directions - cosines[:, None] * along
     squares = (1.0 - cosines) / np.maximum(1.0 + cosines, _BACKWARDS)
@@ -168,7 +168,7 @@ def bent(directions: Floats, parts: Floats, chord: Floats, share: Floats) -> Flo
     bends = np.exp(factor) * squares
     ahead = (1.0 - bends) / (1.0 + bends)
     size = np.sqrt(np.maximum(1.0 - ahead * ahead, 0.0))
-    return ahead[:, None] * along + size[:, None] * unit(across)
+    return ahead[:, None] * along + size[:, None] * components_first.normalized(across)
 
 
 def lerp_bends(outward: Floats, start: Floats, end: Floats, share: Floats) -> Floats:
@@ -189,12 +189,12 @@ def lerp_bends(outward: Floats, start: Floats, end: Floats, share: Floats) -> Fl
     if len(between) == 0:
         return result
     first = np.broadcast_to(np.array([[1.0], [0.0], [0.0]]), (3, len(between)))
-    rest = smallest_arc(first, outward[:, between])
+    rest = components_first.shortest_arc(first, outward[:, between])
     share = share[between]
     # Frames along the two and along what is between them, carried from segment to segment
     # without twist.
     frames = np.empty((3, *np.eye(3).shape, len(between)))
-    frames[:] = [turned(rest, axis[:, None]) for axis in np.eye(3)]
+    frames[:] = [components_first.rotate(rest, axis[:, None]) for axis in np.eye(3)]
     for number in range(len(start)):
         ways = np.stack([start[number][:, between], end[number][:, between]])
         seen = np.einsum("xicb,xcb->xib", frames[:2], ways)
@@ -249,7 +249,7 @@ def evened(directions: Floats, share: Floats) -> Floats:
     mean -= directions[1:-1]
     mean *= share[1:-1, None]
     result[1:-1] += mean
-    return unit(result)
+    return components_first.normalized(result)
 
 
 def raise_over_ground(
@@ -299,7 +299,7 @@ def raise_over_ground(
         weights *= 1.0 / (np.sum(weights, axis=0) + least)
         wanted = np.einsum("sb,sb->b", weights, below)
         # Share of the weights beyond each segment: what is raised by turning it.
-        carried = running(weights[:0:-1].copy())[::-1]
+        carried = cumulative_sum(weights[:0:-1].copy())[::-1]
         z = own[:, 2]
         level = 1.0 - z * z
         turn = loosened * carried
@@ -316,7 +316,7 @@ def _heights(directions: Floats, lengths: Floats, roots: Floats, ground: Ground)
     joints = np.empty((len(lengths) + 1, *roots.shape))
     joints[0] = roots
     np.multiply(lengths[:, None], directions, out=joints[1:])
-    running(joints)
+    cumulative_sum(joints)
     return joints[:, 2] - ground.height(np.moveaxis(joints, 1, -1))
 
 
@@ -413,8 +413,3 @@ def _solved(matrix: tuple[Floats, ...], right: Floats) -> Floats:
     return np.stack([a * x + b * y + c * z, b * x + d * y + e * z, c * x + e * y + f * z]) * (
         1.0 / np.maximum(determinant, _TINY * xx**3)
     )
-
-
-def unit(vectors: Floats) -> Floats:
-    """Vectors (…, 3, batch) at unit length."""
-    return vectors * (1.0 / np.maximum(np.sqrt(dot(vectors, vectors)), _TINY))[..., None, :]

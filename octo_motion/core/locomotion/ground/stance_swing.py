@@ -7,7 +7,7 @@ the two it is a blend. Its segments are then turned, as little as it takes, unti
 foothold: those that lie on the ground not at all. All of it is a function of the frame's own
 phase and place; there is no frame before it.
 
-Vectors are (…, 3, batch), as in ``batched``; the batch is frames × arms.
+Vectors are (…, 3, batch), components first; the batch is frames × arms.
 """
 
 from __future__ import annotations
@@ -18,20 +18,11 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import dot
 from ...easing import least_jerk, smooth_step
-from ...rotations import Floats
+from ...rotations import Floats, components_first
+from ...rotations.components_first import dot
 from ..rig import MARGIN, JointRoom, loose_from_root, room_needed
-from .arm_curves import (
-    bent,
-    curve,
-    drawn,
-    evened,
-    lerp_bends,
-    raise_over_ground,
-    spread_chain,
-    unit,
-)
+from .arm_curves import bent, curve, drawn, evened, lerp_bends, raise_over_ground, spread_chain
 from .foothold_reach import PEELING
 from .footholds import UNROLLING, Footholds
 from .stance_settings import Limbs, StanceSettings
@@ -190,7 +181,7 @@ class Stance:
 
     def upwards(self, segments: int) -> Floats:
         """Which way is up for each segment (segments, 3, batch): what lies, lies on its ground."""
-        lying = unit(self.normals[1:] + self.normals[:-1])
+        lying = components_first.normalized(self.normals[1:] + self.normals[:-1])
         free = np.broadcast_to(self.normals[:1], (self.touching, *self.normals.shape[1:]))
         return np.concatenate([free, lying])[:segments]
 
@@ -360,7 +351,9 @@ def _in_stance(
     strain = strain * _freedom(batch, stance)
     # Some of the gait stays, but for what lies or unrolls.
     kept = np.where(_kneed(batch, stance), 0.0, _KEPT)
-    own = unit(guess + (kept * _freedom(batch, stance))[:, None] * (shapes - guess))
+    own = components_first.normalized(
+        guess + (kept * _freedom(batch, stance))[:, None] * (shapes - guess)
+    )
     own = _drawn_to_foothold(batch, own, stance, ground, strain=strain, chord=chord)
     own = _laid_on_ground(batch, own, strain, stance, ground)
     strains[:, chosen], directions[..., chosen] = strain * stance.weight, own
@@ -464,11 +457,11 @@ def _knee(batch: Batch, stance: Stance, chord: Floats, longer: Floats) -> Floats
     away = np.maximum(np.sqrt(dot(chord, chord)), _TINY)
     along = chord / away
     side = batch.outward + batch.upward
-    side = unit(side - dot(side, along) * along)
+    side = components_first.normalized(side - dot(side, along) * along)
     cosine = (upper * upper + away * away - lower * lower) / (2.0 * upper * away)
     cosine = np.clip(cosine, -_STRAIGHT, _STRAIGHT)
     thigh = cosine * along + np.sqrt(1.0 - cosine * cosine) * side
-    shin = unit(chord - upper * thigh)
+    shin = components_first.normalized(chord - upper * thigh)
     before = np.arange(len(batch.lengths))[:, None, None] < knee
     return np.where(before, thigh, shin)
 
@@ -511,7 +504,7 @@ def _asked(batch: Batch, stance: Stance, settings: StanceSettings) -> tuple[Floa
     directions[first:] = through[:, None] * directions[first:] + (1.0 - through[:, None]) * lying
     rolled = _rolled(batch, stance, lying, directions[first - 1])
     directions[first:] = np.where(stance.by_tip, directions[first:], rolled)
-    return strain, unit(directions), chord
+    return strain, components_first.normalized(directions), chord
 
 
 def _met(batch: Batch, stance: Stance, lying: Floats) -> tuple[Floats, Floats]:
@@ -535,7 +528,7 @@ def _met(batch: Batch, stance: Stance, lying: Floats) -> tuple[Floats, Floats]:
         arriving += inside * (
             at_joints[number] + share * (at_joints[number + 1] - at_joints[number])
         )
-    return place, unit(arriving)
+    return place, components_first.normalized(arriving)
 
 
 def _strained(ratio: Floats, stretch: float) -> Floats:
@@ -572,7 +565,7 @@ def _arch(batch: Batch, stance: Stance, chord: Floats, arriving: Floats, strain:
     rising = _RAISED + _ARCHED * slack
     # Slack, it comes down rather than back from under the body.
     falling = _FALLING * slack
-    arriving = unit((1.0 - falling) * arriving - falling * batch.upward)
+    arriving = components_first.normalized((1.0 - falling) * arriving - falling * batch.upward)
     leaving = np.cos(rising) * batch.outward + np.sin(rising) * batch.upward
     leaving, arriving = spread_chain(
         (leaving, arriving), chord, batch.upward, ratio / (1.0 + strain)
@@ -614,5 +607,5 @@ def _rolled(batch: Batch, stance: Stance, lying: Floats, before: Floats) -> Floa
     angle = (angle * room * np.tanh(1.0 / room))[:, None]
     up = np.zeros_like(lying)
     up[:, 2] = 1.0
-    up = unit(up - dot(up, lying)[:, None] * lying)
+    up = components_first.normalized(up - dot(up, lying)[:, None] * lying)
     return np.cos(angle) * lying + np.sin(angle) * up

@@ -9,11 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import turned
-from ...rotations import Floats, multiply, rotate
+from ...rotations import Floats, components_first, multiply, rotate
 from ..gait import Build, GaitPoser, bone_twists
 from ..rig import Facing, rotate_bones
-from .arm_curves import unit
 from .footholds import Footholds
 from .grounded_poses import Raise
 from .stance_settings import Limbs, StanceSettings
@@ -139,13 +137,15 @@ class WalkPart:
         else:
             shapes = higher.shapes[number]
         arms, facing = self._batch(moments, chosen, higher)
-        shapes = turned(facing, shapes[..., chosen].reshape(bones, 3, -1))
+        shapes = components_first.rotate(facing, shapes[..., chosen].reshape(bones, 3, -1))
         times = (each[:, columns].reshape(-1) for each in (moments.cycles, moments.since))
         stance = stance_at(arms, self.footholds, *times)
         strains, ways = pulled_to_footholds(arms, shapes, stance, self.ground, self.settings)
         evened, each_frame = None, (bones, 3, frames, many)
         if higher is not None and higher.evened:
-            ways = unit(ways + higher.evened[number][..., chosen].reshape(ways.shape))
+            ways = components_first.normalized(
+                ways + higher.evened[number][..., chosen].reshape(ways.shape)
+            )
         elif higher is None and smoothing is not None:
             before, share = ways, airborne(stance).reshape(frames, many)
             ways = smoothing.evened(ways.reshape(each_frame), share).reshape(ways.shape)
@@ -186,8 +186,8 @@ class WalkPart:
             self.limbs,
             np.tile(chosen, len(moments.angles)),
             np.ascontiguousarray(roots.reshape(-1, 3).T),
-            turned(facing, np.array([1.0, 0.0, 0.0])[:, None]),
-            turned(facing, np.array([0.0, 0.0, 1.0])[:, None]),
+            components_first.rotate(facing, np.array([1.0, 0.0, 0.0])[:, None]),
+            components_first.rotate(facing, np.array([0.0, 0.0, 1.0])[:, None]),
             lift,
         )
         return batch, facing
@@ -212,13 +212,13 @@ class WalkPart:
         segments, many = len(pose.directions), len(columns)
         shape = segments, 3, len(to_armature), many
         back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
-        towards = turned(back, -stance.upwards(segments)).reshape(shape)
+        towards = components_first.rotate(back, -stance.upwards(segments)).reshape(shape)
         along = np.minimum(_FIRST_TURN + np.arange(segments) / 3.0, 1.0)
         most = min(_MOST_TURN, _TURN / segments) * along
         turns = most[:, None, None] * stance.weight.reshape(shape[2:])
         return rotate_bones(
             [self.poser.rests[arm] for arm in columns],
-            turned(back, pose.directions).reshape(shape),
+            components_first.rotate(back, pose.directions).reshape(shape),
             bank,
             Facing([self.sides[arm] for arm in columns], towards, turns),
         )

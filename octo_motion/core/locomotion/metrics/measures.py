@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...rotations import Floats, multiply
-from ...rotations import conjugate as inverse
+from ...rotations import Floats, angle_between
 from ..ground import Ground
 
 
@@ -80,8 +79,7 @@ def change(rotations: Floats, frames: Floats) -> Worst:
         rotations: (frames, bones, 4) unit quaternions.
         frames: (frames,) ascending; need not be whole.
     """
-    turn = multiply(inverse(rotations[:-1]), rotations[1:])
-    angle = 2.0 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
+    angle = angle_between(rotations[:-1], rotations[1:])
     return _worst(angle / np.diff(frames)[:, None])
 
 

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 
 from ....blender.animation import Channel, object_places, rotation_path, strains_of
-from ...keyframes import rotations_of, values_at
-from ...rotations import Floats
+from ...keyframes import values_at
+from ...rotations import Floats, from_mode_values
 from ...skeleton import Skeleton
 from ..rig import Poses, carried_by_root_bone, halfway_linear
 from .report import Measured
@@ -84,7 +84,7 @@ def _poses(
         bone = rig.armature.pose.bones[name]
         turned = played(rotation_path(bone))
         if turned is not None:
-            rotations[:, place] = rotations_of(turned, bone.rotation_mode)
+            rotations[:, place] = from_mode_values(turned, bone.rotation_mode)
         scaled = played(bone.path_from_id("scale"))
         if scaled is not None:
             alongs[name] = scaled[:, 1]
@@ -96,7 +96,7 @@ def _poses(
     turned = played(rotation_path(carrier))
     if moved is None or turned is None:
         return Poses(rotations, strains, computed.locations, computed.orientations)
-    turns = rotations_of(turned, carrier.rotation_mode)
+    turns = from_mode_values(turned, carrier.rotation_mode)
     if rig.root_bone:
         places = carried_by_root_bone(rig.skeleton, rig.root_bone, rig.world, moved, turns)
     else:

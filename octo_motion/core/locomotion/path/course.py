@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...easing import least_jerk
-from ...rotations import Floats
+from ...rotations import Floats, rotation_vector_between, slerp_in_sense
 from ..gait import CYCLE
 from ..rig import lift_to_floor
 from .burst_glide import stroke_distance
-from .gait_changes import GaitTransition, sense_of, slerp_rotations
+from .gait_changes import GaitTransition
 from .heading import Bearings
 from .route import Route
 from .travel import Travel, TravelSettings, travel_at, walked_at
@@ -122,7 +122,7 @@ class Course:
         for change in self.changes:
             middle = np.array([change.middle])
             (_, before), (_, after) = (self.lines[each].at(middle) for each in (way, change.way))
-            found.append(sense_of(before, after)[0])
+            found.append(rotation_vector_between(before, after)[0])
             way = change.way
         return found
 
@@ -139,7 +139,7 @@ class Course:
             place, bearing = self.lines[change.way].at(flat[later])
             share = over[later]
             positions[later] += share[:, None] * (place - positions[later])
-            rotations[later] = slerp_rotations(
+            rotations[later] = slerp_in_sense(
                 rotations[later], bearing, share, self._senses[number]
             )
         return positions.reshape(*wanted.shape, 3), rotations.reshape(*wanted.shape, 4)

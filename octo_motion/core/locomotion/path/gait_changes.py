@@ -25,7 +25,6 @@ from ...rotations import (
     continuous,
     from_rotation_vector,
     multiply,
-    to_rotation_vector,
 )
 
 _HELD: Final = 0.3
@@ -158,32 +157,6 @@ def slowing(way: Floats, within: float) -> Floats:
     """A way (…,) from 0 on that comes to a stop: at full speed at 0, still from ``within`` on."""
     inside = np.clip(way, 0.0, within)
     return inside - 0.5 * inside * inside / within
-
-
-def slerp_rotations(
-    first: Floats, second: Floats, share: Floats, sense: Floats | None = None
-) -> Floats:
-    """Rotations (…, 4) a share (…,) of the way from one to the other.
-
-    Args:
-        first: (…, 4)
-        second: (…, 4)
-        share: (…,) 0…1
-        sense: (…, 3) which way round to turn, where it matters, as a rotation vector; none for
-            the shortest. A walker that swims off turns about: half a turn, which is as short the
-            one way as the other, and must not be taken now this way and now that.
-    """
-    turn = to_rotation_vector(multiply(conjugate(first), second))
-    if sense is not None:
-        angle = np.linalg.norm(turn, axis=-1, keepdims=True)
-        against = (np.sum(turn * sense, axis=-1, keepdims=True) < 0.0) & (angle > 0.5 * np.pi)
-        turn = np.where(against, turn * (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-12)), turn)
-    return multiply(first, from_rotation_vector(share[..., None] * turn))
-
-
-def sense_of(first: Floats, second: Floats) -> Floats:
-    """The shortest turn (…, 3) from one rotation (…, 4) to the other, as a rotation vector."""
-    return to_rotation_vector(multiply(conjugate(first), second))
 
 
 def blend_motions(first: Floats, second: Floats, share: Floats) -> Floats:

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from ...easing import least_jerk
-from ...rotations import Floats
-from ..rig import ArmFrames, lerp_rotation_vectors
+from ...rotations import Floats, lerp_rotation_vectors
+from ..rig import ArmFrames
 from .timeline import Timeline, folded
 
 _FREE: Final = 0.3

@@ -23,6 +23,7 @@ from ...rotations import (
     Floats,
     conjugate,
     from_axis_angle,
+    lerp_rotation_vectors,
     less_whole_turns,
     multiply,
     normalized,
@@ -30,7 +31,7 @@ from ...rotations import (
     shortest_arc,
 )
 from ..gait import close_group
-from ..rig import ArmFrames, frame_of, lerp_rotation_vectors, transport_frames
+from ..rig import ArmFrames, frame_of, transport_frames
 from .timeline import Timeline, first_place, folded, front_width, passed
 from .winding import Coil, Profile, Skins, Winding, WindingStart, wind
 

@@ -14,14 +14,7 @@ from .arm_chains import (
     nearest_axis,
     place_added,
 )
-from .arm_frames import (
-    ArmFrames,
-    bend_rotations,
-    frame_of,
-    frames_of_arm,
-    lerp_rotation_vectors,
-    transport_frames,
-)
+from .arm_frames import ArmFrames, bend_rotations, frame_of, frames_of_arm, transport_frames
 from .bone_rotations import ArmRest, Facing, arm_rest, carried_to, rotate_bones, sucker_sides
 from .detection import Detection, detect_arms
 from .joint_room import (
@@ -70,7 +63,6 @@ __all__ = [
     "halfway_linear",
     "is_driven",
     "joint_positions",
-    "lerp_rotation_vectors",
     "lies_back",
     "lift_to_floor",
     "loose_from_root",

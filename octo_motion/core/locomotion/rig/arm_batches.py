@@ -2,7 +2,7 @@
 """Arms of as many bones each, from their bones to their joints and back, all of them at once.
 
 The same as ``ArmFrames`` says of one arm, without its frames: each bone's orientation tells where
-its segment points. Components come first and the batch last, as in ``batched``.
+its segment points. Components come first and the batch last, as in ``rotations.components_first``.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...batched import product, running, turned
-from ...rotations import Floats
+from ...rotations import Floats, components_first
+from ...rotations.components_first import cumulative_sum
 from .arm_frames import ArmFrames
 
 
@@ -53,7 +53,7 @@ class ArmBatch:
         result = np.empty(rotations.shape)
         for bone, own in enumerate(rotations):
             before = result[bone - 1] if bone else None
-            result[bone] = product(self._carried(bone, arm, before), own)
+            result[bone] = components_first.multiply(self._carried(bone, arm, before), own)
         return result
 
     def rotations(self, orientations: Floats, arm: np.ndarray) -> Floats:
@@ -63,7 +63,7 @@ class ArmBatch:
             before = orientations[bone - 1] if bone else None
             back = self._carried(bone, arm, before)
             back[1:] *= -1.0
-            result[bone] = product(back, own)
+            result[bone] = components_first.multiply(back, own)
         return result
 
     def _carried(self, bone: int, arm: np.ndarray, before: Floats | None) -> Floats:
@@ -79,7 +79,7 @@ class ArmBatch:
         if before is None or not follows.any():
             # Of those that follow nothing it is in armature space already.
             return carried
-        taken = product(before, carried)
+        taken = components_first.multiply(before, carried)
         return taken if follows.all() else np.where(follows[arm], taken, carried)
 
     def joints(self, orientations: Floats, arm: np.ndarray, strains: Floats) -> Floats:
@@ -94,9 +94,9 @@ class ArmBatch:
         result[0] = self.roots[:, arm]
         lengths = self.lengths[:, arm] * (1.0 + strains)
         for bone, own in enumerate(orientations):
-            along = turned(own, self.segments[bone][:, arm])
+            along = components_first.rotate(own, self.segments[bone][:, arm])
             np.multiply(along, lengths[bone], out=result[bone + 1])
-        return running(result)
+        return cumulative_sum(result)
 
 
 def batches_by_bones(arms: Sequence[ArmFrames]) -> list[tuple[list[int], ArmBatch]]:

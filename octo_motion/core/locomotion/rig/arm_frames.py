@@ -20,12 +20,10 @@ from ...rotations import (
     cross,
     from_axis_angle,
     from_matrix,
-    from_rotation_vector,
     multiply,
     normalized,
     rotate,
     shortest_arc,
-    to_rotation_vector,
 )
 from ...skeleton import Skeleton
 from .arm_chains import AXES, BodyFrame, joint_positions
@@ -150,18 +148,6 @@ def frame_of(along: Floats, facing: Floats) -> Floats:
     x = normalized(along)
     y = normalized(facing - np.sum(facing * x, axis=-1, keepdims=True) * x)
     return from_matrix(np.stack(np.broadcast_arrays(x, y, cross(x, y)), axis=-1))
-
-
-def lerp_rotation_vectors(start: Floats, end: Floats, share: Floats) -> Floats:
-    """Between turns (…, 4) of joints, by a share (…), by way of their rotation vectors.
-
-    The shortest way from one to the other changes sides where they are half a turn apart; an arm
-    that bends one way and then the other goes through being straight instead.
-    """
-    part = share[..., None]
-    return from_rotation_vector(
-        (1.0 - part) * to_rotation_vector(start) + part * to_rotation_vector(end)
-    )
 
 
 def bend_rotations(angles: Floats) -> Floats:

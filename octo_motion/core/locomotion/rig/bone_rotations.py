@@ -21,9 +21,9 @@ from typing import Final
 
 import numpy as np
 
-from ...batched import cross, dot, product, smallest_arc, turned
 from ...content_cache import ContentCache, content_key
-from ...rotations import Floats, conjugate, multiply, normalized, rotate
+from ...rotations import Floats, components_first, conjugate, multiply, normalized, rotate
+from ...rotations.components_first import dot
 from ...skeleton import Skeleton
 from .arm_chains import AXES, joint_positions
 
@@ -157,18 +157,20 @@ def rotate_bones(
         carried = _tiled([rest.carried[bone] for rest in rests], frames)
         follows = np.array([rest.follows[bone] for rest in rests])
         if np.all(follows):
-            carried = product(orientation, carried)
+            carried = components_first.multiply(orientation, carried)
         elif np.any(follows):
-            carried = np.where(np.tile(follows, frames), product(orientation, carried), carried)
+            carried = np.where(
+                np.tile(follows, frames), components_first.multiply(orientation, carried), carried
+            )
         turn = _swing(rests, bone, carried, wanted[bone])
         twisted = half[bone]
         if facing is not None:
             side = _tiled([each[bone] for each in facing.sides], frames)
-            side = turned(product(carried, turn), side)
+            side = components_first.rotate(components_first.multiply(carried, turn), side)
             # Bank is meant to be seen: it is what the side is turned away by.
             banked = banked + 2.0 * half[bone]
             towards = facing.towards[bone].reshape(3, batch)
-            sine = dot(cross(side, towards), wanted[bone])
+            sine = dot(components_first.cross(side, towards), wanted[bone])
             cosine = dot(side, towards) - dot(side, wanted[bone]) * dot(towards, wanted[bone])
             askew = np.sin(banked) * cosine + np.cos(banked) * sine
             # Where all face away, each would add its own to what those before it turned.
@@ -176,8 +178,10 @@ def rotate_bones(
             askew *= 0.5 * (1.0 + right)
             twisted = twisted + 0.5 * facing.most_turn[bone].reshape(batch) * askew
         if np.any(twisted):
-            turn = product(turn, np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segment]))
-        orientation = product(carried, turn)
+            turn = components_first.multiply(
+                turn, np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segment])
+            )
+        orientation = components_first.multiply(carried, turn)
         result[:, :, bone] = turn.T.reshape(frames, arms, 4)
     return result
 
@@ -210,17 +214,16 @@ def _swing(rests: Sequence[ArmRest], bone: int, carried: Floats, wanted: Floats)
     """
     frames = wanted.shape[-1] // len(rests)
     segment = _tiled([rest.segments[bone] for rest in rests], frames)
-    goal = turned(_inverse(carried), wanted)
+    goal = components_first.rotate(components_first.conjugate(carried), wanted)
     if all(rest.outward is None for rest in rests):
-        return smallest_arc(segment, goal)
+        return components_first.shortest_arc(segment, goal)
     between = [rest.straight_on(bone) for rest in rests]
-    first = smallest_arc(_tiled([rest.segments[bone] for rest in rests], 1), _tiled(between, 1))
-    return product(smallest_arc(_tiled(between, frames), goal), np.tile(first, (1, frames)))
-
-
-def _inverse(turns: Floats) -> Floats:
-    """The opposite turns (4, batch)."""
-    return turns * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
+    first = components_first.shortest_arc(
+        _tiled([rest.segments[bone] for rest in rests], 1), _tiled(between, 1)
+    )
+    return components_first.multiply(
+        components_first.shortest_arc(_tiled(between, frames), goal), np.tile(first, (1, frames))
+    )
 
 
 def _tiled(each: Sequence[Floats], frames: int) -> Floats:

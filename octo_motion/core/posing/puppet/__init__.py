@@ -14,17 +14,7 @@ from .build import (
 )
 from .figure import Elements, Figure, JointRanges, Pose
 from .joint_limits import _ONES, bends, slopes
-from .kinematics import (
-    exponential,
-    inverse_product,
-    logarithm,
-    matrices,
-    product,
-    product_inverse,
-    rest_pose,
-    skew,
-    transforms,
-)
+from .kinematics import rest_pose
 from .material_fit import Bend, MeasuredBend, measure_bend, measure_shown
 from .materials import Material, elements_for, joint_loads, material_of
 from .plastic_element import ElementResponse, PlasticLaw
@@ -54,21 +44,13 @@ __all__ = [
     "build_figure",
     "diagonal",
     "elements_for",
-    "exponential",
     "find_roles",
-    "inverse_product",
     "joint_loads",
     "joints_of",
-    "logarithm",
     "material_of",
-    "matrices",
     "measure_bend",
     "measure_shown",
-    "product",
-    "product_inverse",
     "rest_pose",
-    "skew",
     "slopes",
-    "transforms",
     "turned_bodies",
 ]

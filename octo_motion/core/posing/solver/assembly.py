@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...rotations import Floats
-from ..puppet import Figure, PlasticLaw, skew
+from ...rotations.small_batches import skew
+from ..puppet import Figure, PlasticLaw
 from .bodies import Bodies
 from .constraint_rows import Rows
 from .joint_stops import JointStops

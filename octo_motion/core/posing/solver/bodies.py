@@ -11,17 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...rotations import Floats, normalized
-from ..puppet import (
-    Figure,
-    Pose,
-    exponential,
-    inverse_product,
-    logarithm,
-    product,
-    product_inverse,
-    transforms,
-)
+from ...rotations import Floats, normalized, small_batches
+from ..puppet import Figure, Pose
 from .state import BodiesState
 from .tree import Tree
 
@@ -66,7 +57,7 @@ class Bodies:
         """Matrices and places, from orientations and roots."""
         tree = self._tree
         # (bodies, 4, 4) homogeneous, without the places yet; and the same, transposed.
-        self.transforms, self.transposed = transforms(self.orientations)
+        self.transforms, self.transposed = small_batches.to_transforms(self.orientations)
         self.matrices = self.transforms[:, :3, :3]
         """(bodies, 3, 3)"""
         parents = self.matrices.take(self.parent_or_self, 0)
@@ -93,18 +84,22 @@ class Bodies:
 
     def turns(self) -> Floats:
         """(bodies, 4) orientation of each body in its parent's frame (a root's in the world's)."""
-        return inverse_product(self._parent_turns(), self.orientations)
+        return small_batches.conjugate_multiply(self._parent_turns(), self.orientations)
 
     # Springs
 
     def springs(self) -> Floats:
         """(bodies, 3) q_f of the elements: rotation vectors in the parents' frames."""
-        return logarithm(product_inverse(self.turns(), self.rest))
+        return small_batches.to_rotation_vector(
+            small_batches.multiply_conjugate(self.turns(), self.rest)
+        )
 
     def springs_in_world(self) -> Floats:
         """(bodies, 3) the same in world axes."""
-        at_rest = product(self._parent_turns(), self.rest)
-        return logarithm(product_inverse(self.orientations, at_rest))
+        at_rest = small_batches.multiply(self._parent_turns(), self.rest)
+        return small_batches.to_rotation_vector(
+            small_batches.multiply_conjugate(self.orientations, at_rest)
+        )
 
     def relax(self) -> None:
         """Let the springs have their rest where the joints are."""
@@ -114,8 +109,10 @@ class Bodies:
         """Move springs' rest so that they are bent by ``springs`` (which, 3), parents' frames."""
         parents = self.orientations.take(self.parent_or_self.take(which), 0)
         parents[self.is_root.take(which)] = _UNTURNED
-        turns = inverse_product(parents, self.orientations.take(which, 0))
-        self.rest[which] = product(exponential(-springs), turns)
+        turns = small_batches.conjugate_multiply(parents, self.orientations.take(which, 0))
+        self.rest[which] = small_batches.multiply(
+            small_batches.from_rotation_vector(-springs), turns
+        )
 
     # How they move
 
@@ -167,7 +164,9 @@ class Bodies:
 
     def move(self, turns: Floats, shifts: Floats) -> None:
         """Turn by rotation vectors (bodies, 3) and shift the roots by (roots, 3), world axes."""
-        orientations = product(exponential(turns), self.orientations)
+        orientations = small_batches.multiply(
+            small_batches.from_rotation_vector(turns), self.orientations
+        )
         size = np.sqrt((orientations * orientations) @ _FOUR_ONES)
         orientations /= size[:, None]
         self.orientations = orientations

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats
-from ..puppet import skew
+from ...rotations.small_batches import skew
 from .contact_detection import Contacts
 
 Integers = NDArray[np.int64]

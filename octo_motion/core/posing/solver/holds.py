@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...rotations import Floats
-from ..puppet import logarithm, product, product_inverse
+from ...rotations import Floats, small_batches
 from .bodies import Bodies
 from .constraint_rows import Holds
 from .hand_spring import HandSpring
@@ -99,9 +98,9 @@ class Holding:
             if spring.target_orientation is not None
         ]
         pairs = np.array(firm + hands)
-        wanted = product(pairs[:, 0], pairs[:, 1])
+        wanted = small_batches.multiply(pairs[:, 0], pairs[:, 1])
         now = bodies.orientations.take(self._bodies[self._turning], 0)
-        return logarithm(product_inverse(wanted, now))
+        return small_batches.to_rotation_vector(small_batches.multiply_conjugate(wanted, now))
 
     def take(self, springs: Sequence[HandSpring], impulses: Floats) -> None:
         """Let hands feel the impulses (rows, 3) of the last ``rows``."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...rotations import Floats
-from ..puppet import _ONES, Figure, bends, inverse_product, matrices, slopes
+from ...rotations import Floats, small_batches
+from ..puppet import _ONES, Figure, bends, slopes
 from .problem import Stops
 
 _ENDLESS = np.pi - 1e-9
@@ -43,7 +43,7 @@ class JointStops:
         self._signs = np.array([1.0, -1.0])[:, None]
         self._ends = np.stack([-least, most], axis=1)[self.joints]
         self._rest = figure.rest[self.joints]
-        self._axes = matrices(self._rest)
+        self._axes = small_batches.to_matrix(self._rest)
         self._gains = gains[self.joints]
         self._count = len(figure)
 
@@ -60,7 +60,7 @@ class JointStops:
             return ()
         speeds = speeds[self.joints]
         fastest = float(np.sqrt((speeds * speeds).sum(axis=1).max()))
-        own = inverse_product(self._rest, turns[self.joints])
+        own = small_batches.conjugate_multiply(self._rest, turns[self.joints])
         gaps = self._signs * bends(own)[:, None, :] + self._ends
         found = gaps < _NEAR + 2.0 * step * fastest
         found &= (own[:, 0] ** 2 + own[:, 2] ** 2 > _OPEN)[:, None, None]

@@ -30,7 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rotations import Floats
-from ..puppet import Figure, skew
+from ...rotations.small_batches import skew
+from ..puppet import Figure
 
 Integers = NDArray[np.int64]
 

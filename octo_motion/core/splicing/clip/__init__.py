@@ -3,7 +3,7 @@
 
 from .bvh_check import check_bvh
 from .clip import Clip
-from .posture import Posture, posture_of, sample_clip, sample_scales, sample_world, slerp
+from .posture import Posture, posture_of, sample_clip, sample_scales, sample_world
 from .scaled_pose import without_scale
 from .splice_timing import After, SpliceWindow, Timing, splice_window, window_middle
 from .unpose import orientations_of, unposed
@@ -20,7 +20,6 @@ __all__ = [
     "sample_clip",
     "sample_scales",
     "sample_world",
-    "slerp",
     "splice_window",
     "unposed",
     "window_middle",

@@ -13,8 +13,8 @@ from ...rotations import (
     from_matrix,
     from_rotation_vector,
     multiply,
-    normalized,
     rotate,
+    slerp,
     to_rotation_vector,
 )
 from ...skeleton import Skeleton
@@ -153,21 +153,6 @@ def sample_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
         turns = slerp(turns, from_matrix(second[:, :3, :3] / clip.scale), share)
     places = first[:, :3, 3] + share[:, None] * (second[:, :3, 3] - first[:, :3, 3])
     return turns, places, clip.scale
-
-
-def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
-    """Between two orientations (…, 4) the short way, at constant speed; share (…) in [0, 1]."""
-    cosine = np.sum(first * second, axis=-1)
-    near = np.where(cosine[..., None] < 0.0, -second, second)
-    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
-    sine = np.sin(angle)
-    small = sine < 1e-6
-    divisor = np.where(small, 1.0, sine)
-    left = np.where(small, 1.0 - share, np.sin((1.0 - share) * angle) / divisor)
-    right = np.where(small, share, np.sin(share * angle) / divisor)
-    result = normalized(left[..., None] * first + right[..., None] * near)
-    # At a frame of the clip's own the very values of the clip.
-    return np.where((share == 0.0)[..., None], first, result)
 
 
 def _between(clip: Clip, frames: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:

@@ -22,9 +22,10 @@ from ...rotations import (
     from_rotation_vector,
     multiply,
     rotate,
+    slerp,
     to_rotation_vector,
 )
-from ..clip import Clip, Posture, SpliceWindow, sample_clip, sample_world, slerp
+from ..clip import Clip, Posture, SpliceWindow, sample_clip, sample_world
 from ..humanoid import chain_length
 from .body_frames import AnatomicalFrame
 from .parts import LEG, landmark_bone

@@ -19,9 +19,10 @@ from ...rotations import (
     normalized,
     rotate,
     shortest_arc,
+    slerp,
 )
 from ...skeleton import Skeleton
-from ..clip import Clip, Posture, posture_of, sample_clip, slerp
+from ..clip import Clip, Posture, posture_of, sample_clip
 from ..humanoid import (
     Correspondence,
     Landmarks,

@@ -38,7 +38,7 @@ from ....core.locomotion.gait import Arm, GaitPoser, GaitTable
 from ....core.locomotion.ground import Ground, Raise, SwingSmoothing
 from ....core.locomotion.metrics import TOLD, Figure, KeyedRig, Measured, figures, measure_keyed
 from ....core.locomotion.motion import Body, Motion, Tolerances, reduced
-from ....core.locomotion.path import Route, Travel, TravelSettings, plan_travel, slerp_rotations
+from ....core.locomotion.path import Route, Travel, TravelSettings, plan_travel
 from ....core.locomotion.rig import (
     BodyFrame,
     Detection,
@@ -47,7 +47,7 @@ from ....core.locomotion.rig import (
     object_transforms,
     root_bone_transforms,
 )
-from ....core.rotations import IDENTITY, Floats, from_matrix, rotate
+from ....core.rotations import IDENTITY, Floats, from_matrix, rotate, slerp
 from ....core.skeleton import Skeleton
 from ..reading import (
     Apart,
@@ -637,9 +637,7 @@ class Shot:
         held = np.tile(self.mantle_rotations, (len(self.moments), 1, 1))
         if moving.swimming is not None:
             rest = np.broadcast_to(IDENTITY, held.shape)
-            held = slerp_rotations(
-                rest, held, np.repeat(moving.swimming[:, None], held.shape[1], axis=1)
-            )
+            held = slerp(rest, held, np.repeat(moving.swimming[:, None], held.shape[1], axis=1))
         if self.in_place and not self.root_bone:
             travel = []
         elif self.root_bone:

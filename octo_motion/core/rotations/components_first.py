@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vectors (…, 3, batch) and unit quaternions (…, 4, batch): the batch last, components before it.
-
-With each component one run of memory, numpy works several times faster than on triples. It is
-what the solver's hot loops use; everywhere else components come last (``core.rotations``).
-"""
+"""Vectors (…, 3, batch) and unit quaternions (4, batch): the batch last, components before it."""
 
 from __future__ import annotations
 
@@ -11,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from . import rotations
-from .rotations import Floats
+from . import arrays
+from .arrays import IDENTITY, Floats
 
 _TINY: Final = 1e-12
 _HAMILTON: Final = (
@@ -30,14 +26,9 @@ def dot(first: Floats, second: Floats) -> Floats:
     return np.einsum("...cb,...cb->...b", first, second)
 
 
-def running(values: Floats) -> Floats:
-    """Sums of the first, the first two … rows (n, …) of values, which are changed in place.
-
-    Long rows are added several times faster than ``numpy.cumsum`` adds along them.
-    """
-    for row in range(1, len(values)):
-        values[row] += values[row - 1]
-    return values
+def normalized(vectors: Floats) -> Floats:
+    """Vectors (…, 3, batch) at unit length; those of no length stay zero."""
+    return vectors * (1.0 / np.maximum(np.sqrt(dot(vectors, vectors)), _TINY))[..., None, :]
 
 
 def cross(first: Floats, second: Floats) -> Floats:
@@ -53,11 +44,16 @@ def cross(first: Floats, second: Floats) -> Floats:
     return result
 
 
-def turned(turn: Floats, vectors: Floats) -> Floats:
+def conjugate(turn: Floats) -> Floats:
+    """The opposite turns (4, batch)."""
+    return turn * np.array([1.0, -1.0, -1.0, -1.0])[:, None]
+
+
+def rotate(turn: Floats, vectors: Floats) -> Floats:
     """Vectors (…, 3, batch) turned by quaternions (4, batch)."""
     if vectors.ndim > turn.ndim:
         # Several by each: by way of matrices.
-        return np.einsum("ijb,...jb->...ib", matrices(turn), vectors)
+        return np.einsum("ijb,...jb->...ib", to_matrix(turn), vectors)
     twice = cross(turn[1:], vectors)
     twice += twice
     result = turn[0] * twice
@@ -66,7 +62,7 @@ def turned(turn: Floats, vectors: Floats) -> Floats:
     return result
 
 
-def matrices(turn: Floats) -> Floats:
+def to_matrix(turn: Floats) -> Floats:
     """Matrices (3, 3, batch) of unit quaternions (4, batch)."""
     doubled = 2.0 * turn[1:]
     (wx, wy, wz), (xx, xy, xz) = turn[0] * doubled, turn[1] * doubled
@@ -78,7 +74,7 @@ def matrices(turn: Floats) -> Floats:
     return result
 
 
-def product(first: Floats, second: Floats) -> Floats:
+def multiply(first: Floats, second: Floats) -> Floats:
     """Quaternions (4, batch) that turn by the second and then by the first."""
     result = np.empty(np.broadcast_shapes(first.shape, second.shape))
     a, b, part = list(first), list(second), np.empty(result.shape[1:])
@@ -90,7 +86,7 @@ def product(first: Floats, second: Floats) -> Floats:
     return result
 
 
-def smallest_arc(start: Floats, goal: Floats) -> Floats:
+def shortest_arc(start: Floats, goal: Floats) -> Floats:
     """Quaternions (4, batch) of the smallest turn from vectors (3, batch) of any length to others.
 
     A vector of no length turns nothing. Opposite vectors turn by π about an axis across the
@@ -105,10 +101,20 @@ def smallest_arc(start: Floats, goal: Floats) -> Floats:
     definite = there & (length > 1e-8 * size)
     if not np.all(definite):
         opposite = there & ~definite
-        turn[:, opposite] = rotations.shortest_arc(
-            rotations.normalized(np.broadcast_to(start, goal.shape)[:, opposite].T),
-            rotations.normalized(goal[:, opposite].T),
+        turn[:, opposite] = arrays.shortest_arc(
+            arrays.normalized(np.broadcast_to(start, goal.shape)[:, opposite].T),
+            arrays.normalized(goal[:, opposite].T),
         ).T
-        turn[:, ~there] = rotations.IDENTITY[:, None]
+        turn[:, ~there] = IDENTITY[:, None]
         length = np.where(definite, length, 1.0)
     return turn / length
+
+
+def cumulative_sum(values: Floats) -> Floats:
+    """Sums of the first, the first two … rows (n, …) of values, which are changed in place.
+
+    Long rows are added several times faster than ``numpy.cumsum`` adds along them.
+    """
+    for row in range(1, len(values)):
+        values[row] += values[row - 1]
+    return values

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Vectors and rotations one at a time, as tuples of floats.
 
-``core.rotations`` works on batches; a call of numpy costs about a microsecond whatever the size of
-its arrays, and a tick of the haptic loop needs some hundred operations on three numbers each. In
-plain floats they cost a tenth of that. Quaternions are (w, x, y, z).
+A call of numpy costs about a microsecond whatever the size of its arrays, and a tick of the haptic
+loop needs some hundred operations on three numbers each. In plain floats they cost a tenth of that.
 """
 
 from __future__ import annotations
@@ -55,7 +54,7 @@ def length(a: Vector) -> float:
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-def shortened(a: Vector, most: float) -> Vector:
+def clamp_length(a: Vector, most: float) -> Vector:
     """The vector itself, or one of the same direction with the length ``most``."""
     size = length(a)
     return a if size <= most else scale(a, most / size)
@@ -83,7 +82,7 @@ def rotate(q: Quaternion, a: Vector) -> Vector:
     return add(add_scaled(a, twice, q[0]), cross(axis, twice))
 
 
-def unit(q: Quaternion) -> Quaternion | None:
+def normalized(q: Quaternion) -> Quaternion | None:
     """The quaternion with length one; None where it has no direction or is not finite."""
     size = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if not isfinite(size) or size < _SMALL:
@@ -109,7 +108,7 @@ def to_rotation_vector(q: Quaternion) -> Vector:
     return (q[1] * share, q[2] * share, q[3] * share)
 
 
-def turned(q: Quaternion, angular_velocity: Vector, seconds: float) -> Quaternion:
-    """An orientation after turning with a velocity seen from the world."""
+def integrate(q: Quaternion, angular_velocity: Vector, seconds: float) -> Quaternion:
+    """An orientation after turning with an angular velocity (rad/s) seen from the world."""
     moved = multiply(from_rotation_vector(scale(angular_velocity, seconds)), q)
-    return unit(moved) or q
+    return normalized(moved) or q

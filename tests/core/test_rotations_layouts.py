@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An operation does the same in each layout: components last, first, or one number at a time."""
+
+import numpy as np
+import pytest
+
+from octo_motion.core import rotations
+from octo_motion.core.rotations import components_first, normalized, rotate, scalars
+
+
+@pytest.mark.parametrize("many", [1, 4, 12])
+def test_several_vectors_are_turned_as_each_by_itself(many: int) -> None:
+    random = np.random.default_rng(many)
+    turns = normalized(random.normal(size=(50, 4)))
+    vectors = random.normal(size=(many, 50, 3))
+    expected = rotate(turns, vectors)
+
+    together = components_first.rotate(turns.T, np.swapaxes(vectors, 1, 2))
+    alone = [components_first.rotate(turns.T, each.T) for each in vectors]
+
+    np.testing.assert_allclose(np.swapaxes(together, 1, 2), expected, atol=1e-14)
+    np.testing.assert_allclose(np.stack(alone), together, atol=1e-14)
+
+
+def test_vectors_of_hardly_any_length_turn_nothing_whatever_is_beside_them() -> None:
+    # Opposite, of no length, and so short that squares of it are lost; and one as it should be.
+    start = np.array([[1.0, 0.0, 1e-13, 1.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    goal = np.array([[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 1e-12, 1.0], [0.0, 0.0, 0.0, 0.0]])
+    turns = components_first.shortest_arc(start, goal)
+    np.testing.assert_allclose(np.linalg.norm(turns, axis=0), 1.0, atol=1e-12)
+    np.testing.assert_allclose(turns[:, 1:3], [[1.0, 1.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    np.testing.assert_allclose(rotate(turns[:, 3], start[:, 3]), goal[:, 3], atol=1e-12)
+
+
+def test_components_first_the_operations_are_the_same() -> None:
+    random = np.random.default_rng(5)
+    a, b = normalized(random.normal(size=(2, 20, 4)))
+    u, v = normalized(random.normal(size=(2, 20, 3)))
+    for found, expected in (
+        (components_first.multiply(a.T, b.T).T, rotations.multiply(a, b)),
+        (components_first.conjugate(a.T).T, rotations.conjugate(a)),
+        (np.moveaxis(components_first.to_matrix(a.T), -1, 0), rotations.to_matrix(a)),
+        (components_first.cross(u.T, v.T).T, rotations.cross(u, v)),
+        (components_first.dot(u.T, v.T), rotations.dot(u, v)),
+        (components_first.normalized(3.0 * u.T).T, u),
+        (components_first.shortest_arc(u.T, v.T).T, rotations.shortest_arc(u, v)),
+    ):
+        np.testing.assert_allclose(found, expected, atol=1e-14)
+
+
+def test_scalars_do_the_same_as_arrays() -> None:
+    random = np.random.default_rng(6)
+    first, second = normalized(random.normal(size=(2, 4)))
+    one, other = random.normal(size=(2, 3))
+    a, b = tuple(map(float, first)), tuple(map(float, second))
+    u, v = tuple(map(float, one)), tuple(map(float, other))
+    assert len(a) == len(b) == 4
+    assert len(u) == len(v) == 3
+    for found, expected in (
+        (scalars.multiply(a, b), rotations.multiply(a, b)),
+        (scalars.conjugate(a), rotations.conjugate(a)),
+        (scalars.rotate(a, u), rotations.rotate(a, u)),
+        (scalars.cross(u, v), rotations.cross(np.array(u), np.array(v))),
+        (scalars.dot(u, v), rotations.dot(np.array(u), np.array(v))),
+        (scalars.from_rotation_vector(u), rotations.from_rotation_vector(u)),
+        (scalars.to_rotation_vector(a), rotations.to_rotation_vector(a)),
+    ):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
