@@ -49,20 +49,18 @@ def test_components_first_the_operations_are_the_same() -> None:
 
 
 def test_scalars_do_the_same_as_arrays() -> None:
-    random = np.random.default_rng(6)
-    first, second = normalized(random.normal(size=(2, 4)))
-    one, other = random.normal(size=(2, 3))
-    a, b = tuple(map(float, first)), tuple(map(float, second))
-    u, v = tuple(map(float, one)), tuple(map(float, other))
-    assert len(a) == len(b) == 4
-    assert len(u) == len(v) == 3
+    a, b = normalized([[0.9, -0.2, 0.4, 0.1], [-0.3, 0.5, 0.2, 0.7]])
+    one: scalars.Quaternion = (float(a[0]), float(a[1]), float(a[2]), float(a[3]))
+    two: scalars.Quaternion = (float(b[0]), float(b[1]), float(b[2]), float(b[3]))
+    u: scalars.Vector = (0.5, -1.5, 0.25)
+    v: scalars.Vector = (1.0, 0.75, -0.5)
     for found, expected in (
-        (scalars.multiply(a, b), rotations.multiply(a, b)),
-        (scalars.conjugate(a), rotations.conjugate(a)),
-        (scalars.rotate(a, u), rotations.rotate(a, u)),
+        (scalars.multiply(one, two), rotations.multiply(a, b)),
+        (scalars.conjugate(one), rotations.conjugate(a)),
+        (scalars.rotate(one, u), rotations.rotate(a, u)),
         (scalars.cross(u, v), rotations.cross(np.array(u), np.array(v))),
         (scalars.dot(u, v), rotations.dot(np.array(u), np.array(v))),
         (scalars.from_rotation_vector(u), rotations.from_rotation_vector(u)),
-        (scalars.to_rotation_vector(a), rotations.to_rotation_vector(a)),
+        (scalars.to_rotation_vector(one), rotations.to_rotation_vector(a)),
     ):
         np.testing.assert_allclose(found, expected, atol=1e-12)
