@@ -22,7 +22,7 @@ from octo_motion.core.rotations import (
     from_rotation_vector,
     normalized,
 )
-from tests.core.test_keys import LIMIT, an_arm, limb_of, seeds, swing, wandering
+from tests.core.keyframes.test_keys import LIMIT, an_arm, limb_of, seeds, swing, wandering
 
 
 def resting_arm(seed: int, frames: int, *, room: float, stretching: bool = False) -> Limb:

@@ -18,8 +18,8 @@ from octo_motion.core.errors import ClipError
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.ui.splicing import import_session
 from octo_motion.ui.splicing.import_clips import OCTO_MOTION_OT_import_clips
+from tests.ui.locomotion.test_generate import Press, Window
 from tests.ui.rig import click, joints_in_world, keys
-from tests.ui.test_generate import Press, Window
 
 Data = Callable[[str], Path]
 

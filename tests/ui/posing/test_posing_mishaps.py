@@ -20,7 +20,7 @@ from octo_motion.ui.posing.controls import Outcome, PoseControls
 from octo_motion.ui.posing.puppet_session import PuppetSession, active_session
 from octo_motion.ui.posing.session_operator import tell
 from octo_motion.ui.posing.view import view_under
-from tests.ui.test_posing import MOVE, TICK, VIEW, Event, drag, keyed, over
+from tests.ui.posing.test_posing import MOVE, TICK, VIEW, Event, drag, keyed, over
 
 ARM, OTHER = "arm1.04.L", "arm2.04.L"
 

@@ -15,7 +15,7 @@ from octo_motion.blender.rig.puppet_reading import MATERIAL, bone_materials
 from octo_motion.core.posing.puppet.materials import joint_loads
 from octo_motion.ui.posing.controls import MEASURING, Outcome, PoseControls
 from octo_motion.ui.posing.puppet_session import PuppetSession
-from tests.ui.test_posing import MOVE, PIXELS, TICK, VIEW, Event, over, tip
+from tests.ui.posing.test_posing import MOVE, PIXELS, TICK, VIEW, Event, over, tip
 
 BONE = "arm1.02.L"
 

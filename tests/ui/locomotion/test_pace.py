@@ -11,8 +11,8 @@ import pytest
 from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion.generate_motion import prepare
 from octo_motion.ui.locomotion.writing.write_motion import Shot
+from tests.ui.locomotion.test_quality_report import WAY, bumpy
 from tests.ui.rig import click, give_route, joints_in_world
-from tests.ui.test_quality_report import WAY, bumpy
 
 TOLD = "frames for a swing and jumps from pose to pose"
 

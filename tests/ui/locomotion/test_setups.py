@@ -15,7 +15,7 @@ from octo_motion.ui.locomotion.settings.properties import locomotion_settings, r
 from octo_motion.ui.plain import plain
 from tests.ui.rig import click, make_octopus
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 SHIPPED = sorted(path.stem for path in (setups.PACKAGE / "presets" / setups.FOLDER).glob("*.py"))
 
 

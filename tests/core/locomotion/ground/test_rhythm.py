@@ -24,7 +24,7 @@ from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.path.in_place import route_in_place
 from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import from_axis_angle
-from tests.core.test_crawl import journey
+from tests.core.locomotion.ground.test_crawl import journey
 
 MIDDLE, DUTY = np.radians(225.0), 0.55
 

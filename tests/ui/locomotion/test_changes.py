@@ -11,8 +11,8 @@ from octo_motion.core.locomotion.path.travel import plan_travel
 from octo_motion.ui.locomotion.generate_motion import prepare
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh
+from tests.ui.locomotion.test_quality_report import measured_joints, played_joints
 from tests.ui.rig import click
-from tests.ui.test_quality_report import measured_joints, played_joints
 
 RISING = {"b0": (-2.5, 0, 0), "b1": (-0.5, 0, -0.1), "b2": (-0.2, 0.3, 0.1), "b3": (2.2, 0, 1.6)}
 HUMP = {"b0": (-3.0, 0, 0), "b1": (-1.0, 0, 2.2), "b2": (1.0, 0, 2.2), "b3": (3.0, 0, 0)}

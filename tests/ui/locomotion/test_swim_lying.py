@@ -13,9 +13,9 @@ from octo_motion.blender.animation.actions import curves_of
 from octo_motion.core.rotations import rotate
 from octo_motion.ui.locomotion.generate_motion import generate, prepare
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
+from tests.ui.locomotion.test_changes import HUMP, computed, steps
+from tests.ui.locomotion.test_generate_on_rigs import opened
 from tests.ui.rig import click, make_octopus
-from tests.ui.test_changes import HUMP, computed, steps
-from tests.ui.test_generate_on_rigs import opened
 
 LEVEL = {"b0": (0, 0, 0), "b1": (0, -2, 0), "b2": (1, -4, 0), "b3": (1, -6, 0)}
 

@@ -11,8 +11,8 @@ import pytest
 
 from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion.reading.arm_items import bones_of
+from tests.ui.locomotion.test_generate_on_rigs import opened
 from tests.ui.rig import click
-from tests.ui.test_generate_on_rigs import opened
 
 STIFF = (0.12, 0.34, 0.34, 0.2)
 """Lengths of four bones of which two are as good as all."""
