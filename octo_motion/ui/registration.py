@@ -35,12 +35,12 @@ from .posing import (
     device_settings,
     marks,
     measure,
-    pose_script,
     pose_start,
 )
 from .posing import panels as posing_panels
 from .posing import properties as posing_properties
 from .posing import registration as posing
+from .posing import script_player as pose_script
 from .splicing import (
     import_clips,
     landmark_table,

@@ -27,7 +27,7 @@ import numpy as np
 from octo_motion.core.posing.puppet.figure import Figure, JointRanges
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.session import hand_for
-from octo_motion.core.posing.solver.obstacles import Box, Plane, Sphere
+from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane, Sphere
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats
 from tests.core.puppets import Torn, doll, octopus, posed, soft, torn, tree

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.core.posing.solver.obstacles import Plane
+from octo_motion.core.posing.solver.obstacle_shapes import Plane
 from octo_motion.device import __main__ as program
 from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc import process

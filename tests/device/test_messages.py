@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.posing.solver.obstacles import (
+from octo_motion.core.posing.solver.obstacle_shapes import (
     Box,
     Capsule,
     Hull,

@@ -20,7 +20,6 @@ from ...device.ipc import (
     Button,
     Buzz,
     Client,
-    ClientState,
     DeviceMessage,
     Grab,
     Notice,
@@ -117,11 +116,6 @@ class DeviceHands:
             self._send_changes(settings)
 
     # --- What is there --------------------------------------------------------------------------
-
-    @property
-    def lost(self) -> bool:
-        """Whether the bridge has ended by itself."""
-        return self.client.state is ClientState.LOST
 
     @property
     def holding(self) -> bool:

@@ -51,8 +51,6 @@ class NdofHands:
         self._clock = clock
         self._last = clock()
 
-    lost = False
-
     @property
     def holding(self) -> bool:
         """Whether the pointer holds a limb."""

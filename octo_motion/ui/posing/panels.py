@@ -11,10 +11,10 @@ from ..panel_base import ArmaturePanel
 from .custom_material import CUSTOM
 from .marks import OCTO_MOTION_OT_pose_mark_bones, OCTO_MOTION_OT_pose_obstacle
 from .measure import OCTO_MOTION_OT_pose_forget_measured, OCTO_MOTION_OT_pose_measure
-from .pose_script import OCTO_MOTION_OT_pose_script
 from .pose_start import OCTO_MOTION_OT_pose_start
 from .properties import posing_settings
 from .puppet_session import active_session
+from .script_player import OCTO_MOTION_OT_pose_script
 
 
 class PosePanel(ArmaturePanel):

@@ -13,13 +13,7 @@ from typing import Any
 
 import bpy
 
-from ...blender.animation import (
-    Keyed,
-    PoseKeys,
-    pose_values,
-    restore_pose,
-    writable_armature,
-)
+from ...blender.animation import Keyed, PoseKeys, pose_values, restore_pose, writable_armature
 from ...core.errors import OctoMotionError, RigError, SettingsError
 from ...core.posing.session import HandSample, TickReport
 from ...core.posing.solver import HandSpring, OneThread

@@ -14,7 +14,7 @@ from octo_motion.core.errors import SettingsError
 from octo_motion.core.posing.puppet.figure import Figure
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.solver.contact_detection import Detector, nearest_on_segments
-from octo_motion.core.posing.solver.obstacles import (
+from octo_motion.core.posing.solver.obstacle_shapes import (
     Box,
     Capsule,
     Hull,

@@ -15,7 +15,7 @@ from octo_motion.core.posing.puppet.joint_limits import bends, slopes
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.session import hand_for
 from octo_motion.core.posing.solver.hand_spring import Coupling
-from octo_motion.core.posing.solver.obstacles import Plane
+from octo_motion.core.posing.solver.obstacle_shapes import Plane
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import (
     Floats,

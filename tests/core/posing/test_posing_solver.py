@@ -11,13 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.posing.puppet.figure import Elements, JointRanges
-from octo_motion.core.posing.solver.constraint_rows import Holds, Rows
+from octo_motion.core.posing.solver.constraint_rows import Holds, RowImpulses, Rows
 from octo_motion.core.posing.solver.contact_detection import Contacts
 from octo_motion.core.posing.solver.newton import Start
-from octo_motion.core.posing.solver.obstacles import Box, Plane
+from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane
 from octo_motion.core.posing.solver.tree import Layout, Tree, plan
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import (
+    Floats,
     conjugate,
     from_rotation_vector,
     multiply,
@@ -206,13 +207,17 @@ def test_slopes_of_contacts_and_holds_are_derivatives_of_convex_functions(seed: 
     )
     rows = Rows(contacts, holds, np.zeros(3), np.ones(1), 1e-2, 20.0 * rng.normal(size=(count, 3)))
     speeds = rng.normal(size=(count + 2, 3))
-    answer = rows.answer(speeds)
-    slopes = rows.slopes(answer)
+
+    def impulses(speeds: Floats) -> RowImpulses:
+        return rows.respond(rows.asked - rows.pattern.column * (speeds + rows.targets))
+
+    answer = impulses(speeds)
+    slopes = rows.pattern.gains[:, None, None] * rows.tangent(answer).blocks()
     np.testing.assert_allclose(slopes, slopes.transpose(0, 2, 1), atol=1e-9)
     assert np.linalg.eigvalsh(slopes).min() > -1e-9
     for axis in range(3):
         nudge = 1e-7 * np.eye(3)[axis]
-        change = rows.answer(speeds + nudge).impulses - rows.answer(speeds - nudge).impulses
+        change = impulses(speeds + nudge).impulses - impulses(speeds - nudge).impulses
         np.testing.assert_allclose(-change / 2e-7, slopes[..., axis], atol=1e-3)
     # Within Coulomb's cone, and never a pull.
     push = (answer.impulses[:count] * normals).sum(axis=1)

@@ -12,7 +12,7 @@ from octo_motion.core.posing.puppet.figure import Figure, JointRanges
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.solver.hand_spring import Coupling, HandSpring
 from octo_motion.core.posing.solver.newton import Start
-from octo_motion.core.posing.solver.obstacles import Plane
+from octo_motion.core.posing.solver.obstacle_shapes import Plane
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.puppets import chain, doll, octopus, posed, soft

@@ -14,7 +14,7 @@ from octo_motion.core.errors import SettingsError
 from octo_motion.core.posing.puppet.figure import Figure, Pose
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.solver.hand_spring import Coupling
-from octo_motion.core.posing.solver.obstacles import Box, Plane, Sphere
+from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane, Sphere
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, multiply, rotate
 from tests.core.puppets import chain, doll, free, octopus, posed, soft, torn, tree

@@ -238,7 +238,7 @@ def test_killed_bridge_leaves_pose_and_keys_and_can_be_started_again(hands: Devi
     before = turn_of("bone2")
     assert hands.client._child
     hands.client._child._process.kill()
-    wait(hands, lambda: hands.lost, "it is noticed")
+    wait(hands, lambda: hands.client.state is ClientState.LOST, "it is noticed")
     assert [each.problem for each in hands.notices()] == [
         "The program between Blender and the device has ended."
     ]
@@ -272,7 +272,7 @@ def test_bridge_that_is_started_again_knows_force_floor_and_calibration(
     hands.calibrations.learned = {"simulated": kept}
     assert hands.client._child
     hands.client._child._process.kill()
-    wait_gently(lambda: hands.lost, "it is noticed")
+    wait_gently(lambda: hands.client.state is ClientState.LOST, "it is noticed")
     sent: list[say.Message] = []
     start, send = hands.client.start, hands.client.send
     hands.client.start = lambda *given: (start(*given), sent.clear())
@@ -303,7 +303,7 @@ def test_bridge_that_cannot_be_started_again_leaves_the_session(
     hands.session.key(all_bones=True)
     assert hands.client._child
     hands.client._child._process.kill()
-    wait(hands, lambda: hands.lost, "it is noticed")
+    wait(hands, lambda: hands.client.state is ClientState.LOST, "it is noticed")
     hands.notices()
     python, hands.client._python = hands.client._python, tmp_path / "none"
     assert press(hands, Key("B")) is Outcome.TAKEN

@@ -16,7 +16,7 @@ from octo_motion.blender.rig.puppet_reading import MATERIAL, bone_materials, mov
 from octo_motion.blender.scene.obstacles import read_obstacle
 from octo_motion.core.errors import OctoMotionError, RigError
 from octo_motion.core.posing.puppet.figure import Pose
-from octo_motion.core.posing.solver.obstacles import Box, Plane
+from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane
 from octo_motion.core.rotations import angle_between, from_rotation_vector, multiply, rotate
 from octo_motion.ui.posing.puppet_session import PuppetSession
 

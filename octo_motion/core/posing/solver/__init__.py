@@ -3,7 +3,7 @@
 
 from .blas_threads import OneThread
 from .hand_spring import Coupling, HandSpring
-from .obstacles import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
+from .obstacle_shapes import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from .world import World, WorldSettings, WorldState
 
 __all__ = [

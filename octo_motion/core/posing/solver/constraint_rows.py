@@ -307,11 +307,6 @@ class Rows:
         """Whether any slip was taken over."""
         return self._followed is not None
 
-    def answer(self, speeds: Floats) -> RowImpulses:
-        """Impulses at w (rows, 3)."""
-        moving = speeds if self.still else speeds + self.targets
-        return self.respond(self.asked - self.pattern.column * moving)
-
     def respond(self, wanted: Floats) -> RowImpulses:
         """Impulses at y (rows, 3)."""
         count, holds = self.count, self.holds
@@ -387,10 +382,6 @@ class Rows:
         planes = ways @ ways.transpose(0, 2, 1)
         planes += answer.sticks[:, None, None] * _UNIT
         return planes
-
-    def slopes(self, answer: RowImpulses) -> Floats:
-        """−∂p/∂w (rows, 3, 3), symmetric and positive semidefinite."""
-        return self.pattern.gains[:, None, None] * self.tangent(answer).blocks()
 
     @property
     def weighted(self) -> Floats:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...rotations import Floats, cross, rotate, to_matrix
 from ..puppet import Figure, rest_pose
-from .obstacles import Obstacle, Plane
+from .obstacle_shapes import Obstacle, Plane
 
 Integers = NDArray[np.int64]
 

@@ -65,7 +65,6 @@ class Tree:
             if parent >= 0:
                 self.above[body] += self.above[parent]
         self.roots = np.flatnonzero(self.parents < 0)
-        self.root_of = self.roots[np.argmax(self.above[:, self.roots], axis=1)]
         self.use(plan(self.parents, self.above))
 
     def use(self, layout: Layout) -> None:

@@ -30,7 +30,7 @@ from .contact_detection import Contacts, Detector
 from .hand_spring import Coupling, HandSpring
 from .holds import Holding, Pin
 from .newton import Newton, Solution, Start
-from .obstacles import Obstacle
+from .obstacle_shapes import Obstacle
 from .problem import Problem
 from .state import WorldSettings, WorldState
 from .tree import Tree
