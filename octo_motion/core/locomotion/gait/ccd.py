@@ -100,6 +100,8 @@ def solve_ccd(
 ) -> Floats:
     """Directions (segments, 3, batch) of arms whose groups end at their targets.
 
+    Sweeps of weighted CCD [Octopus, eq. 3.3, 3.7], and ours besides: closing and softening.
+
     Args:
         chain: the arms' build.
         shape: (segments, 3, batch) the shape to start from, each group seen from its own link

@@ -44,7 +44,10 @@ class GaitCurve:
     """Whether the arm never holds on to the ground, and all its cycle is a swing."""
 
     def evaluate(self, phase: Floats) -> Floats:
-        """Angles (…, links, angles) at phases (…) in radians, of any cycle."""
+        """Angles (…, links, angles) at phases (…) in radians, of any cycle.
+
+        The pieces of [Octopus, eq. 3.8–3.10] for a walk, eq. 3.15–3.17 for a swim.
+        """
         knot, share = self.locate(phase)
         share = share[..., None, None]
         return (1.0 - share) * self.angles[knot] + share * self.angles[knot + 1]

@@ -23,13 +23,14 @@ _SHORTEST: Final = 0.2
 _LONGEST: Final = 4.0
 """Handles of a curve, in its lengths."""
 _OPEN: Final = 0.36
-"""Share of the angle between a circle's arc and its chord that there is at a curve's ends at least.
-"""
+"""Share of the angle between a circle's arc and its chord that there is at a curve's ends at
+least."""
 _OPENING: Final = 0.06
 """Radians over which that comes."""
 _NO_CORNER: Final = 0.05
 _HALVINGS: Final = 7
-"""Steps in which they are found."""
+"""Steps in which they are found. With 4 arms of the default octopus overlap by 0.064 radii instead
+of 0.057."""
 _BACKWARDS: Final = 1e-4
 """Least of one and the cosine of an angle whose half has a tangent."""
 _BENDINGS: Final = 6

@@ -9,6 +9,10 @@ chosen by choosing which arms push; the way to face is free of it; and the arms 
 So there is no gait here that the arms are slaves of. Arms whose push points along the way take
 hold again as soon as they can. The others hold on only now and then, to support, and else are left
 to search. How long each hold and each pause lasts is drawn from a seeded stream of the arm's own.
+
+Where a constant says what was seen when it was other, that is eight arms on 24 ways, straight on or
+round a corner, facing ahead, aside or back: three arms are in stance at any time, 3.6 in the mean,
+one of them pushes nearly always, and no two come nearer to each other than 0.10 arm lengths.
 """
 
 from __future__ import annotations
@@ -25,34 +29,46 @@ from ...rotations import Floats, normalized, rotate_in_plane
 from .arm_clearance import Outline, clearance
 
 _PUSHING: Final = np.radians(70.0)
-"""Largest angle between an arm's push and the way to go of an arm that pushes."""
+"""Largest angle between an arm's push and the way to go of an arm that pushes. At 50° none does for
+1.4 % of the way, instead of 0.03 %."""
 _ASTRAY: Final = np.radians(25.0)
-"""Angle by which a foothold may come to lie beside the arm's own direction before it lifts off."""
+"""Angle by which a foothold may come to lie beside the arm's own direction before it lifts off. At
+12° stances are 0.24 arm lengths long instead of 0.26; at 60° arms come nearer to each other, 0.152
+in the mean of all ways instead of 0.166."""
 _MOST_ASIDE: Final = np.radians(20.0)
-"""Largest angle by which an arm takes hold beside its own direction to keep clear of others."""
+"""Largest angle by which an arm takes hold beside its own direction to keep clear of others.
+Without, arms come as near as 0.005 arm lengths: they lie on each other."""
 _CLEAR: Final = 0.13
-"""Arm lengths that arms in stance should be apart, from the middle of one to the other's."""
+"""Arm lengths that arms in stance should be apart, from the middle of one to the other's. At 0.03
+they come as near as 0.037, less than an arm is thick."""
 _SHORTEST: Final = 0.16
 """Arm lengths that a stance lasts at least: in less an arm would hardly have lain down."""
 _PAUSE: Final = (0.2, 0.45)
 """Shortest and longest way, in arm lengths, between two stances of an arm that pushes: time to
-swing."""
+swing. At 0.08 to 0.2 swings are hasty: on bumps arms slip by 0.0017 arm lengths instead of 0.0005
+and turn by 11° instead of 9° from frame to frame."""
 _SEARCH: Final = (0.3, 0.8)
-"""The same of an arm that does not push."""
+"""The same of an arm that does not push, which is left to search: as long as that of one that does,
+it would be in stance as often, and 3.8 arms in the mean."""
 _SHARE: Final = (0.7, 1.0)
-"""Shares of the longest possible stance after which an arm lifts off."""
+"""Shares of the longest possible stance after which an arm lifts off: always the whole of it,
+stances are 0.31 long instead of 0.26."""
 _LEAST: Final = 3
-"""Arms in stance at any time, if the body has as many."""
+"""Arms in stance at any time, if the body has as many: three carry it. With 2 there are fewer than
+three for a quarter of the way."""
 _BEFORE: Final = 1.5
-"""Arm lengths before the start at which the crawl begins, so that arms hold when it is seen."""
+"""Arm lengths before the start at which the crawl begins, so that arms hold when it is seen. At 0.3
+there are but two at times."""
 _TRIED: Final = 16
-"""Lengths of a hold from which the longest is taken that the arm can keep …"""
+"""Lengths of a hold from which the longest is taken that the arm can keep: with 6 they are so
+coarse that arms come as near as 0.08 …"""
 _LOOKED_AT: Final = (0.0, 0.25, 0.75, 1.0)
 """… which is looked at when such a share of it is over."""
 _SLACK: Final = 0.02
 """Arm lengths by which a hold may be nearer or farther than it should."""
 _OVERLAP: Final = 0.03
-"""Arm lengths before the last arms let go at which another takes hold in their place."""
+"""Arm lengths before the last arms let go at which another takes hold in their place: without, arms
+in stance are 3.3 in the mean instead of 3.6."""
 _LYING: Final = (0.4, 0.65)
 """Shares of a hold that are over where an arm of a body that stands may be: it lies unrolled, and
 is hardly peeled off yet. The first is where it is before the body gets going, the other where it
@@ -67,7 +83,8 @@ _LONGER: Final = 0.06
 _TURNS: Final = np.array([0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0])
 """Shares of the most that an arm turns aside, which it tries."""
 _WORTH: Final = 0.15
-"""How much clearance, as a share of what is wanted, turning aside all the way must be worth."""
+"""How much clearance, as a share of what is wanted, turning aside all the way must be worth. At 0.5
+arms come as near as 0.06."""
 
 
 @dataclass(frozen=True)

@@ -17,19 +17,22 @@ from .stance_settings import Limbs, StanceSettings, touching
 from .surface import Ground
 
 PEELING: Final = 0.5
-"""Share of a hold in which the arm is peeled off towards its tip, as the body pulls."""
+"""Share of a stance in which the arm is peeled off towards its tip, as the body pulls. At 0.2 an
+octopus that walks over bumps slips by 0.0014 arm lengths instead of 0.0005."""
 _SLACK: Final = 0.84
 """Distance from root to where an arm is peeled off, as a share of it, that peels no more."""
 _FEW: Final = 2
 """Joints that lie down of an arm that is too stiff to be peeled off."""
 _LEFT: Final = 0.4
-"""Share of the part that lies down which is not peeled off, but let go with the tip."""
+"""Share of the part that lies down which is not peeled off, but let go with the tip: with none of
+it the last bones snap, by 0.106 of a quaternion's component from step to step instead of 0.088."""
 _EASY: Final = 0.80
-"""Distance from root to foothold half way through, as a share of the arm between them."""
+"""Distance from root to foothold half way through, as a share of the arm between them. At 0.9 arms
+stretch by 0.26 instead of 0.25 and overlap by 0.073 radii instead of 0.057."""
 _UPRIGHT: Final = 0.76
 """The same under a body that is as high as arms can bear: where it is lower, it is more."""
 _TAUT: Final = 0.94
-"""The same at its longest."""
+"""The same at its longest. At 0.99 arms stretch by 0.28 instead of 0.25."""
 _SLACKEST: Final = 0.55
 """The same at its shortest: an arm that is slacker has to fold."""
 _SHORTER: Final = 0.5

@@ -8,6 +8,11 @@ foothold: those that lie on the ground not at all. All of it is a function of th
 phase and place; there is no frame before it.
 
 Vectors are (…, 3, batch), components first; the batch is frames × arms.
+
+Where a constant says what was seen when it was other, that is the default octopus with the set-up
+Walk on bumps of 0.3 arm lengths. As it is it slips by 0.0005 arm lengths, overlaps by 0.057 radii,
+and no joint is below the ground; "jerk" is the most by which the change of a quaternion's component
+from one frame to the next changes, 0.088.
 """
 
 from __future__ import annotations
@@ -31,14 +36,18 @@ from .surface import Ground
 _STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised."""
 _EVENED: Final = 0.3
-"""Share of the mean of its neighbours that a segment takes on each time before it is raised."""
+"""Share of the mean of its neighbours that a segment takes on each time before it is raised.
+Without it arms overlap by 0.077 radii, with a jerk of 0.097."""
 _KEPT: Final = 0.3
-"""Share of the gait's own shape in an arm that holds on."""
+"""Share of the gait's own shape in an arm that holds on. Without it arms slip less, by 0.0004, but
+the gait hardly shows while they do, and the jerk is 0.109."""
 _RAISED: Final = np.radians(12.0)
-"""How far an arm that holds on leaves the body upwards of outward."""
+"""How far an arm that holds on leaves the body upwards of outward: at 0° arms overlap by 0.064
+radii, with a jerk of 0.097."""
 _RAISES: Final = 6
 _RAISES_BETWEEN: Final = 2
-"""How often the lowest joints of an arm are raised, in the air and before it is drawn down."""
+"""How often the lowest joints of an arm are raised, in the air and before it is drawn down. Half as
+often does as well on these bumps."""
 _FALLING: Final = 0.2
 """Share of downward in the way that a slack arm comes to the ground."""
 _KNEE: Final = 2.8
@@ -47,20 +56,23 @@ must point up, or it is in the way, and would snap from one side to the other.""
 _STRAIGHT: Final = 0.999
 """Cosine of what is left of the knee's bend where the foothold is as far as it reaches."""
 _ARCHED: Final = np.radians(15.0)
+"""How much more an arm rises where it is slack: with 0° the jerk is 0.095 …"""
 _ARCHING: Final = 0.5
-"""How much more where it is slack, and over what share of its length that comes."""
+"""… and over what share of its length that comes."""
 _BUNCHED: Final = 0.7
 """Share of its length between body and foothold below which its curve is bent all over: a cubic
 that is as long doubles back on itself at its top, and turns over at once."""
 _BUNCHING: Final = 0.05
 """Over what share of its length that comes."""
 _CURLED: Final = np.radians(85.0)
-"""How far the tip stands up before it is unrolled."""
+"""How far the tip stands up before it is unrolled. A choice of looks: at 20° arms slip by 0.0003,
+and are hardly seen to unroll."""
 _FOLDED: Final = np.radians(110.0)
 """How far the first bone of it is bent back at most from the one before: further on, which way it
 has turned on itself is not definite."""
 _BORDER: Final = 1.6
-"""Segments before the ground over which an arm is less and less free to turn."""
+"""Segments before the ground over which an arm is less and less free to turn. At 0.8 the jerk is
+0.093."""
 _EASY: Final = 0.88
 """Share of its length between body and foothold from which on an arm stretches."""
 _CROWDED: Final = 0.7
@@ -73,22 +85,25 @@ _REST: Final = 0.025
 _GENTLE: Final = 0.05
 """Strain over which stretching begins."""
 _GOING: Final = 0.12
-"""Cycles within which an arm in the air comes to go along with its body."""
+"""Cycles within which an arm in the air comes to go along with its body. At 0.03 it leaves with a
+start: arms slip by 0.0009 and come to be 0.001 below the ground."""
 _SOFT: Final = 0.25
 """Share of the height that it needs within which a joint begins to be raised."""
 _AT_ONCE: Final = 40.0
 """How much faster than its hold an arm loses its stiffness against the ground: so it does not pass
-through it …"""
+through it, as at 6, where it comes to be 0.005 below …"""
 _LETTING_GO: Final = 3.0
 """… and how much faster it comes to keep its distance from it, where it has lain: without a jerk.
-"""
+At 30 that is 0.243."""
 _STARTING: Final = 10.0
-"""Hold that it has lost, of the cube of the share of its way from the ground: as least jerk begins.
-"""
+"""Hold that it has lost, of the cube of the share of its way from the ground: as least jerk
+begins."""
 _ROLLED: Final = 0.6
 """Share of that way within which it may come to have rolled to any side."""
 _UNHELD: Final = 0.2
-"""Share of its hold that an arm in the air has lost when all its movement is evened out."""
+"""Share of its hold that an arm in the air has lost when all its movement is evened out: at 1, with
+the middle of the swing, bones turn by 22° instead of 20° from frame to frame, with a jerk of
+0.113."""
 _EARLIER: Final = 0.2
 """Share of its way to the ground before its end from which on an arm unrolls."""
 _TINY: Final = 1e-12
