@@ -12,9 +12,15 @@ import bpy
 from ..blender.animation import lasting, writable_armature
 from ..blender.scene import NOTE, ImportedClip, import_clip
 from ..core.errors import ClipError, OctoMotionError
-from ..ui.splicing.properties import splicing_settings
-from ..ui.splicing.splice_properties import PARTS
-from ..ui.splicing.stack import ClipReader, prepare_splices, write
+from ..ui.splicing import (
+    ClipReader,
+    add_splice,
+    name_splice,
+    own_action,
+    prepare_splices,
+    splicing_settings,
+    write,
+)
 from .job_report import ShotSummary
 from .motion_files import check_motion, files_within
 from .schema import set_values, unknown
@@ -24,9 +30,6 @@ _FIRST_FRAME: Final = 1
 
 _BROADCAST: Final = 1.001
 """What whole rates are divided by for television."""
-
-_SPARE_EASE: Final = 0.25
-"""Of a clip's length, as in the panel: longer easing would leave little of a short clip."""
 
 
 @dataclass
@@ -175,10 +178,9 @@ def splice(
 
 def _choose_base(armature: bpy.types.Object, stack: Any) -> None:
     """Take the armature's own action as the base, where none is set."""
-    data = armature.animation_data
-    if stack.base is None and data is not None and data.action is not None:
-        stack.base = data.action
-        stack.base_slot = data.action_slot.identifier if data.action_slot else ""
+    own = own_action(armature)
+    if stack.base is None and own is not None:
+        stack.base, stack.base_slot = own
 
 
 def _action(name: str) -> bpy.types.Action:
@@ -212,26 +214,14 @@ def _add(
     slot, visual = str(values.get("slot", "")), bool(values.get("visual", False))
     begins = float(reader.base(armature).clip.frames[0])
     frames = reader.source(source, action, slot, visual=visual).clip.frames
-    item = stack.splices.add()
-    item.source, item.action = source, action
-    item.base_start, item.splice_start = begins, float(frames[0])
-    ease = min(item.ease_in, _SPARE_EASE * float(frames[-1] - frames[0]))
-    item.ease_in = item.ease_out = round(ease)
+    item = add_splice(stack, source, action, begins, frames)
     set_values(item, values)
-    item.name = item.name or _name(item, stack.splices)
+    if not item.name:
+        name_splice(stack, item)
 
 
 def _is_landmark(name: str) -> bool:
     return name.startswith("landmarks.")
-
-
-def _name(item: Any, items: Any) -> str:
-    """What the panel would call a splice, other than all others are called."""
-    parts = {identifier: title for identifier, title, *_ in PARTS}
-    name = f"{item.bone or parts[item.part]}: {item.action.name}"
-    taken = {each.name for each in items}
-    numbered = (f"{name}.{number:03}" for number in range(1, len(taken) + 1))
-    return next(each for each in (name, *numbered) if each not in taken)
 
 
 def _source(

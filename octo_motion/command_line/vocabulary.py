@@ -17,9 +17,7 @@ from ..ui.locomotion.settings.changes import ChangeItem
 from ..ui.locomotion.settings.ground import ContactItem
 from ..ui.locomotion.settings.properties import OCTO_MOTION_PG_locomotion
 from ..ui.locomotion.settings.reaches import ReachItem
-from ..ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
-from ..ui.splicing.properties import OCTO_MOTION_PG_splicing
-from ..ui.splicing.splice_properties import PARTS, SpliceItem
+from ..ui.splicing import PARTS, OCTO_MOTION_PG_landmarks, OCTO_MOTION_PG_splicing, SpliceItem
 from .motion_files import check_motion, is_motion
 from .schema import Choice, Kind, Known, Number, Text, flag, point
 from .shot_request import ShotRequest

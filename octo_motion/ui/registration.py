@@ -8,7 +8,7 @@ from typing import Any
 
 import bpy
 
-from . import at_work, settings
+from . import at_work, settings, splicing
 from .locomotion import panels
 from .locomotion.operators import (
     add_octopus,
@@ -41,23 +41,13 @@ from .posing import panels as posing_panels
 from .posing import properties as posing_properties
 from .posing import registration as posing
 from .posing import script_player as pose_script
-from .splicing import (
-    import_clips,
-    landmark_table,
-    splice_build,
-    splice_drag,
-    splice_list,
-    splice_panels,
-    splice_properties,
-)
-from .splicing import properties as splicing_properties
 
 Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
 
 MENUS: tuple[tuple[Any, Draw], ...] = (
     (bpy.types.VIEW3D_MT_armature_add, add_octopus.draw_in_add_menu),
     (bpy.types.VIEW3D_MT_curve_add, add_route.draw_in_add_menu),
-    (bpy.types.TOPBAR_MT_file_import, import_clips.draw_in_import_menu),
+    (bpy.types.TOPBAR_MT_file_import, splicing.draw_in_import_menu),
 )
 
 CLASSES: tuple[type, ...] = (
@@ -68,9 +58,7 @@ CLASSES: tuple[type, ...] = (
     *change_properties.CLASSES,
     *quality_report.CLASSES,
     *properties.CLASSES,
-    *landmark_table.CLASSES,
-    *splice_properties.CLASSES,
-    *splicing_properties.CLASSES,
+    *splicing.SETTINGS,
     *posing_properties.CLASSES,
     *device_settings.CLASSES,
     *settings.CLASSES,
@@ -84,11 +72,7 @@ CLASSES: tuple[type, ...] = (
     *quality_report.OPERATORS,
     *reach_list.CLASSES,
     *panels.CLASSES,
-    *import_clips.CLASSES,
-    *splice_list.CLASSES,
-    *splice_build.CLASSES,
-    *splice_drag.CLASSES,
-    *splice_panels.CLASSES,
+    *splicing.CLASSES,
     *pose_start.CLASSES,
     *pose_script.CLASSES,
     *marks.CLASSES,

@@ -13,7 +13,7 @@ from .locomotion.settings.ground import OCTO_MOTION_PG_contact
 from .locomotion.settings.properties import OCTO_MOTION_PG_locomotion
 from .override_groups import make_overridable
 from .posing.properties import OCTO_MOTION_PG_posing
-from .splicing.properties import OCTO_MOTION_PG_splicing
+from .splicing import OCTO_MOTION_PG_splicing
 
 
 class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):

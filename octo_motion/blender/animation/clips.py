@@ -102,42 +102,21 @@ def read_clip(
             a key that is no number, or the armature is scaled unequally; with ``visual``, the
             scene does not show it.
     """
-    armature_data(armature)
     skeleton = read_skeleton(armature)
     data = armature.animation_data
     if action is None and data is not None:
         action = data.action
         slot = slot or (data.action_slot if action is not None else None)
-    scene = bpy.context.scene
-    assert scene is not None
-    per_second = float(rate or scene.render.fps / scene.render.fps_base)
+    per_second = float(rate or _scene_rate())
     if action is None:
         tracks = data is not None and any(track.strips for track in data.nla_tracks)
         if not (visual and tracks):
             raise ClipError(f"'{armature.name}' has no action.", "Give it one, or import a clip.")
         times = _checked_frames(_track_range(armature) if frames is None else frames, frames)
         return _shown_clip(armature, skeleton, armature.name, times, per_second)
-    slot = slot or _slot_for(armature, action)
-    curves = _curves_of(action, slot, skeleton)
-    if not curves:
-        raise ClipError(
-            f"Action '{action.name}' has no keys for the bones of '{armature.name}'.",
-            "Choose an action made for this armature.",
-        )
-    times = _checked_frames(_action_range(action, curves) if frames is None else frames, frames)
-    if visual:
-        with assigned(armature, action, slot):
-            return _shown_clip(armature, skeleton, action.name, times, per_second)
-    unkeyed = unkeyed_pose(armature)
-    rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
-    world, own = _object_motion(armature, curves, times)
-    if not all(np.isfinite(each).all() for each in (rotations, locations, world)):
-        raise ClipError(
-            f"Action '{action.name}' has keys that are no finite numbers.",
-            "Repair or delete them, or choose another action.",
-        )
-    _check_scale(armature, world)
-    return Clip(action.name, skeleton, times, per_second, rotations, locations, world, scales, own)
+    return _action_clip(
+        armature, skeleton, action, slot, visual=visual, frames=frames, rate=per_second
+    )
 
 
 def write_clip(
@@ -297,6 +276,39 @@ def scaled_channels(
             for channel in ("location", rotation_channel(modes[name]), "scale")
         ]
     return channels, lost
+
+
+def _action_clip(
+    armature: bpy.types.Object,
+    skeleton: Skeleton,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    *,
+    visual: bool,
+    frames: ArrayLike | None,
+    rate: float,
+) -> Clip:
+    slot = slot or _slot_for(armature, action)
+    curves = _curves_of(action, slot, skeleton)
+    if not curves:
+        raise ClipError(
+            f"Action '{action.name}' has no keys for the bones of '{armature.name}'.",
+            "Choose an action made for this armature.",
+        )
+    times = _checked_frames(_action_range(action, curves) if frames is None else frames, frames)
+    if visual:
+        with assigned(armature, action, slot):
+            return _shown_clip(armature, skeleton, action.name, times, rate)
+    unkeyed = unkeyed_pose(armature)
+    rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
+    world, own = _object_motion(armature, curves, times)
+    if not all(np.isfinite(each).all() for each in (rotations, locations, world)):
+        raise ClipError(
+            f"Action '{action.name}' has keys that are no finite numbers.",
+            "Repair or delete them, or choose another action.",
+        )
+    _check_scale(armature, world)
+    return Clip(action.name, skeleton, times, rate, rotations, locations, world, scales, own)
 
 
 def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
@@ -475,6 +487,12 @@ def _whole_frames(start: float, end: float) -> Floats:
     # Frames are single precision in Blender, and importers miss whole ones by a little.
     first, last = np.ceil(start - 1e-3), np.floor(end + 1e-3)
     return np.arange(first, last + 1.0) if last > first else np.array([start, end])
+
+
+def _scene_rate() -> float:
+    scene = bpy.context.scene
+    assert scene is not None
+    return scene.render.fps / scene.render.fps_base
 
 
 def _track_range(armature: bpy.types.Object) -> Floats:

@@ -1,2 +1,56 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Splicing: a body part of one clip put onto another."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from . import (
+    import_clips,
+    landmark_table,
+    properties,
+    splice_build,
+    splice_drag,
+    splice_list,
+    splice_panels,
+    splice_properties,
+)
+from .import_clips import draw_in_import_menu
+from .landmark_properties import OCTO_MOTION_PG_landmarks
+from .properties import OCTO_MOTION_PG_splicing, splicing_settings
+from .splice_list import add_splice, name_splice, own_action
+from .splice_properties import PARTS, SpliceItem
+from .stack import ClipReader, prepare_splices, write
+
+SETTINGS: Final[tuple[type, ...]] = (
+    *landmark_table.CLASSES,
+    *splice_properties.CLASSES,
+    *properties.CLASSES,
+)
+"""What ``Object.octo_motion`` holds of splicing."""
+
+CLASSES: Final[tuple[type, ...]] = (
+    *import_clips.CLASSES,
+    *splice_list.CLASSES,
+    *splice_build.CLASSES,
+    *splice_drag.CLASSES,
+    *splice_panels.CLASSES,
+)
+"""Operators and panels."""
+
+__all__ = [
+    "CLASSES",
+    "PARTS",
+    "SETTINGS",
+    "ClipReader",
+    "OCTO_MOTION_PG_landmarks",
+    "OCTO_MOTION_PG_splicing",
+    "SpliceItem",
+    "add_splice",
+    "draw_in_import_menu",
+    "name_splice",
+    "own_action",
+    "prepare_splices",
+    "splicing_settings",
+    "write",
+]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import chain, count
 from typing import TYPE_CHECKING, Any, Final
 
 import bpy
@@ -11,6 +12,7 @@ from bpy.props import EnumProperty, StringProperty
 from ...blender.animation import writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError
+from ...core.rotations import Floats
 from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ..panel_base import ItemRows
 from .properties import splicing_settings
@@ -22,6 +24,47 @@ if TYPE_CHECKING:
 
 _SPARE_EASE: Final = 0.25
 """Of a clip's length: longer easing would leave little of a short clip."""
+
+
+def own_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | None:
+    """The action of an armature and the identifier of its slot, "" if it has none."""
+    data = armature.animation_data
+    if data is None or data.action is None:
+        return None
+    return data.action, data.action_slot.identifier if data.action_slot else ""
+
+
+def add_splice(
+    settings: Any,
+    source: bpy.types.Object,
+    action: bpy.types.Action,
+    base_start: float,
+    frames: Floats,
+) -> Any:
+    """Add a splice without a name to the list, from the clip's first frame on.
+
+    Args:
+        settings: of the base's splicing.
+        source: the armature that the clip is for.
+        action: the clip.
+        base_start: frame of the base at which it begins.
+        frames: (frames,) the clip's.
+    """
+    item = settings.splices.add()
+    item.source, item.action = source, action
+    item.base_start, item.splice_start = base_start, float(frames[0])
+    ease = min(item.ease_in, _SPARE_EASE * float(frames[-1] - frames[0]))
+    item.ease_in = item.ease_out = round(ease)
+    return item
+
+
+def name_splice(settings: Any, item: Any) -> None:
+    """Call a splice by its part and its clip, other than all others are called."""
+    title = item.bone or item.bl_rna.properties["part"].enum_items[item.part].name
+    name = f"{title}: {item.action.name}"
+    taken = {each.name for each in settings.splices}
+    numbered = (f"{name}.{number:03}" for number in count(1))
+    item.name = next(each for each in chain((name,), numbered) if each not in taken)
 
 
 class OCTO_MOTION_UL_splices(ItemRows, bpy.types.UIList):
@@ -130,14 +173,9 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
         clip = reader.source(source, action, slot, visual=False).clip
         if settings.base is None:
             settings.base, settings.base_slot = base, base_slot
-        item = settings.splices.add()
-        title = next(each[1] for each in PARTS if each[0] == self.part)
-        item.name = _unique(settings, f"{bone or title}: {action.name}")
-        item.part, item.bone = self.part, bone
-        item.source, item.action, item.slot = source, action, slot
-        item.base_start, item.splice_start = float(begins), float(clip.frames[0])
-        ease = min(item.ease_in, _SPARE_EASE * float(clip.frames[-1] - clip.frames[0]))
-        item.ease_in = item.ease_out = round(ease)
+        item = add_splice(settings, source, action, float(begins), clip.frames)
+        item.part, item.bone, item.slot = self.part, bone, slot
+        name_splice(settings, item)
         settings.active_splice = len(settings.splices) - 1
 
     def _source(self, context: bpy.types.Context, armature: bpy.types.Object) -> bpy.types.Object:
@@ -172,8 +210,8 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
             if action is None:
                 raise ClipError(f"There is no action '{self.action}'.", "Choose the clip's action.")
             return action, ""
-        data = source.animation_data
-        if data is None or data.action is None:
+        own = own_action(source)
+        if own is None:
             raise ClipError(
                 f"The source '{source.name}' has no action.", "Give it one, or choose an action."
             )
@@ -181,7 +219,7 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
             raise ClipError(
                 f"'{source.name}' is both base and source.", "Choose the action of the source."
             )
-        return data.action, data.action_slot.identifier if data.action_slot else ""
+        return own
 
     def _bone(self, context: bpy.types.Context, armature: bpy.types.Object) -> str:
         if self.part != "CHAIN":
@@ -227,21 +265,12 @@ def _other_armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
 def _base(armature: bpy.types.Object, settings: Any) -> tuple[bpy.types.Action, str]:
     if settings.base is not None:
         return settings.base, settings.base_slot
-    data = armature.animation_data
-    if data is None or data.action is None:
+    own = own_action(armature)
+    if own is None:
         raise ClipError(
             f"'{armature.name}' has no action to splice onto.", "Give it one, or choose the base."
         )
-    return data.action, data.action_slot.identifier if data.action_slot else ""
-
-
-def _unique(settings: Any, name: str) -> str:
-    taken = {each.name for each in settings.splices}
-    unique, number = name, 1
-    while unique in taken:
-        unique = f"{name}.{number:03}"
-        number += 1
-    return unique
+    return own
 
 
 CLASSES: Final[tuple[type, ...]] = (

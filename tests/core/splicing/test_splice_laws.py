@@ -31,6 +31,7 @@ from octo_motion.core.splicing.transfer.parts import (
     part_bones,
     part_named,
 )
+from octo_motion.core.splicing.transfer.retarget import MappedClip, find_retargets
 from octo_motion.core.splicing.transfer.splice import (
     LimbGoal,
     Splice,
@@ -341,3 +342,19 @@ def test_a_kind_of_part_that_the_skeleton_lacks_is_told_and_never_becomes_anothe
 def test_the_table_keeps_its_order():
     names = "right_arm left_arm legs trunk head right_leg left_leg chain"
     assert [part.name for part in PART_TABLE][:8] == names.split()
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_taking_the_collar_bone_along_hardly_turns_the_hand(seed: int):
+    """Whether arms count as the same body's must not hang on the collar bones."""
+    random = np.random.default_rng(seed)
+    ours = MappedClip(motion(random, humanoid(random)), LANDMARKS)
+    theirs = MappedClip(motion(random, humanoid(random, same_proportions=False)), LANDMARKS)
+    hand = ours.skeleton.index["hand.R"]
+    with_it, without = (
+        find_retargets(PARTS["right_arm"], ours, theirs, clavicle=clavicle, seen_from="")[0].match
+        for clavicle in (True, False)
+    )
+    turn = angle_between(with_it.constants[hand], without.constants[hand])
+    assert np.degrees(turn) < 1.0
+    assert with_it.same_body == without.same_body

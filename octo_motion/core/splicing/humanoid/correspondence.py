@@ -133,10 +133,13 @@ def find_correspondence(
         landmarks: the base's and the splice clip's, none for a chain.
         aim_all: whether directions matter for all bones, as in a chain.
     """
-    same_body = _same_body(base, splice, pairs)
-    aim_all = aim_all or same_body
     marks, others = landmarks
     kinds = {} if marks is None else {name: key for key, name in marks.bones.items()}
+    clavicles = {bone for bone in pairs if kinds.get(base.names[bone], "").startswith("clavicle")}
+    # Whether a collar bone comes along says nothing of how arm and hand are built.
+    limbs = {bone: other for bone, other in pairs.items() if bone not in clavicles}
+    same_body = _same_body(base, splice, limbs)
+    same_with_clavicles = same_body and _same_body(base, splice, pairs)
     our_back, their_back = (conjugate(each) for each in frames_at_rest)
     laid: dict[int, Floats] = {}
     constants: dict[int, Floats] = {}
@@ -152,7 +155,8 @@ def find_correspondence(
             ours, theirs = normalized(ours), normalized(rotate(lay, theirs))
             # Clavicles, feet, spines and heads are built differently, but hang on alike at rest:
             # unless one rest pose is none to stand in.
-            aimed = aim_all or kind in _AIMED or not kind or np.dot(ours, theirs) < _UNLIKE
+            same = same_with_clavicles if bone in clavicles else same_body
+            aimed = aim_all or same or kind in _AIMED or not kind or np.dot(ours, theirs) < _UNLIKE
             if aimed and np.any(ours) and np.any(theirs):
                 lay = multiply(shortest_arc(theirs, ours), lay)
         elif kind == "foot" and marks is not None and others is not None:
