@@ -26,7 +26,7 @@ from octo_motion.core.splicing.transfer.body_frames import (
     laid_over,
     pelvis_frame,
 )
-from octo_motion.core.splicing.transfer.parts import LEG, Part, landmark_bone
+from octo_motion.core.splicing.transfer.parts import LEG, Part, landmark_bone, sided
 from octo_motion.core.splicing.transfer.splice import Splice
 
 Bools = NDArray[np.bool_]
@@ -143,8 +143,8 @@ def _by_limb(values: Sequence[Floats], result: Clip, splice: Splice) -> Floats:
 def turn_error(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
     """How much trunk and head are turned otherwise than in the splice clip.
 
-    The chest is seen from the pelvis. The head is seen from the chest, by how it has turned since
-    the rest pose.
+    The chest is seen from the pelvis. The head, and what else is no limb, is seen from the
+    chest, by how it has turned since the rest pose.
 
     Args:
         result: to be measured.
@@ -152,20 +152,23 @@ def turn_error(result: Clip, landmarks: Landmarks, splice: Splice) -> Floats:
         splice: what was to be spliced.
 
     Returns:
-        (frames, 1) radians, over the frames in which the splice is fully in; (frames, 0) for
+        (frames, sides) radians, over the frames in which the splice is fully in; (frames, 0) for
         limbs.
     """
     span, whole = _whole(result, splice)
-    sides = (
+    bodies = (
         (result.skeleton, landmarks, _posture(result, span.frames)),
         (splice.clip.skeleton, _landmarks(splice), sample_clip(splice.clip, span.splice_frames)),
     )
     kind = splice.part.kind
     if kind is None or kind.limb is not None:
         return np.zeros((int(whole.sum()), 0))
-    turn = _chest_turn if kind.spine else _head_turn
-    ours, theirs = (turn(*side) for side in sides)
-    return angle_between(ours, theirs)[whole][:, None]
+    if kind.spine:
+        ours, theirs = (_chest_turn(*body) for body in bodies)
+        return angle_between(ours, theirs)[whole][:, None]
+    roots = [sided(kind.root, side) for side in splice.part.sides]
+    turns = [[_turn_since_rest(*body, root) for body in bodies] for root in roots]
+    return np.stack([angle_between(*pair)[whole] for pair in turns], axis=-1)
 
 
 def log_dimensionless_jerk(path: Floats, rate: float) -> float:
@@ -331,11 +334,13 @@ def _chest_turn(skeleton: Skeleton, landmarks: Landmarks, posture: Posture) -> F
     return multiply(conjugate(pelvis.orientation(posture)), chest.orientation(posture))
 
 
-def _head_turn(skeleton: Skeleton, landmarks: Landmarks, posture: Posture) -> Floats:
+def _turn_since_rest(
+    skeleton: Skeleton, landmarks: Landmarks, posture: Posture, landmark: str
+) -> Floats:
     chest = chest_frame(skeleton, landmarks)
-    head = landmark_bone(skeleton, landmarks, "head")
-    at_rest = multiply(conjugate(chest.at_rest(skeleton)), skeleton.rest_rotations[head])
-    now = multiply(conjugate(chest.orientation(posture)), posture.orientation(head))
+    bone = landmark_bone(skeleton, landmarks, landmark)
+    at_rest = multiply(conjugate(chest.at_rest(skeleton)), skeleton.rest_rotations[bone])
+    now = multiply(conjugate(chest.orientation(posture)), posture.orientation(bone))
     return multiply(now, conjugate(at_rest))
 
 

@@ -335,7 +335,7 @@ def test_a_kind_of_part_that_the_skeleton_lacks_is_told_and_never_becomes_anothe
     wing = PartKind("wing", root="wing", below="chest", seen_from=("chest",))
     with pytest.raises(ClipError, match="which bone is the wing"):
         kind_bones(wing, "", skeleton, LANDMARKS, clavicle=True)
-    with pytest.raises(ClipError, match="no part 'wing'"):
+    with pytest.raises(ValueError, match="not 'wing'"):
         part_named("wing")
 
 

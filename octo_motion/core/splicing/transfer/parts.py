@@ -125,10 +125,10 @@ def part_named(name: str) -> Part:
     """A part of a humanoid.
 
     Raises:
-        ClipError: there is none of this name.
+        ValueError: there is none of this name.
     """
     if name not in PARTS:
-        raise ClipError(f"There is no part '{name}'.", f"Choose one of: {', '.join(PARTS)}.")
+        raise ValueError(f"part must be one of {', '.join(PARTS)}, not {name!r}")
     return PARTS[name]
 
 
