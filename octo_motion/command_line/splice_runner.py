@@ -19,7 +19,7 @@ from ..ui.splicing import (
     own_action,
     prepare_splices,
     splicing_settings,
-    write,
+    write_splices,
 )
 from .job_report import ShotSummary
 from .motion_files import check_motion, files_within
@@ -170,7 +170,7 @@ def splice(
             except OctoMotionError as error:
                 raise type(error)(f"Splice {number}: {error.problem}", error.remedy) from error
     prepared = prepare_splices(armature)
-    made = write(prepared, prepared.compute())
+    made = write_splices(prepared, prepared.compute())
     first, last = (round(each) for each in bpy.data.actions[made.action].frame_range)
     warnings = (*clips.warnings, *made.warnings)
     return ShotSummary(made.message, made.frames, first, last, warnings)

@@ -20,7 +20,7 @@ from .landmark_properties import OCTO_MOTION_PG_landmarks
 from .properties import OCTO_MOTION_PG_splicing, splicing_settings
 from .splice_list import add_splice, name_splice, own_action
 from .splice_properties import PARTS, SpliceItem
-from .stack import ClipReader, prepare_splices, write
+from .stack import ClipReader, prepare_splices, write_splices
 
 SETTINGS: Final[tuple[type, ...]] = (
     *landmark_table.CLASSES,
@@ -52,5 +52,5 @@ __all__ = [
     "own_action",
     "prepare_splices",
     "splicing_settings",
-    "write",
+    "write_splices",
 ]

@@ -11,7 +11,7 @@ from bpy.props import IntProperty
 from ...core.splicing.transfer import Suggestion
 from ..locomotion.reading import assign
 from .splice_list import SpliceOperator, StackOperator
-from .stack import SpliceSummary, Stack, prepare_splices, suggestions, write
+from .stack import SpliceSummary, Stack, prepare_splices, suggestions, write_splices
 
 MOST_SUGGESTIONS: Final = 5
 
@@ -38,7 +38,7 @@ class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
         settings: Any,  # noqa: ARG002
     ) -> None:
         stack = prepare_splices(armature)
-        tell(self, write(stack, stack.compute()))
+        tell(self, write_splices(stack, stack.compute()))
 
 
 class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
@@ -80,7 +80,7 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
         stack = stack.retimed(number, chosen.base_start, chosen.splice_start)
         clip = stack.compute()
         set_timing(settings.splices[number], chosen.base_start, chosen.splice_start)
-        made = write(stack, clip)
+        made = write_splices(stack, clip)
         lines = [_line(rank, each) for rank, each in enumerate(found, 1)]
         self.told = "\n".join(lines)
         told = f"Begins at {chosen.base_start:g}. Best first: {'; '.join(lines)}."
@@ -106,7 +106,7 @@ def build_retimed(
     stack = (prepared or prepare_splices(armature)).retimed(number, *starts)
     clip = stack.compute()
     set_timing(settings.splices[number], *starts)
-    return write(stack, clip)
+    return write_splices(stack, clip)
 
 
 def tell(operator: bpy.types.Operator, made: SpliceSummary, message: str = "") -> None:

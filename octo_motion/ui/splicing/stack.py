@@ -2,7 +2,7 @@
 """A stack of splices from settings to keys: read → plain arrays → compute → write.
 
 :func:`prepare_splices` reads everything and finds everything that is wrong; a :class:`Stack`
-computes on plain arrays alone; :func:`write` changes the file.
+computes on plain arrays alone; :func:`write_splices` changes the file.
 """
 
 from __future__ import annotations
@@ -349,7 +349,7 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
 # --- Writing -------------------------------------------------------------------------------------
 
 
-def write(stack: Stack, clip: Clip) -> SpliceSummary:
+def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
     """Give the armature the result, in place of the one that was built before.
 
     Raises:
