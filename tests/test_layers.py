@@ -116,7 +116,9 @@ def protected() -> list[str]:
 
 def test_every_package_that_is_entered_by_its_door_says_what_it_hands_out() -> None:
     with_door = {".".join(path.parent.relative_to(REPOSITORY).parts) for path in doors()}
-    assert set(protected()) - with_door == set()
+    packages = {each for each in protected() if Path(REPOSITORY, *each.split(".")).is_dir()}
+    assert len(packages) > 20
+    assert packages - with_door == set()
 
 
 @pytest.mark.parametrize("door", doors(), ids=lambda path: path.parent.name)

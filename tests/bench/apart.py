@@ -109,10 +109,10 @@ def _both(name: str, ground: str, route: str, seed: int) -> tuple[Measured, ...]
 def _measured(octopus: Any, *, keep_apart: bool) -> Measured:
     import bpy
 
-    from octo_motion.ui.locomotion import generate_motion as workflow
+    from tests.ui.made import prepare
 
     octopus.octo_motion.locomotion.keep_apart = keep_apart
-    shot = workflow.prepare(octopus, bpy.context)
+    shot = prepare(octopus, bpy.context)
     start = time.process_time()
     for _ in shot.compute():
         pass

@@ -6,6 +6,7 @@ python -m tests.bench.case RESULT.json generate|bake bare|skin ARMS JOINTS FRAME
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 import time
@@ -18,17 +19,19 @@ import octo_motion
 from octo_motion.blender.animation import actions
 from octo_motion.core.locomotion.gait import gait_poser as generator
 from octo_motion.ui.locomotion import generate_motion as workflow
-from octo_motion.ui.locomotion.writing import write_motion as shot
 from tests.bench import blender_way, scene
 from tests.bench.stopwatch import Place, Stopwatch
 
+# A module of the same name as the function that its package hands out.
+computing = importlib.import_module("octo_motion.core.locomotion.motion.pipeline")
+
 PARTS: dict[str, list[Place]] = {
     "read rig, route, settings": [(workflow, "prepare")],
-    "travel along the route": [(shot, "plan_travel"), (shot, "object_transforms")],
+    "travel along the route": [(computing, "plan_travel"), (computing, "object_transforms")],
     "gait angles and targets": [(generator.GaitPoser, "pose"), (generator, "pseudo_targets")],
-    "solve (CCD)": [(generator, "solve"), (generator, "asked_shape")],
-    "joints to bone rotations": [(generator, "bone_rotations")],
-    "values of the channels": [(shot.Shot, "_channels")],
+    "solve (CCD)": [(generator, "solve_ccd"), (generator, "asked_shape")],
+    "joints to bone rotations": [(generator, "rotate_bones")],
+    "values of the channels": [(computing, "_motion")],
     "write keys": [(actions, "_write_curves")],
     "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
 }

@@ -19,7 +19,7 @@ from octo_motion.core.locomotion.gait.table import gait_angles
 from octo_motion.core.locomotion.path.travel import plan_travel
 from octo_motion.core.locomotion.rig.arm_chains import arm_azimuths, joint_positions
 from octo_motion.core.rotations import Floats, from_axis_angle, rotate
-from octo_motion.ui.locomotion.generate_motion import prepare
+from tests.ui.made import prepare
 
 _CYCLE_FRAMES = 48
 """Two seconds at 24 frames a second: the default of the settings."""

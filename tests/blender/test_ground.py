@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.animation.stretching import may_stretch, stretch_channels
+from octo_motion.blender.animation import may_stretch, read_channels
 from octo_motion.blender.rig.armature import read_skeleton
 from octo_motion.blender.scene.contact_markers import (
     Contact,
@@ -169,7 +169,7 @@ def test_stretched_bones_get_longer_and_thinner_one_by_one(inherit: str) -> None
     for name in bones:
         armature.data.bones[name].inherit_scale = inherit
     strains = np.tile([0.2, 0.4, 0.0, -0.1, 0.3, 0.0], (1, 1))
-    for channel in stretch_channels(armature, [bones], strains):
+    for channel in read_channels(armature, bones).stretches([bones], strains):
         bone = armature.path_resolve(channel.data_path.rpartition(".")[0])
         bone.scale = channel.values[0]
         bone.rotation_mode = "XYZ"
@@ -181,7 +181,7 @@ def test_stretched_bones_get_longer_and_thinner_one_by_one(inherit: str) -> None
         sizes = bone.matrix.to_scale()
         # Volume stays.
         assert sizes.x * sizes.y * sizes.z == pytest.approx(1.0, abs=1e-4)
-    used = stretch_channels(armature, [bones], np.zeros((3, 6)))
+    used = read_channels(armature, bones).stretches([bones], np.zeros((3, 6)))
     assert used == []
 
 

@@ -10,8 +10,8 @@ import pytest
 from octo_motion.command_line.shot_request import ShotRequest
 from octo_motion.command_line.shot_runner import perform
 from octo_motion.core.errors import RigError, SettingsError
-from octo_motion.ui.locomotion.generate_motion import prepare
 from tests.blender.test_ground import make_square
+from tests.ui.made import prepare
 from tests.ui.rig import click, give_route
 
 CUBE = [(x, y, z) for x in (-0.03, 0.03) for y in (-0.03, 0.03) for z in (-0.03, 0.03)]

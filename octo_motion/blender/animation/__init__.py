@@ -3,7 +3,6 @@
 
 from .actions import (
     Channel,
-    channel_unit,
     channelbags_of,
     curves_of,
     is_edited,
@@ -13,9 +12,8 @@ from .actions import (
     may_replace,
     note_of,
     object_channels,
-    object_places,
+    read_channels,
     rotation_channels,
-    rotation_path,
     writable_armature,
     writable_object,
     write_action,
@@ -34,7 +32,7 @@ from .leftover_poses import (
 from .pose_keys import Keyed, PoseKeys
 from .preview_pose import PoseValues, pose_values, restore_pose, show_pose
 from .scene_playback import time_kept
-from .stretching import ALIGNED, hands_on, may_stretch, strains_of, stretch_channels
+from .stretching import ALIGNED, may_stretch
 
 __all__ = [
     "ALIGNED",
@@ -45,12 +43,10 @@ __all__ = [
     "PoseValues",
     "animated_bones",
     "as_posed",
-    "channel_unit",
     "channelbags_of",
     "curves_of",
     "displaced_bones",
     "further_channels",
-    "hands_on",
     "is_edited",
     "is_generated",
     "key_counts",
@@ -60,18 +56,15 @@ __all__ = [
     "may_stretch",
     "note_of",
     "object_channels",
-    "object_places",
     "pose_values",
+    "read_channels",
     "read_clip",
     "rest_bones",
     "restore_pose",
     "rotation_channels",
-    "rotation_path",
     "scaled_channels",
     "show_pose",
     "standing_of",
-    "strains_of",
-    "stretch_channels",
     "time_kept",
     "unscale_bones",
     "writable_armature",

@@ -18,20 +18,15 @@ import bpy
 import numpy as np
 
 from ...core.errors import RigError, WriteError
-from ...core.keyframes import BezierKeys, Channel
+from ...core.keyframes import BezierKeys, Channel, ObjectChannels, RigChannels
 from ...core.rotations import (
     Floats,
-    conjugate,
-    continuous,
-    continuous_axis_angle,
-    continuous_euler,
     from_euler,
     from_matrix,
-    multiply,
     normalized,
-    to_euler,
 )
 from ..rig import armature_data
+from .stretching import ALIGNED
 
 MARK: Final = "octo_motion_generated"
 """Custom property of an action made here: a group with the fields of ``_mark``."""
@@ -40,9 +35,6 @@ _ENUMERATION: Final = np.uint8
 """What Blender keeps a key's enumerations in: with another type it copies them one by one."""
 _MARK_VERSION: Final = 1
 """Counts up when the fingerprint is taken otherwise: older actions then count as edited."""
-
-_OBJECT_GROUP: Final = "Object Transforms"
-"""The channel group in which Blender itself keeps an object's transform keys."""
 
 _HANDLE_SLACK: Final = 1e-3
 """Share of a handle's length by which it may stray: each time that Blender aligns handles, it
@@ -98,13 +90,50 @@ def writable_object(obj: bpy.types.Object) -> None:
         )
 
 
+def read_channels(
+    armature: bpy.types.Object, bones: Sequence[str], *, travels: bool = False
+) -> RigChannels:
+    """What the channels of some bones are called, and in which rotation modes they are.
+
+    Args:
+        armature: the armature object.
+        bones: names of its bones.
+        travels: whether the object's own channels are wanted as well.
+
+    Raises:
+        RigError: the armature has no such bone; the parent's scale is zero in some direction.
+    """
+    pose_bones = _pose_bones(armature, bones)
+    return RigChannels(
+        paths={bone.name: bone.path_from_id() for bone in pose_bones},
+        modes={bone.name: bone.rotation_mode for bone in pose_bones},
+        aligned=frozenset(bone.name for bone in pose_bones if bone.bone.inherit_scale == ALIGNED),
+        own=read_object_channels(armature) if travels else None,
+    )
+
+
+def read_object_channels(obj: bpy.types.Object) -> ObjectChannels:
+    """How an object's own channels stand to the world at the current frame.
+
+    The parent is taken as it stands; if it moves, it carries the object along. A parent with
+    unequal scales shears what hangs on it: the rotation is then the nearest there is.
+
+    Raises:
+        RigError: the parent's scale is zero in some direction.
+    """
+    return ObjectChannels(
+        rotation_mode=obj.rotation_mode,
+        frame=parent_frame(obj),
+        turn=_parent_turn(obj),
+        delta_location=np.array(obj.delta_location),
+        delta_rotation=delta_rotation(obj),
+    )
+
+
 def rotation_channels(
     armature: bpy.types.Object, bones: Sequence[str], quaternions: Floats
 ) -> list[Channel]:
     """Bones' rotations, each in the rotation mode that its bone has; the mode stays as it is.
-
-    Each frame continues the one before: quaternions keep their sign, Euler angles and the angle
-    about an axis go on past the half turn instead of jumping.
 
     Args:
         armature: the armature object.
@@ -114,17 +143,7 @@ def rotation_channels(
     Raises:
         RigError: the armature has no such bone.
     """
-    pose_bones = _pose_bones(armature, bones)
-    modes = [bone.rotation_mode for bone in pose_bones]
-    channels: dict[int, Channel] = {}
-    for mode in set(modes):
-        chosen = [number for number, each in enumerate(modes) if each == mode]
-        values = _in_rotation_mode(quaternions[:, chosen], mode)
-        for place, number in enumerate(chosen):
-            bone = pose_bones[number]
-            path = bone.path_from_id(_rotation_property(mode))
-            channels[number] = Channel(path, values[:, place], bone.name)
-    return [channels[number] for number in range(len(modes))]
+    return read_channels(armature, bones).rotations(bones, quaternions)
 
 
 def location_channel(armature: bpy.types.Object, bone: str, locations: Floats) -> Channel:
@@ -133,66 +152,17 @@ def location_channel(armature: bpy.types.Object, bone: str, locations: Floats) -
     Raises:
         RigError: the armature has no such bone.
     """
-    (pose_bone,) = _pose_bones(armature, [bone])
-    return Channel(pose_bone.path_from_id("location"), locations, pose_bone.name)
+    return read_channels(armature, [bone]).location(bone, locations)
 
 
 def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
-    """An object's travel through the world, in its own channels; its scale stays as it is.
-
-    Parent, parent inverse, delta transforms and rotation mode are taken off. The parent is taken
-    as it stands at the current frame; if it moves, it carries the object along. A parent with
-    unequal scales shears what hangs on it: the rotation is then the nearest there is.
-
-    Args:
-        obj: the object.
-        locations: (frames, 3), world.
-        quaternions: (frames, 4), world.
+    """An object's travel through the world, (frames, 3) and (frames, 4), in its own channels; its
+    scale stays as it is.
 
     Raises:
         RigError: the parent's scale is zero in some direction.
     """
-    frame, turn = parent_frame(obj), _parent_turn(obj)
-    own_locations = np.linalg.solve(frame[:3, :3], (locations - frame[:3, 3]).T).T
-    return own_channels(obj, own_locations, multiply(conjugate(turn), normalized(quaternions)))
-
-
-def own_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
-    """The same, of places (frames, 3) and orientations (frames, 4) before parents and constraints:
-    delta transforms and rotation mode are taken off.
-    """
-    mode = obj.rotation_mode
-    rotations = multiply(conjugate(delta_rotation(obj)), quaternions)
-    return [
-        Channel("location", locations - np.array(obj.delta_location), _OBJECT_GROUP),
-        Channel(_rotation_property(mode), _in_rotation_mode(rotations, mode), _OBJECT_GROUP),
-    ]
-
-
-def object_places(
-    obj: bpy.types.Object, locations: Floats, quaternions: Floats
-) -> tuple[Floats, Floats]:
-    """Inverse of :func:`object_channels`: where values of an object's channels put it.
-
-    Args:
-        obj: the object.
-        locations: (frames, 3), values of its location.
-        quaternions: (frames, 4), what the values of its rotation mean.
-
-    Returns:
-        Locations (frames, 3) and orientations (frames, 4) in the world.
-    """
-    frame, turn = parent_frame(obj), _parent_turn(obj)
-    places = (locations + np.array(obj.delta_location)) @ frame[:3, :3].T + frame[:3, 3]
-    return places, multiply(multiply(turn, delta_rotation(obj)), quaternions)
-
-
-def channel_unit(obj: bpy.types.Object) -> float:
-    """Metres in the world of one unit of an object's location channels.
-
-    The longest, where a parent scales unequally.
-    """
-    return float(np.linalg.norm(parent_frame(obj)[:3, :3], ord=2))
+    return read_object_channels(obj).channels(locations, quaternions)
 
 
 def write_action(
@@ -710,29 +680,6 @@ def _pose_bones(armature: bpy.types.Object, bones: Sequence[str]) -> list[bpy.ty
             "Leave edit mode, or detect the arms again.",
         )
     return [found[name] for name in bones]
-
-
-def rotation_path(owner: bpy.types.Object | bpy.types.PoseBone) -> str:
-    """Data path of the rotation of an object or of a bone, in the mode that it has."""
-    name = _rotation_property(owner.rotation_mode)
-    return owner.path_from_id(name) if isinstance(owner, bpy.types.PoseBone) else name
-
-
-def _rotation_property(mode: str) -> str:
-    if mode in ("QUATERNION", "AXIS_ANGLE"):
-        return f"rotation_{mode.lower()}"
-    return "rotation_euler"
-
-
-def _in_rotation_mode(quaternions: Floats, mode: str) -> Floats:
-    """Quaternions (frames, …, 4) as values of a rotation mode, continuous over the frames."""
-    if mode == "QUATERNION":
-        result = continuous(quaternions)
-        # Rest is (1, 0, 0, 0): start on its side.
-        return np.where(result[:1, ..., :1] < 0.0, -result, result)
-    if mode == "AXIS_ANGLE":
-        return continuous_axis_angle(quaternions)
-    return continuous_euler(to_euler(quaternions, mode), mode)
 
 
 def parent_frame(obj: bpy.types.Object) -> Floats:

@@ -31,8 +31,8 @@ from .actions import (
     delta_rotation,
     location_channel,
     object_channels,
-    own_channels,
     parent_frame,
+    read_object_channels,
     rotation_channels,
     writable_armature,
     write_action,
@@ -325,7 +325,7 @@ def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
     turns = from_matrix(
         moved[:, :3, :3] / (np.linalg.norm(moved[:, :3, :3], axis=1) * signs)[:, None]
     )
-    return own_channels(armature, moved[:, :3, 3], turns)
+    return read_object_channels(armature).own_channels(moved[:, :3, 3], turns)
 
 
 def _location_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:

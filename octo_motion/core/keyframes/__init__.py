@@ -7,6 +7,7 @@ from .reduction import check_bounds, reduce_keys, reducing
 from .residuals import Residuals
 from .subframes import halfway_values
 from .tracks import LOCATION, SCALE, BezierKeys, Limb, LimbChain, Track, chain_to_tip
+from .transform_channels import ObjectChannels, RigChannels, rotation_property
 
 __all__ = [
     "LOCATION",
@@ -15,12 +16,15 @@ __all__ = [
     "Channel",
     "Limb",
     "LimbChain",
+    "ObjectChannels",
     "Residuals",
+    "RigChannels",
     "Track",
     "chain_to_tip",
     "check_bounds",
     "halfway_values",
     "reduce_keys",
     "reducing",
+    "rotation_property",
     "values_at",
 ]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.path.travel import plan_travel
-from octo_motion.ui.locomotion.generate_motion import prepare
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh
 from tests.ui.locomotion.test_quality_report import measured_joints, played_joints
+from tests.ui.made import prepare
 from tests.ui.rig import click
 
 RISING = {"b0": (-2.5, 0, 0), "b1": (-0.5, 0, -0.1), "b2": (-0.2, 0.3, 0.1), "b3": (2.2, 0, 1.6)}
@@ -75,10 +75,10 @@ def test_no_arm_jumps_while_the_gait_changes(
     for rate in (24, 48, 96):
         bpy.context.scene.render.fps = rate
         shot = computed(settings)
-        assert len(shot.changing.changes) == count
+        assert len(shot.transitions.changes) == count
         distance = plan_travel(shot.route, shot.travel, shot.times).distance[:-1]
         inside = np.any(
-            [(each.start < distance) & (distance < each.end) for each in shot.changing.changes],
+            [(each.start < distance) & (distance < each.end) for each in shot.transitions.changes],
             axis=0,
         )
         largest.append(steps(shot.rotations)[inside].max())
@@ -91,14 +91,14 @@ def test_arms_that_hold_on_do_not_slide_while_the_gait_changes(settings: Any) ->
     bpy.ops.octo_motion.add_route(**RISING)
     settings.change.by = "HEIGHT"
     shot = computed(settings)
-    (window,), (walk, _) = shot.changing.windows, shot.changing.walks
+    (window,), (walk, _) = shot.transitions.windows, shot.plan.segments.walks
     unit = shot.travel.stride / (2.0 * np.pi)
     for each in walk.footholds():
-        off = unit * each.off
-        if each.touch_down * unit < shot.changing.changes[0].end:
+        off = unit * each.lift_off
+        if each.touch_down * unit < shot.transitions.changes[0].end:
             assert off <= window.start[each.arm] + 1e-6
             assert each.short < 1e-3
-    assert shot.out_of_reach.max() < 1e-3
+    assert shot.late.max() < 1e-3
 
 
 def test_places_let_each_gait_go_where_the_artist_says(settings: Any) -> None:
@@ -107,8 +107,8 @@ def test_places_let_each_gait_go_where_the_artist_says(settings: Any) -> None:
     bpy.ops.octo_motion.change_add(gait="crawl", position=0.25)
     shot = computed(settings)
     length = shot.route.length
-    assert [each.middle / length for each in shot.changing.changes] == pytest.approx([0.25, 0.7])
-    names = [shot.changing.ways[each.way].gait.name for each in shot.changing.changes]
+    assert [each.middle / length for each in shot.transitions.changes] == pytest.approx([0.25, 0.7])
+    names = [shot.plan.segments.gaits[each.way].table.name for each in shot.transitions.changes]
     assert names == ["crawl", "swim"]
     assert click("generate_locomotion") == {"FINISHED"}
     bpy.ops.octo_motion.change_remove()
@@ -119,7 +119,7 @@ def test_journey_that_comes_back_to_its_first_gait_ends_as_it_began(settings: An
     bpy.ops.octo_motion.add_route(**HUMP)
     settings.change.by = "HEIGHT"
     shot = computed(settings)
-    assert [each.way for each in shot.changing.changes] == [1, 0]
+    assert [each.way for each in shot.transitions.changes] == [1, 0]
     # The change may begin a little before the route does.
     np.testing.assert_allclose(shot.swimming[[0, -1]], 0.0, atol=0.01)
     assert shot.swimming.max() == 1.0

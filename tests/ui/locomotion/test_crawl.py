@@ -7,8 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion.generate_motion import prepare
-from octo_motion.ui.locomotion.writing.write_motion import Shot
+from tests.ui.made import Made, prepare
 from tests.ui.rig import click
 
 
@@ -42,7 +41,7 @@ def add_bumps(octopus: Any) -> None:
     bpy.context.view_layer.update()
 
 
-def crawled(octopus: Any, seed: int, heading: float = 0.0) -> Shot:
+def crawled(octopus: Any, seed: int, heading: float = 0.0) -> Made:
     settings = octopus.octo_motion.locomotion
     settings.seed, settings.heading_angle = seed, heading
     bpy.context.view_layer.update()
@@ -52,7 +51,7 @@ def crawled(octopus: Any, seed: int, heading: float = 0.0) -> Shot:
     return shot
 
 
-def worst(shot: Shot) -> dict[str, float]:
+def worst(shot: Made) -> dict[str, float]:
     return {each.kind: each.value for each in shot.figures}
 
 

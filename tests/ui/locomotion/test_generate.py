@@ -13,11 +13,12 @@ import pytest
 from octo_motion.blender.scene.curves import read_route
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser
+from octo_motion.core.locomotion.motion import pipeline
 from octo_motion.ui import at_work
 from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion.operators.generate import OCTO_MOTION_OT_generate_locomotion
-from octo_motion.ui.locomotion.writing import write_motion as shot_module
 from octo_motion.ui.modal_job import ModalJob
+from tests.ui.made import prepare
 from tests.ui.rig import (
     ROUTE,
     click,
@@ -327,8 +328,8 @@ def test_work_in_small_steps_gives_the_same_keys(
     octopus: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = {key: values.tobytes() for key, values in keys(generate(octopus)).items()}
-    monkeypatch.setattr(shot_module, "_BONES_AT_ONCE", 24 * 7)
-    shot = workflow.prepare(octopus, bpy.context)
+    monkeypatch.setattr(pipeline, "_BONES_AT_ONCE", 24 * 7)
+    shot = prepare(octopus, bpy.context)
     progress = list(shot.compute())
     # Twice as many moments as frames: it is a hurry.
     assert len(progress) >= 18
@@ -811,19 +812,18 @@ def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
 def test_targets_that_are_missed_are_told(octopus: Any) -> None:
     settings_of(octopus).tell_overlaps = False
     settings_of(octopus).frame_end = 120
-    shot = workflow.prepare(octopus, bpy.context)
+    shot = prepare(octopus, bpy.context)
     for _ in shot.compute():
         pass
-    assert shot.misses is not None
-    shot.misses[:, 1] = 0.02
-    told = shot.write().warnings
-    assert told == (
+    arms = shot.result.arms
+    arms.misses[:, 1] = 0.02
+    assert tuple(pipeline.warnings_for_misses(shot.plan, arms)) == (
         "1 of 4 arms cannot follow the gait everywhere: 'Arm 1 R' stays 0.02 arm lengths away.",
     )
 
 
 def test_an_octopus_that_is_gone_in_the_meantime_is_told(octopus: Any) -> None:
-    shot = workflow.prepare(octopus, bpy.context)
+    shot = prepare(octopus, bpy.context)
     for _ in shot.compute():
         pass
     bpy.data.objects.remove(octopus)
@@ -892,7 +892,7 @@ def long_job(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     """The operator at work in twenty steps and more, each of which takes a whole turn."""
     settings_of(octopus).tell_overlaps = False
     settings_of(octopus).frame_end = 120
-    monkeypatch.setattr(shot_module, "_BONES_AT_ONCE", 24 * 6)
+    monkeypatch.setattr(pipeline, "_BONES_AT_ONCE", 24 * 6)
     monkeypatch.setattr("octo_motion.ui.locomotion.operators.generate.PATIENCE", 0.0)
     monkeypatch.setattr(ModalJob, "_turn", 0.0)
     operator, window = Operator(), Window()
@@ -916,9 +916,12 @@ def test_a_long_job_shows_progress_and_comes_to_its_end(long_job: tuple[Any, Any
     assert operator.reports == ["Walk of 120 frames (5.0 s): 'Octopus Locomotion'."]
 
 
-def test_a_warning_is_what_the_status_bar_goes_on_to_show(long_job: tuple[Any, Any]) -> None:
+def test_a_warning_is_what_the_status_bar_goes_on_to_show(
+    long_job: tuple[Any, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     operator, window = long_job
-    operator._shot.warnings.extend(["This first.", "Then this."])
+    told = ["This first.", "Then this."]
+    monkeypatch.setattr(pipeline, "warnings_for_misses", lambda *_: iter(told))
     while operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}:
         pass
     told = "Walk of 120 frames (5.0 s): 'Octopus Locomotion'."
@@ -961,7 +964,8 @@ def test_a_failure_in_the_middle_cleans_up(
 
     monkeypatch.setattr(GaitPoser, "shapes", fail)
     with pytest.raises(ZeroDivisionError):
-        operator.modal(window, Press("TIMER"))
+        while operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}:
+            pass
     assert window.calls[-3:] == CLEAN
     assert len(bpy.data.actions) == 0
 

@@ -13,6 +13,7 @@ from octo_motion.blender.scene.curves import read_route
 from octo_motion.core.rotations import rotate
 from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion.reading.arm_items import bones_of
+from tests.ui.made import prepare
 from tests.ui.rig import click, joints_in_world
 
 RIGS = (
@@ -90,7 +91,7 @@ def test_a_real_rig_holds_the_ground_as_blender_plays_it(
     click("add_route")
     settings = armature.octo_motion.locomotion
     settings.timing, settings.frame_end = "RANGE", 60
-    shot = workflow.prepare(armature, bpy.context)
+    shot = prepare(armature, bpy.context)
     assert not any("stands off its route" in told for told in shot.warnings)
     for _ in shot.compute():
         pass

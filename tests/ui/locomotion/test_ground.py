@@ -13,7 +13,6 @@ from octo_motion.core.errors import GroundError
 from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
-from octo_motion.ui.locomotion.generate_motion import prepare
 from octo_motion.ui.locomotion.settings import ground as ground_properties
 from octo_motion.ui.locomotion.settings.contact_overrides import (
     ContactEdit,
@@ -23,6 +22,7 @@ from octo_motion.ui.locomotion.settings.contact_overrides import (
 )
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh, make_square
+from tests.ui.made import prepare
 from tests.ui.rig import click, generate, give_route, joints_in_world, keys
 
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
@@ -192,7 +192,7 @@ def test_a_swim_holds_nothing(octopus: Any) -> None:
 def test_a_ground_that_cannot_be_walked_on_is_told(octopus: Any, make: Any, told: str) -> None:
     ground_of(octopus).object = make()
     with pytest.raises(GroundError, match=told):
-        prepare(octopus, bpy.context)
+        _ = prepare(octopus, bpy.context).plan
     with pytest.raises(RuntimeError, match=told):
         click("generate_locomotion")
     assert octopus.animation_data is None or octopus.animation_data.action is None

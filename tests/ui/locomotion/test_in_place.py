@@ -11,7 +11,7 @@ from octo_motion.blender.animation.actions import is_edited
 from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
-from octo_motion.ui.locomotion.generate_motion import prepare
+from tests.ui.made import prepare
 from tests.ui.rig import generate, joints_in_world, keys, make_octopus
 
 

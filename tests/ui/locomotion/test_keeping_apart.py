@@ -7,13 +7,12 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.core.locomotion.clearance import body_volume
+from octo_motion.core.locomotion.clearance.body_volume import DEEP
 from octo_motion.ui.locomotion.operators import live
-from octo_motion.ui.locomotion.reading import skin as apart
-from octo_motion.ui.locomotion.reading.skin import DEEP
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
-from octo_motion.ui.locomotion.writing.write_motion import Shot
 from tests.bench.apart import add_bumps
+from tests.ui.made import Made, prepare
 from tests.ui.rig import keys
 
 
@@ -31,15 +30,15 @@ def octopus() -> Any:
     return armature
 
 
-def computed(armature: Any, *, keep_apart: bool) -> Shot:
+def computed(armature: Any, *, keep_apart: bool) -> Made:
     locomotion_settings(armature).keep_apart = keep_apart
-    shot = workflow.prepare(armature, bpy.context)
+    shot = prepare(armature, bpy.context)
     for _ in shot.compute():
         pass
     return shot
 
 
-def figures(shot: Shot) -> dict[str, float]:
+def figures(shot: Made) -> dict[str, float]:
     return {each.kind: each.value for each in shot.figures}
 
 
@@ -129,14 +128,14 @@ def test_switched_off_the_motion_is_the_gait_s_own(octopus: Any) -> None:
     assert shot.rotations is not None
     again = computed(octopus, keep_apart=False)
     np.testing.assert_array_equal(again.rotations, shot.rotations)
-    assert again.apart is None
+    assert again.shot.job.volume is None
 
 
 def test_too_many_arms_and_frames_are_told_and_left(
     octopus: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     without = computed(octopus, keep_apart=False)
-    monkeypatch.setattr(apart, "_MOST_PARTED", 1000)
+    monkeypatch.setattr(body_volume, "_MOST_PARTED", 1000)
     left = computed(octopus, keep_apart=True)
     np.testing.assert_array_equal(left.rotations, without.rotations)
     assert any(told.startswith("Arms are not kept apart: 8 arms over ") for told in left.warnings)

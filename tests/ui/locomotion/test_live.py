@@ -18,10 +18,10 @@ import pytest
 import octo_motion
 from octo_motion.blender.animation import actions
 from octo_motion.blender.scene.contact_markers import markers
-from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.operators import live
 from tests.blender.test_ground import make_mesh, make_square
+from tests.ui.made import prepare
 from tests.ui.rig import click, generate, give_route, keys, make_octopus
 from tests.ui.test_panels import Layout
 
@@ -191,7 +191,7 @@ def test_the_motion_follows_its_ground(octopus: Any) -> None:
 
 
 def ground_under(armature: Any) -> Any:
-    standing = workflow.prepare(armature, bpy.context).standing
+    standing = prepare(armature, bpy.context).standing
     assert standing is not None
     return standing.ground
 

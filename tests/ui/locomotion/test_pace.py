@@ -8,10 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import generate_motion as workflow
-from octo_motion.ui.locomotion.generate_motion import prepare
-from octo_motion.ui.locomotion.writing.write_motion import Shot
+from octo_motion.core.locomotion.motion import planning
 from tests.ui.locomotion.test_quality_report import WAY, bumpy
+from tests.ui.made import Made, prepare
 from tests.ui.rig import click, give_route, joints_in_world
 
 TOLD = "frames for a swing and jumps from pose to pose"
@@ -29,7 +28,7 @@ def octopus() -> Any:
     return armature
 
 
-def computed(armature: Any) -> Shot:
+def computed(armature: Any) -> Made:
     shot = prepare(armature, bpy.context)
     for _ in shot.compute():
         pass
@@ -81,7 +80,7 @@ def test_in_a_hurry_keys_on_every_frame_are_the_motion_as_it_was_computed(octopu
 def test_at_the_pace_of_a_walk_keys_lead_on_by_themselves(octopus: Any) -> None:
     octopus.octo_motion.locomotion.timing = "CADENCE"  # 2 seconds to a cycle
     shot = prepare(octopus, bpy.context)
-    assert not shot.hasty
+    assert not shot.plan.subframe_sampled
     assert shot.every == 1
     assert told(octopus) == ""
 
@@ -89,10 +88,10 @@ def test_at_the_pace_of_a_walk_keys_lead_on_by_themselves(octopus: Any) -> None:
 def test_what_is_dragged_in_a_long_hurry_need_not_wait_for_that(
     octopus: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert prepare(octopus, bpy.context, live=True).hasty
-    monkeypatch.setattr(workflow, "_QUICKLY", 1_000)
-    assert not prepare(octopus, bpy.context, live=True).hasty
-    assert prepare(octopus, bpy.context).hasty
+    assert prepare(octopus, bpy.context, live=True).plan.subframe_sampled
+    monkeypatch.setattr(planning, "_QUICKLY", 1_000)
+    assert not prepare(octopus, bpy.context, live=True).plan.subframe_sampled
+    assert prepare(octopus, bpy.context).plan.subframe_sampled
 
 
 @pytest.mark.parametrize(

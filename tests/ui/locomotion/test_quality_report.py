@@ -14,10 +14,9 @@ from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import rotate
-from octo_motion.ui.locomotion.generate_motion import prepare
 from octo_motion.ui.locomotion.settings import quality as quality_report
-from octo_motion.ui.locomotion.writing.write_motion import Shot
 from tests.blender.test_ground import make_mesh
+from tests.ui.made import Made, prepare
 from tests.ui.rig import click, generate, give_route, joints_in_world, make_octopus
 
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
@@ -142,10 +141,10 @@ def test_misses_of_a_gait_have_their_frame(small: Any) -> None:
     assert np.ptp(shot.misses.max(axis=1)) > 0.0
 
 
-def computed(armature: Any) -> Shot:
+def computed(armature: Any) -> Made:
     shot = prepare(armature, bpy.context)
     # What is reached for is known on frames alone: nobody looks between them.
-    shot.hasty = False
+    shot.on_frames_alone = True
     for _ in shot.compute():
         pass
     return shot
@@ -308,7 +307,7 @@ def test_an_override_forgets_what_its_linked_file_knew_of_another_motion(
         click("quality_jump", kind="SLIP")
 
 
-def played_joints(armature: Any, shot: Shot, times: np.ndarray) -> np.ndarray:
+def played_joints(armature: Any, shot: Made, times: np.ndarray) -> np.ndarray:
     """Joints of the arms (times, arms, joints, 3) as Blender plays them."""
     names = [bone.name for bone in armature.pose.bones]
     found = []

@@ -12,6 +12,7 @@ from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import angle_between, from_matrix
 from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion import panels
+from tests.ui.made import prepare
 from tests.ui.rig import (
     click,
     generate,
@@ -220,18 +221,18 @@ def test_finding_few_keys_shows_progress_and_can_be_stopped(octopus: Any) -> Non
     settings_of(octopus).keys = "REDUCED"
     before = scene_contents()
     shares = []
-    for share in workflow.prepare(octopus, bpy.context).compute():
+    for share in prepare(octopus, bpy.context).compute():
         shares.append(share)
         if len(shares) == 6:
             break
     assert scene_contents() == before
-    shot = workflow.prepare(octopus, bpy.context)
+    shot = prepare(octopus, bpy.context)
     shares = list(shot.compute())
     assert len(shares) > 6
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     # What is left to do is only to hand them to Blender.
-    assert shot.few is not None
+    assert all(channel.keys is not None for channel in shot.channels)
 
 
 @pytest.mark.parametrize(("columns", "times"), [("BONE", 8.0), ("ARM", 5.0)])

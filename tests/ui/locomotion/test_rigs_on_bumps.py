@@ -12,6 +12,7 @@ import pytest
 from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion.reading.arm_items import bones_of
 from tests.ui.locomotion.test_generate_on_rigs import opened
+from tests.ui.made import prepare
 from tests.ui.rig import click
 
 STIFF = (0.12, 0.34, 0.34, 0.2)
@@ -121,7 +122,7 @@ def test_rigs_of_artists_go_over_bumps(
 def test_on_six_arms_too_the_rear_pair_tiptoes() -> None:
     armature = rig([(0.1,) * 10] * 6, 0.0)
     figures_on_bumps(armature, "tiptoe")
-    shot = workflow.prepare(armature, bpy.context)
+    shot = prepare(armature, bpy.context)
     assert shot.standing is not None
     arms = {shot.arms[each.arm].pair for each in shot.standing.walk.footholds()}
     assert arms == {3}

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import generate_motion as workflow
+from tests.ui.made import prepare
 from tests.ui.rig import click, generate, keys, make_octopus
 
 _THICK = 0.05
@@ -50,10 +50,9 @@ def heights(armature: Any) -> tuple[np.ndarray, np.ndarray]:
     """Arm lengths above the ground of the lowest skin of bones that lie (moments,), and of all
     skin, at the frames and half way between them."""
     generate(armature)
-    shot = workflow.prepare(armature, bpy.context)
+    shot = prepare(armature, bpy.context)
     for _ in shot.compute():
         pass
-    assert shot.moving is not None
     assert shot.standing is not None
     length, scene = shot.generator.arm_length * shot.scale, bpy.context.scene
     skin: Any = bpy.data.objects["Skin"]
@@ -73,7 +72,7 @@ def heights(armature: Any) -> tuple[np.ndarray, np.ndarray]:
         above = (world[:, 2] - shot.standing.ground.height(world)) / length
         lowest.append(above.min())
         ends = [shot.every * each for each in (moment // 2, (moment + 1) // 2)]
-        for arm, rests in zip(shot.arms, shot.moving.lying, strict=True):
+        for arm, rests in zip(shot.arms, shot.in_contact, strict=True):
             for place, name in enumerate(arm.bones):
                 if rests[ends][:, place : place + 2].all():
                     lying.append(above[owner == numbers[name]].min())

@@ -3,7 +3,7 @@
 
 from .arm_curves import drawn, raise_over_ground
 from .body_height import BodyLine, body_line, leaning
-from .contact_timing import EvenTiming, crawling, crawling_in_place, timing_at_rest
+from .contact_timing import ContactTiming, EvenTiming, crawling, crawling_in_place, timing_at_rest
 from .crawl_planner import CrawlSettings
 from .foothold_reach import easy_height, span
 from .footholds import ContactOverride
@@ -16,6 +16,7 @@ from .walk import GroundedWalk
 __all__ = [
     "BodyLine",
     "ContactOverride",
+    "ContactTiming",
     "CrawlSettings",
     "EvenTiming",
     "Ground",

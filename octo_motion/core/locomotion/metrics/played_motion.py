@@ -6,11 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
 
-from ....blender.animation import Channel, object_places, rotation_path, strains_of
-from ...keyframes import values_at
+from ...keyframes import Channel, RigChannels, rotation_property, values_at
 from ...rotations import Floats, from_mode_values
 from ...skeleton import Skeleton
 from ..rig import Poses, carried_by_root_bone, halfway_linear
@@ -21,7 +19,7 @@ from .report import Measured
 class KeyedRig:
     """Whose keys they are."""
 
-    armature: bpy.types.Object
+    channels: RigChannels
     skeleton: Skeleton
     arms: Sequence[Sequence[str]]
     """Bones of each arm, root to tip."""
@@ -76,29 +74,37 @@ def _poses(
         columns = [np.interp(times, frames, column) for column in channel.values.T]
         return np.stack(columns, axis=-1)
 
-    assert rig.armature.pose is not None
-    bones = [name for arm in rig.arms for name in arm]
+    own, named = rig.channels, [name for arm in rig.arms for name in arm]
     rotations = computed.rotations.copy()
     alongs: dict[str, Floats] = {}
-    for place, name in enumerate(bones):
-        bone = rig.armature.pose.bones[name]
-        turned = played(rotation_path(bone))
+    for place, name in enumerate(named):
+        turned = played(own.rotation_path(name))
         if turned is not None:
-            rotations[:, place] = from_mode_values(turned, bone.rotation_mode)
-        scaled = played(bone.path_from_id("scale"))
+            rotations[:, place] = from_mode_values(turned, own.modes[name])
+        scaled = played(own.path(name, "scale"))
         if scaled is not None:
             alongs[name] = scaled[:, 1]
-    strains = strains_of(rig.armature, rig.arms, alongs, len(times))
+    strains = own.strains(rig.arms, alongs, len(times))
     if not rig.travels:
         return Poses(rotations, strains, computed.locations, computed.orientations)
-    carrier = rig.armature.pose.bones[rig.root_bone] if rig.root_bone else rig.armature
-    moved = played(carrier.path_from_id("location") if rig.root_bone else "location")
-    turned = played(rotation_path(carrier))
+    if rig.root_bone:
+        bone = rig.root_bone
+        location, rotation, mode = (
+            own.path(bone, "location"),
+            own.rotation_path(bone),
+            own.modes[bone],
+        )
+    else:
+        assert own.own is not None
+        mode = own.own.rotation_mode
+        location, rotation = "location", rotation_property(mode)
+    moved, turned = played(location), played(rotation)
     if moved is None or turned is None:
         return Poses(rotations, strains, computed.locations, computed.orientations)
-    turns = from_mode_values(turned, carrier.rotation_mode)
+    turns = from_mode_values(turned, mode)
     if rig.root_bone:
         places = carried_by_root_bone(rig.skeleton, rig.root_bone, rig.world, moved, turns)
     else:
-        places = object_places(rig.armature, moved, turns)
+        assert own.own is not None
+        places = own.own.places(moved, turns)
     return Poses(rotations, strains, *places)

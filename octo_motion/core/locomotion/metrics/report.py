@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, rotate
-from ..clearance import Separation
+from ..clearance import DEEP, Separation
 from ..ground import Ground
 from ..rig import ArmFrames, Poses, halfway_linear
 from . import measures as quality
@@ -26,7 +26,7 @@ are below the ground, by which share a bone is longer or shorter than at rest, a
 arm is from its target or foothold, radians per frame that a bone turns, and radii by which arms
 pass through each other or the body."""
 
-TOLD: Final = {"SLIP": 0.01, "DEPTH": 0.005, "MISS": 1e-3, "OVERLAP": 0.1}
+TOLD: Final = {"SLIP": 0.01, "DEPTH": 0.005, "MISS": 1e-3, "OVERLAP": DEEP}
 """From where on a figure is too bad to pass without a word."""
 
 

@@ -7,17 +7,17 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-import bpy
 import numpy as np
 
-from ....blender.animation import Channel, channel_unit, hands_on
 from ...keyframes import (
     LOCATION,
     SCALE,
     BezierKeys,
+    Channel,
     Limb,
     LimbChain,
     Residuals,
+    RigChannels,
     Track,
     chain_to_tip,
     reduce_keys,
@@ -52,7 +52,7 @@ class Tolerances:
 class Body:
     """What moves."""
 
-    armature: bpy.types.Object
+    channels: RigChannels
     scale: float
     """Metres of the armature's unit."""
     skeleton: Skeleton
@@ -64,8 +64,7 @@ class Body:
 
     def modes(self, bones: Sequence[str]) -> list[str]:
         """Rotation modes of bones."""
-        assert self.armature.pose is not None
-        return [self.armature.pose.bones[name].rotation_mode for name in bones]
+        return [self.channels.modes[name] for name in bones]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +164,7 @@ def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> LimbChain:
     return replace(
         chain,
         scaled=tuple(tracks.get(name, -1) for name in arm.bones),
-        handed=tuple(hands_on(body.armature, arm.bones)),
+        handed=tuple(body.channels.handed(arm.bones)),
     )
 
 
@@ -194,10 +193,11 @@ def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> tuple[Limb, f
         pivot = body.skeleton.heads[body.skeleton.index[body.travel_bone]]
         unit = 1.0
     else:
-        mode = body.armature.rotation_mode
+        assert body.channels.own is not None
+        mode = body.channels.own.rotation_mode
         pivot = np.zeros(3)
         # The armature's unit, as the object's location has it.
-        unit = body.scale / channel_unit(body.armature)
+        unit = body.scale / body.channels.own.unit
     held = tolerances.held if motion.lying else np.inf
     limb = Limb(
         tracks=_tracks(motion.travel, [LOCATION, mode]),

@@ -127,6 +127,17 @@ class Travel:
     ahead from here; its length is the angle, at most π. Zero where the route is straight. Of a body
     that swims as it lies, in the plane across its way."""
 
+    def at(self, frames: np.ndarray) -> Travel:
+        """The motion at some of the frames (n,)."""
+        return Travel(
+            self.times[frames],
+            self.distance[frames],
+            self.phase[frames],
+            self.positions[frames],
+            self.rotations[frames],
+            self.turn[frames],
+        )
+
 
 def bearings_of(route: Route, settings: TravelSettings) -> Bearings:
     """The table of directions that the functions here ask; made once for several of them."""

@@ -29,7 +29,7 @@ from .joint_room import (
 )
 from .mantle import find_mantle, lies_back, stretch_mantle
 from .placement import carried_by_root_bone, object_transforms, root_bone_transforms
-from .poses import Poses, halfway_automatic, halfway_linear
+from .poses import ArmMotion, Poses, halfway_automatic, halfway_linear
 from .skin_offset import ArmSkin, arm_skin, nearest_bones
 
 __all__ = [
@@ -38,6 +38,7 @@ __all__ = [
     "ArmBatch",
     "ArmChain",
     "ArmFrames",
+    "ArmMotion",
     "ArmRest",
     "ArmSkin",
     "BodyFrame",

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +24,63 @@ class Poses:
     """(moments, 3) of the armature, world."""
     orientations: Floats
     """(moments, 4)"""
+
+
+@dataclass(eq=False)
+class ArmMotion:
+    """All arms at some moments, while they are worked out."""
+
+    rotations: Floats
+    """(moments, bones, 4) of all arms, one after the other."""
+    strains: Floats
+    """(moments, bones) by how much bones are longer than at rest, as a share."""
+    late: Floats
+    """(moments, arms) arm lengths from an arm to the foothold that it cannot reach."""
+    misses: Floats
+    """(moments, arms) arm lengths from an arm to the targets of its gait."""
+    in_contact: list[np.ndarray]
+    """For each arm (moments, joints) which rest on the ground."""
+    cycles: np.ndarray
+    """(moments, arms) number of each arm's cycle."""
+
+    @classmethod
+    def at_rest(cls, moments: int, bones: Sequence[int]) -> ArmMotion:
+        """Arms at rest that hold on to nothing.
+
+        Args:
+            moments: how many.
+            bones: how many bones each arm has.
+        """
+        rotations = np.zeros((moments, sum(bones), 4))
+        rotations[..., 0] = 1.0
+        return cls(
+            rotations=rotations,
+            strains=np.zeros((moments, sum(bones))),
+            late=np.zeros((moments, len(bones))),
+            misses=np.zeros((moments, len(bones))),
+            in_contact=[np.zeros((moments, each + 1), dtype=bool) for each in bones],
+            cycles=np.zeros((moments, len(bones)), dtype=np.int64),
+        )
+
+    def at_every(self, count: int) -> ArmMotion:
+        """The same at every so many of these moments, from the first on."""
+        return ArmMotion(
+            rotations=self.rotations[::count],
+            strains=self.strains[::count],
+            late=self.late[::count],
+            misses=self.misses[::count],
+            in_contact=[each[::count] for each in self.in_contact],
+            cycles=self.cycles[::count],
+        )
+
+    def copy(self) -> ArmMotion:
+        """The same, whose poses may be changed."""
+        return replace(
+            self,
+            rotations=self.rotations.copy(),
+            strains=self.strains.copy(),
+            late=self.late.copy(),
+        )
 
 
 def halfway_automatic(poses: Poses, *, cyclic: bool) -> Poses:

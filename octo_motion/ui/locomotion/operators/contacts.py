@@ -33,12 +33,13 @@ class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
         shot = prepare(armature, context)
-        if shot.standing is None or shot.in_place:
+        plan = shot.plan()
+        if not plan.can_show_contacts:
             raise SettingsError(
                 "This motion has no contacts with the ground.",
                 "Choose a walk along a route, and Hold the Ground.",
             )
-        count = show_contacts(armature, shot)
+        count = show_contacts(armature, plan, shot.edits)
         show_in_local_view(context, *markers(armature))
         self.report({"INFO"}, f"{count} contacts.")
 
@@ -77,12 +78,13 @@ class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
             return
         try:
             shot = prepare(armature, context)
+            plan = shot.plan()
         except OctoMotionError as error:
             # They are free all the same.
             self.report({"WARNING"}, f"No markers are shown: {error}")
             return
-        if shot.standing is not None and not shot.in_place:
-            show_contacts(armature, shot)
+        if plan.can_show_contacts:
+            show_contacts(armature, plan, shot.edits)
 
 
 class OCTO_MOTION_OT_contacts_shift(OctoOperator, bpy.types.Operator):

@@ -4,15 +4,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, cast
 
 import bpy
 import numpy as np
 
-from ....blender.animation import SCALE, animated_bones, displaced_bones
-from ....blender.rig import armature_data, is_driven_object, world_directions
+from ....blender.animation import (
+    SCALE,
+    animated_bones,
+    as_posed,
+    displaced_bones,
+    read_channels,
+)
+from ....blender.rig import armature_data, is_driven_object, read_skeleton, world_directions
 from ....core.errors import RigError
 from ....core.locomotion.gait import Arm
+from ....core.locomotion.motion import Creature
 from ....core.locomotion.rig import (
     BodyFrame,
     Detection,
@@ -29,6 +37,75 @@ from .arm_items import bones_of
 from .previous_action import previous_action
 
 _UNEQUAL: Final = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class RigRead:
+    """A creature as it was read, and what was seen on the way."""
+
+    creature: Creature
+    rest_body: BodyFrame
+    """Where the body lies in the armature at rest."""
+    detection: Detection | None
+    """What was found, if the settings had no arms."""
+    warnings: tuple[str, ...]
+    """What there is to say of constraints and drivers."""
+    poses: tuple[str, ...]
+    """What there is to say of poses that stay."""
+
+
+def read_creature(
+    armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion, world: Floats
+) -> RigRead:
+    """The rig, its arms, and where it stands.
+
+    Args:
+        armature: the armature object.
+        settings: its settings.
+        world: (4, 4) its world matrix.
+
+    Raises:
+        RigError: it has no arms, bones are gone, or it is scaled unequally.
+    """
+    at_rest = read_skeleton(armature)
+    scale = uniform_scale(armature, world)
+    arms, rest_body, detection = listed_arms(settings, armature, at_rest)
+    root_bone = chosen_root_bone(settings, armature, detection)
+    skeleton, body = at_rest, rest_body
+    carriers = posed_carriers(settings, armature, skeleton, arms, root_bone)
+    turned = [bone for arm in arms for bone in arm.bones]
+    if carriers and (posed := as_posed(armature, skeleton, carriers, turned)) is not None:
+        # Arms hang where the bones that carry them are.
+        skeleton, carriers = posed, []
+        body = listed_body(settings, posed, arms, detection)
+    moved = {*turned, root_bone} - {""}
+    present = armature.pose.bones if armature.pose is not None else ()
+    channels = read_channels(
+        armature,
+        [name for name in at_rest.names if name in moved or name in present],
+        travels=settings.travel_on == "OBJECT",
+    )
+    return RigRead(
+        creature=Creature(
+            skeleton=skeleton,
+            at_rest=at_rest,
+            arms=arms,
+            body=body,
+            listed=tuple(bones_of(item) for item in settings.arms if item.bones),
+            root_bone=root_bone,
+            world=world,
+            scale=scale,
+            channels=channels,
+        ),
+        rest_body=rest_body,
+        detection=detection,
+        # Detection has looked for constraints itself.
+        warnings=(
+            *(detection.notes if detection else warnings_for_driven(skeleton, arms)),
+            *warnings_for_constraints(settings, armature, skeleton, root_bone),
+        ),
+        poses=tuple(warnings_for_poses(settings, armature, arms, carriers)),
+    )
 
 
 def uniform_scale(armature: bpy.types.Object, world: Floats) -> float:

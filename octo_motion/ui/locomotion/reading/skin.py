@@ -3,143 +3,50 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import bpy
-import numpy as np
 
 from ....blender.rig import radii_of_skin, skin_key, skin_parts
 from ....core.content_cache import ContentCache, content_key
-from ....core.locomotion.clearance import (
-    MOST_CAPSULES,
-    Bulk,
-    Capsules,
-    Separation,
-    joints_that_count,
-    measure_overlap,
-)
+from ....core.locomotion.clearance import BodyVolume, Capsules
 from ....core.locomotion.gait import Arm
-from ....core.locomotion.metrics import TOLD
-from ....core.locomotion.rig import ArmFrames, BodyFrame, frames_of_arm
-from ....core.rotations import Floats
+from ....core.locomotion.motion import Creature
+from ....core.locomotion.rig import BodyFrame, frames_of_arm
 from ....core.skeleton import Skeleton
+from ..settings.properties import OCTO_MOTION_PG_locomotion
 
-DEEP: Final = TOLD["OVERLAP"]
-"""Share of a radius by which arms may overlap without a word: flesh gives."""
-
-_MOST_PARTED: Final = 200_000_000
-"""Distances with more of which arms are not kept apart: half a minute where all are tangled."""
-_MOST_DISTANCES: Final = 60_000_000
-"""With more, of very many arms over very many frames, only every second, third … is measured."""
+_known: Final[ContentCache[BodyVolume]] = ContentCache(2)
 
 
-@dataclass(frozen=True, eq=False)
-class Apart:
-    """What it takes to measure how far arms keep apart; see :func:`read_apart`."""
-
-    arms: tuple[ArmFrames, ...]
-    names: tuple[str, ...]
-    radii: tuple[Floats, ...]
-    still: tuple[Capsules, ...]
-    """Of the body, one frame."""
-    upward: Floats
-    """(3,) unit: the body's, armature space."""
-
-    @property
-    def bulk(self) -> Bulk:
-        """What must not pass through itself."""
-        return Bulk(self.arms, self.radii, self.still, self.upward)
-
-    def _distances(self, frames: int) -> int:
-        """How many there are to be looked at over so many frames."""
-        capsules = sum(min(len(arm.bones), MOST_CAPSULES) for arm in self.arms) + len(self.still)
-        return frames * capsules * capsules
-
-    def too_many(self, frames: int) -> str:
-        """Why arms cannot be kept apart over so many frames, "" if they can."""
-        if self._distances(frames) <= _MOST_PARTED:
-            return ""
-        return (
-            f"Arms are not kept apart: {len(self.arms)} arms over {frames:,} frames would take too "
-            "long. Make shorter motions, or switch arms off."
-        )
-
-    def measure(self, rotations: Floats, strains: Floats) -> tuple[Separation, int]:
-        """What overlaps, and at every how many frames it was looked for.
-
-        Args:
-            rotations: (frames, bones, 4) of all arms, one after the other.
-            strains: (frames, bones) by how much bones are longer than at rest.
-        """
-        every = max(1, -(-self._distances(len(rotations)) // _MOST_DISTANCES))
-        looked = rotations[::every]
-        ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)])
-        chains: list[Capsules] = []
-        for number, arm in enumerate(self.arms):
-            columns = slice(int(ends[number]), int(ends[number + 1]))
-            own, longer = looked[:, columns], strains[::every, columns]
-            some = joints_that_count(len(arm.bones))
-            joints, rest = arm.joints(arm.from_bones(own), longer), arm.joints(arm.at_rest)
-            radii = self.radii[number][some]
-            chains.append(Capsules(self.names[number], joints[:, some], radii, rest[some]))
-        still = [
-            Capsules(each.name, np.tile(each.joints, (len(looked), 1, 1)), each.radii, each.at_rest)
-            for each in self.still
-        ]
-        return measure_overlap(chains, still), every
-
-    @staticmethod
-    def told(found: Separation, every: int, frames: Floats) -> tuple[str, ...]:
-        """A sentence on the deepest overlap, none if arms keep apart.
-
-        Args:
-            found: what :meth:`measure_overlap` says.
-            every: at every how many frames it looked.
-            frames: (frames,) their numbers in the scene.
-        """
-        worst = found.worst
-        if worst is None or worst.depth <= DEEP:
-            return ()
-        share = 100.0 * float(np.mean(found.depths > DEEP))
-        told = (
-            f"'{worst.first}' passes through '{worst.second}' at frame "
-            f"{frames[worst.frame * every]:.0f}, by {worst.depth:.1f} of the radius; something "
-            f"overlaps at {share:.0f} % of the frames."
-        )
-        return (told,)
-
-
-_known: Final[ContentCache[Apart]] = ContentCache(2)
-
-
-def read_apart(
+def read_volume(
+    settings: OCTO_MOTION_PG_locomotion,
     armature: bpy.types.Object,
-    skeleton: Skeleton,
-    arms: tuple[Arm, ...],
-    body: BodyFrame,
+    creature: Creature,
     *,
     live: bool = False,
-) -> Apart:
-    """The arms and the parts of the body as thick as their skin.
+) -> BodyVolume | None:
+    """The arms and the parts of the body as thick as their skin, where that is asked for.
 
     Args:
+        settings: of the armature.
         armature: the armature object.
-        skeleton: its bones.
-        arms: those that move.
-        body: which way it faces.
+        creature: its rig.
         live: whether it is to be quick: which bones a skin follows is then looked at anew only
-            where the skin has changed its form.
+            where the skin has changed its form, and nothing is told of overlaps.
     """
+    if not settings.keep_apart and (live or not settings.tell_overlaps):
+        return None
     if not live:
         _known.clear()
-    key = content_key(skeleton, arms, body, skin_key(armature))
-    return _known.get(key, lambda: _read_apart(armature, skeleton, arms, body))
+    rig = creature.skeleton, creature.arms, creature.body
+    key = content_key(*rig, skin_key(armature))
+    return _known.get(key, lambda: _read_volume(armature, *rig))
 
 
-def _read_apart(
+def _read_volume(
     armature: bpy.types.Object, skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame
-) -> Apart:
+) -> BodyVolume:
     limbs = {bone for arm in arms for bone in arm.bones}
     parts = [
         name
@@ -152,7 +59,7 @@ def _read_apart(
     still = [
         Capsules(name, ends[None], thick, ends) for name, ends, thick in skin_parts(armature, parts)
     ]
-    return Apart(
+    return BodyVolume(
         arms=tuple(frames_of_arm(skeleton, arm.bones, body) for arm in arms),
         names=tuple(arm.name for arm in arms),
         radii=tuple(radii),

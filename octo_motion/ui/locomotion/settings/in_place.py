@@ -1,16 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Motion in place, and breath: what the settings say of them."""
+"""Settings of motion in place, and of breath."""
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
-import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from ....core.keyframes import Channel
-from ....core.locomotion.path import breathing_scales
-from ....core.rotations import Floats
 from ...override_flags import OVERRIDE
 
 _IN_PLACE: Final = (
@@ -63,26 +59,3 @@ class InPlace:
         step=10,
         override=OVERRIDE,
     )
-
-
-def breathing_channels(
-    armature: bpy.types.Object, settings: Any, mantle: str, times: Floats
-) -> list[Channel]:
-    """Scale of the mantle's bone, if it is to breathe.
-
-    Args:
-        armature: the armature object.
-        settings: its settings.
-        mantle: name of the bone, "" for none.
-        times: (frames,) seconds from the motion's start.
-
-    Raises:
-        SettingsError: a breath takes no time.
-    """
-    if not mantle or settings.breathing <= 0.0:
-        return []
-    whole = float(times[-1]) if settings.travel_on == "NONE" else None
-    scales = breathing_scales(times, settings.breathing, breath=settings.breath_time, whole=whole)
-    assert armature.pose is not None
-    path = armature.pose.bones[mantle].path_from_id("scale")
-    return [Channel(path, scales, mantle)]

@@ -7,12 +7,10 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-import bpy
+from ..path import Route, TravelSettings, duration, strides
+from .job import Timing
 
-from ....core.locomotion.path import Route, TravelSettings, duration, strides
-from ..settings.properties import OCTO_MOTION_PG_locomotion
-
-_HASTY: Final = 40.0
+_HURRIED: Final = 40.0
 """Frames of a cycle below which keys that lead on from frame to frame by themselves would let arms
 slide and dip in between."""
 _SWING: Final = 5.0
@@ -29,9 +27,9 @@ class Pace:
     """Where the body goes at full speed."""
 
     @property
-    def hasty(self) -> bool:
+    def hurried(self) -> bool:
         """Whether what is between frames is to be looked at, too."""
-        return self.mean < _HASTY
+        return self.mean < _HURRIED
 
 
 def pace_of(route: Route, travel: TravelSettings, frames: float) -> Pace:
@@ -41,34 +39,32 @@ def pace_of(route: Route, travel: TravelSettings, frames: float) -> Pace:
     return Pace(mean, mean * route.length / duration(route, travel, 1.0))
 
 
-def too_few_frames(
-    settings: OCTO_MOTION_PG_locomotion, pace: Pace, render: bpy.types.RenderSettings
-) -> list[str]:
+def too_few_frames(timing: Timing, pace: Pace) -> list[str]:
     """What there is to say of arms that have no frames to swing in, with what would do.
 
     Args:
-        settings: of the armature.
-        pace: of its motion.
-        render: for the frame rate.
+        timing: how the motion's frames are found.
+        pace: of the motion.
     """
-    swing = (1.0 - settings.ground.duty) * pace.fastest
+    swing = (1.0 - timing.duty) * pace.fastest
     if swing >= _SWING:
         return []
     longer = _SWING / swing
-    if settings.timing == "RANGE":
-        length = (settings.frame_end - settings.frame_start) * longer
-        end = settings.frame_start + math.ceil(length - 1e-6)
+    if timing.kind == "RANGE":
+        length = (timing.end - timing.start) * longer
+        end = timing.start + math.ceil(length - 1e-6)
         remedy = f"Let it end at frame {end:,} or later"
-    elif settings.timing == "SPEED":
-        slowest = math.floor(1e3 * settings.speed / longer) / 1e3
+    elif timing.kind == "SPEED":
+        slowest = math.floor(1e3 * timing.speed / longer) / 1e3
         remedy = f"Lower Speed to {slowest:g} m/s"
     else:
-        cycle = math.ceil(1e2 * settings.cycle_time * longer) / 1e2
+        cycle = math.ceil(1e2 * timing.cycle_time * longer) / 1e2
         remedy = f"Raise Cycle to {cycle:g} s"
-    rate, had = render.fps / render.fps_base, math.floor(10.0 * swing) / 10.0
-    told = (
-        f"At full speed an arm has {had:g} frames for a swing and jumps from pose to pose: "
-        f"{pace.fastest / rate:.2g} s a cycle are too short. {remedy}, or give the gait a longer "
-        "stride."
-    )
-    return [told]
+    had = math.floor(10.0 * swing) / 10.0
+    return [
+        (
+            f"At full speed an arm has {had:g} frames for a swing and jumps from pose to pose: "
+            f"{pace.fastest / timing.rate:.2g} s a cycle are too short. {remedy}, or give the gait "
+            "a longer stride."
+        )
+    ]

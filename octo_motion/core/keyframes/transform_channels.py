@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Channels of bones and of an object: motion in space, as values of Blender's own properties.
+
+What Blender knows of a rig's channels (what they are called, in which rotation modes, which bones
+hand their scale on, what frame an object's own channels stand in) is read once; from then on it is
+plain data, and so is all that is made of it here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ..rotations import (
+    Floats,
+    conjugate,
+    continuous,
+    continuous_axis_angle,
+    continuous_euler,
+    multiply,
+    normalized,
+    to_euler,
+)
+from .channel import Channel
+
+OBJECT_GROUP: Final = "Object Transforms"
+"""Where Blender's own keying puts an object's channels."""
+_UNUSED: Final = 1e-5
+"""Scales that differ from 1 by less need no keys."""
+
+
+def rotation_property(mode: str) -> str:
+    """The property that holds a rotation in one of Blender's rotation modes."""
+    if mode in ("QUATERNION", "AXIS_ANGLE"):
+        return f"rotation_{mode.lower()}"
+    return "rotation_euler"
+
+
+def in_rotation_mode(quaternions: Floats, mode: str) -> Floats:
+    """Quaternions (frames, …, 4) as values of a rotation mode, continuous over the frames.
+
+    Each frame continues the one before: quaternions keep their sign, Euler angles and the angle
+    about an axis go on past the half turn instead of jumping.
+    """
+    if mode == "QUATERNION":
+        result = continuous(quaternions)
+        # Rest is (1, 0, 0, 0): start on its side.
+        return np.where(result[:1, ..., :1] < 0.0, -result, result)
+    if mode == "AXIS_ANGLE":
+        return continuous_axis_angle(quaternions)
+    return continuous_euler(to_euler(quaternions, mode), mode)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectChannels:
+    """How an object's own channels stand to the world."""
+
+    rotation_mode: str
+    frame: Floats
+    """(4, 4) in which its own channels stand: parent and parent inverse."""
+    turn: Floats
+    """(4,) the rotation within that frame."""
+    delta_location: Floats
+    """(3,)"""
+    delta_rotation: Floats
+    """(4,)"""
+
+    @property
+    def unit(self) -> float:
+        """Metres in the world of one unit of the location: the longest, if they are unequal."""
+        return float(np.linalg.norm(self.frame[:3, :3], ord=2))
+
+    def channels(self, locations: Floats, quaternions: Floats) -> list[Channel]:
+        """Travel through the world as a location and a rotation.
+
+        Args:
+            locations: (frames, 3), world.
+            quaternions: (frames, 4), world.
+        """
+        frame = self.frame
+        own = np.linalg.solve(frame[:3, :3], (locations - frame[:3, 3]).T).T
+        return self.own_channels(own, multiply(conjugate(self.turn), normalized(quaternions)))
+
+    def own_channels(self, locations: Floats, quaternions: Floats) -> list[Channel]:
+        """The same, of places (frames, 3) and orientations (frames, 4) before the parent and
+        constraints: delta transforms and rotation mode are taken off.
+        """
+        mode = self.rotation_mode
+        rotations = multiply(conjugate(self.delta_rotation), quaternions)
+        return [
+            Channel("location", locations - self.delta_location, OBJECT_GROUP),
+            Channel(rotation_property(mode), in_rotation_mode(rotations, mode), OBJECT_GROUP),
+        ]
+
+    def places(self, locations: Floats, quaternions: Floats) -> tuple[Floats, Floats]:
+        """Inverse of :meth:`channels`: where values of the channels put the object.
+
+        Args:
+            locations: (frames, 3), values of its location.
+            quaternions: (frames, 4), what the values of its rotation mean.
+
+        Returns:
+            Locations (frames, 3) and orientations (frames, 4) in the world.
+        """
+        places = (locations + self.delta_location) @ self.frame[:3, :3].T + self.frame[:3, 3]
+        return places, multiply(multiply(self.turn, self.delta_rotation), quaternions)
+
+
+@dataclass(frozen=True, eq=False)
+class RigChannels:
+    """What the channels of some bones of an armature are."""
+
+    paths: Mapping[str, str]
+    """By bone, the data path that its properties begin with."""
+    modes: Mapping[str, str]
+    """By bone, its rotation mode."""
+    aligned: frozenset[str] = frozenset()
+    """Bones that the one before makes longer with itself."""
+    own: ObjectChannels | None = None
+    """Those of the armature object, where they are wanted."""
+
+    def path(self, bone: str, name: str) -> str:
+        """Data path of a bone's property."""
+        return f"{self.paths[bone]}.{name}"
+
+    def rotation_path(self, bone: str) -> str:
+        """Data path of a bone's rotation, in the mode that it has."""
+        return self.path(bone, rotation_property(self.modes[bone]))
+
+    def rotations(self, bones: Sequence[str], quaternions: Floats) -> list[Channel]:
+        """Bones' rotations (frames, bones, 4) from rest, what Blender calls ``matrix_basis``."""
+        modes = [self.modes[bone] for bone in bones]
+        channels: dict[int, Channel] = {}
+        for mode in set(modes):
+            chosen = [number for number, each in enumerate(modes) if each == mode]
+            values = in_rotation_mode(quaternions[:, chosen], mode)
+            for place, number in enumerate(chosen):
+                bone = bones[number]
+                channels[number] = Channel(self.rotation_path(bone), values[:, place], bone)
+        return [channels[number] for number in range(len(modes))]
+
+    def location(self, bone: str, locations: Floats) -> Channel:
+        """A bone's locations (frames, 3), in its rest frame."""
+        return Channel(self.path(bone, "location"), locations, bone)
+
+    def scale(self, bone: str, scales: Floats) -> Channel:
+        """A bone's scales (frames, 3)."""
+        return Channel(self.path(bone, "scale"), scales, bone)
+
+    def handed(self, bones: Sequence[str]) -> list[bool]:
+        """Of each bone of an arm, root to tip, whether the one before makes it longer."""
+        return [bool(place) and name in self.aligned for place, name in enumerate(bones)]
+
+    def stretches(self, arms: Sequence[Sequence[str]], strains: Floats) -> list[Channel]:
+        """Scales of bones that are longer by a share, and thinner so that they keep their volume.
+
+        Args:
+            arms: bones of each arm, root to tip.
+            strains: (frames, bones) of all arms, one after the other.
+
+        Returns:
+            Channels of those bones whose scale differs from 1 at some frame.
+        """
+        channels: list[Channel] = []
+        start = 0
+        for bones in arms:
+            longer = 1.0 + strains[:, start : start + len(bones)]
+            start += len(bones)
+            for place, (name, handed) in enumerate(zip(bones, self.handed(bones), strict=True)):
+                along = longer[:, place]
+                if handed:
+                    along = along / longer[:, place - 1]
+                if np.abs(along - 1.0).max() <= _UNUSED:
+                    continue
+                across = 1.0 / np.sqrt(along)
+                channels.append(self.scale(name, np.stack([across, along, across], axis=1)))
+        return channels
+
+    def strains(
+        self, arms: Sequence[Sequence[str]], alongs: Mapping[str, Floats], count: int
+    ) -> Floats:
+        """Inverse of :meth:`stretches`: by how much bones are longer, as a share.
+
+        Args:
+            arms: bones of each arm, root to tip.
+            alongs: by bone, its scale along itself (moments,); a bone without is not scaled.
+            count: number of moments.
+
+        Returns:
+            (moments, bones) of all arms, one after the other.
+        """
+        strains = []
+        for bones in arms:
+            longer = np.ones(count)
+            for name, handed in zip(bones, self.handed(bones), strict=True):
+                own = alongs.get(name, 1.0)
+                longer = longer * own if handed else np.ones(count) * own
+                strains.append(longer - 1.0)
+        return np.stack(strains, axis=1)

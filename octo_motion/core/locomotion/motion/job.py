@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a motion is made from: all that was read of settings and scene, nothing worked out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from ...keyframes import RigChannels
+from ...rotations import Floats
+from ...skeleton import Skeleton
+from ..clearance import BodyVolume
+from ..gait import Arm, GaitSettings
+from ..ground import ContactOverride, StanceSettings
+from ..path import Route, TravelSettings
+from ..reaching import Reaching
+from ..rig import ArmSkin, BodyFrame
+from .few_keys import Tolerances
+
+
+@dataclass(frozen=True, eq=False)
+class Creature:
+    """A rig, its arms, and where it stands."""
+
+    skeleton: Skeleton
+    """As its arms hang: bones that carry them and get no keys are in their poses."""
+    at_rest: Skeleton
+    """As its skin is made for."""
+    arms: tuple[Arm, ...]
+    body: BodyFrame
+    listed: tuple[tuple[str, ...], ...]
+    """Bones of all arms, also of those that are switched off: they are no mantle either."""
+    root_bone: str
+    """Bone that takes the travel, "" for the object."""
+    world: Floats
+    """(4, 4) of the object, of uniform scale."""
+    scale: float
+    """Metres of the armature's unit."""
+    channels: RigChannels
+    """Of all bones, and of the object if that travels."""
+
+    @property
+    def bones(self) -> list[tuple[str, ...]]:
+        """Of each arm, root to tip."""
+        return [arm.bones for arm in self.arms]
+
+
+@dataclass(frozen=True, eq=False)
+class GaitJob:
+    """One way of moving. What hangs on the rig is still to be scaled to it."""
+
+    settings: GaitSettings
+    """Its lean is that of a body that lies as it swims wholly."""
+    travel: TravelSettings
+    """Its stride is in arm lengths."""
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """When it moves, and how fast."""
+
+    kind: Literal["CYCLES", "SPEED", "RANGE"]
+    """By the gait's rhythm, by the speed of the body, or between two frames."""
+    start: int
+    """First frame …"""
+    end: int
+    """… and last, of a RANGE."""
+    speed: float
+    """m/s"""
+    cycle_time: float
+    """Seconds of a cycle at full speed."""
+    rate: float
+    """Frames per second."""
+    duty: float
+    """Share of a cycle that arms hold on: what is left is there for a swing."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundJob:
+    """What a walk holds on to."""
+
+    stance: StanceSettings
+    skins: Sequence[ArmSkin]
+    """Of each arm."""
+    may_stretch: Sequence[bool]
+    """For each arm, whether its bones may get longer."""
+    mesh: tuple[Floats, bytes] | None
+    """Triangles (triangles, 3, 3), world, and a key of their content; none to follow the route."""
+    overrides: tuple[ContactOverride, ...] = ()
+    """The artist's, for single contacts."""
+    rest: tuple[bool, bool] = (False, False)
+    """Whether all arms lie on the ground at the start, and at the end …"""
+    rest_within: float = 0.0
+    """… and within how many strides the body is slow there."""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ChangeAt:
+    """A place where the gait changes."""
+
+    position: float
+    """Share of the route's length."""
+    length: float
+    """Arm lengths over which it changes."""
+    gait: int
+    """Number of the one after it."""
+
+
+@dataclass(frozen=True)
+class ChangesByHeight:
+    """The gait changes where the route leaves the ground, and where it comes back."""
+
+    height: float
+    """Arm lengths over the ground."""
+    length: float
+    """Arm lengths over which it changes."""
+    gait: int
+    """Number of the one above."""
+
+
+@dataclass(frozen=True)
+class Breathing:
+    """A mantle that gets wider with each breath."""
+
+    amount: float
+    """By how much, as a share; 0 for none."""
+    seconds: float
+    """Of one breath."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionJob:
+    """All that one motion is made from, as it was read."""
+
+    creature: Creature
+    route: Route | None
+    """None for whole cycles in place."""
+    cycles: int
+    """In place: how many."""
+    repeats: bool
+    """Whether curves go on before the motion and after it."""
+    gaits: tuple[GaitJob, ...]
+    """The first one, and those that it changes to."""
+    changes: ChangesByHeight | tuple[ChangeAt, ...]
+    timing: Timing
+    height: float | None
+    """Metres from the route or the ground to the body's centre; none for what the gait needs."""
+    streamline: float
+    """How far a mantle is stretched out along the way that its body swims: 0…1."""
+    breathing: Breathing
+    ground: GroundJob | None
+    """What walks hold on to, none where they do not."""
+    volume: BodyVolume | None
+    """What there is of the creature, where arms keep apart or overlaps are told."""
+    keep_apart: bool
+    """Whether arms make way for each other."""
+    tell_overlaps: bool
+    reaching: Reaching | None
+    """What arms reach for."""
+    tolerances: Tolerances | None
+    """How far few keys may be off, distances in arm lengths; none for a key on every frame."""
+    live: bool = False
+    """Whether it is to be quick: the same motion with a key on every frame, and without figures of
+    how good it is."""
+    warnings: tuple[str, ...] = ()
+    """What there is to say of what was read."""
+
+    @property
+    def in_place(self) -> bool:
+        """Whether nothing travels: the motion is a loop."""
+        return self.route is None
+
+
+@dataclass(frozen=True, eq=False)
+class ShownContact:
+    """A contact with the ground, for a marker."""
+
+    arm: str
+    cycle: int
+    position: Floats
+    """(3,) the joint that touches first, world."""
+    heading: float
+    """Radians about world Z from +X."""
+    frame_on: float
+    frame_off: float
+    cycle_frames: float
+    """Frames of the arm's cycle."""

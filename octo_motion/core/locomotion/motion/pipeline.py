@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole motion, on plain arrays: planned, posed, cleared, measured, keyed.
+
+Everything that takes time is done here, in steps that yield the share that is done, and may be
+dropped between any two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
+from typing import Final, TypeVar
+
+import numpy as np
+
+from ...keyframes import Channel
+from ...rotations import IDENTITY, Floats, from_matrix, slerp
+from ..clearance import (
+    ArmsOverGround,
+    Opened,
+    keep_off_ground,
+    raise_between_frames,
+    separate_arms,
+)
+from ..ground import Ground
+from ..metrics import TOLD, KeyedRig, Measured, figures, measure_keyed
+from ..path import plan_travel
+from ..reaching import Carried, Travelling
+from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
+from .cached import frames_of_arms
+from .few_keys import Body, Motion, Tolerances, reduced
+from .job import MotionJob
+from .planning import MotionPlan, plan_motion
+from .result import MotionResult
+from .segments import SegmentedMotion
+
+MISS: Final = TOLD["MISS"]
+"""Arm lengths by which a target may be missed without a word."""
+
+_PLANNING: Final = 0.1
+"""Share of the work that is over when the motion is planned …"""
+_MOVING: Final = 0.4
+"""… and when it is there, but not yet its few keys."""
+_EXACT_ANGLE: Final = np.radians(0.5)
+"""Radians that keys on every frame may be off there …"""
+_EXACT_DISTANCE: Final = 0.002
+"""… and arm lengths of an arm's tip."""
+_BONES_AT_ONCE: Final = 24_000
+"""Bones times frames of one step of the work: some tens of megabytes."""
+
+_Outcome = TypeVar("_Outcome")
+Steps = Generator[float, None, _Outcome]
+"""Work in steps that yield the share of it that is done, 0…1."""
+Travelled = tuple[Floats, Floats]
+"""Locations (moments, 3) and orientations (moments, 4) of the armature, world."""
+
+
+def compute(job: MotionJob) -> Steps[MotionResult]:
+    """Work a motion out, in steps that yield the share that is done: 0…1, 1 at the end.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    plan = yield from _scaled(plan_motion(job), 0.0, _PLANNING)
+    return (yield from _scaled(pose(plan), _PLANNING, 1.0))
+
+
+def pose(plan: MotionPlan) -> Steps[MotionResult]:
+    """Work out what is planned, as :func:`compute` does.
+
+    Raises:
+        OctoMotionError: an object is out of an arm's reach.
+    """
+    job, segments, every = plan.job, plan.segments, plan.stride
+    halves = with_half_frames if plan.subframe_sampled else np.asarray
+    moments, times = halves(plan.schedule.frames), halves(plan.schedule.times)
+    standing = plan.first.standing
+    travel = plan_travel(
+        plan.schedule.route,
+        plan.schedule.travel,
+        times,
+        standing.bearings if standing is not None else None,
+    )
+    places = segments.places(travel)
+    creature = job.creature
+    # In place the ground goes by, and arms are measured as if the body went along it.
+    going = object_transforms(creature.body, creature.scale, *places)
+    keyed = _stays(plan, len(moments)) if job.in_place else going
+    reducing = plan.tolerances is not None or plan.subframe_sampled
+    moving = _MOVING if reducing else 1.0
+    step = max(1, _BONES_AT_ONCE // max(len(plan.first.poser.bones), 1))
+    frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
+    made: SegmentedMotion | None = None
+    for done in segments.compute(travel, places, step, frames_per_metre, cyclic=job.in_place):
+        if isinstance(done, SegmentedMotion):
+            made = done
+        else:
+            yield moving * done
+    assert made is not None
+    arms = _cleared(plan, made, going)
+    swimming, warnings = segments.swimming(travel.distance), list(plan.warnings)
+    notes, carried, busy = _reach(plan, arms, keyed)
+    warnings += _separate(plan, arms, busy, going, swimming=swimming, every=every)
+    motion = _motion(plan, arms, keyed, swimming)
+    on_frames = arms.at_every(every)
+    framed = going[0][::every], going[1][::every]
+    measured, overlaps = _measured(plan, on_frames, framed)
+    few: list[Channel] | None = None
+    if reducing:
+        yield moving
+        few = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
+    if measured is not None and few is not None:
+        rig = KeyedRig(
+            channels=creature.channels,
+            skeleton=creature.skeleton,
+            arms=creature.bones,
+            travels=not job.in_place,
+            root_bone=creature.root_bone,
+            world=creature.world,
+        )
+        measured = measure_keyed(measured, rig, few)
+    result = MotionResult(
+        plan=plan,
+        channels=[*(few if few is not None else motion.all()), *plan.breath],
+        automatic=few is None,
+        arms=arms,
+        swimming=swimming[::every] if swimming is not None else None,
+        carried=carried,
+        measured=measured,
+        figures=figures(measured) if measured is not None else (),
+        warnings=(*warnings, *warnings_for_misses(plan, on_frames), *overlaps),
+        notes=notes,
+    )
+    yield 1.0
+    return result
+
+
+def with_half_frames(values: Floats) -> Floats:
+    """Values (frames,) with those half way in between (2 frames − 1,)."""
+    result = np.empty(2 * len(values) - 1)
+    result[::2], result[1::2] = values, 0.5 * (values[:-1] + values[1:])
+    return result
+
+
+def _scaled(steps: Steps[_Outcome], start: float, end: float) -> Steps[_Outcome]:
+    """Steps that are a part of the whole work, from one share of it to another."""
+    while True:
+        try:
+            share = next(steps)
+        except StopIteration as finished:
+            return finished.value
+        yield start + (end - start) * share
+
+
+def _stays(plan: MotionPlan, count: int) -> Travelled:
+    """Where an armature is that stays.
+
+    Its origin is taken to be on the ground; a root bone lifts a walking body to its height.
+    """
+    creature = plan.job.creature
+    up, world = creature.body.rotation[:, 2], creature.world
+    lift = plan.height / creature.scale - float(creature.body.center @ up)
+    lifted = bool(creature.root_bone) and plan.first.table.on_ground
+    raised = lift * up if lifted else 0.0 * up
+    location = world[:3, 3] + world[:3, :3] @ raised
+    orientation = from_matrix(world[:3, :3] / creature.scale)
+    return np.tile(location, (count, 1)), np.tile(orientation, (count, 1))
+
+
+def _ground(plan: MotionPlan) -> Ground | None:
+    """What the arms stand on, where they do."""
+    return plan.standing[0].ground if plan.standing else None
+
+
+def _cleared(plan: MotionPlan, made: SegmentedMotion, going: Travelled) -> ArmMotion:
+    """Arms that do not dip into the ground between frames, nor swim into it."""
+    arms, ground, creature = made.arms, _ground(plan), plan.job.creature
+    if ground is None:
+        return arms
+    frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
+    course = ArmsOverGround(frames, ground, creature.scale, cyclic=plan.job.in_place)
+    loose = plan.segments.afloat(made.travel.distance)
+
+    def kept_off(poses: Poses, share: Floats | None) -> Poses:
+        """The same with arms off the ground that know of none."""
+        if share is None:
+            return poses
+        radii = [creature.scale * each for each in plan.standing[0].radii]
+        return replace(poses, rotations=keep_off_ground(course, poses, radii, share))
+
+    def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, Sequence[Floats]]:
+        """Some frames anew, with arms raised; others are left as they are."""
+        higher, joints = made.higher(chosen, lift)
+        arms.late[chosen] = higher.late
+        poses = Poses(higher.rotations, higher.strains, going[0][chosen], going[1][chosen])
+        poses = kept_off(poses, None if loose is None else loose[chosen])
+        return poses, joints if joints is not None else course.joints(poses)
+
+    whole = kept_off(Poses(arms.rotations, arms.strains, *going), loose)
+    joints = made.joints
+    raised = raise_between_frames(
+        course, whole, joints if joints is not None else course.joints(whole), again
+    )
+    arms.rotations, arms.strains = raised.rotations, raised.strains
+    return arms
+
+
+def _reach(
+    plan: MotionPlan, arms: ArmMotion, keyed: Travelled
+) -> tuple[tuple[str, ...], tuple[Carried, ...], np.ndarray]:
+    """Let arms reach: what they do, where they take objects, and which do (moments, arms).
+
+    Arms which reach hold no ground and follow no gait.
+    """
+    reaching, busy = plan.job.reaching, np.zeros(arms.late.shape, dtype=bool)
+    if reaching is None:
+        return (), (), busy
+    before = arms.rotations.copy()
+    travelling = Travelling(*keyed, plan.job.creature.scale)
+    notes, carried = reaching.apply(plan.schedule.frames, arms.rotations, travelling, arms.strains)
+    moved = np.any(arms.rotations != before, axis=-1)
+    for number, bones in enumerate(plan.segments.bones_of):
+        own = moved[:, bones]
+        arms.in_contact[number][:, 1:] &= ~np.logical_or.accumulate(own, axis=1)
+        busy[:, number] = own.any(axis=1)
+        arms.late[busy[:, number], number] = arms.misses[busy[:, number], number] = 0.0
+    return notes, carried, busy
+
+
+def _separate(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    busy: np.ndarray,
+    going: Travelled,
+    *,
+    swimming: Floats | None,
+    every: int,
+) -> list[str]:
+    """Let arms make way for each other, but for those that are busy; what there is to warn of."""
+    job, volume = plan.job, plan.job.volume
+    if volume is None or not job.keep_apart:
+        return []
+    if too_many := volume.too_many(len(arms.rotations)):
+        return [too_many]
+    moved = separate_arms(
+        replace(volume.bulk, opened=_opened(plan, len(arms.rotations), swimming)),
+        arms.rotations,
+        arms.strains,
+        in_contact=arms.in_contact,
+        busy=busy,
+        travel=going,
+        ground=_ground(plan),
+        scale=job.creature.scale,
+        frames_per_cycle=every * plan.pace.mean,
+        cyclic=job.in_place,
+    )
+    if moved is not None:
+        arms.rotations = moved
+    return []
+
+
+def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | None:
+    """Where arms stand round a body that swims as it lies, none if it never does."""
+    posers = [gait.poser for gait in plan.segments.gaits]
+    lying = next((each for each in posers if each.settings.swim_lean), None)
+    if lying is None:
+        return None
+    return Opened(lying.opens_to, np.ones(count) if swimming is None else swimming)
+
+
+def _measured(
+    plan: MotionPlan, arms: ArmMotion, going: Travelled
+) -> tuple[Measured | None, tuple[str, ...]]:
+    """What figures are taken from, where they are wanted, and what overlaps in words."""
+    job, creature, separation, every = plan.job, plan.job.creature, None, 1
+    overlaps: tuple[str, ...] = ()
+    if job.volume is not None and job.tell_overlaps:
+        separation, every = job.volume.measure(arms.rotations, arms.strains)
+        overlaps = job.volume.told(separation, every, plan.schedule.frames)
+    if job.live:
+        return None, overlaps
+    poses = Poses(arms.rotations, arms.strains, *going)
+    measured = Measured(
+        frames=plan.schedule.frames,
+        arms=frames_of_arms(creature.skeleton, creature.arms, creature.body),
+        names=[arm.name for arm in creature.arms],
+        poses=poses,
+        misses=np.maximum(arms.late, arms.misses),
+        scale=creature.scale,
+        ground=_ground(plan),
+        lying=arms.in_contact,
+        cycles=arms.cycles,
+        separation=separation,
+        every=every,
+        halfway=halfway_automatic(poses, cyclic=job.repeats),
+    )
+    return measured, overlaps
+
+
+def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, swimming: Floats | None) -> Motion:
+    """What was computed, as channels with a key at every moment."""
+    creature, channels = plan.job.creature, plan.job.creature.channels
+    held = np.tile(plan.mantle_rotations, (len(arms.rotations), 1, 1))
+    if swimming is not None:
+        rest = np.broadcast_to(IDENTITY, held.shape)
+        held = slerp(rest, held, np.repeat(swimming[:, None], held.shape[1], axis=1))
+    if bone := creature.root_bone:
+        locations, rotations = root_bone_transforms(creature.skeleton, bone, creature.world, *keyed)
+        travel = [
+            channels.location(bone, locations),
+            *channels.rotations([bone], rotations[:, None]),
+        ]
+    elif plan.job.in_place:
+        travel = []
+    else:
+        assert channels.own is not None
+        travel = channels.own.channels(*keyed)
+    stretches: list[Channel] = []
+    # A swim that becomes a walk stretches there.
+    if any(each.stretching for each in plan.standing):
+        stretches = channels.stretches(creature.bones, arms.strains)
+    return Motion(
+        travel=travel,
+        arms=channels.rotations(plan.first.poser.bones, arms.rotations),
+        mantle=channels.rotations(plan.mantle, held),
+        stretch=stretches,
+        lying=arms.in_contact if plan.standing else (),
+    )
+
+
+def _reduced(plan: MotionPlan, motion: Motion, moments: Floats, every: int) -> Steps[list[Channel]]:
+    """Keys with handles of their own: few, or on every frame and right between them."""
+    creature, tolerances = plan.job.creature, plan.tolerances
+    body = Body(
+        creature.channels,
+        creature.scale,
+        creature.skeleton,
+        creature.arms,
+        plan.mantle,
+        creature.root_bone,
+    )
+    exact = Tolerances(_EXACT_ANGLE, _EXACT_DISTANCE * plan.first.poser.arm_length)
+    return reduced(
+        moments,
+        body,
+        motion,
+        tolerances or exact,
+        every=every,
+        dense=tolerances is None,
+        loops=plan.job.in_place,
+    )
+
+
+def warnings_for_misses(plan: MotionPlan, arms: ArmMotion) -> Iterator[str]:
+    """What there is to say of arms that miss their footholds or the targets of their gait."""
+    names, late = [arm.name for arm in plan.job.creature.arms], arms.late
+    if late.max() > MISS:
+        frame, arm = np.unravel_index(late.argmax(), late.shape)
+        # Bones that may not get longer do not, whatever Stretch is.
+        longer = any(each.stretching for each in plan.standing)
+        remedy = "raise Stretch" if longer else "lower Height"
+        first = "Drag its marker nearer" if _dragged(plan.job, int(arm)) else "Lower Hold"
+        yield (
+            f"'{names[arm]}' slides at frame {plan.schedule.frames[frame]:.0f}: its contact is "
+            f"{late[frame, arm]:.2g} arm lengths out of reach. {first}, {remedy} or shorten the "
+            "stride."
+        )
+        return
+    misses = arms.misses.max(axis=0)
+    worst = int(misses.argmax())
+    if misses[worst] > MISS:
+        yield (
+            f"{int((misses > MISS).sum())} of {len(names)} arms cannot follow the gait "
+            f"everywhere: '{names[worst]}' stays {misses[worst]:.2g} arm lengths away."
+        )
+
+
+def _dragged(job: MotionJob, arm: int) -> bool:
+    """Whether a contact of an arm is where the artist has put it."""
+    overrides = job.ground.overrides if job.ground is not None else ()
+    return any(each.arm == arm and each.position is not None for each in overrides)

@@ -1,0 +1,469 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From what was read to what is to be computed: gaits on this rig, the way, when, and footholds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from ...errors import SettingsError
+from ...keyframes import Channel
+from ...rotations import Floats
+from ..gait import CYCLE, GaitPoser
+from ..ground import ContactOverride, GroundedWalk
+from ..path import (
+    Course,
+    GaitTransition,
+    Line,
+    Route,
+    SwumLine,
+    TravelSettings,
+    WalkedLine,
+    bearings_of,
+    breathing_scales,
+    check_transitions,
+    duration,
+    plan_travel,
+    route_in_place,
+    strides,
+    transition_windows,
+    transitions_by_height,
+    travel_in_place,
+    unhurried,
+    whole_frames,
+)
+from ..rig import find_mantle, joint_positions, lies_back, stretch_mantle
+from .cached import poser_of
+from .few_keys import Tolerances
+from .job import ChangesByHeight, GaitJob, MotionJob, ShownContact
+from .pace import Pace, pace_of, too_few_frames
+from .segments import Gait, Segments, Transitions
+from .standing import Standing, stand
+
+MOST_FRAMES: Final = 100_000
+"""A journey of more is a slip of the hand: over an hour at 24 frames a second."""
+LAST_FRAME: Final = 1_048_574
+"""The last frame that Blender knows; the first is as far below zero."""
+
+_ROUTE_SAMPLES: Final = 257
+_QUICKLY: Final = 12_000
+"""Bones times frames up to which it is soon done to look between frames, too."""
+_SAMPLES: Final = 40
+"""Places per arm length at which a route's height over the ground is looked at."""
+_ROOM: Final = 0.5
+"""Arm lengths that a body swims higher than it walks at least: room for its arms …"""
+_SETTLING: Final = 0.1
+"""… and within which it comes down to that."""
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """Where a motion goes, and when."""
+
+    route: Route
+    travel: TravelSettings
+    frames: Floats
+    """(frames,) whole numbers."""
+    times: Floats
+    """(frames,) share of the journey's time, 0…1."""
+    seconds: float
+    head: tuple[str, ...]
+    """Bones of the mantle, root to tip."""
+    lean: float
+    """Radians from the body's +Z back to the way along which it swims as it lies."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionPlan:
+    """A motion, ready to be computed."""
+
+    job: MotionJob
+    segments: Segments
+    schedule: Schedule
+    pace: Pace
+    mantle: tuple[str, ...]
+    """Bones that are stretched out, none in a walk."""
+    mantle_rotations: Floats
+    """(bones, 4) how, the same at every frame."""
+    breath: Sequence[Channel]
+    """Of the mantle."""
+    warnings: tuple[str, ...]
+
+    @property
+    def first(self) -> Gait:
+        """The gait that the motion begins with."""
+        return self.segments.gaits[0]
+
+    @property
+    def standing(self) -> list[Standing]:
+        """What holds the ground, of every gait that does."""
+        return [gait.standing for gait in self.segments.gaits if gait.standing is not None]
+
+    @property
+    def can_show_contacts(self) -> bool:
+        """Whether there are contacts with the ground, at places that stay."""
+        return self.first.standing is not None and not self.job.in_place
+
+    @property
+    def keeps_contacts(self) -> bool:
+        """Whether what the artist wants of contacts is kept as soon as the motion is made: where
+        the gait changes, that is done only when contacts are shown.
+        """
+        return self.can_show_contacts and self.segments.transitions is None
+
+    @property
+    def height(self) -> float:
+        """Metres from the route to the body's centre."""
+        standing = self.first.standing
+        return standing.line.clearance if standing is not None else self.first.height
+
+    @cached_property
+    def subframe_sampled(self) -> bool:
+        """Whether the motion is worked out half way between frames, too: a cycle has so few frames
+        that its keys have to keep to that. What is reached for is known on frames alone.
+        """
+        if not (self.standing or self.segments.transitions) or self.job.reaching is not None:
+            return False
+        affordable = len(self.schedule.frames) * len(self.first.poser.bones) <= _QUICKLY
+        return self.pace.hurried and (affordable or not self.job.live)
+
+    @property
+    def stride(self) -> int:
+        """At every how many moments that are worked out there is a frame."""
+        return 2 if self.subframe_sampled else 1
+
+    @property
+    def tolerances(self) -> Tolerances | None:
+        """How far few keys may be off, in the armature's units; none for a key on every frame."""
+        asked, length = self.job.tolerances, self.first.poser.arm_length
+        if asked is None or self.job.live:
+            return None
+        return replace(asked, distance=asked.distance * length, held=asked.held * length)
+
+
+def schedule(job: MotionJob) -> Schedule:
+    """Where a motion goes and when, which is soon known: what is reached for is read on its frames.
+
+    Raises:
+        SettingsError: the motion has no frames, or too many; a loop has no cycle.
+    """
+    creature, first = job.creature, job.gaits[0]
+    head = find_mantle(creature.skeleton, creature.listed or creature.bones, creature.body)
+    lean = job.streamline * lies_back(creature.skeleton, head, creature.body)
+    travel = _travel(job, first, lean)
+    route = job.route or route_in_place(travel.stride, job.cycles)
+    if first.settings.gait.on_ground and job.ground is not None and any(job.ground.rest):
+        start, end = (job.ground.rest_within * travel.stride * each for each in job.ground.rest)
+        travel = unhurried(travel, route.length, start=start, end=end)
+    seconds, frames, times = _timing(job, route, travel)
+    return Schedule(route, travel, frames, times, seconds, head, lean)
+
+
+def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
+    """Plan a motion, in steps that yield the share that is done.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    when = schedule(job)
+    route, lean = when.route, when.lean
+    breath = _breath(job, when.head[-1] if when.head else "", when.times * when.seconds)
+    plane = None
+    if isinstance(job.changes, ChangesByHeight):
+        plane = float(route.position(np.linspace(0.0, 1.0, _ROUTE_SAMPLES))[:, 2].min())
+    changes = bool(job.changes) and not job.in_place
+    gaits: list[Gait] = []
+    for number, each in enumerate(job.gaits if changes else job.gaits[:1]):
+        poser = _poser(job, each, lean)
+        yield 0.5 * (number + 0.2) / len(job.gaits)
+        gaits.append(_gait(job, each, poser, route, lean=lean, plane=plane))
+        yield 0.5 * (number + 1) / len(job.gaits)
+    overrides = job.ground.overrides if job.ground is not None else ()
+    standing = gaits[0].standing
+    if changes:
+        # The pace is the same for all gaits: a stroke's burst is the swimming gait's own.
+        when = replace(when, travel=replace(when.travel, burst=0.0))
+        segments = yield from _with_transitions(job, gaits, route, overrides)
+    else:
+        # Contacts are places in the world; in place the ground goes by.
+        asked = () if job.in_place else overrides
+        walk = standing.walk(standing.line, asked) if standing is not None else None
+        segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones])
+    pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
+    warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
+    if standing is not None or changes:
+        warnings += too_few_frames(job.timing, pace)
+    swims = any(not gait.table.on_ground for gait in gaits)
+    # A mantle that lies flat is swum along as it is.
+    mantle = when.head if swims and job.streamline > 0.0 and not lean else ()
+    creature = job.creature
+    yield 1.0
+    return MotionPlan(
+        job=job,
+        segments=segments,
+        schedule=when,
+        pace=pace,
+        mantle=mantle,
+        mantle_rotations=stretch_mantle(creature.skeleton, mantle, creature.body, job.streamline),
+        breath=breath,
+        warnings=tuple(warnings),
+    )
+
+
+def _arm_length(job: MotionJob) -> float:
+    """Mean length of the arms, metres: what strides are counted in."""
+    creature = job.creature
+    joints = [
+        creature.body.to_body(joint_positions(creature.skeleton, each)) for each in creature.bones
+    ]
+    lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
+    return float(np.array(lengths).mean())
+
+
+def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
+    """What moves the arms in a gait, the cycle of it included."""
+    creature = job.creature
+    settings = replace(gait.settings, swim_lean=0.0 if gait.settings.gait.on_ground else lean)
+    return poser_of(creature.skeleton, creature.arms, creature.body, settings)
+
+
+def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:
+    """How the body travels in a gait."""
+    travel = replace(
+        gait.travel,
+        stride=gait.travel.stride * _arm_length(job) * job.creature.scale,
+        lean=0.0 if gait.settings.gait.on_ground else lean,
+    )
+    return travel_in_place(travel) if job.in_place else travel
+
+
+def _gait(
+    job: MotionJob,
+    gait: GaitJob,
+    poser: GaitPoser,
+    route: Route,
+    *,
+    lean: float,
+    plane: float | None,
+) -> Gait:
+    """One way of moving along this route."""
+    table, travel, standing = gait.settings.gait, _travel(job, gait, lean), None
+    if table.on_ground and job.ground is not None:
+        standing = stand(
+            job.creature,
+            poser,
+            job.ground,
+            route,
+            travel,
+            height=job.height,
+            plane=plane,
+            cyclic=job.in_place,
+        )
+    height = job.height
+    if height is None:
+        height = poser.clearance * job.creature.scale if table.on_ground else 0.0
+    return Gait(table, poser, travel, standing, height)
+
+
+def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float, Floats, Floats]:
+    """Seconds that the journey takes, its frames, and the share of its time at each."""
+    timing = job.timing
+    start, rate = timing.start, timing.rate
+    if timing.kind == "RANGE":
+        length = timing.end - start
+        if length < 1:
+            raise SettingsError(
+                f"The motion ends at frame {timing.end} and starts at {start}.",
+                "Let it end after its start.",
+            )
+        exact = float(length)
+    elif timing.kind == "SPEED":
+        exact = duration(route, travel, timing.speed) * rate
+    else:
+        # At full speed a cycle takes the cycle time; so many cycles make the route.
+        cycles = strides(route, travel)
+        cruising = route.length / (cycles * timing.cycle_time)
+        exact = duration(route, travel, cruising) * rate
+    if job.in_place:
+        exact = whole_frames(exact)
+    if exact > MOST_FRAMES:
+        raise SettingsError(
+            f"The motion would take {exact:,.0f} frames, more than {MOST_FRAMES:,}.",
+            "Shorten the route, or make the body faster.",
+        )
+    # The motion is the same at any frame rate: it ends when it ends, and the frame after that
+    # holds the end. A length that is whole but for rounding does not need that frame.
+    count = max(math.ceil(exact - 1e-4), 1) + 1
+    if start < -LAST_FRAME:
+        raise SettingsError(
+            f"The motion would start at frame {start:,}, before Blender's first.",
+            "Let it start later.",
+        )
+    if start + count - 1 > LAST_FRAME:
+        raise SettingsError(
+            f"The motion would end at frame {start + count - 1:,}, after Blender's last.",
+            "Let it start earlier.",
+        )
+    steps = np.arange(count, dtype=np.float64)
+    return exact / rate, start + steps, np.minimum(steps / exact, 1.0)
+
+
+def _breath(job: MotionJob, mantle: str, times: Floats) -> list[Channel]:
+    """Scale of the mantle's bone, if it is to breathe, at times (frames,) in seconds."""
+    amount = job.breathing.amount
+    if not mantle or amount <= 0.0:
+        return []
+    whole = float(times[-1]) if job.in_place else None
+    scales = breathing_scales(times, amount, breath=job.breathing.seconds, whole=whole)
+    return [job.creature.channels.scale(mantle, scales)]
+
+
+# --- Where the gait changes ----------------------------------------------------------------------
+
+
+def _transitions(job: MotionJob, route: Route, first: Gait) -> tuple[GaitTransition, ...]:
+    """Where the gait changes.
+
+    Raises:
+        SettingsError: two changes overlap, or the route does not change its height.
+    """
+    reach, changes = first.poser.arm_length * job.creature.scale, job.changes
+    if not isinstance(changes, ChangesByHeight):
+        found = [
+            GaitTransition(
+                each.position * route.length - 0.5 * each.length * reach,
+                each.position * route.length + 0.5 * each.length * reach,
+                each.gait,
+            )
+            for each in changes
+        ]
+        return check_transitions(found, route.length)
+    count = int(np.ceil(_SAMPLES * route.length / reach)) + 2
+    distance = np.linspace(0.0, route.length, count)
+    places = route.position(route.parameter_at(distance))
+    floor = np.full(count, places[:, 2].min())
+    if first.standing is not None:
+        floor = first.standing.ground.height(places[:, :2])
+    found = transitions_by_height(
+        distance,
+        places[:, 2] - floor,
+        take_off=changes.height * reach,
+        length=changes.length * reach,
+    )
+    found = [GaitTransition(each.start, each.end, changes.gait * each.way) for each in found]
+    # One that is done before the route begins is no place of it.
+    done = [each for each in found if each.middle < 0.0]
+    return (*done, *check_transitions(found[len(done) :], route.length))
+
+
+def _with_transitions(
+    job: MotionJob, gaits: Sequence[Gait], route: Route, overrides: Sequence[ContactOverride]
+) -> Generator[float, None, Segments]:
+    """Lay all footholds of a motion, and find when each arm goes over."""
+    bones = [len(each) for each in job.creature.bones]
+    changes = _transitions(job, route, gaits[0])
+    lines = [_line(gait, number, changes, route, gaits) for number, gait in enumerate(gaits)]
+    course = Course(lines, changes)
+    asked: list[list[ContactOverride]] = [list(overrides), *([] for _ in gaits[1:])]
+    walks = _walks(gaits, course, asked)
+    yield 0.7
+    found = []
+    for number, change in enumerate(changes):
+        before = changes[number - 1].way if number else 0
+        first = changes[number - 1].middle if number else -np.inf
+        last = changes[number + 1].middle if number + 1 < len(changes) else np.inf
+        over = before, change.way
+        holds = [_holds(walks[each], gaits[each], len(bones), first, last) for each in over]
+        window = transition_windows(change, *([each[0] for each in arms] for arms in holds))
+        dropped = window.dropped_before, window.dropped_after
+        for gait, arms, left_out in zip(over, holds, dropped, strict=True):
+            for arm, (_, cycles) in enumerate(arms):
+                asked[gait].extend(
+                    ContactOverride(arm, int(cycle), removed=True)
+                    for cycle in cycles[left_out[arm]]
+                )
+        found.append(window)
+    return Segments(gaits, _walks(gaits, course, asked), Transitions(changes, found, course), bones)
+
+
+def _line(
+    gait: Gait, number: int, changes: Sequence[GaitTransition], route: Route, gaits: Sequence[Gait]
+) -> Line:
+    """The body's way in one of the gaits."""
+    if gait.standing is not None:
+        return gait.standing.line
+    bearings = bearings_of(route, gait.travel)
+    if gait.table.on_ground:
+        return WalkedLine(route, gait.travel, bearings, gait.height)
+    # The stroke that takes it off the ground, or the first one.
+    start = next((each.middle for each in changes if each.way == number), 0.0)
+    reach = gait.travel.stride / gait.table.stride
+    return SwumLine(
+        route,
+        gait.travel,
+        bearings,
+        start,
+        height=gait.height,
+        floor=next((each.standing.line for each in gaits if each.standing is not None), None),
+        room=_ROOM * reach,
+        softness=_SETTLING * reach,
+    )
+
+
+def _walks(
+    gaits: Sequence[Gait], course: Course, overrides: Sequence[Sequence[ContactOverride]]
+) -> list[GroundedWalk | None]:
+    return [
+        gait.standing.walk(course.line(number), overrides[number]) if gait.standing else None
+        for number, gait in enumerate(gaits)
+    ]
+
+
+def _holds(
+    walk: GroundedWalk | None, gait: Gait, arms: int, first: float, last: float
+) -> list[tuple[tuple[Floats, Floats], np.ndarray]]:
+    """For each arm, where its holds begin and end between two places, and their cycles."""
+    found: list[list[tuple[float, float, int]]] = [[] for _ in range(arms)]
+    unit = gait.travel.stride / CYCLE
+    for each in walk.footholds() if walk is not None else ():
+        on, off = unit * each.touch_down, unit * each.lift_off
+        if first < 0.5 * (on + off) <= last:
+            found[each.arm].append((on, off, each.cycle))
+    result = []
+    for holds in found:
+        table = np.array(sorted(holds), dtype=np.float64).reshape(len(holds), 3)
+        result.append(((table[:, 0], table[:, 1]), table[:, 2].astype(int)))
+    return result
+
+
+def shown_contacts(plan: MotionPlan) -> list[ShownContact]:
+    """The contacts with the ground of the gait that a motion begins with, for markers."""
+    (walk, *_), standing, when = plan.segments.walks, plan.first.standing, plan.schedule
+    assert walk is not None
+    assert standing is not None
+    if plan.segments.transitions is not None:
+        # All of them, as if the gait never changed.
+        walk = standing.walk(standing.line, standing.job.overrides)
+    travel = plan_travel(when.route, when.travel, when.times, standing.bearings)
+    # The first of equal phases, where the body stands still, is as good as any.
+    phases, first = np.unique(travel.phase, return_index=True)
+    contacts = []
+    for each in walk.footholds():
+        on, off = np.interp([each.touch_down, each.lift_off], phases, when.frames[first])
+        contacts.append(
+            ShownContact(
+                plan.job.creature.arms[each.arm].name,
+                each.cycle,
+                each.position,
+                each.heading,
+                frame_on=float(on),
+                frame_off=float(off),
+                cycle_frames=float(off - on) / each.lasts,
+            )
+        )
+    return contacts

@@ -1,0 +1,477 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A motion's segments: one for each gait along its way, and how arms go over from one to the next.
+
+A motion with one gait all the way is one segment. Where the gait changes, each arm is worked out in
+both, goes over between two of its holds, and comes to rest in either meanwhile.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from ...easing import least_jerk
+from ...rotations import Floats, rotate
+from ..clearance import afloat
+from ..gait import CYCLE, GaitPoser, GaitTable
+from ..ground import GroundedPoses, GroundedWalk, Raise, SwingSmoothing, frames_around
+from ..path import (
+    Course,
+    GaitTransition,
+    SwumLine,
+    Travel,
+    TravelSettings,
+    Windows,
+    bearings_of,
+    blend_motions,
+    slowing,
+    travel_at,
+    way_weights,
+)
+from ..rig import ArmMotion
+from .standing import Standing
+
+_CALM: Final = 0.2
+"""Share of a change within which an arm that goes over comes to rest."""
+_APART: Final = 1_000_000
+"""Between the numbers of one gait's cycles and of the next's: each has cycles of its own."""
+_UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Gait:
+    """One way of moving along this motion's route."""
+
+    table: GaitTable
+    poser: GaitPoser
+    travel: TravelSettings
+    standing: Standing | None
+    """What holds the ground, none for a swim."""
+    height: float
+    """Metres from the route to the body's centre, where nothing holds the ground."""
+
+
+@dataclass(frozen=True, eq=False)
+class Transitions:
+    """Where the gait changes, and when each arm goes over."""
+
+    changes: Sequence[GaitTransition]
+    windows: Sequence[Windows]
+    course: Course
+    """The body's way through all of them."""
+
+
+@dataclass(eq=False)
+class SegmentMotion:
+    """The arms on one segment, at all moments of the motion."""
+
+    arms: ArmMotion
+    shapes: list[list[Floats]] = field(default_factory=list[list[Floats]])
+    """Of each portion, for each build of its walk, ``GroundedPoses.shapes``; kept only where the
+    gait never changes."""
+    evened: list[Floats] = field(default_factory=list[Floats])
+    """For each build (segments, 3, moments, arms): ``GroundedPoses.evened``."""
+    joints: list[list[Floats]] = field(default_factory=list[list[Floats]])
+    """Of each portion, for each arm (moments, joints, 3), world; kept likewise."""
+
+    def copy(self) -> SegmentMotion:
+        """The same, whose poses may be changed."""
+        return SegmentMotion(self.arms.copy(), evened=self.evened)
+
+    def keep(self, stood: GroundedPoses, walk: GroundedWalk) -> None:
+        """Keep what raising arms asks for, of moments that follow those before."""
+        self.shapes.append(list(stood.shapes))
+        self.joints.append(walk.by_arm(stood.joints))
+
+    def shapes_at(self, chosen: np.ndarray) -> tuple[Floats, ...] | None:
+        """What is kept of some moments, none where nothing is."""
+        if not self.shapes:
+            return None
+        if len(self.shapes) > 1:
+            self.shapes = [
+                [np.concatenate(each, axis=2) for each in zip(*self.shapes, strict=True)]
+            ]
+        return tuple(each[:, :, chosen] for each in self.shapes[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """All segments of a motion, ready to be worked out."""
+
+    gaits: Sequence[Gait]
+    walks: Sequence[GroundedWalk | None]
+    """For each gait that holds the ground, its walk along the whole way."""
+    transitions: Transitions | None
+    """None for one gait all the way."""
+    bones: Sequence[int]
+    """How many bones each arm has."""
+
+    @property
+    def changes(self) -> Sequence[GaitTransition]:
+        """From each segment to the next."""
+        return self.transitions.changes if self.transitions is not None else ()
+
+    @property
+    def count(self) -> int:
+        """Number of segments."""
+        return len(self.changes) + 1
+
+    def gait_of(self, segment: int) -> int:
+        """The gait before the first change, and then the one after each."""
+        return self.changes[segment - 1].way if segment else 0
+
+    @cached_property
+    def bones_of(self) -> list[slice]:
+        """Which bones of all arms' are those of each."""
+        ends = np.cumsum([0, *self.bones]).tolist()
+        return [slice(start, end) for start, end in pairwise(ends)]
+
+    def places(self, travel: Travel) -> tuple[Floats, Floats]:
+        """Centres (moments, 3) and orientations (moments, 4) of the body, world."""
+        gait = self.gaits[0]
+        if self.transitions is not None:
+            return self.transitions.course.at(travel.distance)
+        if gait.standing is not None:
+            return gait.standing.place(travel)
+        up = rotate(travel.rotations, _UP) if gait.table.on_ground else _UP
+        return travel.positions + gait.height * up, travel.rotations
+
+    def swimming(self, distance: Floats) -> Floats | None:
+        """How far (moments,) the body swims at distances (moments,), 0…1; none for one gait."""
+        if self.transitions is None:
+            return None
+        weights = way_weights(self.changes, len(self.gaits), distance)
+        return weights[:, [not gait.table.on_ground for gait in self.gaits]].sum(axis=1)
+
+    def afloat(self, distance: Floats) -> Floats | None:
+        """How far arms (moments, arms) are to be kept off a ground that their gait knows not."""
+        if self.transitions is None:
+            return None
+        swims = [self.walks[self.gait_of(segment)] is None for segment in range(self.count)]
+        shares = [self.shares(change, distance) for change in range(len(self.changes))]
+        # Of a motion on which the gait never changes, one number stands for all.
+        whole = np.broadcast_to(afloat(swims, shares), (len(distance), len(self.bones)))
+        return whole if whole.any() else None
+
+    def shares(self, change: int, distance: Floats) -> Floats:
+        """How far each arm (moments, arms) has gone over at a change."""
+        assert self.transitions is not None
+        found = self.transitions.windows[change]
+        return least_jerk((distance[:, None] - found.start) / (found.end - found.start))
+
+    def within(self, segment: int, distance: Floats) -> np.ndarray:
+        """At which distances (moments,) any arm goes this way."""
+        if self.transitions is None:
+            return np.ones(len(distance), dtype=bool)
+        windows = self.transitions.windows
+        begin = float(windows[segment - 1].start.min()) if segment else -np.inf
+        end = float(windows[segment].end.max()) if segment < len(windows) else np.inf
+        return (distance >= begin) & (distance <= end)
+
+    def travel_of(self, number: int, distance: Floats) -> Travel:
+        """The body at some distances as one of the gaits has it, where the gait changes."""
+        assert self.transitions is not None
+        gait, line = self.gaits[number], self.transitions.course.lines[number]
+        if isinstance(line, SwumLine):
+            return line.travel(distance)
+        phase = CYCLE * distance / gait.travel.stride
+        bearings = gait.standing.bearings if gait.standing else bearings_of(line.route, gait.travel)
+        return travel_at(line.route, gait.travel, bearings, distance, phase)
+
+    def compute(
+        self,
+        travel: Travel,
+        places: tuple[Floats, Floats],
+        step: int,
+        frames_per_metre: float,
+        *,
+        cyclic: bool,
+    ) -> Iterator[SegmentedMotion | float]:
+        """Yield the share that is done, and in the end the arms.
+
+        Args:
+            travel: the body's, at all moments.
+            places: centres (moments, 3) and orientations (moments, 4) of the body.
+            step: moments to be worked on at a time.
+            frames_per_metre: moments, on the way.
+            cyclic: whether the last moment is the first again.
+        """
+        motion = SegmentedMotion(self, travel, places)
+        for segment in range(self.count):
+            part = np.flatnonzero(self.within(segment, travel.distance))
+            gait = self.gaits[self.gait_of(segment)]
+            smoothing = SwingSmoothing.over(
+                gait.poser.settings.smoothing_cycles, frames_per_metre * gait.travel.stride
+            )
+            made = SegmentMotion(ArmMotion.at_rest(len(travel.distance), self.bones))
+            motion.segments.append(made)
+            for start in range(0, len(part), step):
+                chosen = slice(start, min(start + step, len(part)))
+                motion.pose(segment, part, chosen, smoothing, cyclic=cyclic)
+                yield 0.9 * (segment + start / max(len(part), 1)) / self.count
+            motion.calm(segment, np.arange(len(travel.distance)), made.arms)
+        yield motion
+
+
+@dataclass(frozen=True, eq=False)
+class SegmentedMotion:
+    """The arms on all segments of a motion."""
+
+    plan: Segments
+    travel: Travel
+    """The body's, at all moments."""
+    places: tuple[Floats, Floats]
+    """Centres (moments, 3) and orientations (moments, 4) of the body."""
+    segments: list[SegmentMotion] = field(default_factory=list[SegmentMotion])
+
+    @cached_property
+    def arms(self) -> ArmMotion:
+        """The arms, on whichever segment they are."""
+        return self._joined([each.arms for each in self.segments])
+
+    @property
+    def joints(self) -> list[Floats] | None:
+        """Of each arm (moments, joints, 3), world; none where that is not known."""
+        (first, *more) = self.segments
+        if more or not first.joints:
+            return None
+        return [np.concatenate(each) for each in zip(*first.joints, strict=True)]
+
+    def pose(
+        self,
+        segment: int,
+        moments: np.ndarray,
+        part: slice,
+        smoothing: SwingSmoothing | None,
+        *,
+        cyclic: bool,
+    ) -> None:
+        """Pose the arms at a part of the moments of a segment.
+
+        Args:
+            segment: which.
+            moments: (n,) those of the segment.
+            part: which of them.
+            smoothing: how swings are evened out over time, none for each moment by itself.
+            cyclic: whether the last moment is the first again.
+        """
+        plan, made, chosen = self.plan, self.segments[segment], moments[part]
+        number = plan.gait_of(segment)
+        walk, arms = plan.walks[number], made.arms
+        if walk is None:
+            travel = self._travel(number, chosen)
+            posed = plan.gaits[number].poser.pose(travel.phase, travel.turn)
+            arms.rotations[chosen] = posed.rotations
+            arms.misses[chosen] = posed.misses.max(axis=2)
+            return
+        around, own = frames_around(
+            part, smoothing.reach if smoothing else 0, len(moments), cyclic=cyclic
+        )
+        wide = moments[around]
+        travel = self._travel(number, wide)
+        where = self.places[0][wide], self.places[1][wide]
+        stood = walk.pose(travel.phase, travel.turn, *where, smoothing=smoothing).part(own)
+        arms.rotations[chosen], arms.strains[chosen] = stood.rotations, stood.strains
+        arms.late[chosen] = stood.misses
+        arms.cycles[chosen] = stood.cycles + _APART * number
+        for arm, rests in zip(arms.in_contact, walk.by_arm(stood.in_contact), strict=True):
+            arm[chosen] = rests
+        if not made.evened:
+            count = len(arms.late)
+            made.evened.extend(
+                np.zeros((*each.shape[:2], count, each.shape[3])) for each in stood.evened
+            )
+        for whole, each in zip(made.evened, stood.evened, strict=True):
+            whole[:, :, chosen] = each
+        if plan.transitions is None:
+            made.keep(stood, walk)
+
+    def _travel(self, number: int, chosen: np.ndarray) -> Travel:
+        """The body at some moments as one of the gaits has it."""
+        if self.plan.transitions is None:
+            return self.travel.at(chosen)
+        return self.plan.travel_of(number, self.travel.distance[chosen])
+
+    def calm(
+        self, segment: int, moments: np.ndarray, arms: ArmMotion, lift: Floats | None = None
+    ) -> None:
+        """Let arms that are about to go over, or have just done so, come to rest in their gait.
+
+        The body turns meanwhile as no walking body does: what an arm on the ground would make of
+        that is wild. So an arm goes over from the pose in which it let go.
+
+        Args:
+            segment: which.
+            moments: (n,) which are looked at.
+            arms: the arms on this segment; changed in place.
+            lift: (n, arms) arm lengths by which arms are to be higher, and nothing happens to the
+                others; none for all of them as high as they have to be.
+        """
+        plan, number = self.plan, self.plan.gait_of(segment)
+        walk = plan.walks[number]
+        if walk is None or plan.transitions is None:
+            return
+        for change, leaving in ((segment, True), (segment - 1, False)):
+            if not 0 <= change < len(plan.changes):
+                continue
+            asked, here, higher = self._stops(change, moments, lift, leaving=leaving)
+            if not len(here):
+                continue
+            raised = None
+            if lift is not None:
+                raised = Raise(np.zeros((len(here), len(plan.bones))))
+                for arm, _, _, part in asked:
+                    raised.lift[part, arm] = higher[part]
+            travel = plan.travel_of(number, here)
+            places = plan.transitions.course.at(here)
+            stood = walk.pose(travel.phase, travel.turn, *places, raised)
+            for arm, chosen, again, part in asked:
+                bones = plan.bones_of[arm]
+                arms.rotations[chosen, bones] = stood.rotations[part, bones][again]
+                arms.strains[chosen, bones] = stood.strains[part, bones][again]
+                arms.late[chosen, arm] = 0.0
+
+    def _stops(
+        self, change: int, moments: np.ndarray, lift: Floats | None, *, leaving: bool
+    ) -> tuple[list[tuple[int, np.ndarray, np.ndarray, slice]], Floats, Floats]:
+        """Where arms that go over at a change come to rest.
+
+        Returns:
+            For each arm, which of all moments it does so at, which of its own stops that is, and
+            where these are among all; the distances of all stops, and how much higher they are.
+        """
+        transitions = self.plan.transitions
+        assert transitions is not None
+        window, distance = transitions.windows[change], self.travel.distance
+        within = _CALM * (transitions.changes[change].end - transitions.changes[change].start)
+        asked: list[tuple[int, np.ndarray, np.ndarray, slice]] = []
+        stops: list[Floats] = []
+        for arm in range(len(self.plan.bones)):
+            start, end = window.start[arm], window.end[arm]
+            inside = (distance[moments] > start) & (distance[moments] < end)
+            if lift is not None:
+                inside &= lift[:, arm] > 0.0
+            own = np.flatnonzero(inside)
+            higher = np.zeros(len(own)) if lift is None else lift[own, arm]
+            here = distance[moments[own]]
+            if leaving:
+                here = start + slowing(here - start, within)
+            else:
+                here = end - slowing(end - here, within)
+            # At rest it is in the same pose from moment to moment.
+            both = np.stack([here, higher], axis=1)
+            single, again = np.unique(both, axis=0, return_inverse=True)
+            count = sum(len(each) for each in stops)
+            stops.append(single)
+            part = slice(count, count + len(single))
+            asked.append((arm, moments[own], again.reshape(-1), part))
+        here, higher = np.concatenate(stops).T
+        return asked, here, higher
+
+    def higher(self, chosen: np.ndarray, lift: Floats) -> tuple[ArmMotion, list[Floats] | None]:
+        """Some moments anew, with arms that are higher.
+
+        Args:
+            chosen: (n,) moments.
+            lift: (n, arms) arm lengths by which arms are to be higher than they have to be.
+
+        Returns:
+            The arms there, of which those that are not raised count for nothing where the gait
+            never changes; and, where they are known, joints of the raised ones by arm.
+        """
+        if self.plan.transitions is None:
+            return self._higher_on_one(chosen, lift)
+        again = [self._again(number, chosen, lift) for number in range(len(self.segments))]
+        # All moments, so that bones turn the same way round from one to the next as they did.
+        arms = self._joined(again)
+        return _rows(arms, chosen), None
+
+    def _higher_on_one(
+        self, chosen: np.ndarray, lift: Floats
+    ) -> tuple[ArmMotion, list[Floats] | None]:
+        (made,), (walk,) = self.segments, self.plan.walks
+        assert walk is not None
+        evened = tuple(each[:, :, chosen] for each in made.evened)
+        raised = Raise(lift, made.shapes_at(chosen), evened)
+        travel, places = self.travel.at(chosen), (self.places[0][chosen], self.places[1][chosen])
+        stood = walk.pose(travel.phase, travel.turn, *places, raised)
+        arms = _rows(made.arms, chosen)
+        arms.rotations, arms.strains = stood.rotations, stood.strains
+        arms.late[:, raised.arms] = stood.misses[:, raised.arms]
+        return arms, walk.by_arm(stood.joints, raised)
+
+    def _again(self, segment: int, chosen: np.ndarray, lift: Floats) -> ArmMotion:
+        """The arms on one segment, higher at some moments."""
+        plan, distance, before = self.plan, self.travel.distance, self.segments[segment]
+        number = plan.gait_of(segment)
+        walk, inside = plan.walks[number], plan.within(segment, distance[chosen])
+        if walk is None or not np.any(lift[inside]):
+            return before.arms
+        arms, moments = before.arms.copy(), chosen[inside]
+        raised = Raise(lift[inside], evened=tuple(each[:, :, moments] for each in before.evened))
+        travel = plan.travel_of(number, distance[moments])
+        places = self.places[0][moments], self.places[1][moments]
+        stood = walk.pose(travel.phase, travel.turn, *places, raised)
+        for arm in raised.arms:
+            bones, higher = plan.bones_of[arm], raised.lift[:, arm] > 0.0
+            own = moments[higher]
+            arms.rotations[own, bones] = stood.rotations[higher, bones]
+            arms.strains[own, bones] = stood.strains[higher, bones]
+            arms.late[own, arm] = stood.misses[higher, arm]
+        self.calm(segment, chosen, arms, lift)
+        return arms
+
+    def _joined(self, segments: Sequence[ArmMotion]) -> ArmMotion:
+        """The whole motion of the arms on each of its segments."""
+        result = segments[0]
+        for change, segment in enumerate(segments[1:]):
+            shares = self.plan.shares(change, self.travel.distance)
+            result = _over(result, segment, shares, self.plan.bones)
+        return result
+
+
+def _over(first: ArmMotion, second: ArmMotion, shares: Floats, bones: Sequence[int]) -> ArmMotion:
+    """Arms that go over from one segment to the next by shares (moments, arms)."""
+    per_bone = np.repeat(shares, bones, axis=1)
+    over, going = per_bone > 0.0, (per_bone > 0.0) & (per_bone < 1.0)
+    rotations = np.where(over[..., None], second.rotations, first.rotations)
+    part = np.flatnonzero(np.any(going, axis=1))
+    if len(part):
+        inside = slice(int(part[0]), int(part[-1]) + 1)
+        turned = blend_motions(first.rotations[inside], second.rotations[inside], per_bone[inside])
+        rotations[inside] = np.where(going[inside][..., None], turned, rotations[inside])
+    # On the way from one to the other an arm has no place of its own to be at.
+    late, misses = (
+        np.where(shares >= 1.0, there, np.where(shares <= 0.0, here, 0.0))
+        for here, there in ((first.late, second.late), (first.misses, second.misses))
+    )
+    return ArmMotion(
+        rotations,
+        first.strains + per_bone * (second.strains - first.strains),
+        late,
+        misses,
+        [
+            np.where(share >= 1.0, there, here & (share <= 0.0))
+            for share, here, there in zip(
+                shares.T[..., None], first.in_contact, second.in_contact, strict=True
+            )
+        ],
+        np.where(shares > 0.0, second.cycles, first.cycles),
+    )
+
+
+def _rows(arms: ArmMotion, chosen: np.ndarray) -> ArmMotion:
+    """The same at some moments (n,)."""
+    return ArmMotion(
+        arms.rotations[chosen],
+        arms.strains[chosen],
+        arms.late[chosen],
+        arms.misses[chosen],
+        [each[chosen] for each in arms.in_contact],
+        arms.cycles[chosen],
+    )

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A motion from the settings of an armature, and what a test looks at of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import bpy
+import numpy as np
+
+from octo_motion.core.locomotion.gait import Arm, GaitPoser, GaitTable
+from octo_motion.core.locomotion.ground import GroundedPoses, GroundedWalk
+from octo_motion.core.locomotion.motion import MotionPlan, MotionResult
+from octo_motion.core.locomotion.motion.pipeline import pose
+from octo_motion.core.locomotion.motion.segments import Transitions
+from octo_motion.core.locomotion.motion.standing import Standing
+from octo_motion.core.locomotion.path import Route, Travel, TravelSettings
+from octo_motion.core.locomotion.rig import BodyFrame
+from octo_motion.core.skeleton import Skeleton
+from octo_motion.ui.locomotion import generate_motion
+from octo_motion.ui.locomotion.writing import Shot, Summary
+
+
+@dataclass(frozen=True)
+class Stood:
+    """A walk that holds the ground, with its footholds."""
+
+    standing: Standing
+    walk: GroundedWalk
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.standing, name)
+
+    def pose(self, travel: Travel, part: slice, places: tuple[Any, Any]) -> GroundedPoses:
+        """The arms at some of the frames, each by itself."""
+        where = places[0][part], places[1][part]
+        return self.walk.pose(travel.phase[part], travel.turn[part], *where)
+
+
+class Made:
+    """One motion: prepared, then computed, then written."""
+
+    def __init__(self, shot: Shot) -> None:
+        self.shot = shot
+        self.on_frames_alone = False
+        """Whether it is not worked out between frames, however few they are."""
+
+    def compute(self) -> Iterator[float]:
+        if not self.on_frames_alone:
+            yield from self.shot.compute()
+            return
+        plan = self.shot.plan()
+        plan.__dict__["subframe_sampled"] = False
+        self.shot.result = yield from pose(plan)
+
+    def write(self) -> Summary:
+        return self.shot.write()
+
+    @property
+    def result(self) -> MotionResult:
+        assert self.shot.result is not None
+        return self.shot.result
+
+    @cached_property
+    def plan(self) -> MotionPlan:
+        return self.shot.result.plan if self.shot.result is not None else self.shot.plan()
+
+    @property
+    def standing(self) -> Stood | None:
+        standing, walk = self.plan.first.standing, self.plan.segments.walks[0]
+        return Stood(standing, walk) if standing is not None and walk is not None else None
+
+    @property
+    def rotations(self) -> np.ndarray:
+        return self.result.arms.rotations[:: self.every]
+
+    @property
+    def strains(self) -> np.ndarray:
+        return self.result.arms.strains[:: self.every]
+
+    @property
+    def misses(self) -> np.ndarray:
+        return self.result.arms.misses[:: self.every]
+
+    @property
+    def late(self) -> np.ndarray:
+        return self.result.arms.late[:: self.every]
+
+    @property
+    def in_contact(self) -> list[np.ndarray]:
+        return self.result.arms.in_contact
+
+    @property
+    def arms(self) -> tuple[Arm, ...]:
+        return self.shot.job.creature.arms
+
+    @property
+    def note(self) -> str:
+        return self.shot.note
+
+    @property
+    def skeleton(self) -> Skeleton:
+        return self.shot.job.creature.skeleton
+
+    @property
+    def body(self) -> BodyFrame:
+        return self.shot.job.creature.body
+
+    @property
+    def gait(self) -> GaitTable:
+        return self.shot.job.gaits[0].settings.gait
+
+    @property
+    def scale(self) -> float:
+        return self.shot.job.creature.scale
+
+    @property
+    def generator(self) -> GaitPoser:
+        return self.plan.first.poser
+
+    @property
+    def frames(self) -> np.ndarray:
+        return self.plan.schedule.frames
+
+    @property
+    def times(self) -> np.ndarray:
+        return self.plan.schedule.times
+
+    @property
+    def route(self) -> Route:
+        return self.plan.schedule.route
+
+    @property
+    def travel(self) -> TravelSettings:
+        return self.plan.schedule.travel
+
+    @property
+    def transitions(self) -> Transitions:
+        assert self.plan.segments.transitions is not None
+        return self.plan.segments.transitions
+
+    @property
+    def cycle(self) -> float:
+        return self.plan.pace.mean
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return self.plan.warnings if self.shot.result is None else self.shot.result.warnings
+
+    @property
+    def every(self) -> int:
+        return 2 if self.plan.subframe_sampled else 1
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.plan if self.shot.result is None else self.shot.result, name)
+
+
+def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Made:
+    """Read what a motion needs."""
+    return Made(generate_motion.prepare(armature, context, live=live))
