@@ -963,9 +963,13 @@ def test_a_failure_in_the_middle_cleans_up(
         raise ZeroDivisionError
 
     monkeypatch.setattr(GaitPoser, "shapes", fail)
-    with pytest.raises(ZeroDivisionError):
+
+    def work() -> None:
         while operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}:
             pass
+
+    with pytest.raises(ZeroDivisionError):
+        work()
     assert window.calls[-3:] == CLEAN
     assert len(bpy.data.actions) == 0
 
