@@ -132,6 +132,13 @@ def test_everything_that_a_door_hands_out_is_there_and_named_once(door: Path) ->
     )
     there = {name.rpartition(".")[2] for _, name in imports(door)}
     there |= {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    there |= {
+        each.id
+        for node in tree.body
+        for each in ast.walk(node)
+        if isinstance(each, ast.Name)
+        if isinstance(each.ctx, ast.Store)
+    }
     assert len(set(named)) == len(named)
     assert set(named) <= there
 
