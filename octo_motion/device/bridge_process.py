@@ -157,7 +157,7 @@ class Bridge:
                 self._place(message)
             case Pins():
                 if simulation is not None:
-                    pins = {body: pin > 1 for body, pin in enumerate(message.pinned) if pin}
+                    pins = message.pins()
                     if pins and max(pins) >= len(simulation.session.figure):
                         raise MessageError("a pin on a body that does not exist")
                     simulation.pin(pins)

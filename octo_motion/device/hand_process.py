@@ -2,7 +2,7 @@
 """The process at the devices: reads them, gives force, a thousand times a second, and no more.
 
 No simulation, nothing that waits: looking for devices has a thread of its own. Whoever started it
-is told what the hands do, and tells where the held bodies are.
+is sent what the hands do, and sends where the held bodies are.
 """
 
 from __future__ import annotations
@@ -30,7 +30,6 @@ from .ipc import (
     HeldMessage,
     Hello,
     Listener,
-    LoopTimesMessage,
     Message,
     MessageChannel,
     MessageError,
@@ -47,14 +46,14 @@ log = logging.getLogger(__name__)
 RATE: Final = 1000.0
 """Hz"""
 MOST_POINTERS: Final = 8
-_TELL_EVERY: Final = 0.002
-"""s between two words on where the hands are."""
+_SEND_EVERY: Final = 0.002
+"""s between two messages on where the hands are."""
 _TIMES_EVERY: Final = 1.0
 _LET_GO_SECONDS: Final = 0.2
 """For taking all force away, once whoever started us is gone; a tick is enough, unless the system
 call of a driver does not return."""
 _LOOK_EVERY: Final = 0.1
-"""s between two words to the discovery that it may look for devices."""
+"""s after which the discovery may look for devices again."""
 
 
 class HandLoop:
@@ -71,9 +70,9 @@ class HandLoop:
         self._numbers: dict[str, int] = {}
         self._workspaces: dict[int, Workspace] = {}
         self._corrections: dict[int, Calibration] = {}
-        """By pointer: zeros and ranges that were told or learned."""
+        """By pointer: zeros and ranges that were sent or learned."""
         self._settings = Settings()
-        self._told = self._told_times = self._looked = 0.0
+        self._hands_sent = self._times_sent = self._looked = 0.0
         self._held = False
 
     @property
@@ -82,28 +81,28 @@ class HandLoop:
         return self._pointers.values()
 
     def tick(self, now: float) -> None:
-        """Hear, feel, tell.
+        """Receive, feel, send.
 
         Raises:
             ChannelClosedError: whoever started us is gone.
         """
         held = self._held
         for message in self._channel.receive():
-            self._hear(message, now)
+            self._receive(message, now)
         for number, pointer in list(self._pointers.items()):
             try:
                 pointer.tick(now)
             except DeviceLostError:
                 self._lose(number)
-        self._tell(now)
+        self._send(now)
         self._held = any(each.grab for each in self.pointers)
         if self._held and not held:
-            self._schedule.forget()  # what is told of the clock is told of holding something
+            self._schedule.forget()  # the clock's times are those of holding something
         if not self._held and now - self._looked > _LOOK_EVERY:
             self._looked = now
             self._look()
 
-    def _hear(self, message: Message, now: float) -> None:
+    def _receive(self, message: Message, now: float) -> None:
         match message:
             case HeldMessage():
                 pointer = self._pointers.get(message.pointer)
@@ -176,10 +175,10 @@ class HandLoop:
         for pointer in self.pointers:
             pointer.use(settings)
 
-    def _tell(self, now: float) -> None:
-        due = now - self._told > _TELL_EVERY - 0.5 * self._period
+    def _send(self, now: float) -> None:
+        due = now - self._hands_sent > _SEND_EVERY - 0.5 * self._period
         if due:
-            self._told = now
+            self._hands_sent = now
         for pointer in self.pointers:
             for index, pressed in pointer.presses:
                 self._channel.send(Button(pointer.number, index, pressed))
@@ -193,12 +192,9 @@ class HandLoop:
                     CalibrationMessage.of(pointer.number, learner.so_far, learner.phase),
                     droppable=True,
                 )
-        if now - self._told_times > _TIMES_EVERY:
-            self._told_times = now
-            times = self._schedule.times()
-            self._channel.send(
-                LoopTimesMessage(times.rate, times.late, times.computing, times.missed)
-            )
+        if now - self._times_sent > _TIMES_EVERY:
+            self._times_sent = now
+            self._channel.send(self._schedule.times())
 
     def _look(self) -> None:
         for driver in self._discovery.look():
@@ -215,7 +211,7 @@ class HandLoop:
             driver.close()
             return
         if number in self._pointers:  # the same program, and another device
-            self._say_device(self._pointers[number], present=False)
+            self._send_device(self._pointers[number], present=False)
         pointer = Pointer(number, driver, self._period, self._settings)
         if number in self._corrections:
             pointer.correct(self._corrections[number])
@@ -223,7 +219,7 @@ class HandLoop:
             pointer.place(self._workspaces[number])
         self._pointers[number] = pointer
         log.info("Found: %s", who.name)
-        self._say_device(pointer, present=True)
+        self._send_device(pointer, present=True)
 
     def _number_for(self, identity: str) -> int | None:
         """The pointer's number: the one that the device had before, or one that is free."""
@@ -247,9 +243,9 @@ class HandLoop:
         pointer.close()
         self._discovery.lost(pointer.driver.description.identity)
         log.info("Gone: %s", pointer.driver.description.name)
-        self._say_device(pointer, present=False)
+        self._send_device(pointer, present=False)
 
-    def _say_device(self, pointer: Pointer, *, present: bool) -> None:
+    def _send_device(self, pointer: Pointer, *, present: bool) -> None:
         who = pointer.driver.description
         force = torque = 0.0
         if who.dynamics is not None:

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector
+from octo_motion.device.calibration import NONE, corrected
 from octo_motion.device.driver import DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
@@ -26,6 +27,7 @@ from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.client import Client, ClientState
 from octo_motion.device.ipc.message_channel import Listener, MessageChannel, connect
+from octo_motion.device.response import Response
 from octo_motion.device.sources.discovery import Discovery, Sources
 from tests.core.puppets import chain, posed, soft
 from tests.device import firmware, uhid
@@ -128,11 +130,12 @@ def test_space_mouse_is_found_moved_unplugged_and_plugged_in_again(
     def pushed() -> bool:
         device.report(struct.pack("<B3h", 1, 0, 0, -350))
         sample = driver.read()
-        return sample is not None and sample.velocity[2] > 0.0 and sample.buttons == 1
+        return bool(sample and sample.push and sample.push[2] > 0.0 and sample.buttons == 1)
 
     wait_for(pushed, "the push arrives")
     sample = driver.read()
     assert sample
+    sample = corrected(sample, Kind.RATE, NONE, Response())
     assert sample.velocity == pytest.approx((0.0, 0.0, 0.4))
     assert sample.angular_velocity == pytest.approx((2.0, 0.0, 0.0))
 

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How well a loop keeps time: periods and computing times, counted by size."""
+"""Durations counted by size: how well a loop keeps time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 _RANGES: Final = ((0.0, 1e-3, 1e-6), (1e-3, 1e-2, 1e-5), (1e-2, 5e-2, 1e-4))
@@ -62,17 +61,3 @@ def _upper_edge(index: int) -> float:
     place = 2 if index >= _FIRSTS[2] else 1 if index >= _FIRSTS[1] else 0
     start, _, width = _RANGES[place]
     return start + (index - _FIRSTS[place] + 1) * width
-
-
-@dataclass(frozen=True)
-class LoopTimes:
-    """What a loop's clock says of it."""
-
-    rate: float
-    """Hz, on average."""
-    late: Percentiles
-    """By how much the time from one tick to the next differed from the period."""
-    computing: Percentiles
-    """From a tick's begin to its end."""
-    missed: int
-    """Ticks left out since the one before took too long."""

@@ -36,7 +36,7 @@ from .safety import ForceLimits, Shaper
 _FULL_PUSH: Final = 0.1
 """s: a rate device that has not been read for so long stands still."""
 _GIVE_UP: Final = 0.25
-"""s of ticks without a word from the simulation, after which the hand has let go for good."""
+"""s of ticks without a message from the simulation, after which the hand has let go for good."""
 MOST_HOLDS: Final = 0.1
 """s for which a local model is trusted at most, however long the simulation's steps take."""
 _LEAP: Final = 0.02
@@ -70,7 +70,7 @@ class Pointer:
     grab: int = 0
     """Number of the grab that is wanted; 0: none."""
     presses: list[tuple[int, bool]] = field(default_factory=list[tuple[int, bool]])
-    """Buttons pressed and let go since they were last told."""
+    """Buttons pressed and let go, to be sent."""
 
     def __post_init__(self) -> None:
         """Choose the coupling for the device."""
@@ -84,7 +84,7 @@ class Pointer:
         self._turn = _observer(device, turning=True)
         self._model = LocalModel()
         self._answered = 0
-        self._heard = -math.inf
+        self._last_answer = -math.inf
         self._holds = 0.0
         self._silence = 0.0
         self.calibration = NONE
@@ -92,7 +92,7 @@ class Pointer:
         self.calibrator: Calibrator | None = None
         """While the device's zero and range are learned: then it neither points nor grabs."""
         self._grabs = 0
-        self._told_place = False
+        self._placed = False
         self._test_until = -math.inf
         self._last: tuple[Vector, Quaternion] | None = None
         self._ticked = -math.inf
@@ -117,7 +117,7 @@ class Pointer:
         """J that the hand got beyond what it had given."""
         return self._push.given + self._turn.given
 
-    # --- What is told ----------------------------------------------------------------------------
+    # --- What is asked of it ---------------------------------------------------------------------
 
     def use(self, settings: Settings) -> None:
         """Take over settings.
@@ -130,11 +130,11 @@ class Pointer:
 
     def place(self, workspace: Workspace) -> None:
         """Take over where the device's room lies in the scene; lets go, for nothing may jump."""
-        if self._told_place and workspace == self.workspace:
+        if self._placed and workspace == self.workspace:
             return
-        moved = not self._told_place or workspace.origin != self.workspace.origin
+        moved = not self._placed or workspace.origin != self.workspace.origin
         self.workspace = workspace
-        self._told_place = True
+        self._placed = True
         if self._kind is Kind.RATE:
             if moved:
                 self.position, self.orientation = workspace.origin, workspace.orientation
@@ -176,7 +176,7 @@ class Pointer:
             self._model.begin(held)
             self._push.forget()
             self._turn.forget()
-        self._heard = now
+        self._last_answer = now
         self._silence = 0.0
 
     def refuse(self, grab: int) -> None:
@@ -319,7 +319,7 @@ class Pointer:
             *(self.gains, apart, scale(rotate(back, twist), share), drift),
             scale(rotate(back, spin), share),
         )
-        return force, torque, max(age, now - self._heard - self._holds)
+        return force, torque, max(age, now - self._last_answer - self._holds)
 
     def _observe(self) -> None:
         """Account for the force of the last period, over the way that the hand went in it."""

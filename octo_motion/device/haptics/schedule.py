@@ -26,7 +26,8 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from .durations import Histogram, LoopTimes
+from ..ipc import LoopTimesMessage
+from .durations import Histogram
 
 _AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015
 """s before a deadline from which on the loop does not sleep."""
@@ -87,10 +88,10 @@ class Schedule:
         """Say that the tick's work is done."""
         self.computing.add(self._clock() - self._begun)
 
-    def times(self) -> LoopTimes:
+    def times(self) -> LoopTimesMessage:
         """How well the loop has kept time since the start, or since ``forget``."""
         spent = self._clock() - self._started
-        return LoopTimes(
+        return LoopTimesMessage(
             rate=self.late.count / spent if spent > 0.0 else 0.0,
             late=self.late.percentiles(),
             computing=self.computing.percentiles(),

@@ -82,9 +82,9 @@ class Client:
     notices: list[Notice] = field(default_factory=list[Notice])
     """To be shown, then cleared, by the caller."""
     heard: float = 0.0
-    """``time.monotonic`` of the last word."""
+    """``time.monotonic`` of the last message."""
     _placed: int = 0
-    """How often the bridge was told where the puppet is."""
+    """How often the puppet was put into a pose."""
     _child: Child | None = None
     _arguments: tuple[str, ...] = ()
     _python: Path | None = None
@@ -174,7 +174,7 @@ class Client:
         """
         self._pins = dict(pins)
         count = len(self._figure[0]) if self._figure else 0
-        self.send(Pins(tuple(1 + pins[body] if body in pins else 0 for body in range(count))))
+        self.send(Pins.of(pins, count))
 
     def send_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
         """Add or move something solid; None takes it away."""
@@ -203,13 +203,13 @@ class Client:
                 case PointerMessage():
                     self.pointers[message.pointer] = message
                 case DeviceMessage():
-                    self._hear_device(message)
+                    self._take_device(message)
                 case Button():
                     buttons.append(message)
                 case Times():
                     self.times = message
                 case CalibrationMessage():
-                    self._hear_calibration(message)
+                    self._take_calibration(message)
                 case Hello():
                     self.hello = message
                 case Notice():
@@ -222,7 +222,7 @@ class Client:
         """Begin to learn a device's zero and range, finish, or give it up."""
         self.send(Calibrate(pointer, order))
 
-    def _hear_calibration(self, message: CalibrationMessage) -> None:
+    def _take_calibration(self, message: CalibrationMessage) -> None:
         if message.phase in {Phase.REST, Phase.REACH}:
             self.calibrating[message.pointer] = message
             return
@@ -230,7 +230,7 @@ class Client:
         if message.phase == Phase.DONE:
             self.calibrated[message.pointer] = message
 
-    def _hear_device(self, message: DeviceMessage) -> None:
+    def _take_device(self, message: DeviceMessage) -> None:
         if message.present:
             self.devices[message.pointer] = message
         else:
@@ -259,7 +259,7 @@ class Client:
 
     @property
     def silent(self) -> bool:
-        """Whether a bridge that runs has not said a word for long: it hangs, or gave up."""
+        """Whether a bridge that runs has sent nothing for long: it hangs, or gave up."""
         return self.state is ClientState.RUNNING and time.monotonic() - self.heard > _SILENT
 
     @property

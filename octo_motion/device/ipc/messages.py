@@ -63,7 +63,7 @@ class Message:
 
 @dataclass(frozen=True)
 class Hello(Message):
-    """The bridge's first word: who it is, and how well it may keep time."""
+    """The bridge's first message: who it is, and how well it may keep time."""
 
     KIND = 1
     process: Annotated[int, U32]
@@ -161,6 +161,15 @@ class Pins(Message):
     KIND = 5
     pinned: Annotated[tuple[int, ...], Many(U8, 4096)]
     """For each body 0: free, 1: its joint stays in its place, 2: and it does not turn."""
+
+    @classmethod
+    def of(cls, pins: dict[int, bool], count: int) -> Pins:
+        """The message that pins bodies, by number whether firmly, of so many."""
+        return cls(tuple(1 + pins[body] if body in pins else 0 for body in range(count)))
+
+    def pins(self) -> dict[int, bool]:
+        """By body that is pinned, whether its orientation is held as well."""
+        return {body: pin > 1 for body, pin in enumerate(self.pinned) if pin}
 
 
 @dataclass(frozen=True)
@@ -276,16 +285,25 @@ class Button(Message):
 
 
 @dataclass(frozen=True)
-class Times(Message):
-    """Bridge to Blender, once a second: how well time is kept."""
+class LoopTimesMessage(Message):
+    """Loop to bridge, once a second: how well time is kept."""
+
+    KIND = 22
+    rate: Annotated[float, F64]
+    """Hz of the loop at the device, on average."""
+    late: Annotated[tuple[float, ...], Number("d", 4)]
+    """s by which the time between two ticks is off: at 50, 99, 99.9 % and the longest."""
+    computing: Annotated[tuple[float, ...], Number("d", 4)]
+    """s from a tick's begin to its end, likewise."""
+    missed: Annotated[int, U32]
+    """Ticks left out since the one before took too long."""
+
+
+@dataclass(frozen=True)
+class Times(LoopTimesMessage):
+    """Bridge to Blender, once a second: the loop's times, and those of the simulation."""
 
     KIND = 12
-    rate: Annotated[float, F64]
-    """Hz of the loop at the device."""
-    late: Annotated[tuple[float, ...], Number("d", 4)]
-    """s at 50, 99, 99.9 % and the longest."""
-    computing: Annotated[tuple[float, ...], Number("d", 4)]
-    missed: Annotated[int, U32]
     step: Annotated[float, F64]
     """s that a step of the simulation takes to compute."""
     pace: Annotated[float, F64]
@@ -527,7 +545,7 @@ class HeldMessage(Message):
     time: Annotated[float, F64]
     """When this was true, by ``time.perf_counter``."""
     holds: Annotated[float, F64]
-    """s for which the next word is not expected: so long does the local model do instead."""
+    """s for which the next message is not expected: so long does the local model do instead."""
     position: Annotated[Vector, VECTOR]
     orientation: Annotated[Quaternion, QUATERNION]
     velocity: Annotated[Vector, VECTOR]
@@ -544,20 +562,9 @@ class HeldMessage(Message):
         )
 
 
-@dataclass(frozen=True)
-class LoopTimesMessage(Message):
-    """Loop to bridge, once a second."""
-
-    KIND = 22
-    rate: Annotated[float, F64]
-    late: Annotated[tuple[float, ...], Number("d", 4)]
-    computing: Annotated[tuple[float, ...], Number("d", 4)]
-    missed: Annotated[int, U32]
-
-
 def _kinds() -> dict[int, type[Message]]:
     kinds: dict[int, type[Message]] = {}
-    for kind in Message.__subclasses__():
+    for kind in (*Message.__subclasses__(), *LoopTimesMessage.__subclasses__()):
         hints = get_type_hints(kind, include_extras=True)
         kind._names = tuple(each.name for each in fields(kind))  # noqa: SLF001 - ours
         codecs = tuple(get_args(hints[name])[1] for name in kind._names)  # noqa: SLF001

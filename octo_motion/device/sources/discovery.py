@@ -33,7 +33,7 @@ _EVERY: Final = 0.5
 _EVERY_COSTLY: Final = 2.0
 """s, where it is not."""
 _SETTLES: Final = 1.5
-"""s that the system may take to let us read what was just plugged in; then the user is told."""
+"""s that the system may take to let us read what was just plugged in; then it is reported."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Discovery:
         self._simulated = sources.simulated
         self._search = _Search(sources) if sources.hid or sources.haply else None
         self.problems: list[DeviceError] = []
-        """What the user should be told; each once."""
+        """What the user should know; each once."""
 
     def look(self) -> Iterator[Driver]:
         """The devices that have come since the last look, opened."""
@@ -106,7 +106,7 @@ class _Search:
         """By identity, the paths of devices that are open."""
         self._refused: dict[str, float] = {}
         """By identity, since when a device could not be opened."""
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._seen: object = object()
         self._looked = self._looked_for_haply = -_EVERY_COSTLY
         self._asked = threading.Event()
@@ -149,7 +149,7 @@ class _Search:
     def _found(self, identity: str, path: bytes, driver: Driver) -> None:
         self._used[identity] = path
         self._refused.pop(identity, None)
-        self._told.discard(identity)
+        self._reported.discard(identity)
         self.drivers.append(driver)
         if self._closed:  # meanwhile: whoever closed has not seen this one
             with suppress(IndexError, DeviceLostError):
@@ -211,13 +211,13 @@ class _Search:
         self, identity: str, error: DeviceError, now: float, *, at_once: bool = False
     ) -> None:
         since = self._refused.setdefault(identity, now)
-        if identity not in self._told and (at_once or now - since >= _SETTLES):
-            self._told.add(identity)
+        if identity not in self._reported and (at_once or now - since >= _SETTLES):
+            self._reported.add(identity)
             self.problems.append(error)
             log.warning("%s", error)
 
     def _forget_refused(self, there: set[str]) -> None:
-        """Of what was pulled out; plugged in again it is told anew."""
+        """Of what was pulled out; plugged in again it is reported anew."""
         for identity in self._refused.keys() - there:
             del self._refused[identity]
-            self._told.discard(identity)
+            self._reported.discard(identity)
