@@ -284,13 +284,11 @@ def raise_over_ground(
         return result
     # Those that are high enough stay as they are, if they are many.
     chosen = low if len(low) < _MANY * len(below[0]) else slice(None)
-    own, lengths, free, roots = (
-        result[..., chosen],
-        lengths[:, chosen],
-        free[:, chosen],
-        roots[:, chosen],
-    )
-    room, below = room.part(chosen), below[:, chosen]
+    # What is picked out by numbers lies otherwise in memory: slower, and summed in another order.
+    own = np.ascontiguousarray(result[..., chosen])
+    below = np.ascontiguousarray(below[:, chosen])
+    lengths, free, roots = lengths[:, chosen], free[:, chosen], roots[:, chosen]
+    room = room.part(chosen)
     least = (1e-4 * np.max(np.broadcast_to(room.soft, room.needed.shape), axis=0)) ** 2
     loosened, weak = free * lengths, _WEAK * lengths[0] ** 2
     for number in range(iterations):
