@@ -14,8 +14,10 @@ from octo_motion.ui.posing.puppet_session import PuppetSession
 
 
 @pytest.fixture
-def octopus() -> Any:
-    """A small one: four arms of four bones along the axes' diagonals."""
+def octopus(request: pytest.FixtureRequest) -> Any:
+    """The one that the test's module describes as OCTOPUS, else the add-on's, small and bare."""
+    if wanted := getattr(request.module, "OCTOPUS", None):
+        return wanted.make()
     bpy.ops.octo_motion.add_octopus(with_mesh=False, arms=4, joints=4)
     return bpy.context.object
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A small octopus and a route in Blender, for tests of what the artist does with them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import bpy
@@ -47,6 +48,48 @@ def give_route(armature: Any, points: Sequence[Sequence[float]] = ROUTE) -> Any:
     route = add_route_curve("Route", np.array(points), bpy.context.scene.collection)
     armature.octo_motion.locomotion.route = route
     return route
+
+
+@dataclass(frozen=True)
+class Octopus:
+    """What the fixture ``octopus`` makes: a module of tests names its own as ``OCTOPUS``."""
+
+    add_on: bool = False
+    """Whether it is the add-on's, with the arms that are found, or a small one of four arms …"""
+    joints: int = 6
+    """… of so many bones."""
+    with_mesh: bool = True
+    """The add-on's has a skin."""
+    setup: str = ""
+    """Set-up that is loaded before it gets its route."""
+    route: Sequence[Sequence[float]] | Mapping[str, Sequence[float]] | None = None
+    """Control points, or what Add Route is given; none for no route."""
+    frames: int = 0
+    """Length of its motion from frame 1; 0 leaves the timing as it is."""
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    """Settings of locomotion."""
+
+    def make(self) -> Any:
+        """The armature, active."""
+        if self.add_on:
+            click("add_octopus", with_mesh=self.with_mesh)
+            armature: Any = bpy.context.object
+            click("detect_arms")
+        else:
+            armature = make_octopus(joints=self.joints)
+        settings = armature.octo_motion.locomotion
+        if self.setup:
+            bpy.ops.octo_motion.setup_load(name=self.setup)
+        if isinstance(self.route, Mapping):
+            click("add_route", **self.route)
+        elif self.route is not None:
+            give_route(armature, self.route)
+        bpy.context.view_layer.objects.active = armature
+        if self.frames:
+            settings.timing, settings.frame_end = "RANGE", self.frames
+        for name, value in self.settings.items():
+            setattr(settings, name, value)
+        return armature
 
 
 def generate(armature: Any) -> Any:

@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 
 from tests.ui.made import Made, prepare
-from tests.ui.rig import click
+from tests.ui.rig import Octopus
 
-
-@pytest.fixture
-def octopus() -> Any:
-    """The default octopus that crawls along the default route."""
-    click("add_octopus")
-    armature: Any = bpy.context.object
-    click("detect_arms")
-    click("add_route")
-    bpy.context.view_layer.objects.active = armature
-    armature.octo_motion.locomotion.gait = "crawl"
-    return armature
+OCTOPUS = Octopus(add_on=True, route={}, settings={"gait": "crawl"})
+"""The default octopus that crawls along the default route."""
 
 
 def add_bumps(octopus: Any) -> None:

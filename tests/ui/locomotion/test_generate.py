@@ -21,6 +21,7 @@ from octo_motion.ui.modal_job import ModalJob
 from tests.ui.made import prepare
 from tests.ui.rig import (
     ROUTE,
+    Octopus,
     click,
     generate,
     give_route,
@@ -30,15 +31,8 @@ from tests.ui.rig import (
     scene_contents,
 )
 
-
-@pytest.fixture
-def octopus() -> Any:
-    """An octopus with four arms of six bones, a route of about six metres, and 60 frames."""
-    armature = make_octopus()
-    give_route(armature)
-    settings = armature.octo_motion.locomotion
-    settings.timing, settings.frame_end = "RANGE", 60
-    return armature
+OCTOPUS = Octopus(route=ROUTE, frames=60)
+"""Four arms of six bones, one metre long, a route of about six metres."""
 
 
 def settings_of(armature: Any) -> Any:

@@ -23,23 +23,15 @@ from octo_motion.ui.locomotion.settings.contact_overrides import (
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh, make_square
 from tests.ui.made import prepare
-from tests.ui.rig import click, generate, give_route, joints_in_world, keys
+from tests.ui.rig import Octopus, click, generate, give_route, joints_in_world, keys
 
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
 
 
-@pytest.fixture
-def octopus() -> Any:
-    """The default octopus without its skin, a route of some four arm lengths, and 160 frames."""
-    click("add_octopus", with_mesh=False)
-    armature: Any = bpy.context.object
-    click("detect_arms")
-    give_route(armature, WAY)
-    settings = armature.octo_motion.locomotion
-    settings.timing, settings.frame_end = "RANGE", 160
-    # Whether arms keep apart is another matter.
-    settings.tell_overlaps = False
-    return armature
+OCTOPUS = Octopus(
+    add_on=True, with_mesh=False, route=WAY, frames=160, settings={"tell_overlaps": False}
+)
+"""On a route of some four arm lengths. Whether arms keep apart is another matter."""
 
 
 def ground_of(armature: Any) -> Any:

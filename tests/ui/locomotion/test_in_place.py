@@ -12,18 +12,10 @@ from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
 from tests.ui.made import prepare
-from tests.ui.rig import generate, joints_in_world, keys, make_octopus
+from tests.ui.rig import Octopus, generate, joints_in_world, keys
 
-
-@pytest.fixture
-def octopus() -> Any:
-    """An octopus of four arms that moves in place; it has no route."""
-    armature = make_octopus()
-    settings = armature.octo_motion.locomotion
-    settings.travel_on = "NONE"
-    settings.cycle_time = 1.0
-    bpy.context.scene.render.fps = 24
-    return armature
+OCTOPUS = Octopus(settings={"travel_on": "NONE", "cycle_time": 1.0})
+"""It has no route."""
 
 
 def curves(action: Any) -> list[Any]:

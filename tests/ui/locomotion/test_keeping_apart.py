@@ -13,21 +13,14 @@ from octo_motion.ui.locomotion.operators import live
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.bench.apart import add_bumps
 from tests.ui.made import Made, prepare
-from tests.ui.rig import keys
+from tests.ui.rig import Octopus, keys
 
-
-@pytest.fixture
-def octopus() -> Any:
-    """The octopus of the add-on, about to walk a bend in a way that tangles its arms."""
-    operators: Any = bpy.ops.octo_motion
-    operators.add_octopus()
-    armature: Any = bpy.context.object
-    operators.detect_arms()
-    operators.setup_load(name="walk")
-    operators.add_route(
-        b0=(0.0, 0.0, 0.0), b1=(0.0, -0.5, 0.0), b2=(0.3, -0.8, 0.0), b3=(0.8, -0.9, 0.0)
-    )
-    return armature
+OCTOPUS = Octopus(
+    add_on=True,
+    setup="walk",
+    route={"b0": (0, 0, 0), "b1": (0, -0.5, 0), "b2": (0.3, -0.8, 0), "b3": (0.8, -0.9, 0)},
+)
+"""About to walk a bend in a way that tangles its arms."""
 
 
 def computed(armature: Any, *, keep_apart: bool) -> Made:

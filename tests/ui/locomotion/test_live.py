@@ -22,7 +22,7 @@ from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.operators import live
 from tests.blender.test_ground import make_mesh, make_square
 from tests.ui.made import prepare
-from tests.ui.rig import click, generate, give_route, keys, make_octopus
+from tests.ui.rig import ROUTE, Octopus, click, generate, give_route, keys, make_octopus
 from tests.ui.test_panels import Layout
 
 MADE: list[str] = []
@@ -40,17 +40,16 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live, "_make", counting)
 
 
+OCTOPUS = Octopus(route=ROUTE, frames=40)
+
+
 @pytest.fixture
-def octopus() -> Any:
-    """An octopus with four arms that walks for 40 frames, its motion generated and live."""
-    armature = make_octopus()
-    give_route(armature)
-    settings = armature.octo_motion.locomotion
-    settings.timing, settings.frame_end = "RANGE", 40
-    generate(armature)
-    settings.live = True
+def octopus(octopus: Any) -> Any:
+    """The same, its motion generated and live."""
+    generate(octopus)
+    octopus.octo_motion.locomotion.live = True
     settle()
-    return armature
+    return octopus
 
 
 def settings_of(armature: Any) -> Any:

@@ -11,21 +11,15 @@ import pytest
 from octo_motion.core.locomotion.motion import planning
 from tests.ui.locomotion.test_quality_report import WAY, bumpy
 from tests.ui.made import Made, prepare
-from tests.ui.rig import click, give_route, joints_in_world
+from tests.ui.rig import Octopus, joints_in_world
 
 TOLD = "frames for a swing and jumps from pose to pose"
 
 
-@pytest.fixture
-def octopus() -> Any:
-    """The default octopus without its skin, on a route of some four arm lengths."""
-    click("add_octopus", with_mesh=False)
-    armature: Any = bpy.context.object
-    click("detect_arms")
-    give_route(armature, WAY)
-    settings = armature.octo_motion.locomotion
-    settings.timing, settings.frame_end, settings.tell_overlaps = "RANGE", 45, False
-    return armature
+OCTOPUS = Octopus(
+    add_on=True, with_mesh=False, route=WAY, frames=45, settings={"tell_overlaps": False}
+)
+"""On a route of some four arm lengths."""
 
 
 def computed(armature: Any) -> Made:

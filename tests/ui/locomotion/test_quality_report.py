@@ -17,23 +17,15 @@ from octo_motion.core.rotations import rotate
 from octo_motion.ui.locomotion.settings import quality as quality_report
 from tests.blender.test_ground import make_mesh
 from tests.ui.made import Made, prepare
-from tests.ui.rig import click, generate, give_route, joints_in_world, make_octopus
+from tests.ui.rig import Octopus, click, generate, give_route, joints_in_world, make_octopus
 
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
 OF_ARM = 0.01
 """The most that a foot may slip, in arm lengths."""
 
 
-@pytest.fixture
-def octopus() -> Any:
-    """The default octopus without its skin, a route of some four arm lengths: a hurry."""
-    click("add_octopus", with_mesh=False)
-    armature: Any = bpy.context.object
-    click("detect_arms")
-    give_route(armature, WAY)
-    settings = armature.octo_motion.locomotion
-    settings.timing, settings.frame_end = "RANGE", 80
-    return armature
+OCTOPUS = Octopus(add_on=True, with_mesh=False, route=WAY, frames=80)
+"""On a route of some four arm lengths: a hurry."""
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from mathutils import Matrix, Vector
 
 from octo_motion.blender.animation.actions import is_edited
 from tests.core import objects
-from tests.ui.rig import click, generate, give_route, joints_in_world, keys, make_octopus
+from tests.ui.rig import Octopus, click, generate, give_route, joints_in_world, keys
 
 WAY = ((0.0, 0.0, 0.0), (0.0, -0.1, 0.0), (0.0, -0.2, 0.0), (0.0, -0.3, 0.0))
 
@@ -31,14 +31,8 @@ def thing(form: objects.Form | None = None, where: Any = (0.55, -0.6, 0.0)) -> A
     return added
 
 
-@pytest.fixture
-def octopus() -> Any:
-    """An octopus of four arms that walks a little way in 100 frames."""
-    armature = make_octopus(joints=10)
-    give_route(armature, WAY)
-    settings = settings_of(armature)
-    settings.timing, settings.frame_end = "RANGE", 100
-    return armature
+OCTOPUS = Octopus(joints=10, route=WAY, frames=100)
+"""It walks a little way."""
 
 
 def reach(armature: Any, target: Any, **values: Any) -> Any:

@@ -14,12 +14,13 @@ from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion import panels
 from tests.ui.made import prepare
 from tests.ui.rig import (
+    ROUTE,
+    Octopus,
     click,
     generate,
     give_route,
     joints_in_world,
     keys,
-    make_octopus,
     scene_contents,
 )
 from tests.ui.test_panels import Layout
@@ -27,14 +28,8 @@ from tests.ui.test_panels import Layout
 FRAMES = range(1, 61)
 
 
-@pytest.fixture
-def octopus() -> Any:
-    """An octopus with four arms of six bones, one metre long, that walks for 60 frames."""
-    armature = make_octopus()
-    give_route(armature)
-    settings = armature.octo_motion.locomotion
-    settings.timing, settings.frame_end = "RANGE", 60
-    return armature
+OCTOPUS = Octopus(route=ROUTE, frames=60)
+"""Four arms of six bones, one metre long, a route of about six metres."""
 
 
 def settings_of(armature: Any) -> Any:
