@@ -12,7 +12,7 @@ from typing import Any, Final
 import bpy
 
 from ..core.errors import OctoMotionError, SettingsError, WriteError
-from ..ui.locomotion.writing import Summary
+from ..ui.locomotion import Summary
 from .command_line import parse
 from .job_runner import STOPPED, BakeOptions, bake
 from .motion_files import is_motion

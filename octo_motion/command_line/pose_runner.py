@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ..ui.posing.script_player import play_file
+from ..ui.posing import play_file
 from .job_report import ShotSummary
 
 

@@ -18,10 +18,7 @@ from ..blender.scene import add_octopus, add_route_curve, remove_markers
 from ..core.errors import OctoMotionError, RigError, SettingsError, WriteError
 from ..core.locomotion.gait import gait_from_json
 from ..core.locomotion.rig import detect_arms
-from ..ui.locomotion.generate_motion import generate
-from ..ui.locomotion.settings.contact_overrides import once_called, store
-from ..ui.locomotion.settings.properties import locomotion_settings, set_gait
-from ..ui.locomotion.writing import Summary
+from ..ui.locomotion import Summary, generate, locomotion_settings, once_called, set_gait, store
 from .exports import check_export, export
 from .job_report import ShotSummary
 from .motion_files import is_motion

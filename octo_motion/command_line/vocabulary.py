@@ -13,10 +13,7 @@ import bpy
 from ..blender.files import load_gait, read_gait_file
 from ..core.errors import OctoMotionError
 from ..core.locomotion.gait import gait_to_json
-from ..ui.locomotion.settings.changes import ChangeItem
-from ..ui.locomotion.settings.ground import ContactItem
-from ..ui.locomotion.settings.properties import OCTO_MOTION_PG_locomotion
-from ..ui.locomotion.settings.reaches import ReachItem
+from ..ui.locomotion import ChangeItem, ContactItem, OCTO_MOTION_PG_locomotion, ReachItem
 from ..ui.splicing import PARTS, OCTO_MOTION_PG_landmarks, OCTO_MOTION_PG_splicing, SpliceItem
 from .motion_files import check_motion, is_motion
 from .schema import Choice, Kind, Known, Number, Text, flag, point

@@ -15,7 +15,7 @@ from typing import Any, Final
 import bpy
 
 from ..core.errors import OctoMotionError
-from ..ui.locomotion.writing import Summary
+from ..ui.locomotion import Summary
 from .command_line import COMMAND
 from .outputs import remove_staged, write_json
 from .processes import dying_with_parent

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Groups of properties that a library override keeps."""
+"""Groups of properties in a library override."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
+import numpy as np
 
 
 def make_overridable(armature: bpy.types.Object) -> None:
@@ -16,6 +19,14 @@ def make_overridable(armature: bpy.types.Object) -> None:
     override = armature.override_library
     if override is not None and isinstance(override.reference, bpy.types.Object):
         _look_at(override.reference.octo_motion)  # type: ignore[attr-defined]
+
+
+def assign(group: Any, name: str, value: Any) -> None:
+    """Set a property only if it differs: in a library override, what is set no longer follows."""
+    before = getattr(group, name)
+    is_array = isinstance(value, tuple | list | np.ndarray)
+    if list(before) != list(value) if is_array else before != value:
+        setattr(group, name, value)
 
 
 def _look_at(group: bpy.types.PropertyGroup) -> None:

@@ -9,10 +9,9 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.props import PointerProperty
 
-from .locomotion.settings.ground import OCTO_MOTION_PG_contact
-from .locomotion.settings.properties import OCTO_MOTION_PG_locomotion
+from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion
 from .override_groups import make_overridable
-from .posing.properties import OCTO_MOTION_PG_posing
+from .posing import OCTO_MOTION_PG_posing
 from .splicing import OCTO_MOTION_PG_splicing
 
 

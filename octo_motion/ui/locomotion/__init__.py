@@ -1,2 +1,37 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Locomotion: rig, arms, gait, route, generate."""
+"""Locomotion, as an artist sees it."""
+
+from . import operators, panels, settings
+from .generate_motion import generate
+from .operators import MENUS, STEPS
+from .settings import (
+    ChangeItem,
+    ContactItem,
+    OCTO_MOTION_PG_contact,
+    OCTO_MOTION_PG_locomotion,
+    ReachItem,
+    locomotion_settings,
+    once_called,
+    set_gait,
+    store,
+)
+from .writing import Summary
+
+CLASSES = (*settings.CLASSES, *operators.CLASSES, *panels.CLASSES)
+
+__all__ = [
+    "CLASSES",
+    "MENUS",
+    "STEPS",
+    "ChangeItem",
+    "ContactItem",
+    "OCTO_MOTION_PG_contact",
+    "OCTO_MOTION_PG_locomotion",
+    "ReachItem",
+    "Summary",
+    "generate",
+    "locomotion_settings",
+    "once_called",
+    "set_gait",
+    "store",
+]

@@ -33,8 +33,7 @@ from .reading import (
     tolerances_of,
     warnings_for_display,
 )
-from .settings.contact_overrides import read_overrides
-from .settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .settings import OCTO_MOTION_PG_locomotion, locomotion_settings, read_overrides
 from .writing import Shot, Summary
 
 RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})

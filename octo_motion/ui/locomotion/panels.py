@@ -10,27 +10,34 @@ import bpy
 from ...blender.animation import key_counts
 from ...blender.files import NODE, curve_node
 from ..panel_base import ArmaturePanel, ItemRows, TabPanel, armature_in, draw_sentence
-from .operators.add_octopus import OCTO_MOTION_OT_add_octopus
-from .operators.add_route import OCTO_MOTION_OT_add_route
-from .operators.arms import draw_arms
-from .operators.changes import draw_changes
-from .operators.contacts import draw_ground, draw_rest
-from .operators.gait_table import (
+from .operators import (
     OCTO_MOTION_MT_gait,
     OCTO_MOTION_MT_gait_offset,
+    OCTO_MOTION_OT_add_octopus,
+    OCTO_MOTION_OT_add_route,
     OCTO_MOTION_OT_gait_curve_add,
     OCTO_MOTION_OT_gait_curve_remove,
     OCTO_MOTION_OT_gait_knot_add,
     OCTO_MOTION_OT_gait_knot_remove,
     OCTO_MOTION_OT_gait_load,
     OCTO_MOTION_OT_gait_offset_remove,
+    OCTO_MOTION_OT_generate_locomotion,
+    OCTO_MOTION_PT_setups,
+    draw_arms,
+    draw_changes,
+    draw_figures,
+    draw_ground,
+    draw_reaches,
+    draw_rest,
 )
-from .operators.generate import OCTO_MOTION_OT_generate_locomotion
-from .operators.reaches import draw_reaches
-from .operators.setups import OCTO_MOTION_PT_setups
-from .settings.gait import OCTO_MOTION_PG_gait_curve, OCTO_MOTION_PG_gait_table, used
-from .settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from .settings.quality import draw_figures, known_figures
+from .settings import (
+    OCTO_MOTION_PG_gait_curve,
+    OCTO_MOTION_PG_gait_table,
+    OCTO_MOTION_PG_locomotion,
+    known_figures,
+    locomotion_settings,
+    used,
+)
 
 _SIDES: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
 

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import IntProperty
 
 from ...core.splicing.transfer import Suggestion
-from ..locomotion.reading import assign
+from ..override_groups import assign
 from .splice_list import SpliceOperator, StackOperator
 from .stack import SpliceSummary, Stack, prepare_splices, suggestions, write_splices
 

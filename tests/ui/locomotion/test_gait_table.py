@@ -12,8 +12,8 @@ import pytest
 from octo_motion.blender.files import presets
 from octo_motion.core.errors import GaitError
 from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.ui.locomotion.settings import locomotion_settings, read_gait, set_gait
 from octo_motion.ui.locomotion.settings.gait import used
-from octo_motion.ui.locomotion.settings.properties import locomotion_settings, read_gait, set_gait
 from tests.ui.rig import click, make_octopus, scene_contents
 
 

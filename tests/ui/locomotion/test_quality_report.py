@@ -14,6 +14,7 @@ from octo_motion.core.locomotion.metrics import measures as quality
 from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import rotate
+from octo_motion.ui.locomotion.operators import quality as quality_operators
 from octo_motion.ui.locomotion.settings import quality as quality_report
 from tests.blender.test_ground import make_mesh
 from tests.ui.made import Made, prepare
@@ -167,11 +168,11 @@ def test_a_button_goes_to_the_worst_frame_and_is_no_step_of_undo(small: Any) -> 
     bpy.context.scene.frame_set(1)
     assert click("quality_jump", kind="TURN") == {"FINISHED"}
     assert bpy.context.scene.frame_current == frame
-    assert "UNDO" not in quality_report.OCTO_MOTION_OT_quality_jump.bl_options
+    assert "UNDO" not in quality_operators.OCTO_MOTION_OT_quality_jump.bl_options
 
 
 def test_its_tooltip_says_in_full_what_a_narrow_sidebar_cuts_off(small: Any) -> None:
-    operator: Any = quality_report.OCTO_MOTION_OT_quality_jump
+    operator: Any = quality_operators.OCTO_MOTION_OT_quality_jump
     turn = SimpleNamespace(kind="TURN")
     assert operator.description(bpy.context, turn) == operator.bl_description
     generate(small)
@@ -235,7 +236,7 @@ def test_rows_say_what_how_much_and_whose_with_a_button_to_the_frame(small: Any)
         ],
     )
     drawn = Drawn()
-    quality_report.draw_figures(drawn, settings)
+    quality_operators.draw_figures(drawn, settings)
     assert drawn.labels == [
         "Slip: 0.12 %, Right",
         "Strain: 25.1 %, Left",
@@ -400,6 +401,6 @@ def test_what_one_would_see_is_marked_in_the_panel(small: Any) -> None:
         settings, [Figure(kind, value, 7, "Arm") for kind, value in values.items()]
     )
     drawn = Drawn()
-    quality_report.draw_figures(drawn, settings)
+    quality_operators.draw_figures(drawn, settings)
     assert len(drawn.labels) == len(values)
     assert drawn.marked == ["Slip: 2.0 %, Arm", "Miss: 10.0 %, Arm"]

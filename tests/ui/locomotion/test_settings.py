@@ -10,8 +10,11 @@ import pytest
 
 from octo_motion.core.errors import RigError
 from octo_motion.core.locomotion.gait.gait_poser import GaitSettings
+from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
 from octo_motion.core.locomotion.path.travel import TravelSettings
+from octo_motion.core.settings import declared_settings
 from octo_motion.ui import registration
+from octo_motion.ui.declared_settings import read_settings
 from octo_motion.ui.job import Job
 from octo_motion.ui.locomotion.settings.properties import (
     OCTO_MOTION_PG_locomotion,
@@ -32,7 +35,8 @@ NAMES = {
     *("weight_root", "weight_tip", "use_weight_curve", "weight_curve"),
     *("timing", "cycle_time", "speed", "frame_start", "frame_end"),
     *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),
-    "result",
+    *("result", "figures", "live", "live_error", "keep_apart", "tell_overlaps"),
+    *("reaches", "active_reach", "cycles", "repeat", "breathing", "breath_time"),
 }
 
 
@@ -45,7 +49,8 @@ def groups() -> Iterator[Any]:
 def properties(group: Any) -> Iterator[Any]:
     """What a group of properties defines itself; its own come after those of all groups."""
     found = {each.identifier: each for each in group.bl_rna.properties}
-    yield from (found[name] for name in group.__annotations__)
+    for each in group.__mro__:
+        yield from (found[name] for name in vars(each).get("__annotations__", ()))
 
 
 def test_the_names_are_those_that_scripts_use() -> None:
@@ -77,13 +82,21 @@ def test_every_setting_can_be_overridden_except_names_of_list_items() -> None:
             assert definition.is_overridable, (group, definition.identifier)
 
 
-def test_defaults_are_those_of_core() -> None:
-    settings = locomotion_settings(make_octopus())
-    for name in ("contraction", "softness", "phase_spread", "seed", "turning"):
-        assert getattr(settings, name) == pytest.approx(getattr(GaitSettings, name)), name
-    assert settings.sway == pytest.approx(GaitSettings.lateral_bend)
-    for name in ("heading", "heading_angle", "burst", "look_ahead", "keep_upright", "corner"):
-        assert getattr(settings, name) == pytest.approx(getattr(TravelSettings, name)), name
+@pytest.mark.parametrize("kind", [GaitSettings, TravelSettings, StanceSettings])
+def test_what_core_declares_is_what_the_panel_begins_with(kind: type) -> None:
+    settings: Any = locomotion_settings(make_octopus())
+    group = settings.ground if kind is StanceSettings else settings
+    for name, each in declared_settings(kind).items():
+        expected = each.default if each.offered is None else each.offered
+        value = getattr(group, each.stored_as or name)
+        assert value == (expected if isinstance(expected, str) else pytest.approx(expected)), name
+
+
+def test_core_reads_what_is_set_and_takes_single_precision_for_what_was_meant() -> None:
+    ground = locomotion_settings(make_octopus()).ground
+    ground.duty, ground.planted, ground.lift = 0.85, 0.8, 0.25
+    read = read_settings(StanceSettings, ground, lean=0.5)
+    assert (read.duty, read.planted, read.lift, read.lean) == (0.85, 0.8, 0.25, 0.5)
 
 
 def test_settings_of_something_else_than_an_armature_are_refused() -> None:
@@ -133,7 +146,7 @@ def test_the_weight_curve_is_made_when_it_is_switched_on_and_kept_when_off() -> 
 
 def test_the_weight_curve_moves_the_arms_as_weights_do() -> None:
     from octo_motion.ui.locomotion.reading.gait import gait_settings
-    from octo_motion.ui.locomotion.settings.properties import read_gait
+    from octo_motion.ui.locomotion.settings import read_gait
 
     settings = locomotion_settings(make_octopus())
     settings.weight_root, settings.weight_tip = 0.9, 0.3

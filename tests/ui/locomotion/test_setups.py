@@ -11,7 +11,7 @@ import pytest
 
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.ui.locomotion.operators import setups
-from octo_motion.ui.locomotion.settings.properties import locomotion_settings, read_gait
+from octo_motion.ui.locomotion.settings import locomotion_settings, read_gait
 from octo_motion.ui.plain import plain
 from tests.ui.rig import click, make_octopus
 

@@ -3,7 +3,7 @@
 
 from .builds import Build, bone_twists
 from .ccd import close_group
-from .gait_poser import MOST_STEADY, Arm, GaitPoser, GaitSettings
+from .gait_poser import Arm, GaitPoser, GaitSettings
 from .joint_groups import diameters
 from .table import (
     ANGLES,
@@ -23,7 +23,6 @@ __all__ = [
     "ANGLES",
     "CYCLE",
     "LINKS",
-    "MOST_STEADY",
     "Arm",
     "Build",
     "GaitCurve",

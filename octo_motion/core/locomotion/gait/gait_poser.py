@@ -27,6 +27,7 @@ from ...rotations import (
     rotate,
 )
 from ...rotations.components_first import cumulative_sum
+from ...settings import check_settings, setting
 from ...skeleton import Skeleton
 from ..rig import (
     ArmRest,
@@ -45,9 +46,6 @@ from .joint_groups import GROUPS
 from .pseudo_targets import BANK, HEAD, PITCH, contraction, link_rotations, pseudo_targets
 from .swim_spread import swim_azimuths, trailing_asides, trailing_beside
 from .table import GaitCurve, GaitTable, gait_angles, variation
-
-MOST_STEADY: Final = 0.25
-"""Cycles over which movement may be evened out: more, and it is no longer there."""
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
@@ -88,55 +86,112 @@ class GaitSettings:
     """How the arms move. Angles in radians."""
 
     gait: GaitTable
-    contraction: float = 1.0
-    """Factor on the contraction of the links; 1 as in the source, 0 none."""
+    contraction: float = setting(
+        "Contraction",
+        "How much an arm shortens as it bends: 1 as an octopus does, 0 not at all",
+        default=1.0,
+        low=0.0,
+        high=4.0,
+        soft_high=1.0,
+        step=5,
+    )
     weights: tuple[float, ...] = (0.4,)
     """Weights a of the joints, at even steps from the arm's root to its tip, each in (0, 1]."""
-    softness: float = 0.8
-    """0 leaves bends where CCD puts them; towards 1 they are spread over neighbouring joints."""
-    stretch_slack: float = 0.0
-    """Group lengths by which an arm may reach beyond its targets as it straightens, so that it does
-    so gently; 0 meets them, as the source does, with a snap."""
-    lateral_bend: float = np.radians(10.0)
-    """Bend across the gait's own that each group starts with, so that no group passes through a
-    straight line."""
-    phase_spread: float = 1.0
-    """Factor on the gait's phase offsets; 0 moves all arms together."""
+    softness: float = setting(
+        "Softness",
+        "How far a bend spreads over neighbouring joints: 0 leaves it where it falls",
+        default=0.8,
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    """0 leaves bends where CCD puts them."""
+    stretch_slack: float = setting(
+        "Give",
+        "How far an arm may reach beyond its targets as it straightens, in lengths of a third of "
+        "it: it straightens gently. 0 meets them exactly, and snaps straight",
+        default=0.0,
+        offered=0.08,
+        stored_as="give",
+        low=0.0,
+        high=1.0,
+        soft_high=0.3,
+        subtype="FACTOR",
+    )
+    lateral_bend: float = setting(
+        "Sway",
+        "Bend across the gait's own that keeps an arm from becoming a straight line",
+        default=np.radians(10.0),
+        stored_as="sway",
+        low=0.0,
+        high=0.5 * np.pi,
+        soft_high=np.radians(45.0),
+        step=100,
+        precision=1,
+        subtype="ANGLE",
+    )
+    """Each group of joints starts with it."""
+    phase_spread: float = setting(
+        "Phase Spread",
+        "How far the arms are apart in the cycle: 1 as the gait says, 0 all together",
+        default=1.0,
+        soft_low=0.0,
+        soft_high=2.0,
+        step=5,
+    )
     variation: tuple[float, float] = (0.0, 0.0)
     """Limits j, k of the random additions to head and pitch [Octopus, §3.4]."""
-    seed: int = 0
+    seed: int = setting(
+        "Seed",
+        "Another number gives another variation, the same number the same one",
+        default=0,
+        low=0,
+    )
     period: int = 0
     """Cycles after which the random additions come again, 0 for never."""
-    turning: float = 0.5
-    """Share of the turn that lies ahead which the arms take on as pitch [Octopus, §3.5]."""
-    smoothing_cycles: float = 0.0
-    """Cycles before and after each moment over which movement is evened out in time; 0 leaves the
-    table's corners, as the source does."""
+    turning: float = setting(
+        "Turning",
+        "Share of the turn that lies ahead which the arms take on",
+        default=0.5,
+        low=0.0,
+        high=4.0,
+        soft_high=1.0,
+        step=5,
+    )
+    """As pitch [Octopus, §3.5]."""
+    smoothing_cycles: float = setting(
+        "Steady",
+        "How much of a cycle movement is evened out over, before and after each moment: arms in "
+        "the air move smoothly. 0 keeps every corner of the gait's table",
+        default=0.0,
+        offered=0.08,
+        stored_as="steady",
+        low=0.0,
+        high=0.25,  # over more than that, the movement is no longer there
+        soft_high=0.15,
+        step=1,
+        precision=3,
+    )
     heading: float = 0.0
     """WALK: radians anticlockwise from the way that the body goes to its front: arms take their
     phases from the gait by where they are seen from that way."""
-    raise_to_floor: bool = False
-    """WALK: whether targets that lie deeper than most are raised to a floor where most are, so
-    that many arms stand on the ground together, and not the tip of one. The source's walk, whose
-    targets are the table's alone, knows no ground."""
+    raise_to_floor: bool = setting(
+        "Stand",
+        "Walking, arms that would reach deeper than most lie down at their depth, so that several "
+        "stand on the ground together. Off, the gait's angles alone count, and the creature hangs "
+        "on the tip of its deepest arm",
+        default=False,
+        offered=True,
+        stored_as="stand",
+    )
+    """Targets that lie deeper than most are raised to a floor where most are. The source's walk,
+    whose targets are the table's alone, knows no ground."""
     swim_lean: float = 0.0
     """SWIM: how far from the body's +Z towards its back the way lies that its arms trail behind;
     see ``TravelSettings``. Radians."""
 
     def __post_init__(self) -> None:
-        numbers = (
-            *(
-                self.contraction,
-                self.softness,
-                self.stretch_slack,
-                self.lateral_bend,
-                self.phase_spread,
-            ),
-            *(self.turning, self.smoothing_cycles, self.heading, self.swim_lean),
-            *(*self.weights, *self.variation),
-        )
-        if not np.all(np.isfinite(numbers)):
-            raise SettingsError("A setting of the gait is not a number.", "Set it anew.")
+        check_settings(self)
         if not self.weights or min(self.weights) <= 0.0 or max(self.weights) > 1.0:
             raise SettingsError(
                 "A joint's weight is not between 0 and 1.", "Give weights above 0, 1 at most."
@@ -144,19 +199,6 @@ class GaitSettings:
         if self.variation[0] > self.variation[1]:
             raise SettingsError(
                 "The variation's minimum is greater than its maximum.", "Exchange the two."
-            )
-        if self.contraction < 0.0:
-            raise SettingsError(
-                f"The contraction is {self.contraction:g}.", "Give 0 (none) or more."
-            )
-        if not 0.0 <= self.softness <= 1.0:
-            raise SettingsError(f"The softness is {self.softness:g}.", "Give a value from 0 to 1.")
-        if not 0.0 <= self.stretch_slack <= 1.0:
-            raise SettingsError(f"The give is {self.stretch_slack:g}.", "Give a value from 0 to 1.")
-        if not 0.0 <= self.smoothing_cycles <= MOST_STEADY:
-            raise SettingsError(
-                f"Steady is {self.smoothing_cycles:g} cycles.",
-                f"Give a value from 0 to {MOST_STEADY:g}.",
             )
 
 

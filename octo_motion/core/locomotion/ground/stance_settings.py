@@ -7,39 +7,72 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import SettingsError
 from ...rotations import Floats
+from ...settings import check_settings, setting
 
 
 @dataclass(frozen=True)
 class StanceSettings:
     """How arms hold on to the ground. Lengths in arm lengths, angles in radians."""
 
-    duty: float = 0.55
-    """Share of the cycle that an arm holds on."""
-    planted: float = 0.3
-    """Share of the arm that lies down."""
-    stretch: float = 0.4
-    """How much longer bones may get that may stretch."""
-    lift: float = 0.06
-    """How far above the ground an arm is moved at least."""
-    lean: float = 0.7
-    """How far the body leans with the ground."""
-    smoothing: float = 0.35
-    """How far along the way the body evens the ground out."""
+    duty: float = setting(
+        "Hold",
+        "Share of its cycle for which an arm holds on to the ground. More keeps more arms down at "
+        "a time; less gives them longer swings",
+        default=0.55,
+        low=0.1,
+        high=0.85,
+        subtype="FACTOR",
+        digits=6,
+    )
+    planted: float = setting(
+        "Planted",
+        "Share of the arm, from its tip, that lies on the ground while it holds on",
+        default=0.3,
+        low=0.1,
+        high=0.8,
+        subtype="FACTOR",
+    )
+    stretch: float = setting(
+        "Stretch",
+        "How much longer an arm may get as it pushes, becoming thinner: 0.4 is 40 %. Only bones "
+        "that hand their scale on aligned or not at all stretch; others bend instead",
+        default=0.4,
+        low=0.0,
+        high=2.0,
+        soft_high=1.0,
+        step=5,
+    )
+    lift: float = setting(
+        "Lift",
+        "How high above the ground an arm is at least in the middle of its swing, in arm lengths",
+        default=0.06,
+        low=0.0,
+        high=1.0,
+        soft_high=0.3,
+        step=1,
+        precision=3,
+    )
+    lean: float = setting(
+        "Lean",
+        "How far the body leans with the ground: 0 stays upright, 1 follows its slope",
+        default=0.7,
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    smoothing: float = setting(
+        "Smoothing",
+        "Over what length the body evens the ground out, in arm lengths. Less follows every bump",
+        default=0.35,
+        low=0.05,
+        high=10.0,
+        soft_high=2.0,
+        step=5,
+    )
 
     def __post_init__(self) -> None:
-        numbers = (self.duty, self.planted, self.stretch, self.lift, self.lean, self.smoothing)
-        if not np.all(np.isfinite(numbers)):
-            raise SettingsError("A setting of the ground is not a number.", "Set it anew.")
-        if not 0.1 <= self.duty <= 0.85:
-            raise SettingsError(
-                f"Arms hold on for {self.duty:g} of the cycle.", "Give 0.1 to 0.85."
-            )
-        if not 0.1 <= self.planted <= 0.8:
-            raise SettingsError(
-                f"{self.planted:g} of each arm lies on the ground.", "Give 0.1 to 0.8."
-            )
+        check_settings(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from ...content_cache import ContentCache, content_key
 from ...errors import SettingsError
 from ...rotations import Floats, from_axis_angle, multiply, rotate_in_plane
+from ...settings import check_settings, setting
 from ..gait import CYCLE
 from .burst_glide import phase_at_distance, stroke_distance
 from .heading import Bearings, bearings
@@ -48,63 +49,122 @@ class TravelSettings:
     manner: Manner = "WALK"
     """WALK: upright, front along travel. SWIM: mantle (+Z) along travel, the arms trail, and the
     front faces up as far as it can: the body leans back."""
-    speed: Speed = "EVEN"
-    """EVEN: equal distances in equal times. NATURAL: equal shares of the curve's parameter."""
-    ease_in: float = 0.0
-    """Share of the time spent speeding up, 0…1."""
-    ease_out: float = 0.0
-    """Share of the time spent slowing down, 0…1; the two together at most 1."""
+    speed: Speed = setting(
+        "Pace",
+        "How travel is spread over the time",
+        default="EVEN",
+        stored_as="speed_mode",
+        items=(
+            ("EVEN", "Even", "Equal distances in equal times, however the curve is drawn", 0),
+            (
+                "NATURAL",
+                "Natural",
+                "The curve's own parameter runs evenly: slower where its points lie close",
+                1,
+            ),
+        ),
+    )
+    ease_in: float = setting(
+        "Ease In",
+        "Share of the time spent speeding up from a standstill",
+        default=0.0,
+        offered=0.1,
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    ease_out: float = setting(
+        "Ease Out",
+        "Share of the time spent slowing down to a standstill",
+        default=0.0,
+        offered=0.1,
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
     stride: float = 1.0
     """Metres travelled per gait cycle."""
-    heading: Heading = "ALONG"
-    """WALK: whether the front turns with the route or keeps a compass angle. A swimming body
-    turns with its route always."""
-    heading_angle: float = 0.0
-    """WALK, ALONG: turn of the front away from travel, so that a body can crawl sideways; FIXED:
-    compass angle of the front about world Z. Zero faces along travel, or to −Y."""
-    burst: float = 0.6
-    """SWIM: 0 steady … 1 all travel comes with the power stroke and the glide nearly stops."""
+    heading: Heading = setting(
+        "Heading",
+        "Which way a walking body faces; a swimming one turns with its route",
+        default="ALONG",
+        items=(
+            ("ALONG", "Along", "Turn with the route", 0),
+            ("FIXED", "Fixed", "Keep facing one way, as an octopus can while it crawls", 1),
+        ),
+    )
+    heading_angle: float = setting(
+        "Angle",
+        "Along: how far the front is turned away from travel, to the left, so that a body can "
+        "crawl sideways. Fixed: compass angle of the front about Z, 0 faces -Y",
+        default=0.0,
+        soft_low=-np.pi,
+        soft_high=np.pi,
+        step=500,
+        precision=1,
+        subtype="ANGLE",
+    )
+    burst: float = setting(
+        "Burst",
+        "Swimming: 0 glides evenly, 1 shoots ahead with each stroke and nearly stops",
+        default=0.6,
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
     stroke_phase: float = 0.75 * np.pi
     """SWIM: phase of the middle of the power stroke. In the table β₁ falls from π/2 to π."""
-    look_ahead: float = 1.0
-    """Strides ahead at which the goal lies for turning; at most the whole of a closed route."""
-    bank: float = 0.0
-    """SWIM: roll into turns; at 1 a turn of θ per stride rolls the body by atan θ."""
+    look_ahead: float = setting(
+        "Look Ahead",
+        "How many strides ahead the body looks for the turn that its arms prepare",
+        default=1.0,
+        low=0.0,
+        soft_high=5.0,
+        step=10,
+    )
+    """At most the whole of a closed route."""
+    bank: float = setting(
+        "Bank in Turns",
+        "Swimming: how far the body rolls into a turn. At 1, a turn of 45° in a stride rolls it "
+        "by 38°",
+        default=0.0,
+        stored_as="bank_in_turns",
+        low=0.0,
+        high=4.0,
+        soft_high=1.0,
+        step=5,
+    )
+    """At 1 a turn of θ per stride rolls the body by atan θ."""
     lean: float = 0.0
     """SWIM: how far from +Z towards the back the way lies that goes along travel, for bodies whose
     mantle lies flat behind them; at 90° they swim backwards, upright."""
-    keep_upright: bool = True
-    """WALK: whether the body stays upright, or tilts with the slope of the route."""
-    corner: float = 0.2
-    """Strides before and after a sharp corner within which most of it is turned through. The
-    body stays on the route; bends wider than this are left as they are."""
+    keep_upright: bool = setting(
+        "Keep Upright",
+        "Walking, stay upright on a slope instead of leaning with it",
+        default=True,
+    )
+    corner: float = setting(
+        "Corner",
+        "Strides before and after a sharp corner within which the body turns; gentle bends are "
+        "left as they are",
+        default=0.2,
+        low=0.01,
+        soft_high=2.0,
+        step=5,
+    )
+    """Within these most of the corner is turned through. The body stays on the route."""
 
     def __post_init__(self) -> None:
-        numbers = (
-            *(self.ease_in, self.ease_out, self.stride, self.heading_angle, self.burst),
-            *(self.stroke_phase, self.look_ahead, self.bank, self.corner, self.lean),
-        )
-        if not np.all(np.isfinite(numbers)):
-            raise SettingsError("A setting of the travel is not a number.", "Set it anew.")
+        check_settings(self)
         if self.stride <= 0.0:
             raise SettingsError(
                 f"The stride is {self.stride:g} m.", "Give a stride longer than nothing."
             )
-        if min(self.ease_in, self.ease_out) < 0.0 or self.ease_in + self.ease_out > 1.0 + 1e-9:
+        if self.ease_in + self.ease_out > 1.0 + 1e-9:
             raise SettingsError(
                 f"Ease in ({self.ease_in:g}) and ease out ({self.ease_out:g}) do not fit into the "
                 "time.",
-                "Give shares of the time that are not negative and make 1 at most together.",
-            )
-        if not 0.0 <= self.burst <= 1.0:
-            raise SettingsError(f"The burst is {self.burst:g}.", "Give a value from 0 to 1.")
-        if self.look_ahead < 0.0:
-            raise SettingsError(
-                f"The body looks {self.look_ahead:g} strides ahead.", "Give 0 or more."
-            )
-        if self.corner <= 0.0:
-            raise SettingsError(
-                f"A corner is turned within {self.corner:g} strides.", "Give more than 0."
+                "Give shares of the time that make 1 at most together.",
             )
 
 

@@ -1,1 +1,81 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The buttons, and what of the panel belongs to each."""
+
+from ...steps import Step
+from . import (
+    add_octopus,
+    add_route,
+    arms,
+    changes,
+    contacts,
+    gait_table,
+    generate,
+    live,
+    quality,
+    reaches,
+    setups,
+)
+from .add_octopus import OCTO_MOTION_OT_add_octopus
+from .add_route import OCTO_MOTION_OT_add_route
+from .arms import draw_arms
+from .changes import draw_changes
+from .contacts import draw_ground, draw_rest
+from .gait_table import (
+    OCTO_MOTION_MT_gait,
+    OCTO_MOTION_MT_gait_offset,
+    OCTO_MOTION_OT_gait_curve_add,
+    OCTO_MOTION_OT_gait_curve_remove,
+    OCTO_MOTION_OT_gait_knot_add,
+    OCTO_MOTION_OT_gait_knot_remove,
+    OCTO_MOTION_OT_gait_load,
+    OCTO_MOTION_OT_gait_offset_remove,
+)
+from .generate import OCTO_MOTION_OT_generate_locomotion
+from .quality import draw_figures
+from .reaches import draw_reaches
+from .setups import OCTO_MOTION_PT_setups
+
+CLASSES = (
+    *arms.CLASSES,
+    add_octopus.OCTO_MOTION_OT_add_octopus,
+    add_route.OCTO_MOTION_OT_add_route,
+    *gait_table.CLASSES,
+    generate.OCTO_MOTION_OT_generate_locomotion,
+    *contacts.CLASSES,
+    *setups.CLASSES,
+    *changes.CLASSES,
+    *quality.CLASSES,
+    *reaches.CLASSES,
+)
+STEPS = (
+    Step(live.register, live.unregister),
+    Step(setups.register, setups.unregister),
+)
+MENUS = (
+    ("VIEW3D_MT_armature_add", add_octopus.draw_in_add_menu),
+    ("VIEW3D_MT_curve_add", add_route.draw_in_add_menu),
+)
+
+__all__ = [
+    "CLASSES",
+    "MENUS",
+    "STEPS",
+    "OCTO_MOTION_MT_gait",
+    "OCTO_MOTION_MT_gait_offset",
+    "OCTO_MOTION_OT_add_octopus",
+    "OCTO_MOTION_OT_add_route",
+    "OCTO_MOTION_OT_gait_curve_add",
+    "OCTO_MOTION_OT_gait_curve_remove",
+    "OCTO_MOTION_OT_gait_knot_add",
+    "OCTO_MOTION_OT_gait_knot_remove",
+    "OCTO_MOTION_OT_gait_load",
+    "OCTO_MOTION_OT_gait_offset_remove",
+    "OCTO_MOTION_OT_generate_locomotion",
+    "OCTO_MOTION_PT_setups",
+    "draw_arms",
+    "draw_changes",
+    "draw_figures",
+    "draw_ground",
+    "draw_reaches",
+    "draw_rest",
+]

@@ -13,7 +13,7 @@ from ....core.locomotion.path import Route
 from ...local_view import show_in_local_view
 from ...operator_base import OctoOperator
 from ...panel_base import armature_in
-from ..settings.properties import locomotion_settings
+from ..settings import locomotion_settings
 
 _POINTS = ("b0", "b1", "b2", "b3")
 

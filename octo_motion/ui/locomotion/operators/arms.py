@@ -23,11 +23,11 @@ from ....blender.rig import (
 from ....core.errors import RigError
 from ....core.locomotion.rig import ArmChain, body_frame, chain_of, detect_arms, place_added
 from ...list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
+from ...override_groups import assign
 from ...panel_base import ItemRows
 from ..reading import (
     active_arm,
     add_item,
-    assign,
     body_axes,
     bones_of,
     list_owner,
@@ -35,8 +35,7 @@ from ..reading import (
     write_arms,
     write_body,
 )
-from ..settings import arms as arm_properties
-from ..settings.properties import AXES, OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..settings import AXES, OCTO_MOTION_PG_locomotion, locomotion_settings
 
 _SIDE_LETTERS: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": "-"}
 _AXIS_CHOICES: Final = (
@@ -342,7 +341,6 @@ def _summary(arms: Sequence[ArmChain]) -> str:
 
 
 CLASSES: Final[tuple[type, ...]] = (
-    *arm_properties.CLASSES,
     OCTO_MOTION_UL_arms,
     OCTO_MOTION_OT_detect_arms,
     OCTO_MOTION_OT_arm_add,

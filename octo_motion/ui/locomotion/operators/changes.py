@@ -12,7 +12,7 @@ from ....blender.animation import writable_armature
 from ....blender.files import gait_names, has_gait, load_gait
 from ...list_operators import ListKind, ListOperator, RemoveOperator
 from ...panel_base import ItemRows
-from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..settings import OCTO_MOTION_PG_locomotion, locomotion_settings
 
 
 def _change_settings(armature: bpy.types.Object) -> Any:

@@ -16,8 +16,14 @@ from ...local_view import show_in_local_view
 from ...operator_base import OctoOperator
 from ..generate_motion import prepare
 from ..reading import resting
-from ..settings.contact_overrides import changed_by_hand, once_called, read_overrides, store
-from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..settings import (
+    OCTO_MOTION_PG_locomotion,
+    changed_by_hand,
+    locomotion_settings,
+    once_called,
+    read_overrides,
+    store,
+)
 from ..writing import show_contacts
 
 

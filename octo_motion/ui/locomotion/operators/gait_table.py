@@ -25,13 +25,17 @@ from ....blender.rig import active_armature
 from ....core.errors import GaitError
 from ....core.locomotion.gait import CYCLE, GaitCurve, renamed_gait
 from ...armature_operator import ArmatureOperator
-from ..settings.gait import SIDES, fill_curve, fill_offsets, fill_table, used
-from ..settings.properties import (
+from ..settings import (
+    SIDES,
     OCTO_MOTION_PG_locomotion,
+    fill_curve,
     fill_gait_table,
+    fill_offsets,
+    fill_table,
     locomotion_settings,
     read_gait,
     set_gait,
+    used,
 )
 
 if TYPE_CHECKING:

@@ -22,15 +22,18 @@ from bpy.app.handlers import persistent
 
 from ....blender.animation import is_edited, may_replace
 from ....blender.rig import deformed_meshes, read_skeleton
-from ....core import content_cache as remembered
-from ....core.content_cache import content_key
+from ....core.content_cache import clear_caches, content_key
 from ....core.errors import OctoMotionError, RigError
 from ...plain import plain
 from ..generate_motion import RESULTS, prepare
 from ..reading import playing_action, previous_action
-from ..settings import live as live_properties
-from ..settings.contact_overrides import once_called, read_overrides
-from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..settings import (
+    SWITCHED,
+    OCTO_MOTION_PG_locomotion,
+    locomotion_settings,
+    once_called,
+    read_overrides,
+)
 
 _SOON: Final = 0.01
 """Seconds from a change to the new motion at least: what changes together is made together."""
@@ -79,7 +82,7 @@ def unregister() -> None:
     """Listen no more, and drop what was about to be made."""
     _drop()
     _state.clear()
-    remembered.clear_caches()
+    clear_caches()
     for handlers, function in _handlers():
         if function in handlers:
             handlers.remove(function)
@@ -185,8 +188,8 @@ def _listens() -> bool:
                 _state.seen[each.name] = _made_from(each, locomotion_settings(each))
         _state.rates = {each.name: _rate(each) for each in bpy.data.scenes}
         _state.complete = True
-    while live_properties.SWITCHED:
-        armature = _armature(live_properties.SWITCHED.pop())
+    while SWITCHED:
+        armature = _armature(SWITCHED.pop())
         if armature is not None:
             _look_at(armature)
     return bool(_state.seen)
@@ -306,7 +309,7 @@ def _after_undo(*_: object) -> None:
 def _before_loading(*_: object) -> None:
     _drop()
     _state.clear()
-    remembered.clear_caches()
+    clear_caches()
 
 
 @persistent

@@ -15,8 +15,7 @@ from ...armature_operator import ArmatureOperator
 from ...list_operators import ListKind, RemoveOperator
 from ...panel_base import ItemRows
 from ..reading import bones_of
-from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from ..settings.reaches import MODES
+from ..settings import MODES, OCTO_MOTION_PG_locomotion, locomotion_settings
 
 _SECONDS_TO_REACH: Final = 1.25
 _SECONDS_TO_HOLD: Final = 2.0

@@ -22,11 +22,13 @@ from ....blender.rig import active_armature
 from ....core.errors import SettingsError
 from ...armature_operator import ArmatureOperator
 from ...armature_preset import ARMATURE, ArmaturePresetAdd
+from ...override_groups import assign
 from ...plain import plain
-from ..settings.gait import DEFAULT_GAIT, assign, matched
-from ..settings.properties import (
+from ..settings import (
+    DEFAULT_GAIT,
     OCTO_MOTION_PG_locomotion,
     locomotion_settings,
+    matched,
     read_gait,
     set_gait,
 )

@@ -4,7 +4,6 @@
 from .arm_items import (
     active_arm,
     add_item,
-    assign,
     body_axes,
     bones_of,
     list_owner,
@@ -25,7 +24,6 @@ __all__ = [
     "RigRead",
     "active_arm",
     "add_item",
-    "assign",
     "body_axes",
     "bones_of",
     "breathing",

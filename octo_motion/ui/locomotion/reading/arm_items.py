@@ -13,7 +13,8 @@ from ....blender.overrides import linked_names
 from ....blender.rig import armature_data, world_directions
 from ....core.locomotion.rig import ArmChain, Detection, Side, nearest_axis
 from ....core.skeleton import Skeleton
-from ..settings.properties import OCTO_MOTION_PG_locomotion
+from ...override_groups import assign
+from ..settings import OCTO_MOTION_PG_locomotion
 
 # Names that detection gives, and the numbers that keep them apart.
 _GIVEN_NAME: Final = re.compile(r"Arm \d+( [LR])?(\.\d+)?")
@@ -113,9 +114,3 @@ def write_body(settings: OCTO_MOTION_PG_locomotion, found: Detection) -> None:
     assign(settings, "body_front", found.front)
     if settings.root_bone not in armature_data(list_owner(settings)).bones:
         assign(settings, "root_bone", found.root_bone)
-
-
-def assign(group: Any, name: str, value: Any) -> None:
-    """Set a property only if it differs: in a library override, what is set no longer follows."""
-    if getattr(group, name) != value:
-        setattr(group, name, value)

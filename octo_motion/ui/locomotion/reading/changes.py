@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ....core.errors import SettingsError
 from ....core.locomotion.motion import ChangeAt, ChangesByHeight
-from ..settings.changes import OCTO_MOTION_PG_change
+from ..settings import OCTO_MOTION_PG_change
 
 
 def read_changes(

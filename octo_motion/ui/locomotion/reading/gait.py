@@ -13,7 +13,8 @@ from ....core.keyframes import check_bounds
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.motion import GaitJob, Tolerances
 from ....core.locomotion.path import TravelSettings
-from ..settings.properties import OCTO_MOTION_PG_locomotion, read_gait
+from ...declared_settings import read_settings
+from ..settings import OCTO_MOTION_PG_locomotion, read_gait
 
 _HELD: Final = 0.003
 """Arm lengths that few keys may be off where a joint rests on the ground: it would slide."""
@@ -29,21 +30,14 @@ def gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> GaitS
         weights = tuple(float(each) for each in np.clip(drawn, 0.01, 1.0))
     else:
         weights = (settings.weight_root, settings.weight_tip)
-    return GaitSettings(
+    return read_settings(
+        GaitSettings,
+        settings,
         gait=gait,
-        contraction=settings.contraction,
         weights=weights,
-        softness=settings.softness,
-        stretch_slack=settings.give,
-        smoothing_cycles=settings.steady,
-        lateral_bend=settings.sway,
-        phase_spread=settings.phase_spread,
         variation=(settings.variation_min, settings.variation_max),
-        seed=settings.seed,
         period=settings.cycles if settings.travel_on == "NONE" else 0,
-        turning=settings.turning,
         heading=_heading(settings),
-        raise_to_floor=settings.stand,
     )
 
 
@@ -56,20 +50,12 @@ def _heading(settings: OCTO_MOTION_PG_locomotion) -> float:
 
 def travel_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> TravelSettings:
     """How the body travels in a gait; its stride is in arm lengths."""
-    return TravelSettings(
+    return read_settings(
+        TravelSettings,
+        settings,
         manner="WALK" if gait.on_ground else "SWIM",
-        speed=settings.speed_mode,
-        ease_in=settings.ease_in,
-        ease_out=settings.ease_out,
         stride=gait.stride,
-        heading=settings.heading,
-        heading_angle=settings.heading_angle,
-        burst=settings.burst,
         stroke_phase=gait.power_phase,
-        look_ahead=settings.look_ahead,
-        bank=settings.bank_in_turns,
-        keep_upright=settings.keep_upright,
-        corner=settings.corner,
     )
 
 

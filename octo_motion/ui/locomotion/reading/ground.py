@@ -10,10 +10,10 @@ import bpy
 
 from ....blender.animation import may_stretch
 from ....blender.scene import arm_skins, is_enabled, read_triangles
+from ....core.locomotion.ground import StanceSettings
 from ....core.locomotion.motion import Creature, GroundJob
-from ..settings.contact_overrides import ContactEdit, Place, overrides_for_core
-from ..settings.ground import stance_settings
-from ..settings.properties import OCTO_MOTION_PG_locomotion
+from ...declared_settings import read_settings
+from ..settings import ContactEdit, OCTO_MOTION_PG_locomotion, Place, overrides_for_core
 
 _BARE: Final = (
     "The ground '{name}' is disabled in viewports or excluded: its modifiers do not count. Hide it "
@@ -63,7 +63,7 @@ def read_ground(
         if len(ground.object.modifiers) > 0 and not is_enabled(ground.object, depsgraph):
             warnings = (_BARE.format(name=ground.object.name),)
     return GroundJob(
-        stance=stance_settings(ground),
+        stance=read_settings(StanceSettings, ground),
         skins=arm_skins(armature, creature.at_rest, creature.bones),
         may_stretch=[may_stretch(armature, bones) for bones in creature.bones],
         mesh=mesh,

@@ -8,7 +8,7 @@ from typing import Any, cast
 import bpy
 
 from ....blender.animation import is_generated
-from ..settings.properties import OCTO_MOTION_PG_locomotion
+from ..settings import OCTO_MOTION_PG_locomotion
 
 
 def playing_action(armature: bpy.types.Object) -> bpy.types.Action | None:

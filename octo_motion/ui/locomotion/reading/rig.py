@@ -32,7 +32,7 @@ from ....core.locomotion.rig import (
 )
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
-from ..settings.properties import OCTO_MOTION_PG_locomotion
+from ..settings import OCTO_MOTION_PG_locomotion
 from .arm_items import bones_of
 from .previous_action import previous_action
 

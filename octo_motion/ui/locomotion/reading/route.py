@@ -8,7 +8,7 @@ import bpy
 from ....blender.scene import read_route
 from ....core.locomotion.motion import Breathing, Timing
 from ....core.locomotion.path import Route
-from ..settings.properties import OCTO_MOTION_PG_locomotion
+from ..settings import OCTO_MOTION_PG_locomotion
 
 
 def read_route_of(settings: OCTO_MOTION_PG_locomotion, depsgraph: bpy.types.Depsgraph) -> Route:

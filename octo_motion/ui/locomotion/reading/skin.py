@@ -14,7 +14,7 @@ from ....core.locomotion.gait import Arm
 from ....core.locomotion.motion import Creature
 from ....core.locomotion.rig import BodyFrame, frames_of_arm
 from ....core.skeleton import Skeleton
-from ..settings.properties import OCTO_MOTION_PG_locomotion
+from ..settings import OCTO_MOTION_PG_locomotion
 
 _known: Final[ContentCache[BodyVolume]] = ContentCache(2)
 

@@ -1,1 +1,82 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist sets, kept with the armature object."""
+
+from . import arms, changes, gait, ground, properties, quality, reaches
+from .arms import AXES
+from .changes import ChangeItem, OCTO_MOTION_PG_change
+from .contact_overrides import (
+    ContactEdit,
+    Place,
+    changed_by_hand,
+    note_shown,
+    once_called,
+    overrides_for_core,
+    read_overrides,
+    store,
+)
+from .gait import (
+    DEFAULT_GAIT,
+    SIDES,
+    OCTO_MOTION_PG_gait_curve,
+    OCTO_MOTION_PG_gait_table,
+    fill_curve,
+    fill_offsets,
+    fill_table,
+    matched,
+    used,
+)
+from .ground import ContactItem, OCTO_MOTION_PG_contact, OCTO_MOTION_PG_ground
+from .live import SWITCHED
+from .movement import fill_gait_table, read_gait, set_gait
+from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
+from .quality import KIND_NAMES, KINDS, known_figures, write_figures
+from .reaches import MODES, ReachItem
+
+CLASSES = (
+    *gait.CLASSES,
+    *arms.CLASSES,
+    *reaches.CLASSES,
+    *ground.CLASSES,
+    *changes.CLASSES,
+    *quality.CLASSES,
+    *properties.CLASSES,
+)
+
+__all__ = [
+    "AXES",
+    "CLASSES",
+    "DEFAULT_GAIT",
+    "KINDS",
+    "KIND_NAMES",
+    "MODES",
+    "SIDES",
+    "SWITCHED",
+    "ChangeItem",
+    "ContactEdit",
+    "ContactItem",
+    "OCTO_MOTION_PG_change",
+    "OCTO_MOTION_PG_contact",
+    "OCTO_MOTION_PG_gait_curve",
+    "OCTO_MOTION_PG_gait_table",
+    "OCTO_MOTION_PG_ground",
+    "OCTO_MOTION_PG_locomotion",
+    "Place",
+    "ReachItem",
+    "changed_by_hand",
+    "fill_curve",
+    "fill_gait_table",
+    "fill_offsets",
+    "fill_table",
+    "known_figures",
+    "locomotion_settings",
+    "matched",
+    "note_shown",
+    "once_called",
+    "overrides_for_core",
+    "read_gait",
+    "read_overrides",
+    "set_gait",
+    "store",
+    "used",
+    "write_figures",
+]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One arm of the list, as it is saved with the armature object.
+"""The list of arms, as it is saved with the armature object.
 
 Names of arms and bones are what Blender tells the items of a linked list apart by: a library
 override that renames one gets the whole list once more when the file is opened again. So they
@@ -24,6 +24,15 @@ from bpy.props import (
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 from .contact_overrides import rename_arm
 from .gait import SIDES
+
+AXES: Final = (
+    ("X", "X", "The armature's own +X", 0),
+    ("Y", "Y", "The armature's own +Y", 1),
+    ("Z", "Z", "The armature's own +Z", 2),
+    ("-X", "-X", "The armature's own −X", 3),
+    ("-Y", "-Y", "The armature's own −Y", 4),
+    ("-Z", "-Z", "The armature's own −Z", 5),
+)
 
 
 def _renamed(arm: ArmItem, _context: bpy.types.Context) -> None:
@@ -90,6 +99,37 @@ class ArmItem(bpy.types.PropertyGroup):
         name="Enabled",
         description="Move this arm. Switched off, it gets no keys and keeps its pose",
         default=True,
+        override=OVERRIDE,
+    )
+
+
+class ArmList:
+    """What ``Object.octo_motion.locomotion`` has of the rig."""
+
+    arms: CollectionProperty(
+        name="Arms",
+        description="The arms that are moved; without any, they are detected when generating",
+        type=ArmItem,
+        override=OVERRIDE_LIST,
+    )
+    active_arm: IntProperty(name="Active Arm", options={"HIDDEN"}, override=OVERRIDE)
+    body_front: EnumProperty(
+        name="Front",
+        description="Which way the body faces, as an axis of the armature",
+        items=AXES,
+        default="-Y",
+        override=OVERRIDE,
+    )
+    body_up: EnumProperty(
+        name="Up",
+        description="Where the body's top is, as an axis of the armature",
+        items=AXES,
+        default="Z",
+        override=OVERRIDE,
+    )
+    root_bone: StringProperty(
+        name="Root Bone",
+        description="Bone that carries the whole body; it can take the travel along the route",
         override=OVERRIDE,
     )
 

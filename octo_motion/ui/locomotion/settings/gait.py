@@ -39,6 +39,7 @@ from ....core.locomotion.gait import (
 )
 from ....core.rotations import Floats
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
+from ...override_groups import assign
 
 DEFAULT_GAIT: Final = "walk"
 _DEFAULT: Final = gait_presets()[DEFAULT_GAIT]
@@ -434,13 +435,6 @@ def _linked_count(group: Any, name: str) -> int:
         # Within an item that was added here.
         return 0
     return len(getattr(original, name))
-
-
-def assign(group: Any, name: str, value: Any) -> None:
-    """Set a property only if it differs: in a library override, what is set no longer follows."""
-    before = getattr(group, name)
-    if np.any(np.asarray(before) != np.asarray(value)):
-        setattr(group, name, value)
 
 
 def _angle(radians: float) -> float:

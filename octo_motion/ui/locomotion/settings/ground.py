@@ -6,7 +6,6 @@ from __future__ import annotations
 from typing import Any, Final
 
 import bpy
-import numpy as np
 from bpy.props import (
     BoolProperty,
     CollectionProperty,
@@ -18,6 +17,7 @@ from bpy.props import (
 )
 
 from ....core.locomotion.ground import StanceSettings
+from ...declared_settings import declared
 from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 
@@ -86,68 +86,12 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         poll=may_be_ground,
         override=OVERRIDE,
     )
-    duty: FloatProperty(
-        name="Hold",
-        description="Share of its cycle for which an arm holds on to the ground. More keeps more "
-        "arms down at a time; less gives them longer swings",
-        subtype="FACTOR",
-        default=StanceSettings.duty,
-        min=0.1,
-        max=0.85,
-        override=OVERRIDE,
-    )
-    planted: FloatProperty(
-        name="Planted",
-        description="Share of the arm, from its tip, that lies on the ground while it holds on",
-        subtype="FACTOR",
-        default=StanceSettings.planted,
-        min=0.1,
-        max=0.8,
-        override=OVERRIDE,
-    )
-    stretch: FloatProperty(
-        name="Stretch",
-        description="How much longer an arm may get as it pushes, becoming thinner: 0.4 is 40 %. "
-        "Only bones that hand their scale on aligned or not at all stretch; others bend instead",
-        default=StanceSettings.stretch,
-        min=0.0,
-        soft_max=1.0,
-        max=2.0,
-        step=5,
-        override=OVERRIDE,
-    )
-    lift: FloatProperty(
-        name="Lift",
-        description="How high above the ground an arm is at least in the middle of its swing, in "
-        "arm lengths",
-        default=StanceSettings.lift,
-        min=0.0,
-        soft_max=0.3,
-        max=1.0,
-        step=1,
-        precision=3,
-        override=OVERRIDE,
-    )
-    lean: FloatProperty(
-        name="Lean",
-        description="How far the body leans with the ground: 0 stays upright, 1 follows its slope",
-        subtype="FACTOR",
-        default=StanceSettings.lean,
-        min=0.0,
-        max=1.0,
-        override=OVERRIDE,
-    )
-    smoothing: FloatProperty(
-        name="Smoothing",
-        description="Over what length the body evens the ground out, in arm lengths. Less follows "
-        "every bump",
-        default=StanceSettings.smoothing,
-        min=0.05,
-        soft_max=2.0,
-        max=10.0,
-        step=5,
-        override=OVERRIDE,
-    )
+    duty: declared(StanceSettings, "duty")
+    planted: declared(StanceSettings, "planted")
+    stretch: declared(StanceSettings, "stretch")
+    lift: declared(StanceSettings, "lift")
+    lean: declared(StanceSettings, "lean")
+    smoothing: declared(StanceSettings, "smoothing")
     start_at_rest: BoolProperty(
         name="Start at Rest",
         description="All arms lie on the ground at the start, and leave it as the body gets going. "
@@ -184,18 +128,6 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         description="Contacts that were moved, locked, shifted or removed by hand",
         type=ContactItem,
         override=OVERRIDE_LIST,
-    )
-
-
-def stance_settings(settings: OCTO_MOTION_PG_ground) -> StanceSettings:
-    """The settings as core has them."""
-    return StanceSettings(
-        duty=float(np.round(settings.duty, 6)),
-        planted=settings.planted,
-        stretch=settings.stretch,
-        lift=settings.lift,
-        lean=settings.lean,
-        smoothing=settings.smoothing,
     )
 
 

@@ -29,9 +29,16 @@ from ....core.locomotion.motion import (
 )
 from ....core.locomotion.rig import Detection
 from ..reading import bones_of, previous_action, write_arms, write_body
-from ..settings.contact_overrides import ContactEdit, Place, note_shown, once_called, store
-from ..settings.properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from ..settings.quality import write_figures
+from ..settings import (
+    ContactEdit,
+    OCTO_MOTION_PG_locomotion,
+    Place,
+    locomotion_settings,
+    note_shown,
+    once_called,
+    store,
+    write_figures,
+)
 from .carried import write_carried
 from .summary import Summary
 

@@ -602,14 +602,14 @@ def test_a_bone_that_is_gone_is_a_clear_error() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"lateral_bend": float("nan")}, "A setting of the gait is not a number."),
+        ({"lateral_bend": float("nan")}, "Sway is not a number."),
         ({"weights": (0.5, 0.0)}, "A joint's weight is not between 0 and 1."),
         ({"weights": (1.5,)}, "A joint's weight is not between 0 and 1."),
         ({"weights": ()}, "A joint's weight is not between 0 and 1."),
         ({"variation": (0.2, 0.1)}, "The variation's minimum is greater than its maximum."),
-        ({"contraction": -0.5}, "The contraction is -0.5."),
-        ({"softness": 1.5}, "The softness is 1.5."),
-        ({"stretch_slack": -0.1}, "The give is -0.1."),
+        ({"contraction": -0.5}, "Contraction is -0.5."),
+        ({"softness": 1.5}, "Softness is 1.5."),
+        ({"stretch_slack": -0.1}, "Give is -0.1."),
     ],
 )
 def test_a_senseless_setting_is_a_clear_error(changes: dict[str, object], message: str) -> None:

@@ -572,13 +572,13 @@ def test_the_reversed_route_is_walked_the_other_way_round(name: str) -> None:
     [
         ({"stride": 0.0}, "stride"),
         ({"stride": -1.0}, "stride"),
-        ({"stride": float("nan")}, "not a number"),
+        ({"stride": float("nan")}, "Stride is not a number"),
         ({"ease_in": 0.6, "ease_out": 0.6}, "do not fit"),
-        ({"ease_in": -0.1}, "do not fit"),
-        ({"burst": 1.5}, "burst"),
-        ({"look_ahead": -1.0}, "looks"),
-        ({"corner": 0.0}, "corner"),
-        ({"heading_angle": float("inf")}, "not a number"),
+        ({"ease_in": -0.1}, "Ease In is -0.1"),
+        ({"burst": 1.5}, "Burst is 1.5"),
+        ({"look_ahead": -1.0}, "Look Ahead is -1"),
+        ({"corner": 0.0}, "Corner is 0"),
+        ({"heading_angle": float("inf")}, "Angle is not a number"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused_with_the_reason(

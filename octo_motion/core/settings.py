@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings declared once: default, bounds and words of what an artist sets, beside the field of
+the dataclass that core reads.
+
+Core checks the values against what is declared here; the panel's property, and the reader that
+makes the dataclass from properties, are made from it (ui/declared_settings.py). A field that is not
+declared is no setting: it is worked out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, Final
+
+import numpy as np
+
+from .errors import SettingsError
+
+_KEY: Final = "setting"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is declared of one setting; angles in radians."""
+
+    label: str
+    """What it is called in the panel."""
+    description: str
+    """What it does: the tooltip."""
+    default: Any
+    """What the field is if it is not given."""
+    offered: Any = None
+    """What an artist begins with, if that is not the default: the source's own motion is that of
+    the defaults."""
+    stored_as: str = ""
+    """Name of the property that scripts and files know, if it is not the field's."""
+    low: float | None = None
+    high: float | None = None
+    """Bounds that are kept, inclusive, …"""
+    soft_low: float | None = None
+    soft_high: float | None = None
+    """… and those that a slider has."""
+    step: int | None = None
+    """Hundredths by which an arrow of the slider changes it."""
+    precision: int | None = None
+    """Digits that are shown after the point."""
+    subtype: str = "NONE"
+    """What kind of number it is, in Blender's word: "FACTOR", "ANGLE"."""
+    items: tuple[tuple[str, str, str, int], ...] = ()
+    """Of a choice: identifier, label, description and number of each."""
+    digits: int | None = None
+    """Digits after the point that count. Properties are single precision; where something is
+    counted from a setting, 0.55 has to be 0.55."""
+
+
+def setting(label: str, description: str, *, default: Any, **more: Any) -> Any:
+    """The field of a dataclass that is a setting; what ``more`` may say is in :class:`Setting`."""
+    return field(default=default, metadata={_KEY: Setting(label, description, default, **more)})
+
+
+def declared_settings(kind: type) -> dict[str, Setting]:
+    """The settings of a dataclass by the names of its fields."""
+    return {each.name: each.metadata[_KEY] for each in fields(kind) if _KEY in each.metadata}
+
+
+def check_settings(settings: Any) -> None:
+    """Check that all numbers of a dataclass are finite, and its settings within their bounds.
+
+    Raises:
+        SettingsError: one is not.
+    """
+    for each in fields(settings):
+        value, declared = getattr(settings, each.name), each.metadata.get(_KEY)
+        if not isinstance(value, float | int | tuple):
+            continue
+        label = declared.label if declared else each.name.replace("_", " ").capitalize()
+        if not np.all(np.isfinite(value)):
+            raise SettingsError(f"{label} is not a number.", "Set it anew.")
+        low, high = (declared.low, declared.high) if declared else (None, None)
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise SettingsError(f"{label} is {value:g}.", _remedy(low, high))
+
+
+def _remedy(low: float | None, high: float | None) -> str:
+    if high is None:
+        return f"Give {low:g} or more."
+    return f"Give {high:g} or less." if low is None else f"Give a value from {low:g} to {high:g}."

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The worst of each kind in the panel, and a button that goes there."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty
+
+from ....blender.rig import active_armature
+from ....core.errors import RigError, SettingsError
+from ....core.locomotion.metrics import TOLD
+from ...armature_operator import ArmatureOperator
+from ..settings import (
+    KIND_NAMES,
+    KINDS,
+    OCTO_MOTION_PG_locomotion,
+    known_figures,
+    locomotion_settings,
+)
+
+_WORDS: Final = 0.7
+"""Share of a row that a figure and its arm need beside the button."""
+
+
+def shown(kind: str, value: float) -> str:
+    """A figure as people read it."""
+    if kind == "TURN":
+        return f"{np.degrees(value):.1f}°"
+    if kind == "OVERLAP":
+        return f"{value:.2f} radii"
+    percent = 100.0 * value
+    # The aims are hundredths of a percent; of what is large nobody wants to know so much.
+    return f"{percent:.2f} %" if percent < 1.0 else f"{percent:.1f} %"
+
+
+def draw_figures(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+    """A row for each figure, with a button that goes to its frame."""
+    column = layout.column(align=True)
+    for item in known_figures(settings):
+        row = column.split(factor=_WORDS, align=True)
+        words = row.row()
+        words.alert = item.value > TOLD.get(item.kind, np.inf)
+        words.label(text=_told(item))
+        jump = row.operator(
+            OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
+        )
+        jump.kind = item.kind
+
+
+def _told(item: Any) -> str:
+    """A figure, and the arm that it is of."""
+    told = f"{KIND_NAMES[item.kind]}: {shown(item.kind, item.value)}"
+    return f"{told}, {item.arm}" if item.arm else told
+
+
+def _figure(context: bpy.types.Context, kind: str) -> Any:
+    """What is known of one kind, None if nothing is."""
+    figures = known_figures(locomotion_settings(active_armature(context)))
+    return next((each for each in figures if each.kind == kind), None)
+
+
+class OCTO_MOTION_OT_quality_jump(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.quality_jump"
+    bl_label = "Go to Worst Frame"
+    bl_description = "Go to the frame where this is worst"
+    # The current frame is no step of undo, here as in Blender's timeline.
+    bl_options = {"REGISTER"}
+
+    kind: EnumProperty(name="Kind", description="Which figure", items=KINDS)
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: Any) -> str:
+        """What the figure means, and all of what the sidebar may be too narrow for."""
+        try:
+            item = _figure(context, properties.kind)
+        except RigError:
+            item = None
+        if item is None:
+            return cls.bl_description
+        meaning = next(told for kind, _, told, _ in KINDS if kind == item.kind)
+        return f"{meaning}. Go to frame {item.frame}, where it is worst. {_told(item)}"
+
+    def run(self, context: bpy.types.Context) -> None:
+        item = _figure(context, self.kind)
+        if item is None:
+            raise SettingsError(
+                f"Nothing is known of {KIND_NAMES[self.kind].lower()}.", "Generate a motion first."
+            )
+        assert context.scene is not None
+        context.scene.frame_set(item.frame)
+        self.report({"INFO"}, f"{_told(item)}.")
+
+
+CLASSES: Final = (OCTO_MOTION_OT_quality_jump,)
