@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
-
 from ..core.settings import Setting, declared_settings
-from .override_flags import OVERRIDE
+from .overridable import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 Settings = TypeVar("Settings")
 
@@ -26,7 +24,6 @@ def declared(kind: type, field: str) -> Any:
         "name": setting.label,
         "description": setting.description,
         "default": default,
-        "override": OVERRIDE,
     }
     if setting.items:
         return EnumProperty(items=setting.items, **told)

@@ -7,9 +7,9 @@ from typing import Final
 
 import bpy
 from bpy.app.handlers import persistent
-from bpy.props import PointerProperty
 
 from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion
+from .overridable import PointerProperty
 from .override_groups import make_overridable
 from .posing import OCTO_MOTION_PG_posing
 from .splicing import OCTO_MOTION_PG_splicing
@@ -22,25 +22,21 @@ class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
         name="Locomotion",
         description="How the armature walks or swims",
         type=OCTO_MOTION_PG_locomotion,
-        override={"LIBRARY_OVERRIDABLE"},
     )
     contact: PointerProperty(
         name="Contact",
         description="What a marker of a contact with the ground stands for",
         type=OCTO_MOTION_PG_contact,
-        override={"LIBRARY_OVERRIDABLE"},
     )
     splicing: PointerProperty(
         name="Splicing",
         description="What splicing knows of the armature",
         type=OCTO_MOTION_PG_splicing,
-        override={"LIBRARY_OVERRIDABLE"},
     )
     posing: PointerProperty(
         name="Posing",
         description="How the armature is posed by hand, and what stops it",
         type=OCTO_MOTION_PG_posing,
-        override={"LIBRARY_OVERRIDABLE"},
     )
 
 
@@ -60,7 +56,6 @@ def register() -> None:
         name="Octo Motion",
         description="Settings of Octo Motion",
         type=OCTO_MOTION_PG_object,
-        override={"LIBRARY_OVERRIDABLE"},
     )
     bpy.app.handlers.save_pre.append(_before_saving)
 

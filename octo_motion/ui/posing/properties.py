@@ -7,11 +7,10 @@ from typing import Any, Final, cast
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 
 from ...blender.rig import armature_data
 from ...core.posing.puppet import SMALLEST
-from ..override_flags import OVERRIDE
+from ..overridable import BoolProperty, EnumProperty, FloatProperty, PointerProperty
 from ..override_groups import make_overridable
 
 MATERIALS: Final = (
@@ -66,7 +65,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         description="What the joints are made of",
         items=MATERIALS,
         default="CLAY",
-        override=OVERRIDE,
     )
     strength: FloatProperty(
         name="Strength",
@@ -77,13 +75,11 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_min=0.1,
         soft_max=10.0,
         step=10,
-        override=OVERRIDE,
     )
     custom_yields: BoolProperty(
         name="Gives Way",
         description="Keep a bend, instead of springing back always",
         default=True,
-        override=OVERRIDE,
     )
     custom_bears: FloatProperty(
         name="Bears",
@@ -93,7 +89,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         max=1000.0,
         soft_max=10.0,
         step=10,
-        override=OVERRIDE,
     )
     custom_springs: FloatProperty(
         name="Springs Back",
@@ -105,7 +100,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_max=float(np.radians(90.0)),
         step=50,
         precision=2,
-        override=OVERRIDE,
     )
     custom_settles: FloatProperty(
         name="Settles",
@@ -117,7 +111,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_max=1.0,
         step=1,
         precision=3,
-        override=OVERRIDE,
     )
     custom_gives: FloatProperty(
         name="Gives",
@@ -129,7 +122,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_max=float(np.radians(1000.0)),
         step=500,
         precision=1,
-        override=OVERRIDE,
     )
     root: EnumProperty(
         name="Root",
@@ -139,7 +131,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
             ("PINNED", "Pinned", "The root bone stays in its place and turns as a joint", 1),
             ("FREE", "Free", "The whole figure can be carried about", 2),
         ),
-        override=OVERRIDE,
     )
     smallest: FloatProperty(
         name="Smallest Bone",
@@ -152,22 +143,15 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_max=0.1,
         step=1,
         precision=3,
-        override=OVERRIDE,
     )
 
     # --- The world -----------------------------------------------------------------------------
 
-    gravity: BoolProperty(
-        name="Gravity",
-        description="Let the figure have weight",
-        default=False,
-        override=OVERRIDE,
-    )
+    gravity: BoolProperty(name="Gravity", description="Let the figure have weight", default=False)
     floor: BoolProperty(
         name="Floor",
         description="A solid floor through the whole scene",
         default=False,
-        override=OVERRIDE,
     )
     floor_height: FloatProperty(
         name="Height",
@@ -176,19 +160,16 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         default=0.0,
         soft_min=-10.0,
         soft_max=10.0,
-        override=OVERRIDE,
     )
     use_obstacles: BoolProperty(
         name="Obstacles",
         description="Objects that are marked as solid stop the figure",
         default=True,
-        override=OVERRIDE,
     )
     self_collision: BoolProperty(
         name="Self Collision",
         description="Limbs stop each other. Takes longer to compute",
         default=False,
-        override=OVERRIDE,
     )
     friction: FloatProperty(
         name="Friction",
@@ -198,7 +179,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         max=10.0,
         soft_max=2.0,
         step=10,
-        override=OVERRIDE,
     )
 
     # --- Keys ------------------------------------------------------------------------------------
@@ -208,13 +188,11 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         description="Which action gets the keys",
         items=TARGETS,
         default="CURRENT",
-        override=OVERRIDE,
     )
     action: PointerProperty(
         name="Action",
         description="The action that gets the keys",
         type=bpy.types.Action,
-        override=OVERRIDE,
     )
     record_angle: FloatProperty(
         name="Tolerance Angle",
@@ -225,7 +203,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         max=float(np.radians(45.0)),
         step=50,
         precision=2,
-        override=OVERRIDE,
     )
 
     # --- What is shown ------------------------------------------------------------------------
@@ -234,7 +211,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         name="Loads",
         description="Show the limbs as capsules, redder where a joint bears more",
         default=True,
-        override=OVERRIDE,
     )
 
     # --- For other objects ---------------------------------------------------------------------
@@ -244,7 +220,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         description="What puppets take this object for",
         items=OBSTACLES,
         default="NONE",
-        override=OVERRIDE,
     )
 
 

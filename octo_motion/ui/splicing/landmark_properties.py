@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 import bpy
-from bpy.props import StringProperty
 
 from ...core.splicing.humanoid import LANDMARKS, Landmarks
+from ..overridable import StringProperty
 
 
 def _bone(name: str, description: str) -> Any:
-    return StringProperty(name=name, description=description, override={"LIBRARY_OVERRIDABLE"})
+    return StringProperty(name=name, description=description)
 
 
 class OCTO_MOTION_PG_landmarks(bpy.types.PropertyGroup):

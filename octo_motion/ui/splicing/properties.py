@@ -6,9 +6,9 @@ from __future__ import annotations
 from typing import Final, cast
 
 import bpy
-from bpy.props import PointerProperty
 
 from ...blender.rig import armature_data
+from ..overridable import PointerProperty
 from ..override_groups import make_overridable
 from .landmark_properties import OCTO_MOTION_PG_landmarks
 from .splice_properties import SpliceStack
@@ -21,7 +21,6 @@ class OCTO_MOTION_PG_splicing(SpliceStack, bpy.types.PropertyGroup):
         name="Landmarks",
         description="Which bone is which part of the body",
         type=OCTO_MOTION_PG_landmarks,
-        override={"LIBRARY_OVERRIDABLE"},
     )
 
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 import bpy
-from bpy.props import (
+
+from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
+from ..overridable import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -19,9 +21,6 @@ from bpy.props import (
     PointerProperty,
     StringProperty,
 )
-
-from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
-from ..override_flags import OVERRIDE, OVERRIDE_LIST
 
 PARTS: Final = tuple(
     (part.name.upper(), part.title, part.description, number)
@@ -62,28 +61,27 @@ def _is_armature(_: Any, candidate: bpy.types.Object) -> bool:
 
 
 def _slot(description: str) -> Any:
-    return StringProperty(name="Slot", description=description, override=OVERRIDE)
+    return StringProperty(name="Slot", description=description)
 
 
 class SpliceItem(bpy.types.PropertyGroup):
     """One part of one clip, and when."""
 
-    name: StringProperty(name="Name", description="What this splice is called in the list")
+    name: bpy.props.StringProperty(
+        name="Name", description="What this splice is called in the list"
+    )
     part: EnumProperty(
         name="Part",
         description="Which part of the body is taken from the source",
         items=PARTS,
-        override=OVERRIDE,
     )
     bone: StringProperty(
         name="First Bone",
         description="With the part Chain: its first bone on this armature",
-        override=OVERRIDE,
     )
     source_bone: StringProperty(
         name="Source Bone",
         description="With the part Chain: its first bone on the source, if it is called otherwise",
-        override=OVERRIDE,
     )
     source: PointerProperty(
         name="Source",
@@ -91,20 +89,17 @@ class SpliceItem(bpy.types.PropertyGroup):
         "axes, and may be this armature itself",
         type=bpy.types.Object,
         poll=_is_armature,
-        override=OVERRIDE,
     )
     action: PointerProperty(
         name="Action",
         description="The clip. It is never changed",
         type=bpy.types.Action,
-        override=OVERRIDE,
     )
     slot: _slot("Slot of the clip's action; empty takes the one that fits the source")
     visual: BoolProperty(
         name="As Shown",
         description="Take the clip as the scene shows it, with constraints, drivers and NLA. "
         "That plays the scene, so it takes longer",
-        override=OVERRIDE,
     )
     splice_start: FloatProperty(
         name="Clip Start",
@@ -112,7 +107,6 @@ class SpliceItem(bpy.types.PropertyGroup):
         default=1.0,
         step=100,
         precision=1,
-        override=OVERRIDE,
     )
     base_start: FloatProperty(
         name="Base Start",
@@ -120,7 +114,6 @@ class SpliceItem(bpy.types.PropertyGroup):
         default=1.0,
         step=100,
         precision=1,
-        override=OVERRIDE,
     )
     rate: FloatProperty(
         name="Rate",
@@ -130,7 +123,6 @@ class SpliceItem(bpy.types.PropertyGroup):
         max=100.0,
         soft_max=4.0,
         step=5,
-        override=OVERRIDE,
     )
     length: FloatProperty(
         name="Length",
@@ -138,7 +130,6 @@ class SpliceItem(bpy.types.PropertyGroup):
         min=0.0,
         step=100,
         precision=1,
-        override=OVERRIDE,
     )
     ease_in: FloatProperty(
         name="Ease In",
@@ -147,7 +138,6 @@ class SpliceItem(bpy.types.PropertyGroup):
         min=0.0,
         step=100,
         precision=1,
-        override=OVERRIDE,
     )
     ease_out: FloatProperty(
         name="Ease Out",
@@ -157,41 +147,35 @@ class SpliceItem(bpy.types.PropertyGroup):
         min=0.0,
         step=100,
         precision=1,
-        override=OVERRIDE,
     )
     after: EnumProperty(
         name="After",
         description="What happens when the clip runs out",
         items=AFTER,
-        override=OVERRIDE,
     )
     mode: EnumProperty(
         name="Reach",
         description="Where hands and feet go on a body of other proportions",
         items=MODES,
-        override=OVERRIDE,
     )
     with_clavicle: BoolProperty(
         name="With Collar Bone",
         description="An arm takes its collar bone along, where both armatures have one: the hand "
         "is then where it was seen. Without, the shoulder stays the base's",
         default=True,
-        override=OVERRIDE,
     )
     seen_from: EnumProperty(
         name="Seen From",
         description="From where the clip's legs are seen, so that they lie alike on the base. Legs "
         "with travel are always seen from the pelvis",
         items=SEEN_FROM,
-        override=OVERRIDE,
     )
     with_travel: BoolProperty(
         name="With Travel",
         description="Legs bring the clip's way through the world with them, so that feet do not "
         "skate",
-        override=OVERRIDE,
     )
-    mute: BoolProperty(name="Mute", description="Leave this splice out", override=OVERRIDE)
+    mute: BoolProperty(name="Mute", description="Leave this splice out")
 
 
 class SpliceStack:
@@ -201,28 +185,24 @@ class SpliceStack:
         name="Base",
         description="The action onto which parts are spliced. It is never changed",
         type=bpy.types.Action,
-        override=OVERRIDE,
     )
     base_slot: _slot("Slot of the base; empty takes the one that fits the armature")
     visual: BoolProperty(
         name="Base As Shown",
         description="Take the base as the scene shows it, with constraints, drivers and NLA. "
         "That plays the scene, so it takes longer",
-        override=OVERRIDE,
     )
     splices: CollectionProperty(
         name="Splices",
         description="What is spliced onto the base, each onto the result of those above it",
         type=SpliceItem,
-        override=OVERRIDE_LIST,
     )
-    active_splice: IntProperty(name="Active Splice", options={"HIDDEN"}, override=OVERRIDE)
+    active_splice: IntProperty(name="Active Splice", options={"HIDDEN"})
     result: PointerProperty(
         name="Result",
         description="The action that was built last. It is made anew in place until you edit it; "
         "then it is yours, and the next one is a new action",
         type=bpy.types.Action,
-        override=OVERRIDE,
     )
 
 

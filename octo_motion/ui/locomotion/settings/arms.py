@@ -12,7 +12,8 @@ import math
 from typing import Final
 
 import bpy
-from bpy.props import (
+
+from ...overridable import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -20,8 +21,6 @@ from bpy.props import (
     IntProperty,
     StringProperty,
 )
-
-from ...override_flags import OVERRIDE, OVERRIDE_LIST
 from .contact_overrides import rename_arm
 from .gait import SIDES
 
@@ -45,16 +44,16 @@ def _renamed(arm: ArmItem, _context: bpy.types.Context) -> None:
 class ArmBoneItem(bpy.types.PropertyGroup):
     """A bone of an arm."""
 
-    name: StringProperty(name="Bone", description="Name of the bone")
+    name: bpy.props.StringProperty(name="Bone", description="Name of the bone")
 
 
 class ArmItem(bpy.types.PropertyGroup):
     """An arm: its bones from root to tip, and its place in the gait."""
 
-    name: StringProperty(
+    name: bpy.props.StringProperty(
         name="Name", description="What this arm is called in the list", update=_renamed
     )
-    known_as: StringProperty(
+    known_as: bpy.props.StringProperty(
         name="Known As",
         description="What it was called until its name was changed",
         options={"HIDDEN"},
@@ -63,13 +62,11 @@ class ArmItem(bpy.types.PropertyGroup):
         name="Bones",
         description="The arm's bones, from its root to its tip",
         type=ArmBoneItem,
-        override=OVERRIDE_LIST,
     )
     side: EnumProperty(
         name="Side",
         description="Side of the body. Gaits mirror forward and backward between left and right",
         items=SIDES,
-        override=OVERRIDE,
     )
     pair: IntProperty(
         name="Pair",
@@ -77,7 +74,6 @@ class ArmItem(bpy.types.PropertyGroup):
         "its own motion, and shift the pairs against one another",
         default=1,
         min=1,
-        override=OVERRIDE,
     )
     phase: FloatProperty(
         name="Phase",
@@ -87,19 +83,16 @@ class ArmItem(bpy.types.PropertyGroup):
         soft_max=math.tau,
         step=500,
         precision=1,
-        override=OVERRIDE,
     )
     flip: BoolProperty(
         name="Flip",
         description="Mirror this arm's motion: forward and twist turn the other way, for an arm "
         "that moves backward where others move forward",
-        override=OVERRIDE,
     )
     enabled: BoolProperty(
         name="Enabled",
         description="Move this arm. Switched off, it gets no keys and keeps its pose",
         default=True,
-        override=OVERRIDE,
     )
 
 
@@ -110,27 +103,23 @@ class ArmList:
         name="Arms",
         description="The arms that are moved; without any, they are detected when generating",
         type=ArmItem,
-        override=OVERRIDE_LIST,
     )
-    active_arm: IntProperty(name="Active Arm", options={"HIDDEN"}, override=OVERRIDE)
+    active_arm: IntProperty(name="Active Arm", options={"HIDDEN"})
     body_front: EnumProperty(
         name="Front",
         description="Which way the body faces, as an axis of the armature",
         items=AXES,
         default="-Y",
-        override=OVERRIDE,
     )
     body_up: EnumProperty(
         name="Up",
         description="Where the body's top is, as an axis of the armature",
         items=AXES,
         default="Z",
-        override=OVERRIDE,
     )
     root_bone: StringProperty(
         name="Root Bone",
         description="Bone that carries the whole body; it can take the travel along the route",
-        override=OVERRIDE,
     )
 
 

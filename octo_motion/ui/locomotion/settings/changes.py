@@ -6,16 +6,15 @@ from __future__ import annotations
 from typing import Any, Final
 
 import bpy
-from bpy.props import (
+
+from ....blender.files import gait_names
+from ...overridable import (
     CollectionProperty,
     EnumProperty,
     FloatProperty,
     IntProperty,
     StringProperty,
 )
-
-from ....blender.files import gait_names
-from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 
 def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
@@ -31,21 +30,21 @@ def _length() -> Any:
         min=0.1,
         soft_max=5.0,
         step=10,
-        override=OVERRIDE,
     )
 
 
 class ChangeItem(bpy.types.PropertyGroup):
     """A place of the route from which on another gait goes."""
 
-    name: StringProperty(name="Name", description="What this change is called in the list")
+    name: bpy.props.StringProperty(
+        name="Name", description="What this change is called in the list"
+    )
     gait: StringProperty(
         name="Gait",
         description="The gait from here on. Its own strides, the other settings of this armature",
         default="swim",
         search=_gait_names,
         search_options=set(),
-        override=OVERRIDE,
     )
     position: FloatProperty(
         name="Position",
@@ -55,7 +54,6 @@ class ChangeItem(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         precision=3,
-        override=OVERRIDE,
     )
     length: _length()
 
@@ -76,7 +74,6 @@ class OCTO_MOTION_PG_change(bpy.types.PropertyGroup):
             ),
             ("MARKERS", "At Places", "At the places of a list, each with its own gait", 2),
         ),
-        override=OVERRIDE,
     )
     gait: StringProperty(
         name="Above",
@@ -84,7 +81,6 @@ class OCTO_MOTION_PG_change(bpy.types.PropertyGroup):
         default="swim",
         search=_gait_names,
         search_options=set(),
-        override=OVERRIDE,
     )
     height: FloatProperty(
         name="Height",
@@ -94,16 +90,14 @@ class OCTO_MOTION_PG_change(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=3.0,
         step=5,
-        override=OVERRIDE,
     )
     length: _length()
     places: CollectionProperty(
         name="Places",
         description="Places of the route where the gait changes, in any order",
         type=ChangeItem,
-        override=OVERRIDE_LIST,
     )
-    active_place: IntProperty(name="Active Place", options={"HIDDEN"}, override=OVERRIDE)
+    active_place: IntProperty(name="Active Place", options={"HIDDEN"})
 
 
 CLASSES: Final = (ChangeItem, OCTO_MOTION_PG_change)

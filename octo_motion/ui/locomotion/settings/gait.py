@@ -15,15 +15,6 @@ from typing import Any, Final
 
 import bpy
 import numpy as np
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    StringProperty,
-)
 
 from ....core.errors import GaitError
 from ....core.locomotion.gait import (
@@ -38,7 +29,15 @@ from ....core.locomotion.gait import (
     gait_to_json,
 )
 from ....core.rotations import Floats
-from ...override_flags import OVERRIDE, OVERRIDE_LIST
+from ...overridable import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
 from ...override_groups import assign
 
 DEFAULT_GAIT: Final = "walk"
@@ -61,7 +60,6 @@ def _unused() -> Any:
         name="Unused",
         description="Left out. Items of a linked file can be changed here, but not removed",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
 
 
@@ -93,7 +91,6 @@ def _link_angles(name: str, description: str) -> Any:
         soft_max=np.pi,
         step=500,
         precision=1,
-        override=OVERRIDE,
     )
 
 
@@ -108,7 +105,6 @@ class OCTO_MOTION_PG_gait_knot(bpy.types.PropertyGroup):
         max=2.0 * np.pi,
         step=500,
         precision=1,
-        override=OVERRIDE,
     )
     head: _link_angles("Head", "Up and down; above zero raises")
     pitch: _link_angles("Pitch", "Left and right; above zero turns to the body's front")
@@ -124,20 +120,17 @@ class OCTO_MOTION_PG_gait_curve(bpy.types.PropertyGroup):
         description="Pair of arms that these angles are for, 1 in front; 0 is for all others",
         min=-50,
         soft_min=0,
-        override=OVERRIDE,
     )
     knots: CollectionProperty(
         name="Knots",
         description="Angles at some phases; the last runs on to the first",
         type=OCTO_MOTION_PG_gait_knot,
-        override=OVERRIDE_LIST,
     )
     free: BoolProperty(
         name="Off the Ground",
         description="These arms never hold on to the ground: they move as the table says",
-        override=OVERRIDE,
     )
-    active_knot: IntProperty(name="Active Knot", options={"HIDDEN"}, override=OVERRIDE)
+    active_knot: IntProperty(name="Active Knot", options={"HIDDEN"})
     unused: _unused()
 
 
@@ -150,9 +143,8 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
         min=-50,
         soft_min=1,
         default=1,
-        override=OVERRIDE,
     )
-    side: EnumProperty(name="Side", description="Side of the arm", items=SIDES, override=OVERRIDE)
+    side: EnumProperty(name="Side", description="Side of the arm", items=SIDES)
     phase: FloatProperty(
         name="Ahead",
         description="How far this arm is ahead of the body's cycle, whatever the spread says",
@@ -161,7 +153,6 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
         soft_max=2.0 * np.pi,
         step=500,
         precision=1,
-        override=OVERRIDE,
     )
     unused: _unused()
 
@@ -169,22 +160,16 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
 class OCTO_MOTION_PG_gait_note(bpy.types.PropertyGroup):
     """A remark that travels with the table."""
 
-    subject: StringProperty(
-        name="Subject", description="What the remark is about", override=OVERRIDE
-    )
-    text: StringProperty(name="Text", description="The remark itself", override=OVERRIDE)
+    subject: StringProperty(name="Subject", description="What the remark is about")
+    text: StringProperty(name="Text", description="The remark itself")
     unused: _unused()
 
 
 class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
     """A gait table."""
 
-    name: StringProperty(
-        name="Name", description="Name of the gait that was loaded", override=OVERRIDE
-    )
-    description: StringProperty(
-        name="Description", description="What this gait is for", override=OVERRIDE
-    )
+    name: StringProperty(name="Name", description="Name of the gait that was loaded")
+    description: StringProperty(name="Description", description="What this gait is for")
     manner: EnumProperty(
         name="Manner",
         description="How the body travels with this gait",
@@ -199,7 +184,6 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
             ),
         ),
         default=_DEFAULT.manner,
-        override=OVERRIDE,
     )
     stride: FloatProperty(
         name="Stride",
@@ -210,7 +194,6 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         soft_min=0.1,
         soft_max=3.0,
         step=5,
-        override=OVERRIDE,
     )
     spread_pairs: FloatProperty(
         name="Pairs",
@@ -220,7 +203,6 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         soft_min=-2.0,
         soft_max=2.0,
         step=5,
-        override=OVERRIDE,
     )
     spread_sides: FloatProperty(
         name="Sides",
@@ -230,22 +212,19 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         soft_min=-1.0,
         soft_max=1.0,
         step=5,
-        override=OVERRIDE,
     )
     spread_halves: FloatProperty(
         name="Halves",
         description="Cycles that the rear half of the arms is ahead of the front half",
         default=_DEFAULT.spread_halves,
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
     offsets: CollectionProperty(
         name="Offsets",
         description="Arms that keep a phase of their own, whatever the spread says",
         type=OCTO_MOTION_PG_gait_offset,
-        override=OVERRIDE_LIST,
     )
-    active_offset: IntProperty(name="Active Offset", options={"HIDDEN"}, override=OVERRIDE)
+    active_offset: IntProperty(name="Active Offset", options={"HIDDEN"})
     power_phase: FloatProperty(
         name="Power Stroke",
         description="Phase at the middle of the power stroke: a swimming body shoots ahead there",
@@ -255,16 +234,14 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         max=2.0 * np.pi,
         step=500,
         precision=1,
-        override=OVERRIDE,
     )
     curves: CollectionProperty(
         name="Curves",
         description="Angles of the arms over one cycle: one curve for all pairs, others for "
         "single pairs. Without any, the preset's",
         type=OCTO_MOTION_PG_gait_curve,
-        override=OVERRIDE_LIST,
     )
-    active_curve: IntProperty(name="Active Curve", options={"HIDDEN"}, override=OVERRIDE)
+    active_curve: IntProperty(name="Active Curve", options={"HIDDEN"})
     shown_angle: EnumProperty(
         name="Angle",
         description="Which of the three angles the table shows",
@@ -273,12 +250,9 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
             ("PITCH", "Pitch", "Left and right; above zero turns to the body's front", 1),
             ("BANK", "Bank", "Twist about the arm", 2),
         ),
-        override=OVERRIDE,
     )
-    notes: CollectionProperty(
-        name="Notes", type=OCTO_MOTION_PG_gait_note, options={"HIDDEN"}, override=OVERRIDE_LIST
-    )
-    as_text: StringProperty(
+    notes: CollectionProperty(name="Notes", type=OCTO_MOTION_PG_gait_note, options={"HIDDEN"})
+    as_text: bpy.props.StringProperty(
         name="Text",
         description="The whole table as in a gait's file (JSON), to read and to set",
         get=_text,

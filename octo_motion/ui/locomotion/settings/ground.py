@@ -6,7 +6,10 @@ from __future__ import annotations
 from typing import Any, Final
 
 import bpy
-from bpy.props import (
+
+from ....core.locomotion.ground import StanceSettings
+from ...declared_settings import declared
+from ...overridable import (
     BoolProperty,
     CollectionProperty,
     FloatProperty,
@@ -15,10 +18,6 @@ from bpy.props import (
     PointerProperty,
     StringProperty,
 )
-
-from ....core.locomotion.ground import StanceSettings
-from ...declared_settings import declared
-from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 
 def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
@@ -29,13 +28,9 @@ def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
 class ContactItem(bpy.types.PropertyGroup):
     """What an artist wants of one contact: it stays when the motion is generated again."""
 
-    arm: StringProperty(name="Arm", description="Name of the arm in the list", override=OVERRIDE)
-    cycle: IntProperty(
-        name="Cycle", description="Number of the arm's cycle along the route", override=OVERRIDE
-    )
-    removed: BoolProperty(
-        name="Removed", description="The arm does not touch the ground here", override=OVERRIDE
-    )
+    arm: StringProperty(name="Arm", description="Name of the arm in the list")
+    cycle: IntProperty(name="Cycle", description="Number of the arm's cycle along the route")
+    removed: BoolProperty(name="Removed", description="The arm does not touch the ground here")
     shift: FloatProperty(
         name="Shift",
         description="Share of a cycle by which the contact is later, negative if it is earlier",
@@ -44,27 +39,23 @@ class ContactItem(bpy.types.PropertyGroup):
         max=0.3,
         step=1,
         precision=3,
-        override=OVERRIDE,
     )
     locked: BoolProperty(
         name="Locked",
         description="The contact stays where it is in the world, however the route or the gait "
         "are changed",
-        override=OVERRIDE,
     )
     position: FloatVectorProperty(
         name="Position",
         description="Where the arm touches the ground, if the contact is locked",
         subtype="TRANSLATION",
         size=3,
-        override=OVERRIDE,
     )
     heading: FloatProperty(
         name="Heading",
         description="Which way the arm lies from there, about the world's Z axis, if the contact "
         "is locked",
         subtype="ANGLE",
-        override=OVERRIDE,
     )
 
 
@@ -76,7 +67,6 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         description="Walking, each arm takes hold of the ground and does not slide over it, while "
         "the body moves on. Off, the arms move as the gait alone has them",
         default=True,
-        override=OVERRIDE,
     )
     object: PointerProperty(
         name="Ground",
@@ -84,7 +74,6 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         "one, the ground is where the route is",
         type=bpy.types.Object,
         poll=may_be_ground,
-        override=OVERRIDE,
     )
     duty: declared(StanceSettings, "duty")
     planted: declared(StanceSettings, "planted")
@@ -97,14 +86,12 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         description="All arms lie on the ground at the start, and leave it as the body gets going. "
         "Only with an Ease In: without one the creature comes walking",
         default=True,
-        override=OVERRIDE,
     )
     come_to_rest: BoolProperty(
         name="Come to Rest",
         description="All arms lie on the ground at the end: each takes its last step in time. Only "
         "with an Ease Out: without one the creature walks on",
         default=True,
-        override=OVERRIDE,
     )
     rest_within: FloatProperty(
         name="Within",
@@ -115,19 +102,16 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         soft_max=4.0,
         max=100.0,
         step=10,
-        override=OVERRIDE,
     )
     shown: StringProperty(
         name="Shown",
         description="Which contacts have markers",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
     contacts: CollectionProperty(
         name="Contacts",
         description="Contacts that were moved, locked, shifted or removed by hand",
         type=ContactItem,
-        override=OVERRIDE_LIST,
     )
 
 
@@ -138,22 +122,17 @@ class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
         name="Armature",
         description="Object whose arm touches here",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
-    arm: StringProperty(
-        name="Arm", description="Name of the arm", options={"HIDDEN"}, override=OVERRIDE
-    )
+    arm: StringProperty(name="Arm", description="Name of the arm", options={"HIDDEN"})
     cycle: IntProperty(
         name="Cycle",
         description="Number of the arm's cycle along the route",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
     locked: BoolProperty(
         name="Locked",
         description="The contact stays here, however the route or the gait are changed. One that "
         "was dragged or turned is locked; free it to have it where the gait wants it",
-        override=OVERRIDE,
     )
     shift: FloatProperty(
         name="Shift",
@@ -162,39 +141,33 @@ class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
         max=0.3,
         step=1,
         precision=3,
-        override=OVERRIDE,
     )
     position: FloatVectorProperty(
         name="Position",
         description="Where the marker was put",
         size=3,
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
     heading: FloatProperty(
         name="Heading",
         description="How the marker was turned",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
     frame_on: FloatProperty(
         name="From",
         description="Frame at which the arm takes hold",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
     frame_off: FloatProperty(
         name="To",
         description="Frame at which the arm lets go",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
     cycle_frames: FloatProperty(
         name="Cycle Frames",
         description="Frames that a cycle takes there",
         default=1.0,
         options={"HIDDEN"},
-        override=OVERRIDE,
     )
 
 

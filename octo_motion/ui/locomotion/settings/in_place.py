@@ -5,9 +5,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bpy.props import BoolProperty, FloatProperty, IntProperty
-
-from ...override_flags import OVERRIDE
+from ...overridable import BoolProperty, FloatProperty, IntProperty
 
 _IN_PLACE: Final = (
     "Nothing travels: whole cycles on the spot, whose last frame meets the first, for games and "
@@ -28,14 +26,12 @@ class InPlace:
         min=1,
         soft_max=12,
         max=10_000,
-        override=OVERRIDE,
     )
     repeat: BoolProperty(
         name="Repeat",
         description="In place: curves repeat before and after the loop, by Cycles modifiers. "
         "Exporters take the loop alone",
         default=True,
-        override=OVERRIDE,
     )
     breathing: FloatProperty(
         name="Breathing",
@@ -46,7 +42,6 @@ class InPlace:
         soft_max=0.3,
         max=1.0,
         step=1,
-        override=OVERRIDE,
     )
     breath_time: FloatProperty(
         name="Breath",
@@ -57,5 +52,4 @@ class InPlace:
         min=0.05,
         soft_max=20.0,
         step=10,
-        override=OVERRIDE,
     )

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-from bpy.props import BoolProperty
-
-from ...override_flags import OVERRIDE
+from ...overridable import BoolProperty
 
 
 class KeepingApart:
@@ -16,12 +14,10 @@ class KeepingApart:
         description="Arms that would pass through each other or through the body make way: those "
         "in the air, and what does not lie on the ground of those that hold on",
         default=True,
-        override=OVERRIDE,
     )
     tell_overlaps: BoolProperty(
         name="Tell Overlaps",
         description="After generating, say at which frame an arm passes deepest through another "
         "or through the body, if by more than a tenth of its thickness",
         default=True,
-        override=OVERRIDE,
     )

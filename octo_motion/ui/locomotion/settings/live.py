@@ -6,9 +6,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
 
-from ...override_flags import OVERRIDE
+from ...overridable import BoolProperty, StringProperty
 
 SWITCHED: Final[set[str]] = set()
 """Names of the armatures whose Live was switched, until somebody has looked."""
@@ -29,12 +28,10 @@ class LiveSettings:
         "changes, with a key on every frame. Generate measures it and leaves out keys. Switches "
         "itself off when you edit the action",
         update=_tell,
-        override=OVERRIDE,
     )
     live_error: StringProperty(
         name="Live Error",
         description="Why the motion does not follow at the moment; the last one that could be "
         "made is still there",
         options={"HIDDEN"},
-        override=OVERRIDE,
     )

@@ -7,13 +7,12 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
 
 from ....blender.files import curve_node, ensure_weight_curve, gait_names, load_gait
 from ....core.errors import GaitError
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ...declared_settings import declared
-from ...override_flags import OVERRIDE
+from ...overridable import BoolProperty, FloatProperty, PointerProperty, StringProperty
 from .gait import DEFAULT_GAIT, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
 
 
@@ -52,13 +51,11 @@ class Movement:
         search=_gait_names,
         search_options=set(),
         update=_load_gait,
-        override=OVERRIDE,
     )
     table: PointerProperty(
         name="Gait Table",
         description="The gait itself: angles of the arms over one cycle",
         type=OCTO_MOTION_PG_gait_table,
-        override=OVERRIDE,
     )
     contraction: declared(GaitSettings, "contraction")
     softness: declared(GaitSettings, "softness")
@@ -79,7 +76,6 @@ class Movement:
         max=np.pi,
         step=100,
         precision=1,
-        override=OVERRIDE,
     )
     variation_max: FloatProperty(
         name="Max",
@@ -92,7 +88,6 @@ class Movement:
         max=np.pi,
         step=100,
         precision=1,
-        override=OVERRIDE,
     )
     seed: declared(GaitSettings, "seed")
     weight_root: FloatProperty(
@@ -103,7 +98,6 @@ class Movement:
         default=GaitSettings.weights[0],
         min=0.01,
         max=1.0,
-        override=OVERRIDE,
     )
     weight_tip: FloatProperty(
         name="Tip",
@@ -113,20 +107,17 @@ class Movement:
         default=GaitSettings.weights[-1],
         min=0.01,
         max=1.0,
-        override=OVERRIDE,
     )
     use_weight_curve: BoolProperty(
         name="Curve",
         description="Draw the weights as a curve from the arm's root, left, to its tip, right",
         update=_make_weight_curve,
-        override=OVERRIDE,
     )
     weight_curve: PointerProperty(
         name="Weight Curve",
         description="Node group that keeps the curve of joint weights",
         type=bpy.types.NodeTree,
         poll=_is_weight_curve,
-        override=OVERRIDE,
     )
 
 

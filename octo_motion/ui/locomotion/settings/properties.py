@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import Final, cast
 
 import bpy
-from bpy.props import PointerProperty
 
 from ....blender.rig import armature_data
-from ...override_flags import OVERRIDE
+from ...overridable import PointerProperty
 from ...override_groups import make_overridable
 from .arms import ArmList
 from .changes import OCTO_MOTION_PG_change
@@ -47,13 +46,11 @@ class OCTO_MOTION_PG_locomotion(
         name="Ground",
         description="What a walking creature stands on, and how",
         type=OCTO_MOTION_PG_ground,
-        override=OVERRIDE,
     )
     change: PointerProperty(
         name="Change of Gait",
         description="Where along the route the gait changes",
         type=OCTO_MOTION_PG_change,
-        override=OVERRIDE,
     )
 
 

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import bpy
-from bpy.props import (
+
+from ....blender.overrides import linked_names
+from ....core.locomotion.metrics import Figure
+from ...overridable import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -15,10 +18,6 @@ from bpy.props import (
     IntProperty,
     StringProperty,
 )
-
-from ....blender.overrides import linked_names
-from ....core.locomotion.metrics import Figure
-from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 KINDS: Final = (
     ("SLIP", "Slip", "How far an arm slides over the ground that it holds, in arm lengths", 0),
@@ -35,28 +34,23 @@ KIND_NAMES: Final = {kind: name for kind, name, _, _ in KINDS}
 class FigureItem(bpy.types.PropertyGroup):
     """The worst of one kind, as it is kept with the settings."""
 
-    kind: EnumProperty(name="Kind", description="What was measured", items=KINDS, override=OVERRIDE)
+    kind: EnumProperty(name="Kind", description="What was measured", items=KINDS)
     value: FloatProperty(
         name="Value",
         description="Slip, depth and miss in arm lengths, strain as a share, turn in radians per "
         "frame, overlap in radii",
         precision=5,
-        override=OVERRIDE,
     )
     frame: IntProperty(
         name="Frame",
         description="Where it is worst; between two frames the first of them",
-        override=OVERRIDE,
     )
-    arm: StringProperty(
-        name="Arm", description="Of which arm; of an overlap both", override=OVERRIDE
-    )
+    arm: StringProperty(name="Arm", description="Of which arm; of an overlap both")
     known: BoolProperty(
         name="Known",
         description="Whether it was measured in this motion. Off for what a linked file tells of "
         "another one",
         default=True,
-        override=OVERRIDE,
     )
 
 
@@ -67,7 +61,6 @@ class QualityReport:
         name="Quality",
         description="The worst of each kind in the motion that was generated last",
         type=FigureItem,
-        override=OVERRIDE_LIST,
     )
 
 

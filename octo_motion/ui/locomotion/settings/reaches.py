@@ -6,7 +6,9 @@ from __future__ import annotations
 from typing import Any, Final
 
 import bpy
-from bpy.props import (
+
+from ....blender.scene import WITH_SURFACE
+from ...overridable import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -15,9 +17,6 @@ from bpy.props import (
     PointerProperty,
     StringProperty,
 )
-
-from ....blender.scene import WITH_SURFACE
-from ...override_flags import OVERRIDE, OVERRIDE_LIST
 
 MODES: Final = (
     ("COIL", "Coil", "Wind about the object, hold it, and let go", 0),
@@ -39,21 +38,19 @@ def _has_surface(_item: Any, candidate: bpy.types.Object) -> bool:
 class ReachItem(bpy.types.PropertyGroup):
     """An arm reaches for an object while it moves, and goes back to its gait."""
 
-    name: StringProperty(name="Name", description="What this reach is called in the list")
-    mute: BoolProperty(name="Mute", description="Leave this reach out", override=OVERRIDE)
+    name: bpy.props.StringProperty(name="Name", description="What this reach is called in the list")
+    mute: BoolProperty(name="Mute", description="Leave this reach out")
     arm: StringProperty(
         name="Arm",
         description="The arm of the list that reaches; empty takes the one nearest to the object",
-        override=OVERRIDE,
     )
     target: PointerProperty(
         name="Object",
         description="What is reached for. It may move; only if it is carried is it changed",
         type=bpy.types.Object,
         poll=_has_surface,
-        override=OVERRIDE,
     )
-    mode: EnumProperty(name="Mode", description="What the arm does", items=MODES, override=OVERRIDE)
+    mode: EnumProperty(name="Mode", description="What the arm does", items=MODES)
     turns: FloatProperty(
         name="Turns",
         description="Winds about the object at most so often, as far as the arm is long enough",
@@ -62,25 +59,18 @@ class ReachItem(bpy.types.PropertyGroup):
         max=20.0,
         step=10,
         precision=2,
-        override=OVERRIDE,
     )
     carry: BoolProperty(
         name="Carry",
         description="Take the object along, from when the arm is wound until it lets go. The "
         "object gets keys for that; it must have none of its own",
-        override=OVERRIDE,
     )
-    axis: EnumProperty(
-        name="Axis", description="What of the object is wound about", items=AXES, override=OVERRIDE
-    )
-    frame_start: IntProperty(
-        name="Start", description="Frame at which the arm sets out", default=1, override=OVERRIDE
-    )
+    axis: EnumProperty(name="Axis", description="What of the object is wound about", items=AXES)
+    frame_start: IntProperty(name="Start", description="Frame at which the arm sets out", default=1)
     frame_contact: IntProperty(
         name="Contact",
         description="Frame at which the arm touches the object; a curl is closed then",
         default=30,
-        override=OVERRIDE,
     )
     coil_frames: IntProperty(
         name="Coil",
@@ -88,14 +78,12 @@ class ReachItem(bpy.types.PropertyGroup):
         default=20,
         min=1,
         soft_max=100,
-        override=OVERRIDE,
     )
     frame_release: IntProperty(
         name="Release",
         description="Frame at which the arm begins to let go; after the end of the motion, it "
         "holds on",
         default=80,
-        override=OVERRIDE,
     )
     back_frames: IntProperty(
         name="Back",
@@ -103,7 +91,6 @@ class ReachItem(bpy.types.PropertyGroup):
         default=40,
         min=1,
         soft_max=100,
-        override=OVERRIDE,
     )
 
 
@@ -114,9 +101,8 @@ class Reaches:
         name="Reaches",
         description="What single arms reach for while the body moves",
         type=ReachItem,
-        override=OVERRIDE_LIST,
     )
-    active_reach: IntProperty(name="Active Reach", options={"HIDDEN"}, override=OVERRIDE)
+    active_reach: IntProperty(name="Active Reach", options={"HIDDEN"})
 
 
 CLASSES: Final[tuple[type, ...]] = (ReachItem,)

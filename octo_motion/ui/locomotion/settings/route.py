@@ -6,11 +6,10 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty, IntProperty, PointerProperty
 
 from ....core.locomotion.path import TravelSettings
 from ...declared_settings import declared
-from ...override_flags import OVERRIDE
+from ...overridable import EnumProperty, FloatProperty, IntProperty, PointerProperty
 
 
 def _is_curve(_settings: Any, candidate: bpy.types.Object) -> bool:
@@ -25,14 +24,12 @@ class RouteSettings:
         description="Curve to travel along. For a walk it lies on the ground",
         type=bpy.types.Object,
         poll=_is_curve,
-        override=OVERRIDE,
     )
     spline: IntProperty(
         name="Spline",
         description="Which of the curve's splines to follow, counted from 0; -1 takes the longest",
         default=-1,
         min=-1,
-        override=OVERRIDE,
     )
     speed_mode: declared(TravelSettings, "speed")
     ease_in: declared(TravelSettings, "ease_in")
@@ -52,7 +49,6 @@ class RouteSettings:
         default=1.0,
         min=0.0,
         max=1.0,
-        override=OVERRIDE,
     )
     height_mode: EnumProperty(
         name="Height",
@@ -66,7 +62,6 @@ class RouteSettings:
             ),
             ("MANUAL", "Manual", "As high as given", 1),
         ),
-        override=OVERRIDE,
     )
     height: FloatProperty(
         name="Height",
@@ -74,5 +69,4 @@ class RouteSettings:
         subtype="DISTANCE",
         soft_min=-10.0,
         soft_max=10.0,
-        override=OVERRIDE,
     )

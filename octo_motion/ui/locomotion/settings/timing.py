@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
-from ...override_flags import OVERRIDE
+from ...overridable import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 from .in_place import TRAVEL_IN_PLACE
 
 
@@ -22,7 +21,6 @@ class Timing:
             ("SPEED", "Speed", "The speed of the body", 1),
             ("RANGE", "Frames", "The first and the last frame", 2),
         ),
-        override=OVERRIDE,
     )
     cycle_time: FloatProperty(
         name="Cycle",
@@ -34,7 +32,6 @@ class Timing:
         soft_min=0.2,
         soft_max=20.0,
         step=10,
-        override=OVERRIDE,
     )
     speed: FloatProperty(
         name="Speed",
@@ -44,14 +41,9 @@ class Timing:
         min=1e-5,
         soft_max=10.0,
         step=10,
-        override=OVERRIDE,
     )
-    frame_start: IntProperty(
-        name="Start", description="First frame of the motion", default=1, override=OVERRIDE
-    )
-    frame_end: IntProperty(
-        name="End", description="Last frame of the motion", default=250, override=OVERRIDE
-    )
+    frame_start: IntProperty(name="Start", description="First frame of the motion", default=1)
+    frame_end: IntProperty(name="End", description="Last frame of the motion", default=250)
     travel_on: EnumProperty(
         name="Travel on",
         description="What carries the body along the route",
@@ -60,7 +52,6 @@ class Timing:
             ("BONE", "Root Bone", "The object stays; its root bone moves, as game engines like", 1),
             TRAVEL_IN_PLACE,
         ),
-        override=OVERRIDE,
     )
     extend_scene_range: BoolProperty(
         name="Extend Scene Range",
@@ -68,7 +59,6 @@ class Timing:
         "rendering show all of it. The range is never shortened, and the message says so when it "
         "is extended. Switch it off where a shot has its length",
         default=True,
-        override=OVERRIDE,
     )
 
 
@@ -87,7 +77,6 @@ class Keys:
                 1,
             ),
         ),
-        override=OVERRIDE,
     )
     key_angle: FloatProperty(
         name="Angle",
@@ -99,7 +88,6 @@ class Keys:
         soft_max=np.radians(10.0),
         step=10,
         precision=2,
-        override=OVERRIDE,
     )
     key_distance: FloatProperty(
         name="Distance",
@@ -110,7 +98,6 @@ class Keys:
         soft_max=0.1,
         step=0.1,
         precision=4,
-        override=OVERRIDE,
     )
     key_columns: EnumProperty(
         name="Columns",
@@ -130,12 +117,10 @@ class Keys:
             ),
         ),
         default="BONE",
-        override=OVERRIDE,
     )
     result: PointerProperty(
         name="Result",
         description="The action that was generated last. It is made anew in place until you edit "
         "it; then it is yours, and the next one is a new action",
         type=bpy.types.Action,
-        override=OVERRIDE,
     )
