@@ -40,7 +40,8 @@ def declared(kind: type, field: str) -> Any:
     told |= {name: value for name, value in bounds.items() if value is not None}
     if isinstance(default, int):
         return IntProperty(**told)
-    return FloatProperty(subtype=setting.subtype, **told)
+    told["subtype"] = setting.subtype
+    return FloatProperty(**told)
 
 
 def read_settings(kind: type[Settings], group: Any, **worked_out: Any) -> Settings:

@@ -24,7 +24,7 @@ def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
     return gait_names()
 
 
-def _load_gait(settings: Movement, _context: bpy.types.Context) -> None:
+def _load_gait(settings: Any, _context: bpy.types.Context) -> None:
     if used(settings.table.curves) and settings.table.name == settings.gait:
         return
     try:
@@ -34,7 +34,7 @@ def _load_gait(settings: Movement, _context: bpy.types.Context) -> None:
         return
 
 
-def _make_weight_curve(settings: Movement, _context: bpy.types.Context) -> None:
+def _make_weight_curve(settings: Any, _context: bpy.types.Context) -> None:
     if settings.use_weight_curve:
         settings.weight_curve = ensure_weight_curve(
             settings.weight_curve, settings.weight_root, settings.weight_tip

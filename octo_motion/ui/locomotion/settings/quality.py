@@ -64,14 +64,14 @@ class QualityReport:
     )
 
 
-def known_figures(settings: QualityReport) -> list[Any]:
+def known_figures(settings: Any) -> list[Any]:
     """Items of the figures that were measured, in the order of ``KINDS``."""
     items = settings.figures
     found = {item.kind: item for item in items if item.known}
     return [found[kind] for kind in KIND_NAMES if kind in found]
 
 
-def write_figures(settings: QualityReport, found: Sequence[Figure]) -> None:
+def write_figures(settings: Any, found: Sequence[Figure]) -> None:
     """Keep figures with the settings.
 
     What a library override has from its linked file can be changed, but not removed.
