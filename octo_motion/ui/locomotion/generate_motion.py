@@ -70,11 +70,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     assert scene is not None
     in_place = settings.travel_on == "NONE"
     _check_route(settings, armature)
-    for edited in (settings.route, settings.ground.object):
-        if edited is not None and edited.mode == "EDIT":
-            # What is evaluated is as it was when it was last written back, else one drag behind.
-            edited.update_from_editmode()
-            edited.data.update_tag()
+    _write_back(settings.route, settings.ground.object)
     depsgraph = context.evaluated_depsgraph_get()
     found = read_creature(armature, settings, world_matrix(armature))
     creature, edits = found.creature, read_overrides(settings.ground, armature)
@@ -118,6 +114,15 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
 def settings_note(settings: OCTO_MOTION_PG_locomotion) -> str:
     """The settings as JSON, without what is no setting."""
     return json.dumps(plain(settings, without=RESULTS), sort_keys=True)
+
+
+def _write_back(*objects: bpy.types.Object | None) -> None:
+    """Let what is being edited count as it is: else it would be one drag behind."""
+    for each in objects:
+        if each is not None and each.mode == "EDIT":
+            each.update_from_editmode()
+            assert each.data is not None
+            each.data.update_tag()
 
 
 def _check_route(settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object) -> None:

@@ -40,11 +40,11 @@ class Tolerances:
 
     angle: float
     """Radians, of each bone against its parent."""
-    distance: float
-    """Of each arm's tip, in the armature's units."""
+    distance: float | Floats
+    """Of each arm's tip, in the armature's units; at each moment, where that differs."""
     by_bone: bool = True
     """Whether each bone has key frames of its own, rather than each arm."""
-    held: float = np.inf
+    held: float | Floats = np.inf
     """Of joints that rest on the ground, in the armature's units."""
 
 
@@ -127,21 +127,10 @@ def reduced(
     for number, arm in enumerate(body.arms):
         turned = [next(rest) for _ in arm.bones]
         stretched = [each for each in motion.stretch if each.group in arm.bones]
-        tracks = _tracks(turned, body.modes(arm.bones))
-        tracks += [Track(each.values, SCALE) for each in stretched]
         parts.append([replace(each, group=arm.name) for each in (*turned, *stretched)])
-        chain = _chain(body, arm, [each.group for each in stretched])
         lying = motion.lying[number] if motion.lying else None
-        limbs.append(
-            Limb(
-                tracks=tracks,
-                angle=tolerances.angle,
-                distance=distance,
-                chain=chain,
-                columns=range(len(tracks)) if tolerances.by_bone else None,
-                room=None if lying is None else _room(chain, lying, tolerances.held - carried),
-            )
-        )
+        left = replace(tolerances, distance=distance, held=tolerances.held - carried)
+        limbs.append(_limb(body, arm, turned, stretched, left, lying=lying))
     if body.mantle:
         parts.append([replace(each, group=MANTLE_GROUP) for each in motion.mantle])
         tracks = _tracks(motion.mantle, body.modes(body.mantle))
@@ -153,6 +142,29 @@ def reduced(
         for part, each in zip(parts, found, strict=True)
         for channel, keys in zip(part, each, strict=True)
     ]
+
+
+def _limb(
+    body: Body,
+    arm: Arm,
+    turned: Sequence[Channel],
+    stretched: Sequence[Channel],
+    tolerances: Tolerances,
+    *,
+    lying: np.ndarray | None,
+) -> Limb:
+    """What belongs together of one arm, and how far that may be off."""
+    tracks = _tracks(turned, body.modes(arm.bones))
+    tracks += [Track(each.values, SCALE) for each in stretched]
+    chain = _chain(body, arm, [each.group for each in stretched])
+    return Limb(
+        tracks=tracks,
+        angle=tolerances.angle,
+        distance=tolerances.distance,
+        chain=chain,
+        columns=range(len(tracks)) if tolerances.by_bone else None,
+        room=None if lying is None else _room(chain, lying, tolerances.held),
+    )
 
 
 def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> LimbChain:

@@ -90,13 +90,8 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     moving = _MOVING if reducing else 1.0
     step = max(1, _BONES_AT_ONCE // max(len(plan.first.poser.bones), 1))
     frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
-    made: SegmentedMotion | None = None
-    for done in segments.compute(travel, places, step, frames_per_metre, cyclic=job.in_place):
-        if isinstance(done, SegmentedMotion):
-            made = done
-        else:
-            yield moving * done
-    assert made is not None
+    posing = segments.compute(travel, places, step, frames_per_metre, cyclic=job.in_place)
+    made = yield from _scaled(posing, 0.0, moving)
     arms = _cleared(plan, made, going)
     swimming, warnings = segments.swimming(travel.distance), list(plan.warnings)
     notes, carried, busy = _reach(plan, arms, keyed)
@@ -109,16 +104,7 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     if reducing:
         yield moving
         few = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
-    if measured is not None and few is not None:
-        rig = KeyedRig(
-            channels=creature.channels,
-            skeleton=creature.skeleton,
-            arms=creature.bones,
-            travels=not job.in_place,
-            root_bone=creature.root_bone,
-            world=creature.world,
-        )
-        measured = measure_keyed(measured, rig, few)
+        measured = _as_keyed(plan, measured, few)
     result = MotionResult(
         plan=plan,
         channels=[*(few if few is not None else motion.all()), *plan.breath],
@@ -295,6 +281,24 @@ def _measured(
         halfway=halfway_automatic(poses, cyclic=job.repeats),
     )
     return measured, overlaps
+
+
+def _as_keyed(
+    plan: MotionPlan, measured: Measured | None, few: Sequence[Channel]
+) -> Measured | None:
+    """What is measured of what the keys play, in place of what was computed."""
+    creature = plan.job.creature
+    if measured is None:
+        return None
+    rig = KeyedRig(
+        channels=creature.channels,
+        skeleton=creature.skeleton,
+        arms=creature.bones,
+        travels=not plan.job.in_place,
+        root_bone=creature.root_bone,
+        world=creature.world,
+    )
+    return measure_keyed(measured, rig, few)
 
 
 def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, swimming: Floats | None) -> Motion:

@@ -7,7 +7,7 @@ both, goes over between two of its holds, and comes to rest in either meanwhile.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -191,8 +191,8 @@ class Segments:
         frames_per_metre: float,
         *,
         cyclic: bool,
-    ) -> Iterator[SegmentedMotion | float]:
-        """Yield the share that is done, and in the end the arms.
+    ) -> Generator[float, None, SegmentedMotion]:
+        """Work the arms out, in steps that yield the share that is done.
 
         Args:
             travel: the body's, at all moments.
@@ -215,7 +215,7 @@ class Segments:
                 motion.pose(segment, part, chosen, smoothing, cyclic=cyclic)
                 yield 0.9 * (segment + start / max(len(part), 1)) / self.count
             motion.calm(segment, np.arange(len(travel.distance)), made.arms)
-        yield motion
+        return motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -143,9 +143,7 @@ def stand(
     Raises:
         GroundError: the route leaves the ground.
     """
-    scale, stance = creature.scale, job.stance
-    bearings = bearings_of(route, travel)
-    warnings = job.warnings
+    scale, warnings, bearings = creature.scale, job.warnings, bearings_of(route, travel)
     if cyclic:
         ground, warnings = LevelGround(0.0), ()
     elif job.mesh is None and plane is not None:
@@ -154,23 +152,16 @@ def stand(
         reach = poser.arm_length * scale
         ground, more = _ground(job.mesh, route, travel, bearings, reach=reach)
         warnings = (*more, *warnings)
-    radii = [each.radii for each in job.skins]
-    under = _under(poser, radii)
-    if height is None:
-        thickness = float(np.mean([each[len(each) // 2] for each in radii]))
-        height = min(
-            poser.clearance + thickness, _within_reach(poser, radii, job.may_stretch, stance)
-        )
-        height = max(height, under, _LOWEST * poser.arm_length) * scale
+    under = _under(poser, [each.radii for each in job.skins])
     line = body_line(
         route,
         travel,
         bearings,
         ground,
-        clearance=height,
+        clearance=_height(poser, job, under) * scale if height is None else height,
         reach=poser.arm_length * scale,
-        lean=stance.lean,
-        smoothing=stance.smoothing,
+        lean=job.stance.lean,
+        smoothing=job.stance.smoothing,
         under=under * scale,
     )
     return Standing(
@@ -220,6 +211,14 @@ def _under(poser: GaitPoser, radii: Sequence[Floats]) -> float:
     """How far a body's skin reaches below its centre where its arms begin, armature units."""
     skins = [radius[0] - root[2] for radius, root in zip(radii, poser.roots, strict=True)]
     return float(max(skins))
+
+
+def _height(poser: GaitPoser, job: GroundJob, under: float) -> float:
+    """As high as the gait is, and as low as arms reach with ease, armature units."""
+    radii = [each.radii for each in job.skins]
+    thickness = float(np.mean([each[len(each) // 2] for each in radii]))
+    easy = _within_reach(poser, radii, job.may_stretch, job.stance)
+    return max(min(poser.clearance + thickness, easy), under, _LOWEST * poser.arm_length)
 
 
 def _within_reach(

@@ -13,7 +13,7 @@ from ...rotations import Floats, conjugate, multiply, rotate
 from ..gait import Arm
 from ..rig import ArmFrames
 from .curl import curled
-from .grasp import Mode, Places, Target, plan_grasp
+from .grasp import Grasp, Mode, Places, Target, plan_grasp
 from .timeline import Timeline
 from .winding import Profile
 
@@ -127,20 +127,10 @@ class Reaching:
             if reach.profile is None:
                 rotations[:, columns] = curled(arm, reach.timeline, times, own)
                 continue
-            mode: Mode = "TOUCH" if reach.mode == "TOUCH" else "COIL"
-            grasp = plan_grasp(
-                arm,
-                self.radii[number],
-                Target(reach.profile.scaled(1.0 / travelling.scale), places, f"'{reach.target}'"),
-                reach.timeline,
-                times,
-                mode=mode,
-                turns=reach.turns,
-                up=self.up,
-                name=f"'{self.arms[number].name}'",
-            )
+            profile = reach.profile.scaled(1.0 / travelling.scale)
+            grasp = self._grasp(reach, number, Target(profile, places, f"'{reach.target}'"), times)
             rotations[:, columns] = grasp.apply(times, places, own)
-            if mode == "COIL":
+            if reach.mode != "TOUCH":
                 notes.append(
                     f"'{self.arms[number].name}' winds {grasp.turns:.1f} times round "
                     f"'{reach.target}'."
@@ -152,6 +142,21 @@ class Reaching:
                 Carried(way.target, times[held], way.positions[held], way.rotations[held])
             )
         return tuple(notes), tuple(carried)
+
+    def _grasp(self, reach: Reach, number: int, target: Target, times: Floats) -> Grasp:
+        """How an arm takes hold of what it reaches for."""
+        mode: Mode = "TOUCH" if reach.mode == "TOUCH" else "COIL"
+        return plan_grasp(
+            self.frames[number],
+            self.radii[number],
+            target,
+            reach.timeline,
+            times,
+            mode=mode,
+            turns=reach.turns,
+            up=self.up,
+            name=f"'{self.arms[number].name}'",
+        )
 
     def _arm(self, reach: Reach, times: Floats, places: Places) -> int:
         """The arm that is named; else the one whose root the object is nearest to at the touch."""
