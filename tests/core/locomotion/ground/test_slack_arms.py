@@ -6,12 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.ground.arm_curves import bent, curve, drawn, spread_chain, unit
+from octo_motion.core.locomotion.ground.arm_curves import bent, curve, drawn, spread_chain
 from octo_motion.core.locomotion.ground.body_height import body_line
 from octo_motion.core.locomotion.ground.foothold_reach import easy_height
 from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
 from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import Floats
+from octo_motion.core.rotations.components_first import normalized
 from tests.core.grounds import STRAIGHT, bumps, largest_turn, walker
 
 
@@ -39,7 +40,7 @@ def test_an_arch_is_bent_until_it_leads_as_far_as_it_should(steepest: float, sha
 
 def test_what_need_not_be_bent_stays_as_it_is() -> None:
     random = np.random.default_rng(1)
-    ways = unit(random.normal(size=(9, 3, 4)) + np.array([2.0, 0.0, 0.0])[:, None])
+    ways = normalized(random.normal(size=(9, 3, 4)) + np.array([2.0, 0.0, 0.0])[:, None])
     parts = random.uniform(0.05, 0.2, (9, 4))
     chord = np.einsum("sb,scb->cb", parts, ways)
     assert np.allclose(bent(ways, parts, chord, np.ones(4)), ways, atol=1e-9)
@@ -84,7 +85,7 @@ def test_a_low_body_keeps_its_skin_out_of_a_hill_it_passes(under: float) -> None
 @given(st.integers(0, 2**31), st.sampled_from([1e-6, 1e-3, 1e6]))
 def test_an_arm_is_drawn_alike_whatever_the_unit_of_length(seed: int, size: float) -> None:
     random = np.random.default_rng(seed)
-    ways = unit(random.normal(size=(7, 3, 4)) + np.array([3.0, 0.0, 0.0])[:, None])
+    ways = normalized(random.normal(size=(7, 3, 4)) + np.array([3.0, 0.0, 0.0])[:, None])
     lengths, free = random.uniform(0.05, 0.2, (7, 4)), random.uniform(0.0, 1.0, (7, 4))
     goal = 0.8 * np.einsum("sb,scb->cb", lengths, ways)
 
