@@ -211,9 +211,11 @@ def group_class(group: str) -> Any:
     from octo_motion.ui.locomotion.settings import quality as quality_report
     from octo_motion.ui.locomotion.settings import reaches as reach_properties
     from octo_motion.ui.posing.properties import OCTO_MOTION_PG_posing
-    from octo_motion.ui.splicing.landmark_properties import OCTO_MOTION_PG_landmarks
-    from octo_motion.ui.splicing.properties import OCTO_MOTION_PG_splicing
-    from octo_motion.ui.splicing.splice_properties import SpliceItem
+    from octo_motion.ui.splicing.properties import (
+        OCTO_MOTION_PG_landmarks,
+        OCTO_MOTION_PG_splicing,
+        SpliceItem,
+    )
 
     own = {
         "locomotion": properties.OCTO_MOTION_PG_locomotion,

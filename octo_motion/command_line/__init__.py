@@ -8,10 +8,13 @@ shown without, and artists who never use a command line do not wait for it when 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from .command_line import COMMAND, parse
 
 __all__ = ["COMMAND", "main", "parse", "register", "unregister"]
+
+_handles: list[Any] = []
 
 
 def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
@@ -22,14 +25,19 @@ def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
 
 
 def register() -> None:
-    """Make ``blender --command octo_motion`` known to Blender."""
-    from . import blender_command  # noqa: PLC0415
+    """Make ``blender --command octo_motion`` known to Blender while the add-on is enabled."""
+    import bpy  # noqa: PLC0415
 
-    blender_command.register()
+    _handles.append(bpy.utils.register_cli_command(COMMAND, _execute))
 
 
 def unregister() -> None:
     """Take the command away."""
-    from . import blender_command  # noqa: PLC0415
+    import bpy  # noqa: PLC0415
 
-    blender_command.unregister()
+    while _handles:
+        bpy.utils.unregister_cli_command(_handles.pop())
+
+
+def _execute(arguments: list[str]) -> int:
+    return main(arguments, f"blender --background [FILE] --command {COMMAND}", has_open_file=True)

@@ -14,17 +14,14 @@ import bpy
 from ..core.errors import OctoMotionError, SettingsError, WriteError
 from ..ui.locomotion import Summary
 from .command_line import parse
+from .job_report import figures_in_words
 from .job_runner import STOPPED, BakeOptions, bake
-from .motion_files import is_motion
 from .outputs import commit, staged
-from .processes import stoppable
-from .quality_limits import told
 from .schema import Reading
-from .shot_request import ShotRequest
 from .shot_runner import perform
-from .shot_schema import KINDS, read_shot
+from .shot_schema import KINDS, ShotRequest, is_motion, read_shot
 from .vocabulary import known, with_gait
-from .worker import RUN_SHOT, run_shot
+from .worker import RUN_SHOT, run_shot, stoppable
 
 _WRONG: Final = 2
 
@@ -71,7 +68,7 @@ def _make(options: argparse.Namespace) -> int:
         print(f"Warning: {warning}", flush=True)
     print(f"{performed.armature}: {summary.message}", flush=True)
     if isinstance(summary, Summary):
-        print(f"Quality: {told(summary.figures)}.", flush=True)
+        print(f"Quality: {figures_in_words(summary.figures)}.", flush=True)
     for path in shot.outputs:
         print(f"Written: {path}", flush=True)
     return 0

@@ -17,8 +17,7 @@ from typing import Any, Final
 
 from ..core.errors import OctoMotionError
 from .schema import Known, Reading, unknown
-from .shot_request import ShotRequest
-from .shot_schema import KINDS, kind_of, read_shot
+from .shot_schema import KINDS, ShotRequest, kind_of, read_shot
 
 _TABLES: Final = ("defaults", "shots")
 _ADDED: Final = ("settings", "octopus", "limits")

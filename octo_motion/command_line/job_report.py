@@ -1,17 +1,153 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The report of a job: what became of each shot, and what a later run needs to know to skip it."""
+"""The report of a job: what became of each shot, how good its motion is, and what a later run needs
+to know to skip it.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Callable, Iterable
+import math
+import tomllib
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal
 
 from ..core.errors import OctoMotionError, WriteError
-from . import outputs
-from .fingerprint import version
+from ..core.locomotion.metrics import Figure
+from .outputs import write_json
+from .shot_schema import NAMES
+
+
+def fingerprint(asked: Mapping[str, Any], gait: str) -> str:
+    """Digits that change with the shot's table, the gait's content and our version.
+
+    Files that are read have digests of their own, see :func:`digest`.
+    """
+    content = {"asked": asked, "gait": gait, "version": version()}
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file's content, or "" where there is none that can be read."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+@cache
+def version() -> str:
+    """Our version, from the manifest: in an installed extension beside the code, else above it."""
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package, package.parent):
+        manifest = folder / "blender_manifest.toml"
+        if manifest.is_file():
+            return str(tomllib.loads(manifest.read_text(encoding="utf-8"))["version"])
+    return "unknown"
+
+
+# --- Figures of how good a motion is, for the report, and limits that let a shot fail -------------
+
+
+_DEGREES: Final = "turn"
+"""What people know in degrees."""
+_LOOKED_FOR: Final = "overlap"
+"""What is measured only where the settings say so."""
+
+
+class LimitError(OctoMotionError):
+    """A motion is not as good as it has to be.
+
+    ``summary`` is that of the motion, whose outputs are not to be kept.
+    """
+
+    def __init__(self, problem: str, summary: Any, remedy: str = "") -> None:
+        super().__init__(problem, remedy)
+        self.summary = summary
+
+
+def quality(figures: Sequence[Figure]) -> dict[str, dict[str, Any]]:
+    """Figures for a report: value, frame and arm of the worst of each kind, by name.
+
+    Values are in arm lengths (slip, depth, miss), shares (strain), degrees per frame (turn) and
+    radii (overlap); none for what is no finite number, which JSON does not know.
+    """
+    return {
+        figure.kind.lower(): {
+            "value": _value(figure) if math.isfinite(figure.value) else None,
+            "frame": figure.frame,
+            "arm": figure.arm,
+        }
+        for figure in figures
+    }
+
+
+def figures_in_words(figures: Sequence[Figure]) -> str:
+    """Figures in words, in the units of :func:`quality`."""
+    return "; ".join(
+        f"{figure.kind.lower()} {_value(figure):.3g} at frame {figure.frame}{_of_arm(figure)}"
+        for figure in figures
+    )
+
+
+def check_limits(limits: Mapping[str, float], summary: Any) -> None:
+    """Make sure that a motion is as good as it has to be.
+
+    A figure that it does not have, such as the slip of a swim, keeps to any limit.
+
+    Args:
+        limits: by name, in the units of :func:`quality`.
+        summary: of the motion, with its ``figures``.
+
+    Raises:
+        LimitError: a figure is above its limit, or nobody has looked.
+    """
+    found = {figure.kind.lower(): figure for figure in summary.figures}
+    if _LOOKED_FOR in limits and _LOOKED_FOR not in found:
+        raise LimitError(
+            "Overlaps are limited, but were not looked for.",
+            summary,
+            "Switch tell_overlaps on, or leave the limit out.",
+        )
+    above = []
+    for name in NAMES:
+        if name not in limits or name not in found:
+            continue
+        figure, limit = found[name], limits[name]
+        value = _value(figure)
+        # What is no number keeps to no limit.
+        if not value <= limit:
+            above.append(
+                f"{name} is {_value_above(value, limit)} at frame {figure.frame}{_of_arm(figure)}, "
+                f"above its limit of {limit:g}"
+            )
+    if above:
+        sentence = "; ".join(above)
+        raise LimitError(f"{sentence[0].upper()}{sentence[1:]}.", summary)
+
+
+def _value(figure: Figure) -> float:
+    name = figure.kind.lower()
+    return math.degrees(figure.value) if name == _DEGREES else figure.value
+
+
+def _of_arm(figure: Figure) -> str:
+    return f" ({figure.arm})" if figure.arm else ""
+
+
+def _value_above(value: float, limit: float) -> str:
+    """A value with as many digits as it takes to see that it is above its limit."""
+    texts = (f"{value:.{digits}g}" for digits in range(3, 17))
+    return next((text for text in texts if not float(text) <= limit), repr(value))
+
+
+# --- The report -----------------------------------------------------------------------------------
+
 
 FORMAT: Final = "octo_motion.report"
 FORMAT_VERSION: Final = 1
@@ -165,7 +301,7 @@ def write_report(path: Path, job: Path, records: Iterable[ShotRecord]) -> None:
         **{status: count(shots, status) for status in ("done", "skipped", "failed")},
         "shots": [asdict(shot) for shot in shots],
     }
-    outputs.write_json(path, content)
+    write_json(path, content)
 
 
 def count(records: Iterable[ShotRecord], status: str) -> int:

@@ -12,15 +12,23 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import OctoMotionError
-from .fingerprint import digest, fingerprint
 from .job_file import JobError, JobFile, read_job
-from .job_report import ShotRecord, count, judge, read_report, write_report
+from .job_report import ShotRecord, count, digest, fingerprint, judge, read_report, write_report
 from .outputs import commit, staged
-from .processes import Ended, Task, check_jobs, last_lines, run_processes
 from .schema import unknown
-from .shot_request import ShotRequest
+from .shot_schema import ShotRequest
 from .vocabulary import check_file, known, with_gait
-from .worker import child_command, child_environment, read_answer, write_request
+from .worker import (
+    Ended,
+    Task,
+    check_jobs,
+    child_command,
+    child_environment,
+    last_lines,
+    read_answer,
+    run_processes,
+    write_request,
+)
 
 STOPPED = 130
 """Exit status of a run that was stopped by Ctrl-C, as shells have it."""

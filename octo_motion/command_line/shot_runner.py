@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One shot in this Blender: open or make the scene, generate or splice, write."""
+"""One shot in this Blender: open or make the scene, generate, splice or pose, write."""
 
 from __future__ import annotations
 
@@ -19,14 +19,11 @@ from ..core.errors import OctoMotionError, RigError, SettingsError, WriteError
 from ..core.locomotion.gait import gait_from_json
 from ..core.locomotion.rig import detect_arms
 from ..ui.locomotion import Summary, generate, locomotion_settings, once_called, set_gait, store
-from .exports import check_export, export
-from .job_report import ShotSummary
-from .motion_files import is_motion
-from .operator_errors import blender_said
-from .pose_runner import is_posable, pose
-from .quality_limits import check_limits
+from ..ui.posing import play_file
+from .job_report import ShotSummary, check_limits
+from .outputs import blender_said, check_export, export
 from .schema import set_values
-from .shot_request import NewRoute, ShotRequest, frame_rate
+from .shot_schema import NewRoute, ShotRequest, frame_rate, is_motion
 from .splice_runner import Clips, has_splices, import_base, splice
 
 _ROUTE_NAME: Final = "Octopus Route"
@@ -77,7 +74,7 @@ def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
         if shot.kind == "splice":
             summary = splice(armature, shot, clips, motion)
         elif shot.script is not None:
-            summary = pose(armature, scene, shot.script)
+            summary = _pose(armature, scene, shot.script)
         else:
             _apply(shot, armature, scene)
             summary = generate(armature, bpy.context)
@@ -100,7 +97,7 @@ def _find(shot: ShotRequest) -> tuple[bpy.types.Object, bpy.types.Scene]:
     if shot.octopus is not None:
         shape, with_mesh = shot.octopus.shape, shot.octopus.with_mesh
         return add_octopus(bpy.context, shape, Matrix(), with_skin=with_mesh), scene
-    fits = {"generate": _has_arms, "splice": has_splices, "pose": is_posable}[shot.kind]
+    fits = {"generate": _has_arms, "splice": has_splices, "pose": _is_posable}[shot.kind]
     armature = find_armature(shot.armature, scene, fits)
     if armature.name in scene.objects:
         return armature, scene
@@ -328,3 +325,20 @@ def _save(place: Path, *, compress: bool) -> None:
         raise WriteError(
             f"The file cannot be written: {blender_said(error)}", "Choose another place."
         ) from error
+
+
+def _is_posable(armature: bpy.types.Object) -> bool:
+    """Whether an armature could be meant: it has bones."""
+    return isinstance(armature.data, bpy.types.Armature) and bool(len(armature.data.bones))
+
+
+def _pose(armature: bpy.types.Object, scene: bpy.types.Scene, script: Path) -> ShotSummary:
+    """Play a pose script on an armature; the context has its scene.
+
+    Raises:
+        OctoMotionError: the script or a step of it is wrong; the armature is as it was.
+    """
+    player = play_file(armature, scene, script)
+    first, last = scene.frame_start, scene.frame_end
+    message = f"played '{script.name}', {player.keys} bones keyed."
+    return ShotSummary(message, last - first + 1, first, last)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -22,9 +23,9 @@ from ..ui.splicing import (
     write_splices,
 )
 from .job_report import ShotSummary
-from .motion_files import check_motion, files_within
 from .schema import set_values, unknown
-from .shot_request import HIGHEST_FPS, NewSplice, ShotRequest, frame_rate
+from .shot_schema import HIGHEST_FPS, NewSplice, ShotRequest, frame_rate
+from .vocabulary import check_file
 
 _FIRST_FRAME: Final = 1
 
@@ -77,7 +78,7 @@ class Clips:
 
     def _clip(self, path: Path) -> ImportedClip:
         if path not in self._imported:
-            check_motion(path)
+            check_file(path)
             try:
                 clip = import_clip(path, bpy.context, _FIRST_FRAME)
             except OctoMotionError as error:
@@ -258,3 +259,17 @@ def _own_action(source: bpy.types.Object, armature: bpy.types.Object) -> bpy.typ
     if source == armature:
         raise ClipError(f"'{source.name}' is both base and source.", "Name the source's action.")
     return data.action
+
+
+def files_within(path: Path) -> tuple[Path, ...]:
+    """Further files that a .gltf file names; they belong to it."""
+    if path.suffix.lower() != ".gltf":
+        return ()
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        named = [each.get("uri", "") for each in content.get("buffers", ())]
+    except (OSError, ValueError, AttributeError, TypeError):
+        # The importer has read it, so this is a matter of what we know of glTF.
+        return ()
+    found = (path.parent / uri for uri in named if isinstance(uri, str) and "data:" not in uri)
+    return tuple(each for each in found if each.is_file())

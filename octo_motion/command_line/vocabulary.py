@@ -11,14 +11,13 @@ from typing import Any
 import bpy
 
 from ..blender.files import load_gait, read_gait_file
-from ..core.errors import OctoMotionError
+from ..core.errors import ClipError, OctoMotionError
 from ..core.locomotion.gait import gait_to_json
+from ..core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ..ui.locomotion import ChangeItem, ContactItem, OCTO_MOTION_PG_locomotion, ReachItem
 from ..ui.splicing import PARTS, OCTO_MOTION_PG_landmarks, OCTO_MOTION_PG_splicing, SpliceItem
-from .motion_files import check_motion, is_motion
 from .schema import Choice, Kind, Known, Number, Text, flag, point
-from .shot_request import ShotRequest
-from .shot_schema import gait_name
+from .shot_schema import ShotRequest, gait_name, is_motion
 
 _OWN_KEYS = {"name", "gait"}
 """No settings: Blender's own name of a group, and the gait, which a shot names itself."""
@@ -101,7 +100,7 @@ def check_file(file: Path) -> None:
         OctoMotionError: there is no such file, or it is neither Blender's nor one of motion.
     """
     if is_motion(file):
-        check_motion(file)
+        _check_motion(file)
         return
     if not file.is_file():
         raise OctoMotionError(f"There is no file '{file}'.", "Give the path of a .blend file.")
@@ -116,3 +115,23 @@ def check_file(file: Path) -> None:
         raise OctoMotionError(
             f"'{file}' is not a file that this Blender can read.", "Give a .blend file."
         ) from error
+
+
+def _check_motion(path: Path) -> None:
+    """Find out without importing it whether it is there, and of BVH, which is text, everything."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise ClipError(
+            f"There is no file '{path}'.", f"Give a motion file ({', '.join(MOTION_SUFFIXES)})."
+        ) from None
+    except OSError as error:
+        reason = error.strerror or type(error).__name__
+        raise ClipError(f"'{path}' cannot be read: {reason}.", "Give another file.") from error
+    if not content:
+        raise ClipError(f"'{path}' is empty.", "Export it again.")
+    if path.suffix.lower() == ".bvh":
+        try:
+            check_bvh(content)
+        except ClipError as error:
+            raise ClipError(f"'{path}': {error.problem}", error.remedy) from error

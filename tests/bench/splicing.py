@@ -21,7 +21,7 @@ import numpy as np
 
 from octo_motion.blender.animation.clips import read_clip
 from octo_motion.blender.scene.imports import import_clip
-from octo_motion.command_line.shot_request import frame_rate
+from octo_motion.command_line.shot_schema import frame_rate
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import Floats
 from octo_motion.core.splicing.clip.bvh_check import check_bvh

@@ -21,9 +21,8 @@ from octo_motion.core.rotations import (
     rotate,
 )
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.posture import posture_of, sample_clip
+from octo_motion.core.splicing.clip.posture import posture_of, sample_clip, unposed
 from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
-from octo_motion.core.splicing.clip.unpose import unposed
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.body_frames import chest_frame, pelvis_frame

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from octo_motion.command_line.fingerprint import fingerprint, version
 from octo_motion.command_line.job_file import JobError, JobFile, read_job
+from octo_motion.command_line.job_report import fingerprint, version
 from octo_motion.command_line.schema import (
     Choice,
     Kind,
@@ -21,7 +21,7 @@ from octo_motion.command_line.schema import (
     flag,
     parse_assignments,
 )
-from octo_motion.command_line.shot_request import NewRoute, ShotRequest, frame_rate
+from octo_motion.command_line.shot_schema import NewRoute, ShotRequest, frame_rate
 from octo_motion.command_line.vocabulary import known, with_gait
 from octo_motion.core.errors import GaitError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait

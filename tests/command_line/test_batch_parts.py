@@ -16,15 +16,20 @@ import pytest
 
 from octo_motion.command_line.command_line import parse
 from octo_motion.command_line.job_report import (
+    LimitError,
     ShotRecord,
     Verdict,
+    check_limits,
+    figures_in_words,
     judge,
+    quality,
     read_report,
     write_report,
 )
-from octo_motion.command_line.operator_errors import blender_said
-from octo_motion.command_line.outputs import commit, remove_staged, staged, write_json
-from octo_motion.command_line.processes import (
+from octo_motion.command_line.outputs import blender_said, commit, remove_staged, staged, write_json
+from octo_motion.command_line.schema import Known, Reading
+from octo_motion.command_line.shot_schema import KINDS, LIMITS
+from octo_motion.command_line.worker import (
     Ended,
     Task,
     check_jobs,
@@ -33,9 +38,6 @@ from octo_motion.command_line.processes import (
     run_processes,
     stoppable,
 )
-from octo_motion.command_line.quality_limits import LimitError, check_limits, quality, told
-from octo_motion.command_line.schema import Known, Reading
-from octo_motion.command_line.shot_schema import KINDS, LIMITS
 from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError
 from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics.report import Figure
@@ -189,7 +191,7 @@ def test_figures_of_a_report_are_in_the_units_of_limits() -> None:
         "turn": {"value": pytest.approx(50.0), "frame": 41, "arm": "Arm 1 R"},
         "overlap": {"value": 0.0, "frame": 1, "arm": ""},
     }
-    assert told(MEASURED) == (
+    assert figures_in_words(MEASURED) == (
         "slip 0.0123 at frame 40 (Arm 3 L); turn 50 at frame 41 (Arm 1 R); overlap 0 at frame 1"
     )
 

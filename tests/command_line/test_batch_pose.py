@@ -12,8 +12,8 @@ import pytest
 
 from octo_motion.command_line.commands import main
 from octo_motion.command_line.job_file import JobError, read_job
-from octo_motion.command_line.shot_request import ShotRequest
 from octo_motion.command_line.shot_runner import perform
+from octo_motion.command_line.shot_schema import ShotRequest
 from octo_motion.command_line.vocabulary import known
 
 STEPS = (

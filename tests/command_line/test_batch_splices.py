@@ -9,11 +9,9 @@ from typing import Any
 import pytest
 
 from octo_motion.command_line.job_file import JobError, JobFile, read_job
-from octo_motion.command_line.motion_files import check_motion, files_within
 from octo_motion.command_line.schema import Reading
-from octo_motion.command_line.shot_request import NewSplice, ShotRequest
-from octo_motion.command_line.shot_schema import SPLICES, parse_splices
-from octo_motion.command_line.splice_runner import import_base
+from octo_motion.command_line.shot_schema import SPLICES, NewSplice, ShotRequest, parse_splices
+from octo_motion.command_line.splice_runner import files_within, import_base
 from octo_motion.command_line.vocabulary import check_file, known
 from octo_motion.core.errors import ClipError, SettingsError
 
@@ -79,7 +77,7 @@ def test_splice_has_all_settings_that_the_list_has(tmp_path: Path) -> None:
 
 
 def test_nothing_that_the_list_has_is_left_out() -> None:
-    from octo_motion.ui.splicing.splice_properties import SpliceItem
+    from octo_motion.ui.splicing.properties import SpliceItem
 
     pointers = {"source", "action"}
     assert set(SpliceItem.__annotations__) - pointers <= set(known().tables["splices"])
@@ -215,9 +213,8 @@ def test_damaged_motion_file_is_told_before_anything_runs(
 ) -> None:
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    for check in (check_motion, check_file):
-        with pytest.raises(ClipError, match=sentence):
-            check(tmp_path / name)
+    with pytest.raises(ClipError, match=sentence):
+        check_file(tmp_path / name)
 
 
 def test_files_that_a_gltf_file_consists_of_are_its_inputs_too(tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.command_line.shot_request import ShotRequest
 from octo_motion.command_line.shot_runner import perform
+from octo_motion.command_line.shot_schema import ShotRequest
 from octo_motion.core.errors import RigError, SettingsError
 from tests.blender.test_ground import make_square
 from tests.ui.made import prepare

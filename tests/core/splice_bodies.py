@@ -16,7 +16,7 @@ from octo_motion.core.rotations import (
 )
 from octo_motion.core.skeleton import Skeleton
 from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.unpose import unposed
+from octo_motion.core.splicing.clip.posture import unposed
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from tests.core.rigs import skeleton_of
 

@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.command_line import blender_command as registration
+from octo_motion import command_line
 from octo_motion.command_line import commands
 from octo_motion.command_line import job_runner as bake
 from octo_motion.core.errors import WriteError
@@ -484,14 +484,14 @@ def test_open_file_is_used_where_no_other_is_named(scene: Path, tmp_path: Path) 
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     before = digest(scene)
     arguments = ["generate", "-o", str(tmp_path / "a.blend"), "--route", "Wall"]
-    assert registration._execute([*arguments, "--set", "timing=RANGE"]) == 0
+    assert command_line._execute([*arguments, "--set", "timing=RANGE"]) == 0
     assert bpy.data.filepath == str(scene)
     assert digest(scene) == before
     job = write(
         tmp_path / "job.toml",
         f'[[shots]]\nname = "b"\nfile = "reef.blend"\noutput = "b.blend"\n{ROUTE}{RANGE}',
     )
-    assert registration._execute(["bake", str(job)]) == 0
+    assert command_line._execute(["bake", str(job)]) == 0
 
 
 @pytest.mark.parametrize(

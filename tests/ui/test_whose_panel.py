@@ -11,7 +11,7 @@ from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.operators import setups
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from octo_motion.ui.panel_base import armature_in
-from octo_motion.ui.splicing.landmark_properties import PROPERTIES
+from octo_motion.ui.splicing.properties import PROPERTIES
 from tests.ui.rig import click, give_route, make_octopus
 
 

@@ -16,14 +16,13 @@ from .grasp_target import (
     read_places,
 )
 from .ground import arm_skins, read_triangles
-from .imports import NOTE, SUFFIXES, ImportedClip, Up, import_clip, remove_clips
+from .imports import NOTE, ImportedClip, Up, import_clip, remove_clips
 from .obstacles import read_obstacle
 from .octopus import add_octopus
 from .world import is_enabled
 
 __all__ = [
     "NOTE",
-    "SUFFIXES",
     "WITH_SURFACE",
     "Contact",
     "ImportedClip",

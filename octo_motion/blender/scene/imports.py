@@ -20,12 +20,10 @@ import numpy as np
 
 from ...core.errors import ClipError, WriteError
 from ...core.rotations import normalized
-from ...core.splicing.clip import check_bvh
+from ...core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ...core.splicing.humanoid import map_skeleton
 from ..animation import channelbags_of, read_clip, time_kept
 from ..rig import read_skeleton
-
-SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
 
 NOTE: Final = "octo_motion_clip"
 """Custom property of an imported action: a group with the name of its file and its own rate."""
@@ -44,7 +42,9 @@ _LYING: Final = 0.8
 _IMPORTED: Final = 0.8
 """Of the work on a file: Blender's own importer, about."""
 
-_ANOTHER: Final = f"Choose a file that ends with {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}."
+_ANOTHER: Final = (
+    f"Choose a file that ends with {', '.join(MOTION_SUFFIXES[:-1])} or {MOTION_SUFFIXES[-1]}."
+)
 
 
 @dataclass(frozen=True)

@@ -5,35 +5,26 @@ from __future__ import annotations
 
 from typing import Final
 
-from . import (
-    import_clips,
-    landmark_table,
-    properties,
-    splice_build,
-    splice_drag,
-    splice_list,
-    splice_panels,
-    splice_properties,
-)
+from . import import_clips, landmark_table, properties, splice_operators, splice_panels, timing_drag
 from .import_clips import draw_in_import_menu
-from .landmark_properties import OCTO_MOTION_PG_landmarks
-from .properties import OCTO_MOTION_PG_splicing, splicing_settings
-from .splice_list import add_splice, name_splice, own_action
-from .splice_properties import PARTS, SpliceItem
+from .properties import (
+    PARTS,
+    OCTO_MOTION_PG_landmarks,
+    OCTO_MOTION_PG_splicing,
+    SpliceItem,
+    splicing_settings,
+)
+from .splice_operators import add_splice, name_splice, own_action
 from .stack import ClipReader, prepare_splices, write_splices
 
-SETTINGS: Final[tuple[type, ...]] = (
-    *landmark_table.CLASSES,
-    *splice_properties.CLASSES,
-    *properties.CLASSES,
-)
+SETTINGS: Final[tuple[type, ...]] = properties.CLASSES
 """What ``Object.octo_motion`` holds of splicing."""
 
 CLASSES: Final[tuple[type, ...]] = (
+    *landmark_table.CLASSES,
     *import_clips.CLASSES,
-    *splice_list.CLASSES,
-    *splice_build.CLASSES,
-    *splice_drag.CLASSES,
+    *splice_operators.CLASSES,
+    *timing_drag.CLASSES,
     *splice_panels.CLASSES,
 )
 """Operators and panels."""

@@ -20,9 +20,7 @@ from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_sk
 from ..armature_operator import ArmatureOperator
 from ..armature_preset import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in
-from . import landmark_properties
-from .landmark_properties import PROPERTIES, read_landmarks, title, write_landmarks
-from .properties import splicing_settings
+from .properties import PROPERTIES, read_landmarks, splicing_settings, title, write_landmarks
 
 if TYPE_CHECKING:
     from .properties import OCTO_MOTION_PG_splicing
@@ -275,7 +273,6 @@ def _draw_rows(
 
 
 CLASSES: Final[tuple[type, ...]] = (
-    *landmark_properties.CLASSES,
     OCTO_MOTION_OT_map_skeleton,
     OCTO_MOTION_OT_landmark_pick,
     OCTO_MOTION_OT_landmarks_mirror,

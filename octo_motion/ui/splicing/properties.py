@@ -1,17 +1,275 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``Object.octo_motion.splicing``: what splicing knows of an armature."""
+"""``Object.octo_motion.splicing``: landmarks and the stack, as saved with the armature object.
+
+The name of a splice is what Blender tells the items of a linked list apart by, so it alone cannot
+be overridden.
+"""
 
 from __future__ import annotations
 
-from typing import Final, cast
+from collections.abc import Mapping
+from typing import Any, Final, cast
 
 import bpy
 
 from ...blender.rig import armature_data
-from ..overridable import PointerProperty
+from ...core.splicing.humanoid import LANDMARKS, Landmarks
+from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
+from ..overridable import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 from ..override_groups import make_overridable
-from .landmark_properties import OCTO_MOTION_PG_landmarks
-from .splice_properties import SpliceStack
+
+
+def _bone(name: str, description: str) -> Any:
+    return StringProperty(name=name, description=description)
+
+
+class OCTO_MOTION_PG_landmarks(bpy.types.PropertyGroup):
+    """One bone name for each landmark; empty where the rig has none."""
+
+    hips: _bone("Hips", "Bone of the pelvis, which carries legs and trunk")
+    spine: _bone("Spine", "Lowest bone above the pelvis that bends the trunk, if there is one")
+    chest: _bone("Chest", "Bone that carries neck and shoulders")
+    neck: _bone("Neck", "Lowest bone of the neck, if there is one")
+    head: _bone("Head", "Bone of the head")
+    clavicle_l: _bone("Left Collar Bone", "Bone from the chest to the left shoulder, if any")
+    upper_arm_l: _bone("Left Upper Arm", "Bone that begins at the left shoulder")
+    forearm_l: _bone("Left Forearm", "Bone that begins at the left elbow")
+    hand_l: _bone("Left Hand", "Bone that begins at the left wrist")
+    thigh_l: _bone("Left Thigh", "Bone that begins at the left hip")
+    shin_l: _bone("Left Shin", "Bone that begins at the left knee")
+    foot_l: _bone("Left Foot", "Bone that begins at the left ankle")
+    toe_l: _bone("Left Toes", "Bone that begins at the ball of the left foot, if there is one")
+    clavicle_r: _bone("Right Collar Bone", "Bone from the chest to the right shoulder, if any")
+    upper_arm_r: _bone("Right Upper Arm", "Bone that begins at the right shoulder")
+    forearm_r: _bone("Right Forearm", "Bone that begins at the right elbow")
+    hand_r: _bone("Right Hand", "Bone that begins at the right wrist")
+    thigh_r: _bone("Right Thigh", "Bone that begins at the right hip")
+    shin_r: _bone("Right Shin", "Bone that begins at the right knee")
+    foot_r: _bone("Right Foot", "Bone that begins at the right ankle")
+    toe_r: _bone("Right Toes", "Bone that begins at the ball of the right foot, if there is one")
+
+
+PROPERTIES: Final = {each: each.replace(".", "_").lower() for each in LANDMARKS}
+"""Name of the property by landmark: "upper_arm.L" is ``upper_arm_l``."""
+
+
+def title(landmark: str) -> str:
+    """What the table calls a landmark: "left hand"."""
+    definition = OCTO_MOTION_PG_landmarks.bl_rna.properties[PROPERTIES[landmark]]
+    return definition.name.lower()
+
+
+def read_landmarks(group: Any) -> Landmarks:
+    """The table as core's landmarks, whether the bones exist or not."""
+    bones = {each: getattr(group, name) for each, name in PROPERTIES.items()}
+    return Landmarks({each: bone for each, bone in bones.items() if bone})
+
+
+def write_landmarks(group: Any, bones: Mapping[str, str]) -> None:
+    """Fill the table; landmarks that are not named become empty."""
+    for landmark, name in PROPERTIES.items():
+        setattr(group, name, bones.get(landmark, ""))
+
+
+# --- The stack of splices, as it is saved with the armature object --------------------------------
+#
+# The name of a splice is what Blender tells the items of a linked list apart by, so it alone cannot
+# be overridden.
+
+
+PARTS: Final = tuple(
+    (part.name.upper(), part.title, part.description, number)
+    for number, part in enumerate(PART_TABLE)
+)
+
+AFTER: Final = (
+    ("STOP", "Stop", "Back to the base", 0),
+    ("HOLD", "Hold", "Stay in the last pose", 1),
+    ("LOOP", "Loop", "Begin again with the clip's first frame", 2),
+)
+
+MODES: Final = (
+    ("DIRECTION", "Direction", "Hands and feet lie in the direction where the clip has them", 0),
+    ("EXACT", "Exact", "The limb bends so that hands and feet are where the clip has them", 1),
+)
+
+
+SEEN_FROM: Final = (
+    ("PELVIS", "Pelvis", "Feet stay under the hips, however the trunk leans", 0),
+    (
+        "CHEST",
+        "Chest",
+        "As the method that this follows has it: legs go along with a trunk that leans or turns",
+        1,
+    ),
+)
+
+
+def part_kind(item: Any) -> PartKind | None:
+    """What a splice's part is, ``None`` for a chain."""
+    name = item.part.lower()
+    return None if name == CHAIN.name else part_named(name).kind
+
+
+def _is_armature(_: Any, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "ARMATURE"
+
+
+def _slot(description: str) -> Any:
+    return StringProperty(name="Slot", description=description)
+
+
+class SpliceItem(bpy.types.PropertyGroup):
+    """One part of one clip, and when."""
+
+    name: bpy.props.StringProperty(
+        name="Name", description="What this splice is called in the list"
+    )
+    part: EnumProperty(
+        name="Part",
+        description="Which part of the body is taken from the source",
+        items=PARTS,
+    )
+    bone: StringProperty(
+        name="First Bone",
+        description="With the part Chain: its first bone on this armature",
+    )
+    source_bone: StringProperty(
+        name="Source Bone",
+        description="With the part Chain: its first bone on the source, if it is called otherwise",
+    )
+    source: PointerProperty(
+        name="Source",
+        description="The armature that the clip is for. It may have other proportions, bones and "
+        "axes, and may be this armature itself",
+        type=bpy.types.Object,
+        poll=_is_armature,
+    )
+    action: PointerProperty(
+        name="Action",
+        description="The clip. It is never changed",
+        type=bpy.types.Action,
+    )
+    slot: _slot("Slot of the clip's action; empty takes the one that fits the source")
+    visual: BoolProperty(
+        name="As Shown",
+        description="Take the clip as the scene shows it, with constraints, drivers and NLA. "
+        "That plays the scene, so it takes longer",
+    )
+    splice_start: FloatProperty(
+        name="Clip Start",
+        description="Frame of the clip that is shown first",
+        default=1.0,
+        step=100,
+        precision=1,
+    )
+    base_start: FloatProperty(
+        name="Base Start",
+        description="Frame of the base at which the splice begins",
+        default=1.0,
+        step=100,
+        precision=1,
+    )
+    rate: FloatProperty(
+        name="Rate",
+        description="Speed of the clip, 1 as it is",
+        default=1.0,
+        min=0.01,
+        max=100.0,
+        soft_max=4.0,
+        step=5,
+    )
+    length: FloatProperty(
+        name="Length",
+        description="Frames of the base that the splice lasts; 0 is as long as there is motion",
+        min=0.0,
+        step=100,
+        precision=1,
+    )
+    ease_in: FloatProperty(
+        name="Ease In",
+        description="Frames over which the splice comes in, and each further round of a loop",
+        default=6.0,
+        min=0.0,
+        step=100,
+        precision=1,
+    )
+    ease_out: FloatProperty(
+        name="Ease Out",
+        description="Frames over which the splice goes, if it ends before the base; over which a "
+        "round of a loop goes; and over which a clip that is held comes to rest",
+        default=6.0,
+        min=0.0,
+        step=100,
+        precision=1,
+    )
+    after: EnumProperty(
+        name="After",
+        description="What happens when the clip runs out",
+        items=AFTER,
+    )
+    mode: EnumProperty(
+        name="Reach",
+        description="Where hands and feet go on a body of other proportions",
+        items=MODES,
+    )
+    with_clavicle: BoolProperty(
+        name="With Collar Bone",
+        description="An arm takes its collar bone along, where both armatures have one: the hand "
+        "is then where it was seen. Without, the shoulder stays the base's",
+        default=True,
+    )
+    seen_from: EnumProperty(
+        name="Seen From",
+        description="From where the clip's legs are seen, so that they lie alike on the base. Legs "
+        "with travel are always seen from the pelvis",
+        items=SEEN_FROM,
+    )
+    with_travel: BoolProperty(
+        name="With Travel",
+        description="Legs bring the clip's way through the world with them, so that feet do not "
+        "skate",
+    )
+    mute: BoolProperty(name="Mute", description="Leave this splice out")
+
+
+class SpliceStack:
+    """What ``Object.octo_motion.splicing`` has of the stack."""
+
+    base: PointerProperty(
+        name="Base",
+        description="The action onto which parts are spliced. It is never changed",
+        type=bpy.types.Action,
+    )
+    base_slot: _slot("Slot of the base; empty takes the one that fits the armature")
+    visual: BoolProperty(
+        name="Base As Shown",
+        description="Take the base as the scene shows it, with constraints, drivers and NLA. "
+        "That plays the scene, so it takes longer",
+    )
+    splices: CollectionProperty(
+        name="Splices",
+        description="What is spliced onto the base, each onto the result of those above it",
+        type=SpliceItem,
+    )
+    active_splice: IntProperty(name="Active Splice", options={"HIDDEN"})
+    result: PointerProperty(
+        name="Result",
+        description="The action that was built last. It is made anew in place until you edit it; "
+        "then it is yours, and the next one is a new action",
+        type=bpy.types.Action,
+    )
+
+
+# --- All of it ------------------------------------------------------------------------------------
 
 
 class OCTO_MOTION_PG_splicing(SpliceStack, bpy.types.PropertyGroup):
@@ -24,7 +282,11 @@ class OCTO_MOTION_PG_splicing(SpliceStack, bpy.types.PropertyGroup):
     )
 
 
-CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PG_splicing,)
+CLASSES: Final[tuple[type, ...]] = (
+    OCTO_MOTION_PG_landmarks,
+    SpliceItem,
+    OCTO_MOTION_PG_splicing,
+)
 
 
 def splicing_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_splicing:

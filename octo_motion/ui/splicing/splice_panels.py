@@ -9,17 +9,17 @@ import bpy
 
 from ..panel_base import ArmaturePanel, armature_in
 from .landmark_table import draw_landmarks
-from .properties import splicing_settings
-from .splice_build import OCTO_MOTION_OT_splice_build, OCTO_MOTION_OT_splice_suggest_timing
-from .splice_drag import OCTO_MOTION_OT_splice_drag_timing
-from .splice_list import (
+from .properties import part_kind, splicing_settings
+from .splice_operators import (
     OCTO_MOTION_OT_splice_add,
+    OCTO_MOTION_OT_splice_build,
     OCTO_MOTION_OT_splice_move,
     OCTO_MOTION_OT_splice_remove,
+    OCTO_MOTION_OT_splice_suggest_timing,
     OCTO_MOTION_UL_splices,
     active_splice,
 )
-from .splice_properties import part_kind
+from .timing_drag import OCTO_MOTION_OT_splice_drag_timing
 
 
 class _Panel(ArmaturePanel):

@@ -41,8 +41,7 @@ from ...core.splicing.transfer import (
     suggest_timings,
 )
 from ..plain import plain
-from .landmark_properties import read_landmarks, write_landmarks
-from .properties import OCTO_MOTION_PG_splicing, splicing_settings
+from .properties import OCTO_MOTION_PG_splicing, read_landmarks, splicing_settings, write_landmarks
 
 _FINER: Final = 4
 """Samples per frame of a clip that is slowed down, …"""

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 
 from octo_motion.core.rotations import from_axis_angle, to_matrix
-from octo_motion.core.splicing.humanoid.bone_names import read_names
-from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS, OPTIONAL
+from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS, OPTIONAL, read_names
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from tests.core.humanoids import PARENTS, humanoid, number_name
 from tests.core.rigs import body_with_arms, skeleton_of

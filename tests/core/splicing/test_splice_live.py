@@ -10,11 +10,10 @@ import pytest
 from octo_motion.core.rotations import angle_between
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.clip.splice_timing import After, Timing
-from octo_motion.core.splicing.transfer import preview as live
 from octo_motion.core.splicing.transfer import splice
+from octo_motion.core.splicing.transfer import splice as live
 from octo_motion.core.splicing.transfer.parts import PARTS, Part
-from octo_motion.core.splicing.transfer.preview import SplicePreview
-from octo_motion.core.splicing.transfer.splice import Splice, build_splices
+from octo_motion.core.splicing.transfer.splice import Splice, SplicePreview, build_splices
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
 
 HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK = (

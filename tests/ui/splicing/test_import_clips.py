@@ -16,7 +16,7 @@ from octo_motion.blender.scene import imports
 from octo_motion.blender.scene.imports import NOTE, import_clip
 from octo_motion.core.errors import ClipError
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
-from octo_motion.ui.splicing import import_session
+from octo_motion.ui.splicing import import_clips as import_session
 from octo_motion.ui.splicing.import_clips import OCTO_MOTION_OT_import_clips
 from tests.ui.locomotion.test_generate import Press, Window
 from tests.ui.rig import click, joints_in_world, keys

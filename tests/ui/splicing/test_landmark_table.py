@@ -10,13 +10,14 @@ import pytest
 
 from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS, OPTIONAL
 from octo_motion.ui.splicing import landmark_table
-from octo_motion.ui.splicing.landmark_properties import (
+from octo_motion.ui.splicing.properties import (
     PROPERTIES,
+    OCTO_MOTION_PG_landmarks,
     read_landmarks,
+    splicing_settings,
     title,
     write_landmarks,
 )
-from octo_motion.ui.splicing.properties import splicing_settings
 from tests.core.humanoids import LEFT, MIDDLE, PARENTS
 from tests.ui.rig import click, make_octopus
 
@@ -210,7 +211,7 @@ def test_a_linked_rig_has_a_table_of_its_own_in_an_override(tmp_path: Path) -> N
 
 
 def test_every_landmark_has_a_property_with_a_tooltip() -> None:
-    group: Any = landmark_table.landmark_properties.OCTO_MOTION_PG_landmarks
+    group: Any = OCTO_MOTION_PG_landmarks
     assert set(group.__annotations__) == set(PROPERTIES.values())
     for landmark, name in PROPERTIES.items():
         definition = group.bl_rna.properties[name]

@@ -18,9 +18,12 @@ from octo_motion.core.rotations import angle_between, from_rotation_vector
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS
 from octo_motion.ui.splicing import splice_panels
-from octo_motion.ui.splicing.splice_drag import OCTO_MOTION_OT_splice_drag_timing
 from octo_motion.ui.splicing.stack import prepare_splices
-from octo_motion.ui.splicing.timing_drag import DragSession, TimingDrag
+from octo_motion.ui.splicing.timing_drag import (
+    DragSession,
+    OCTO_MOTION_OT_splice_drag_timing,
+    TimingDrag,
+)
 from tests.core.humanoids import MIDDLE, PARENTS, humanoid
 from tests.ui.rig import click, generate, give_route, keys, make_octopus, scene_contents
 from tests.ui.test_panels import Layout

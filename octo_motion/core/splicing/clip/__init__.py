@@ -2,13 +2,21 @@
 """Clips as arrays: poses over time, and how they are read and timed."""
 
 from .bvh_check import check_bvh
-from .clip import Clip
-from .posture import Posture, posture_of, sample_clip, sample_scales, sample_world
-from .scaled_pose import without_scale
+from .clip import MOTION_SUFFIXES, Clip
+from .posture import (
+    Posture,
+    orientations_of,
+    posture_of,
+    sample_clip,
+    sample_scales,
+    sample_world,
+    unposed,
+    without_scale,
+)
 from .splice_timing import After, SpliceWindow, Timing, splice_window, window_middle
-from .unpose import orientations_of, unposed
 
 __all__ = [
+    "MOTION_SUFFIXES",
     "After",
     "Clip",
     "Posture",

@@ -5,12 +5,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...rotations import Floats, from_matrix, multiply, rotate
 from ...skeleton import Skeleton
+
+MOTION_SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
+"""Endings of the files from which clips may come."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Forward kinematics of just those bones that are asked for, over all frames at once."""
+"""Forward kinematics of just those bones that are asked for, and backwards, for all frames."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from ...rotations import (
     from_matrix,
     from_rotation_vector,
     multiply,
+    normalized,
     rotate,
     slerp,
+    to_matrix,
     to_rotation_vector,
 )
 from ...skeleton import Skeleton
@@ -164,3 +167,81 @@ def _between(clip: Clip, frames: Floats) -> tuple[np.ndarray, np.ndarray, Floats
     before = np.floor(place).astype(np.intp)
     after = np.minimum(before + 1, len(clip) - 1)
     return before, after, np.asarray(place - before)
+
+
+# --- Forward kinematics backwards: from where the bones are to how each is turned and moved -------
+
+
+def unposed(skeleton: Skeleton, orientations: Floats, heads: Floats) -> tuple[Floats, Floats]:
+    """Rotations (…, bones, 4) and locations (…, bones, 3) in each bone's rest frame.
+
+    The inverse of ``Skeleton.pose``.
+
+    Args:
+        skeleton: the bones.
+        orientations: (…, bones, 4) quaternions, armature space.
+        heads: (…, bones, 3), armature space.
+    """
+    rotations, locations = np.empty(orientations.shape), np.empty(heads.shape)
+    for bone, parent in enumerate(skeleton.parents):
+        rest, position = skeleton.rest_rotations[bone], skeleton.heads[bone]
+        carried = rest
+        if parent >= 0:
+            turn = multiply(
+                orientations[..., parent, :], conjugate(skeleton.rest_rotations[parent])
+            )
+            position = heads[..., parent, :] + rotate(turn, position - skeleton.heads[parent])
+            carried = multiply(turn, rest)
+        moved = heads[..., bone, :] - position
+        locations[..., bone, :] = rotate(conjugate(carried), moved)
+        if not skeleton.inherits_rotation[bone]:
+            carried = rest
+        rotations[..., bone, :] = multiply(conjugate(carried), orientations[..., bone, :])
+    return rotations, locations
+
+
+def orientations_of(matrices: Floats) -> Floats:
+    """Orthonormal axes (…, 3, 3) of matrices that may scale and shear.
+
+    Y, along which a bone points, keeps its direction, and X its side.
+    """
+    y = normalized(matrices[..., :, 1])
+    x = matrices[..., :, 0]
+    x = normalized(x - np.sum(x * y, axis=-1, keepdims=True) * y)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+# --- Bones that are scaled: where they and those they carry come to lie ---------------------------
+
+
+_LEAST: Final = 1e-4
+"""Scale of what is scaled to nothing, to hide it: which way it points is still to be seen."""
+
+
+def without_scale(
+    skeleton: Skeleton, rotations: Floats, locations: Floats, scales: Floats
+) -> tuple[Floats, Floats]:
+    """Rotations and locations that put all bones where they are when each scales its children.
+
+    For bones that inherit all of their parent's scale and rotation, which is the usual.
+
+    Args:
+        skeleton: the bones.
+        rotations: (frames, bones, 4) in each bone's rest frame.
+        locations: (frames, bones, 3) in each bone's rest frame.
+        scales: (frames, bones, 3) in each bone's rest frame.
+    """
+    scales = np.where(np.abs(scales) < _LEAST, _LEAST, scales)
+    basis = np.zeros((*rotations.shape[:2], 4, 4))
+    basis[..., :3, :3] = to_matrix(rotations) * scales[..., None, :]
+    basis[..., :3, 3] = locations
+    basis[..., 3, 3] = 1.0
+    posed = np.empty_like(basis)
+    for bone, parent in enumerate(skeleton.parents):
+        rest = skeleton.rest_matrices[bone]
+        if parent < 0:
+            posed[:, bone] = rest @ basis[:, bone]
+        else:
+            offset = np.linalg.inv(skeleton.rest_matrices[parent]) @ rest
+            posed[:, bone] = posed[:, parent] @ offset @ basis[:, bone]
+    return unposed(skeleton, from_matrix(orientations_of(posed[..., :3, :3])), posed[..., :3, 3])

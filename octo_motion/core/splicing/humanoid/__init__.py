@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which bone of a skeleton is which landmark of a body."""
 
-from .bone_names import mirrored
 from .correspondence import (
     Correspondence,
     chain_length,
@@ -9,7 +8,7 @@ from .correspondence import (
     matched_bones,
     matched_chains,
 )
-from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks
+from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks, mirrored
 from .mapping import map_skeleton
 
 __all__ = [

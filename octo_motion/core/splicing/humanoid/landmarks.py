@@ -1,10 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bones of a humanoid that splicing needs to know, whatever the rig calls them."""
+"""The bones of a humanoid that splicing needs to know, and what bones' names say of them.
+
+A name is cut into words ("lForeArm", "mixamorig:LeftForeArm", "forearm_fk.L", "左ひじ"), the
+side taken out, and the rest looked up. Some words mean different parts in different rigs ("leg" is
+the shin beside "up leg", the thigh beside "shin"): each meaning has a weight, and the chain of
+bones decides.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
 from typing import Final
 
 MIDDLE: Final = ("hips", "spine", "chest", "neck", "head")
@@ -37,3 +48,193 @@ class Landmarks:
     def get(self, landmark: str) -> str | None:
         """Name of a landmark's bone, or none."""
         return self.bones.get(landmark)
+
+
+# --- What the names of bones say: body part, side, and whether a bone is machinery of the rig -----
+
+
+_WORDS: Final[dict[str, str]] = {
+    "hips": "hips hip pelvis cog=.5 center=.6 torso=.5 センター=.7 腰=.9 下半身=.8",
+    "spine": "spine abdomen ab lowerback lowback lowerspine spinelower waist=.6 torso=.5 back=.5 "
+    "belly=.7 stomach=.7 lumbar 上半身",
+    "chest": "chest upperchest thorax ribcage torso=.6 spineupper upperspine 上半身=.5 胸",
+    "neck": "neck lowerneck necklower neckbase upperneck=.8 neckupper=.8 首",
+    "head": "head skull=.7 cranium=.7 頭",
+    "clavicle": "clavicle collar collarbone clav shoulder=.7 shldr=.4 scapula=.5 肩",
+    "upper_arm": "upperarm uparm arm=.85 shldr=.8 shldrbend shoulder=.6 humerus 腕 上腕",
+    "forearm": "forearm lowerarm lowarm loarm forearmbend elbow=.95 ulna=.8 ひじ 肘 前腕",
+    "hand": "hand wrist palm=.5 手首 手=.9",
+    "thigh": "thigh upleg upperleg thighbend femur hip=.65 leg=.5 足=.9 脚=.9 もも 太もも 大腿",
+    "shin": "shin calf lowerleg lowleg loleg knee=.95 leg=.75 tibia ひざ 膝 すね 下腿",
+    "foot": "foot ankle 足首 足=.3",
+    "toe": "toe toes toebase ball forefoot foot=.3 つま先 つまさき 爪先",
+}
+"""What each landmark is called, words of a name written together; with a weight where a word means
+it only in some rigs."""
+
+_FINGERS: Final = "thumb index mid middle ring pinky little finger fingers fingerbase metacarpal"
+_FACE: Final = "eye eyes jaw tongue teeth brow lip ear ears nose cheek hair breast chin lid 目 両目"
+_ENDS: Final = "end nub tip top leaf site effector dummy"
+_RIG: Final = (
+    "ik ikp pole target twist roll spin rock tweak mch wgt vis parent socket helper master "
+    "widget prop weapon buttock 捩 親 補助"
+)
+_NO_PART: Final = frozenset(f"{_FINGERS} {_FACE} {_ENDS} {_RIG}".split())
+"""A name with one of these is no landmark, whatever else it says."""
+
+_CHARACTER: Final = "mixamorig bip biped valvebiped armature metarig character genesis j c cc m b"
+_FILLING: Final = frozenset(f"{_CHARACTER} jnt joint jt bone bn bind rig skeleton skel".split()) | {
+    *("def", "org", "fk", "ctrl")
+}
+"""Says nothing of the body."""
+
+_SIDES: Final = MappingProxyType(
+    {
+        **dict.fromkeys(("l", "left", "lft", "左"), "L"),
+        **dict.fromkeys(("r", "right", "rgt", "右"), "R"),
+    }
+)
+_SIDE_PREFIX: Final = re.compile(r"^(left|right|左|右|l|r)(?=.)")
+_SIDE_SUFFIX: Final = re.compile(r"(?<=.)(left|right)$")
+_WORD: Final = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_a-zA-Z]+|\d+")
+_VERTEBRA: Final = re.compile(r"^[TL]\d{1,2}$")
+_NAMESPACE: Final = re.compile(r"^.*[:|](?=.)")
+
+_COPY_WEIGHTS: Final = MappingProxyType({"def": 0.9, "org": 0.8})
+"""Copies that follow the bones an artist moves, in rigs that have both."""
+
+_STRANGE_WORD: Final = 0.3
+"""What is left of the weight of a name with a word that nobody knows ("head armour")."""
+
+
+def _meanings() -> dict[str, dict[str, float]]:
+    found: dict[str, dict[str, float]] = {}
+    for landmark, words in _WORDS.items():
+        for word in words.split():
+            text, _, weight = word.partition("=")
+            found.setdefault(text, {})[landmark] = float(weight or 1.0)
+    return found
+
+
+_MEANINGS: Final = _meanings()
+
+
+@dataclass(frozen=True)
+class BoneName:
+    """What one name says."""
+
+    side: str
+    """"L", "R", or "" where it names none."""
+    weights: Mapping[str, float]
+    """How well it fits a landmark without side ("forearm"), 0…1."""
+    stem: str
+    """The name without its side: the same for a bone and its mirror image."""
+    machinery: bool
+    """Whether it names a part of the rig (a target, a twist bone), not of the body."""
+    layer: str
+    """"def", "org" or "": the copies of a skeleton that a rig has."""
+
+
+def read_names(names: Sequence[str]) -> tuple[BoneName, ...]:
+    """What each of a rig's bone names says."""
+    words = [_words(name) for name in names]
+    counts = Counter(word for each in words for word in set(each))
+    # What most bones have in their names is the name of the character.
+    common = {
+        word
+        for word, count in counts.items()
+        if count > 0.5 * len(names) > 2 and not _known(word) and word not in _SIDES
+    }
+    return tuple(_read(each, common) for each in words)
+
+
+def mirrored(names: Sequence[str], name: str) -> str | None:
+    """The bone called like another one but for its side, none if there is no such bone."""
+    said = dict(zip(names, read_names(names), strict=True))
+    own = said.get(name)
+    if own is None or not own.side:
+        return None
+    return next(
+        (
+            other
+            for other, each in said.items()
+            if each.side and each.side != own.side and each.stem == own.stem
+        ),
+        None,
+    )
+
+
+@cache
+def _known(word: str) -> bool:
+    return word in _MEANINGS or word in _NO_PART
+
+
+def _words(name: str) -> tuple[str, ...]:
+    plain = unicodedata.normalize("NFKC", name)
+    plain = _NAMESPACE.sub("", plain)
+    found: list[str] = []
+    for part in re.split(r"[\W_]+", plain):
+        if _VERTEBRA.match(part):
+            found.append("spine")
+        else:
+            found += [word.lower() for word in _WORD.findall(part)]
+    return tuple(found)
+
+
+def _read(words: tuple[str, ...], common: set[str]) -> BoneName:
+    side, rest = "", list[str]()
+    layer = next((word for word in words if word in _COPY_WEIGHTS), "")
+    for word in words:
+        if word in _SIDES and not side:
+            side = _SIDES[word]
+        elif not word.isdigit() and word not in common and not _is_filling(word, words):
+            rest.append(word)
+    if not side:
+        side, rest = _side_within(rest)
+    numbers = [word for word in words if word.isdigit()]
+    barred = any(word in _NO_PART for word in rest)
+    weights = {} if barred else _lookup(rest, side)
+    return BoneName(
+        side=side,
+        weights=MappingProxyType(
+            {part: weight * _COPY_WEIGHTS.get(layer, 1.0) for part, weight in weights.items()}
+        ),
+        stem=" ".join([layer, *rest, *numbers]),
+        machinery=any(word in _NO_PART for word in rest),
+        layer=layer,
+    )
+
+
+def _is_filling(word: str, words: tuple[str, ...]) -> bool:
+    return word in _FILLING or (word == "base" and "cc" in words)
+
+
+def _side_within(words: list[str]) -> tuple[str, list[str]]:
+    """Side written together with a word: "rforearm", "LEFTARM", "armleft"."""
+    for place, word in enumerate(words):
+        if _known(word):
+            continue
+        for pattern in (_SIDE_PREFIX, _SIDE_SUFFIX):
+            found = pattern.search(word)
+            rest = pattern.sub("", word)
+            if found and (_known(rest) or len(found[1]) > 1):
+                return _SIDES[found[1]], [*words[:place], rest, *words[place + 1 :]]
+    return "", words
+
+
+def _lookup(words: list[str], side: str) -> dict[str, float]:
+    """Meanings of the longest run of words that has one."""
+    for length in range(len(words), 0, -1):
+        for start in range(len(words) - length + 1):
+            meanings = _MEANINGS.get("".join(words[start : start + length]))
+            if meanings:
+                share = 1.0 if length == len(words) else _STRANGE_WORD
+                return {
+                    part: share * weight
+                    for part, weight in meanings.items()
+                    if bool(side) == (part in _SIDED_PARTS) or not side
+                }
+    return {}
+
+
+_SIDED_PARTS: Final = frozenset(_WORDS) - {"hips", "spine", "chest", "neck", "head"}

@@ -17,11 +17,9 @@ import numpy as np
 
 from ...rotations import Floats
 from ...skeleton import Skeleton
-from .bone_names import read_names
-from .landmarks import LANDMARKS, OPTIONAL, Landmarks
-from .limb_search import ARM, LEG, OPTIONAL_PARTS, BodyProportions, body_of, find_limb
+from .landmarks import LANDMARKS, OPTIONAL, Landmarks, read_names
+from .name_match import ARM, LEG, OPTIONAL_PARTS, BodyProportions, body_of, find_limb, find_trunk
 from .shape_match import Shape, shape_of
-from .trunk_search import find_trunk
 
 LIMBS: Final = {"arm": ARM, "leg": LEG}
 

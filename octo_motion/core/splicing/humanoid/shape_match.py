@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from ...skeleton import Skeleton
-from .bone_names import BoneName
+from .landmarks import BoneName
 
 _ALIKE: Final = 0.15
 """Relative difference of length between a limb and its mirror image."""

@@ -11,9 +11,8 @@ from .parts import (
     part_bones,
     part_named,
 )
-from .preview import SplicePreview
 from .retarget import MappedClip
-from .splice import LimbGoal, Splice, build_splices
+from .splice import LimbGoal, Splice, SplicePreview, build_splices
 from .timing_suggestions import Suggestion, suggest_timings
 
 __all__ = [
