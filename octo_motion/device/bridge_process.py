@@ -10,48 +10,20 @@ from __future__ import annotations
 
 import logging
 import os
-import platform
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from ..core.errors import DeviceError, OctoMotionError
 from ..core.posing.puppet import Pose
 from ..core.posing.solver import WorldSettings
+from . import messages
 from .calibration import Phase
 from .haptics import Schedule
-from .ipc import (
-    Button,
-    Buzz,
-    Calibrate,
-    CalibrationMessage,
-    ChannelClosedError,
-    Child,
-    DeviceMessage,
-    FigureMessage,
-    Goodbye,
-    Grab,
-    HandMessage,
-    Hello,
-    Listener,
-    LoopTimesMessage,
-    Message,
-    MessageChannel,
-    MessageError,
-    Notice,
-    ObstacleMessage,
-    Parent,
-    Pins,
-    Place,
-    PointerMessage,
-    PoseMessage,
-    Settings,
-    Times,
-    Workspace,
-    WorldMessage,
-)
+from .ipc import ChannelClosedError, Child, Listener, MessageChannel, Parent
 from .simulation import SimulatedPointer, Simulation
 
 log = logging.getLogger(__name__)
@@ -78,13 +50,13 @@ class Bridge:
         self._started = 0.0
         self._gave_up = False
         self._greeted = False
-        self._figure: FigureMessage | None = None
-        self._world = WorldSettings(step=WorldMessage.step)
-        self._obstacles: dict[int, ObstacleMessage] = {}
-        self._remembered: dict[tuple[type[Message], int], Message] = {}
-        self._devices: dict[int, DeviceMessage] = {}
-        self._workspaces: dict[int, Workspace] = {}
-        self._heard: dict[int, HandMessage] = {}
+        self._figure: messages.FigureMessage | None = None
+        self._world = WorldSettings(step=messages.WorldMessage.step)
+        self._obstacles: dict[int, messages.ObstacleMessage] = {}
+        self._remembered: dict[tuple[type[messages.Message], int], messages.Message] = {}
+        self._devices: dict[int, messages.DeviceMessage] = {}
+        self._workspaces: dict[int, messages.Workspace] = {}
+        self._heard: dict[int, messages.HandMessage] = {}
         self.simulation: Simulation | None = None
         self._sent = 0.0
         self._lag = 0.0
@@ -138,77 +110,78 @@ class Bridge:
 
     # --- Blender ---------------------------------------------------------------------------------
 
-    def _hear_blender(self, message: Message) -> None:
+    def _hear_blender(self, message: messages.Message) -> None:
         try:
             self._take(message)
-        except (MessageError, OctoMotionError) as error:
+        except (messages.MessageError, OctoMotionError) as error:
             log.warning("Not taken: %s", error)
             remedy = error.remedy if isinstance(error, OctoMotionError) else ""
-            self._blender.send(Notice(f"The bridge did not take a message: {error}", remedy))
+            problem = f"The bridge did not take a message: {error}"
+            self._blender.send(messages.Notice(problem, remedy))
 
-    def _take(self, message: Message) -> None:
+    def _take(self, message: messages.Message) -> None:
         simulation = self.simulation
         match message:
-            case FigureMessage():
+            case messages.FigureMessage():
                 message.figure()  # refused here if it is none
                 self._figure, self.simulation = message, None
-            case Place():
+            case messages.Place():
                 self._placed += 1
                 self._place(message)
-            case Pins():
+            case messages.Pins():
                 if simulation is not None:
                     pins = message.pins()
                     if pins and max(pins) >= len(simulation.session.figure):
-                        raise MessageError("a pin on a body that does not exist")
+                        raise messages.MessageError("a pin on a body that does not exist")
                     simulation.pin(pins)
-            case WorldMessage():
+            case messages.WorldMessage():
                 self._world = message.settings()
                 if simulation is not None:
                     simulation.change(self._world)
-            case ObstacleMessage():
+            case messages.ObstacleMessage():
                 obstacle = message.obstacle()
                 self._obstacles[message.number] = message
                 if simulation is not None:
                     simulation.put_obstacle(message.number, obstacle)
-            case Settings():
+            case messages.Settings():
                 message.response()
                 if simulation is not None:
                     simulation.reach = message.reach
                 self._pass_on(message, 0)
-            case Workspace():
+            case messages.Workspace():
                 if message.scale <= 0.0:
-                    raise MessageError("a workspace without size")
+                    raise messages.MessageError("a workspace without size")
                 self._workspaces[message.pointer] = message
                 self._pass_on(message, message.pointer)
-            case Grab() | Buzz() | Calibrate():
+            case messages.Grab() | messages.Buzz() | messages.Calibrate():
                 self._send_to_hands(message)
-            case CalibrationMessage():
+            case messages.CalibrationMessage():
                 message.calibration()  # refused here if it is none
                 self._pass_on(message, message.pointer)
-            case Goodbye():
+            case messages.Goodbye():
                 raise ChannelClosedError("goodbye")
             case _:
-                raise MessageError(f"{type(message).__name__} is not for here")
+                raise messages.MessageError(f"{type(message).__name__} is not for here")
 
-    def _place(self, message: Place) -> None:
+    def _place(self, message: messages.Place) -> None:
         if self._figure is None:
-            raise MessageError("a pose came before a figure")
+            raise messages.MessageError("a pose came before a figure")
         pose = Pose(message.positions, message.orientations)
         count = len(self._figure.names)
         if len(pose.positions) != count or len(pose.orientations) != count:
-            raise MessageError("a pose of another figure")
+            raise messages.MessageError("a pose of another figure")
         if self.simulation is not None:
             self.simulation.place(pose)
             return
         simulation = Simulation(self._figure.figure(), pose, self._world)
         for number, obstacle in self._obstacles.items():
             simulation.put_obstacle(number, obstacle.obstacle())
-        settings = self._remembered.get((Settings, 0))
-        if isinstance(settings, Settings):
+        settings = self._remembered.get((messages.Settings, 0))
+        if isinstance(settings, messages.Settings):
             simulation.reach = settings.reach
         self.simulation = simulation
 
-    def _pass_on(self, message: Message, number: int) -> None:
+    def _pass_on(self, message: messages.Message, number: int) -> None:
         self._remembered[type(message), number] = message
         self._send_to_hands(message)
 
@@ -224,26 +197,28 @@ class Bridge:
             pose = simulation.session.pose
             # What was left out is sent once Blender reads again: it may be the last for long.
             simulation.session.changed = not self._blender.send(
-                PoseMessage(
+                messages.PoseMessage(
                     *(self._placed, simulation.steps, simulation.session.time),
                     *(pose.positions, pose.orientations),
                 ),
                 droppable=True,
             )
 
-    def _pointer(self, message: HandMessage, hand: SimulatedPointer | None) -> PointerMessage:
-        place, turn, body = message.position, message.orientation, -1
+    def _pointer(
+        self, message: messages.HandMessage, hand: SimulatedPointer | None
+    ) -> messages.PointerMessage:
+        place, body = message.position, -1
         if hand is not None and hand.spring is not None and self.simulation is not None:
-            held, turned = self.simulation.coupled(hand.spring)
-            place, turn, body = tuple(held), tuple(turned), hand.spring.body
-        return PointerMessage(
-            *(message.pointer, body, message.position, message.orientation, place, turn),
+            place = tuple(self.simulation.world.held_point(hand.spring))
+            body = hand.spring.body
+        return messages.PointerMessage(
+            *(message.pointer, body, message.position, message.orientation, place),
             *(message.force, message.torque, message.buttons),
         )
 
     # --- The devices -----------------------------------------------------------------------------
 
-    def _send_to_hands(self, message: Message) -> None:
+    def _send_to_hands(self, message: messages.Message) -> None:
         if self._hands is not None:
             try:
                 self._hands.channel.send(message)
@@ -254,35 +229,37 @@ class Bridge:
         if self._hands is None:
             return
         try:
-            messages = self._hands.channel.receive()
+            came = self._hands.channel.receive()
         except ChannelClosedError:
             self._lose_hands()
             return
-        for message in messages:
+        for message in came:
             match message:
-                case HandMessage():
+                case messages.HandMessage():
                     self._heard[message.pointer] = message
-                case DeviceMessage():
+                case messages.DeviceMessage():
                     self._hear_device(message)
-                case LoopTimesMessage():
+                case messages.LoopTimesMessage():
                     self._send_times(message)
-                case Hello():
-                    self._send_hello(message)
-                case Button() | Notice():
+                case messages.Hello():
+                    if not self._greeted:
+                        self._greeted = True
+                        self._blender.send(replace(message, process=os.getpid()))
+                case messages.Button() | messages.Notice():
                     self._blender.send(message)
-                case CalibrationMessage():
+                case messages.CalibrationMessage():
                     self._hear_calibration(message)
                 case _:
                     log.warning("The devices' process says %s", type(message).__name__)
 
-    def _hear_calibration(self, message: CalibrationMessage) -> None:
+    def _hear_calibration(self, message: messages.CalibrationMessage) -> None:
         if message.phase == Phase.DONE:  # for a process at the devices that is started anew
-            self._remembered[CalibrationMessage, message.pointer] = message
+            self._remembered[messages.CalibrationMessage, message.pointer] = message
         # While it is learned, the next word comes at once: a Blender that renders needs none twice.
         learning = message.phase in {Phase.REST, Phase.REACH}
         self._blender.send(message, droppable=learning)
 
-    def _hear_device(self, message: DeviceMessage) -> None:
+    def _hear_device(self, message: messages.DeviceMessage) -> None:
         if message.present:
             self._devices[message.pointer] = message
         else:
@@ -292,18 +269,13 @@ class Bridge:
                 self.simulation.forget(message.pointer)
         self._blender.send(message)
 
-    def _send_hello(self, message: Hello) -> None:
-        if not self._greeted:
-            self._greeted = True
-            self._blender.send(Hello(os.getpid(), platform.python_version(), message.priority))
-
-    def _send_times(self, message: LoopTimesMessage) -> None:
+    def _send_times(self, message: messages.LoopTimesMessage) -> None:
         if time.monotonic() - self._started > _SETTLED:
             self._starts = 1  # what was long ago does not count
         simulation = self.simulation
         cost, pace = (simulation.cost, simulation.pace) if simulation else (0.0, 1.0)
         self._blender.send(
-            Times(
+            messages.Times(
                 *(message.rate, message.late, message.computing, message.missed),
                 *(cost, pace, self._lag),
             ),
@@ -315,12 +287,8 @@ class Bridge:
         if self._hands is not None:
             self._hands.stop(0.0)
         self._hands = None
-        for pointer, device in list(self._devices.items()):
-            gone = DeviceMessage(
-                *(pointer, False, device.kind, 0.0, 0.0, 0.0, 0.0),
-                *(device.name, device.identity, ()),
-            )
-            self._hear_device(gone)
+        for device in list(self._devices.values()):
+            self._hear_device(replace(device, present=False))
         log.warning("The process at the devices ended")
 
     def _start_again(self) -> None:
@@ -330,7 +298,7 @@ class Bridge:
         if not self._gave_up:
             self._gave_up = True
             self._blender.send(
-                Notice(
+                messages.Notice(
                     "The program at the devices ends again and again.",
                     "Unplug the device, then start the bridge again.",
                 )

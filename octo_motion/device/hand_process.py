@@ -15,30 +15,11 @@ from collections.abc import Iterable
 from typing import Final
 
 from ..core.errors import DeviceError
+from . import messages
 from .calibration import Calibration, Phase
 from .driver import DeviceLostError, Driver
 from .haptics import Pointer, Schedule, make_real_time
-from .ipc import (
-    Button,
-    Buzz,
-    Calibrate,
-    CalibrationMessage,
-    ChannelClosedError,
-    DeviceMessage,
-    Goodbye,
-    Grab,
-    HeldMessage,
-    Hello,
-    Listener,
-    Message,
-    MessageChannel,
-    MessageError,
-    Notice,
-    Order,
-    Parent,
-    Settings,
-    Workspace,
-)
+from .ipc import ChannelClosedError, Listener, MessageChannel, Parent
 from .sources import Discovery, Sources
 
 log = logging.getLogger(__name__)
@@ -68,10 +49,10 @@ class HandLoop:
         self._period = period
         self._pointers: dict[int, Pointer] = {}
         self._numbers: dict[str, int] = {}
-        self._workspaces: dict[int, Workspace] = {}
+        self._workspaces: dict[int, messages.Workspace] = {}
         self._corrections: dict[int, Calibration] = {}
         """By pointer: zeros and ranges that were sent or learned."""
-        self._settings = Settings()
+        self._settings = messages.Settings()
         self._hands_sent = self._times_sent = self._looked = 0.0
         self._held = False
 
@@ -102,74 +83,74 @@ class HandLoop:
             self._looked = now
             self._look()
 
-    def _receive(self, message: Message, now: float) -> None:
+    def _receive(self, message: messages.Message, now: float) -> None:
         match message:
-            case HeldMessage():
+            case messages.HeldMessage():
                 pointer = self._pointers.get(message.pointer)
-                if pointer is not None and message.held:
-                    pointer.hold(message.grab, message.body(), message.time, now, message.holds)
-                elif pointer is not None:
-                    pointer.refuse(message.grab)
-            case Calibrate():
+                if pointer is not None:
+                    pointer.hold(message, now)
+            case messages.Calibrate():
                 self._calibrate(message)
-            case CalibrationMessage():
+            case messages.CalibrationMessage():
                 self._correct(message)
-            case Settings():
+            case messages.Settings():
                 self._take_settings(message)
-            case Workspace():
+            case messages.Workspace():
                 if message.scale > 0.0 and message.pointer < MOST_POINTERS:
                     self._workspaces[message.pointer] = message
                     if message.pointer in self._pointers:
                         self._pointers[message.pointer].place(message)
-            case Grab():
+            case messages.Grab():
                 pointer = self._pointers.get(message.pointer)
                 if pointer is not None:
                     pointer.want(grab=message.grab)
-            case Buzz():
+            case messages.Buzz():
                 pointer = self._pointers.get(message.pointer)
                 if pointer is not None:
                     pointer.test(now)
-            case Goodbye():
+            case messages.Goodbye():
                 raise ChannelClosedError("goodbye")
             case _:
                 log.warning("A message that is not for here: %s", type(message).__name__)
 
-    def _calibrate(self, order: Calibrate) -> None:
+    def _calibrate(self, order: messages.Calibrate) -> None:
         pointer = self._pointers.get(order.pointer)
         if pointer is None:
             return
         learner = pointer.calibrator
-        if order.order == Order.FINISH and learner is not None:
+        if order.order == messages.Order.FINISH and learner is not None:
             try:
                 pointer.correct(learner.finish())
                 self._corrections[order.pointer] = pointer.calibration
             except DeviceError as error:
-                self._channel.send(Notice(error.problem, error.remedy))
+                self._channel.send(messages.Notice(error.problem, error.remedy))
             phase, learned = learner.phase, pointer.calibration
             pointer.calibrate(begin=False)
-            self._channel.send(CalibrationMessage.of(order.pointer, learned, phase))
-        elif order.order == Order.BEGIN:
+            self._channel.send(messages.CalibrationMessage.of(order.pointer, learned, phase))
+        elif order.order == messages.Order.BEGIN:
             pointer.calibrate(begin=True)
         elif learner is not None:
             pointer.calibrate(begin=False)
             self._channel.send(
-                CalibrationMessage.of(order.pointer, pointer.calibration, Phase.FAILED)
+                messages.CalibrationMessage.of(order.pointer, pointer.calibration, Phase.FAILED)
             )
 
-    def _correct(self, message: CalibrationMessage) -> None:
+    def _correct(self, message: messages.CalibrationMessage) -> None:
         pointer = self._pointers.get(message.pointer)
-        with contextlib.suppress(MessageError):  # as without one, then
+        with contextlib.suppress(messages.MessageError):  # as without one, then
             calibration = message.calibration()
             if message.pointer < MOST_POINTERS:
                 self._corrections[message.pointer] = calibration
             if pointer is not None:
                 pointer.correct(calibration)
 
-    def _take_settings(self, settings: Settings) -> None:
+    def _take_settings(self, settings: messages.Settings) -> None:
         try:
             settings.response()
-        except MessageError as error:
-            self._channel.send(Notice(f"The device's settings were not taken: {error}", ""))
+        except messages.MessageError as error:
+            self._channel.send(
+                messages.Notice(f"The device's settings were not taken: {error}", "")
+            )
             return
         self._settings = settings
         for pointer in self.pointers:
@@ -181,7 +162,7 @@ class HandLoop:
             self._hands_sent = now
         for pointer in self.pointers:
             for index, pressed in pointer.presses:
-                self._channel.send(Button(pointer.number, index, pressed))
+                self._channel.send(messages.Button(pointer.number, index, pressed))
             changed = bool(pointer.presses)
             pointer.presses.clear()
             if changed or due:
@@ -189,7 +170,7 @@ class HandLoop:
             learner = pointer.calibrator
             if learner is not None and due:
                 self._channel.send(
-                    CalibrationMessage.of(pointer.number, learner.so_far, learner.phase),
+                    messages.CalibrationMessage.of(pointer.number, learner.so_far, learner.phase),
                     droppable=True,
                 )
         if now - self._times_sent > _TIMES_EVERY:
@@ -201,7 +182,7 @@ class HandLoop:
             self._welcome(driver)
         problems, self._discovery.problems = self._discovery.problems, []
         for problem in problems:
-            self._channel.send(Notice(problem.problem, problem.remedy))
+            self._channel.send(messages.Notice(problem.problem, problem.remedy))
 
     def _welcome(self, driver: Driver) -> None:
         who = driver.description
@@ -252,7 +233,7 @@ class HandLoop:
             force, torque = who.dynamics.force, who.dynamics.torque
         gains = pointer.gains
         self._channel.send(
-            DeviceMessage(
+            messages.DeviceMessage(
                 *(pointer.number, present, who.kind, force, torque),
                 *(gains.stiffness, gains.angular_stiffness, who.name),
                 *(who.lasting or who.identity, who.buttons),
@@ -280,10 +261,12 @@ def run(sources: Sources, rate: float = RATE) -> int:
     try:
         discovery = Discovery(sources)
     except (OSError, ValueError) as error:
-        channel.send(Notice(f"The network port cannot be used: {error}.", "Choose another one."))
+        channel.send(
+            messages.Notice(f"The network port cannot be used: {error}.", "Choose another one.")
+        )
         discovery = Discovery(Sources(sources.hid, sources.haply, simulated=sources.simulated))
     priority = make_real_time()
-    channel.send(Hello(os.getpid(), platform.python_version(), priority))
+    channel.send(messages.Hello(os.getpid(), platform.python_version(), priority))
     schedule = Schedule(1.0 / rate)
     loop = HandLoop(channel, discovery, schedule, schedule.period)
     try:

@@ -18,9 +18,8 @@ from ..core.posing.session import HandSample, Session
 from ..core.posing.solver import Coupling, HandSpring, Obstacle, World, WorldSettings
 from ..core.posing.step_length import StepLength
 from ..core.rotations import Floats, conjugate, multiply, rotate
-from ..core.rotations.scalars import IDENTITY, ZERO, Vector
-from .held_body import Pull
-from .ipc import DeviceMessage, HandMessage, HeldMessage, Settings
+from ..core.rotations.scalars import Vector
+from .messages import DeviceMessage, HandMessage, HeldMessage, Pull, Settings
 
 log = logging.getLogger(__name__)
 
@@ -322,11 +321,8 @@ class Simulation:
     def _held(self, pointer: int, hand: SimulatedPointer, now: float) -> HeldMessage:
         spring = hand.spring
         if spring is None:
-            return HeldMessage(
-                *(pointer, hand.message.grab, False, now, 0.0),
-                *(ZERO, IDENTITY, ZERO, ZERO, Pull(), ZERO, ZERO),
-            )
-        place, turn = self.coupled(spring)
+            return HeldMessage(pointer, hand.message.grab, held=False, time=now)
+        place = self.world.held_point(spring)
         # What the hand sees: where simulated time is slow, all moves slowly and is hard to move.
         pace = self.pace
         velocity = pace * self.world.velocities()[spring.body]
@@ -335,17 +331,14 @@ class Simulation:
             angular_mobility=pace * pace * hand.pull.angular_mobility,
         )
         at_point = velocity[:3] + np.cross(velocity[3:], place - self._centre(spring.body))
+        # How a hand would be turned that held it without lag.
+        turn = multiply(self.session.pose.orientations[spring.body], conjugate(spring.grip))
         w, x, y, z = map(float, turn)
         return HeldMessage(
             *(pointer, hand.grab, True, now, self.holds, _tuple(place), (w, x, y, z)),
             *(_tuple(at_point), _tuple(velocity[3:]), pull),
             *(_tuple(spring.wrench[:3]), _tuple(spring.wrench[3:])),
         )
-
-    def coupled(self, spring: HandSpring) -> tuple[Floats, Floats]:
-        """Where the held point is, and how a hand would be turned that held it without lag."""
-        turn = multiply(self.session.pose.orientations[spring.body], conjugate(spring.grip))
-        return self.world.held_point(spring), turn
 
     def _centre(self, body: int) -> Floats:
         """(3,) the centre of mass of a body, world."""

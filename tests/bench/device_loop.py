@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from octo_motion.device.ipc import messages as say
+from octo_motion.device import messages as say
 from octo_motion.device.ipc.client import Client
 from tests.core.puppets import doll, posed, soft
 

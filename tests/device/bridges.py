@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from octo_motion.core.posing.puppet.figure import Figure, Pose
-from octo_motion.device.ipc import messages as say
+from octo_motion.device import messages as say
 from octo_motion.device.ipc.client import Client, ClientState
 from tests.core.puppets import chain, posed, soft
 

@@ -14,12 +14,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from octo_motion.device import messages as say
+from octo_motion.device.codec import MessageError
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.descriptor import DescriptorError, parse_descriptor
 from octo_motion.device.hid.force_profile import ReportError
 from octo_motion.device.hid.multi_axis import MultiAxis
-from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.codec import MessageError
 from octo_motion.device.sources import haply, network
 from octo_motion.device.sources.network import PacketError
 from octo_motion.device.sources.websocket import FrameReader, WebSocketError, frame

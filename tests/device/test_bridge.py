@@ -19,7 +19,7 @@ import pytest
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.posing.solver.obstacle_shapes import Plane
 from octo_motion.device import __main__ as program
-from octo_motion.device.ipc import messages as say
+from octo_motion.device import messages as say
 from octo_motion.device.ipc import process
 from octo_motion.device.ipc.client import Client, ClientState
 from tests.device.bridges import (

@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
+from octo_motion.device import messages as say
 from octo_motion.device.calibration import NONE, Calibration, Calibrator, Phase, reached
+from octo_motion.device.codec import MessageError
 from octo_motion.device.driver import Axes, Kind, Sample
 from octo_motion.device.haptics.pointer import Pointer
 from octo_motion.device.hid.multi_axis import classic_layout
 from octo_motion.device.hid.space_mouse import SpaceMouse
-from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.codec import MessageError
-from octo_motion.device.ipc.messages import Settings
+from octo_motion.device.messages import Settings
 from tests.device.parts import FakeHandle, found
 from tests.device.test_pointer import ROCK, Table
 

@@ -25,7 +25,7 @@ from octo_motion.device.ipc.message_channel import (
     connect,
     new_secret,
 )
-from octo_motion.device.ipc.messages import (
+from octo_motion.device.messages import (
     HEADER,
     MAGIC,
     VERSION,

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from octo_motion.device import messages as say
 from octo_motion.device.__main__ import _parser
+from octo_motion.device.codec import Codec, Many, Number, Table, Text
 from octo_motion.device.driver import Dynamics
 from octo_motion.device.haptics.coupling import DAMPER_SHARE, SHARE, gains_for
 from octo_motion.device.haptics.passivity import STORED
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.system import UDEV_FILE
-from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.codec import Codec, Many, Number, Table, Text
 from octo_motion.device.sources import network
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -97,8 +97,7 @@ def test_every_error_of_devices_is_explained() -> None:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if (
                 isinstance(node, ast.Call)
-                and isinstance(node.func, ast.Name)
-                and node.func.id in {"DeviceError", "Notice"}
+                and ast.unparse(node.func) in {"DeviceError", "Notice", "messages.Notice"}
                 and node.args
                 and isinstance(node.args[0], ast.Constant | ast.JoinedStr)
             ):

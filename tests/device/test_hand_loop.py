@@ -13,11 +13,11 @@ import pytest
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.core.rotations.scalars import IDENTITY
+from octo_motion.device import messages as say
 from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.driver import Driver, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
-from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.message_channel import (
     ChannelClosedError,
     Listener,

@@ -31,7 +31,7 @@ from octo_motion.device.haptics.local_model import LocalModel
 from octo_motion.device.haptics.passivity import DAMPING, STORED, Observer
 from octo_motion.device.haptics.safety import FALL, RISE, ForceLimits, Shaper, freshness
 from octo_motion.device.haptics.schedule import Schedule
-from octo_motion.device.held_body import Held, Pull
+from octo_motion.device.messages import HeldMessage, Pull
 from octo_motion.device.sources.simulated_hand import Hand, rest
 
 PERIOD = 0.001
@@ -295,8 +295,12 @@ def test_what_is_no_number_becomes_no_force(bad: float, which: str) -> None:
 # --- The local model -----------------------------------------------------------------------------
 
 
-def held(position: Vector, velocity: Vector = ZERO, pull: Pull | None = None) -> Held:
-    return Held(position, IDENTITY, velocity, ZERO, pull or Pull())
+def held(
+    position: Vector, velocity: Vector = ZERO, pull: Pull | None = None, force: Vector = ZERO
+) -> HeldMessage:
+    return HeldMessage(
+        *(0, 1, True, 0.0, 0.0, position, IDENTITY, velocity, ZERO, pull or Pull(), force)
+    )
 
 
 def still(model: LocalModel, ticks: int) -> list[Vector]:
@@ -354,8 +358,7 @@ def test_slow_simulation_feels_like_a_fast_one(every: int) -> None:
         x += v * PERIOD
         model.advance(PERIOD, (hand, 0.0, 0.0), IDENTITY, (hand_speed, 0.0, 0.0), ZERO)
         if tick % every == 0:
-            told = Held((x, 0.0, 0.0), IDENTITY, (v, 0.0, 0.0), ZERO, pull, (f, 0.0, 0.0))
-            model.correct(told, 0.0)
+            model.correct(held((x, 0.0, 0.0), (v, 0.0, 0.0), pull, (f, 0.0, 0.0)), 0.0)
         worst = max(worst, abs(model.felt()[0][0] - x))
     # 1 mm of 2 cm: at a coupling of 640 N/m not the tenth part of what the device can give.
     assert worst < 0.001

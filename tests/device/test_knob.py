@@ -20,7 +20,7 @@ from octo_motion.device.hid import drivers
 from octo_motion.device.hid.drivers import HID_DRIVERS, HidDriver, hid_driver_for
 from octo_motion.device.hid.force_profile import USAGE, USAGE_PAGE
 from octo_motion.device.hid.system import Found, Handle, HidReports
-from octo_motion.device.ipc.messages import Settings
+from octo_motion.device.messages import Settings
 from tests.device.parts import FakeHandle, found
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"

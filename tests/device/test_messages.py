@@ -22,10 +22,9 @@ from octo_motion.core.posing.solver.obstacle_shapes import (
     Plane,
     Sphere,
 )
+from octo_motion.device import messages as say
 from octo_motion.device.calibration import Calibration, Phase
-from octo_motion.device.held_body import Pull
-from octo_motion.device.ipc import messages as say
-from octo_motion.device.ipc.codec import MessageError
+from octo_motion.device.codec import MessageError
 from tests.core.puppets import doll, posed, soft
 
 CORNERS = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]])
@@ -45,7 +44,7 @@ EXAMPLES: list[say.Message] = [
     say.Settings(force=0.5, toggle=True),
     say.Workspace(1, V, Q, 2.0),
     say.DeviceMessage(*(1, True, 1, 8.0, 0.4, 640.0, 1.5, "Händchen", "1:2", ("Schlüssel",))),
-    say.PointerMessage(1, 7, V, Q, V, Q, V, V, 3),
+    say.PointerMessage(1, 7, V, Q, V, V, V, 3),
     say.Button(1, 2, pressed=True),
     say.Times(999.9, TIMES, TIMES, 3, 0.001, 1.0, 0.012),
     say.Notice("Problem.", "Remedy."),
@@ -56,7 +55,7 @@ EXAMPLES: list[say.Message] = [
     say.Calibrate(1, say.Order.BEGIN),
     say.CalibrationMessage.of(1, Calibration((0.1, 0.0, 0.0, 0.0, 0.0, 0.0)), Phase.REACH),
     say.HandMessage(1, 2.0, 3, V, Q, V, V, V, V, 5),
-    say.HeldMessage(1, 2, *(True,), 3.0, 0.05, V, Q, V, V, Pull(1, 2, 3, 4, 5, 6), V, V),
+    say.HeldMessage(1, 2, *(True,), 3.0, 0.05, V, Q, V, V, say.Pull(1, 2, 3, 4, 5, 6), V, V),
     say.LoopTimesMessage(1000.0, TIMES, TIMES, 0),
 ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,7 @@ from octo_motion.core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vecto
 from octo_motion.device.calibration import Calibration
 from octo_motion.device.driver import DeviceLostError, Kind, Sample
 from octo_motion.device.haptics.pointer import Pointer
-from octo_motion.device.held_body import Held, Pull
-from octo_motion.device.ipc.messages import DeviceMessage, Settings, Workspace
+from octo_motion.device.messages import DeviceMessage, HeldMessage, Settings, Workspace
 from octo_motion.device.simulation import Simulation, coupling_for
 from octo_motion.device.sources.simulated_hand import Hand, SimulatedHand
 from tests.core.puppets import chain, posed, soft
@@ -40,7 +40,9 @@ class Table:
         self.hand_there = True
         self.silent = False
 
-    def ticks(self, count: int = 1, held: Held | None = None, *, answer: bool = True) -> None:
+    def ticks(
+        self, count: int = 1, held: HeldMessage | None = None, *, answer: bool = True
+    ) -> None:
         for _ in range(count):
             self.now += PERIOD
             if not self.silent:
@@ -51,15 +53,20 @@ class Table:
                     )
                 )
             if held is not None and answer:
-                self.pointer.hold(self.pointer.grab, held, self.now, self.now)
+                self.hold(held)
             self.pointer.tick(self.now)
+
+    def hold(self, held: HeldMessage, holds: float = 0.0, before: int = 0) -> None:
+        """Answer the grab, or one so many before it."""
+        grab = self.pointer.grab - before
+        self.pointer.hold(replace(held, grab=grab, time=self.now, holds=holds), self.now)
 
     @property
     def force(self) -> float:
         return length(self.driver.sent[-1][0])
 
 
-ROCK = Held(ZERO, IDENTITY, ZERO, ZERO, Pull())
+ROCK = HeldMessage(0, 0, held=True, time=0.0)
 
 
 def grabbed(settings: Settings | None = None) -> Table:
@@ -138,7 +145,7 @@ def test_silent_simulation_takes_the_force_away_in_twenty_milliseconds() -> None
 
 def test_slow_simulation_may_be_silent_for_as_long_as_a_step_takes_and_no_longer() -> None:
     table = grabbed()
-    table.pointer.hold(table.pointer.grab, ROCK, table.now, table.now, holds=0.05)
+    table.hold(ROCK, holds=0.05)
     before = table.force
     table.ticks(55, answer=False)
     assert table.force == pytest.approx(before)
@@ -148,7 +155,7 @@ def test_slow_simulation_may_be_silent_for_as_long_as_a_step_takes_and_no_longer
 
 def test_no_simulation_is_trusted_for_longer_than_a_tenth_of_a_second() -> None:
     table = grabbed()
-    table.pointer.hold(table.pointer.grab, ROCK, table.now, table.now, holds=10.0)
+    table.hold(ROCK, holds=10.0)
     table.ticks(121, answer=False)
     assert table.force == 0.0
 
@@ -196,7 +203,7 @@ def test_loop_that_is_slow_by_itself_gives_force() -> None:
     for index in range(100):
         now += 0.02 if index % 3 else 0.03
         driver.samples.append(Sample(now, (0.02 * min(1.0, 0.1 * index), 0.0, 0.0), IDENTITY))
-        pointer.hold(pointer.grab, ROCK, now, now)
+        pointer.hold(replace(ROCK, grab=pointer.grab, time=now), now)
         pointer.tick(now)
     assert length(driver.sent[-1][0]) > 0.1
 
@@ -239,7 +246,7 @@ def test_grab_that_is_refused_is_over_until_the_next_one() -> None:
     table.buttons = 1
     table.ticks(5)
     grab = table.pointer.grab
-    table.pointer.refuse(grab)
+    table.pointer.hold(HeldMessage(0, grab, held=False, time=table.now), table.now)
     assert table.pointer.grab == 0
     table.ticks(5)
     assert table.pointer.grab == 0
@@ -248,7 +255,7 @@ def test_grab_that_is_refused_is_over_until_the_next_one() -> None:
     table.buttons = 1
     table.ticks(1)
     assert table.pointer.grab == grab + 1
-    table.pointer.refuse(grab)
+    table.pointer.hold(HeldMessage(0, grab, held=False, time=table.now), table.now)
     assert table.pointer.grab == grab + 1
 
 
@@ -258,8 +265,7 @@ def test_answer_to_an_older_grab_is_not_felt() -> None:
     table.ticks(40, ROCK)
     table.buttons = 1
     table.ticks(1)
-    grab = table.pointer.grab
-    table.pointer.hold(grab - 1, ROCK, table.now, table.now)
+    table.hold(ROCK, before=1)
     table.ticks(50)
     assert table.force == 0.0
 
@@ -424,7 +430,7 @@ class Bench:
                 self.simulation.hear(self.pointer.message(self.now))
                 self.simulation.step(self.now)
                 for held in self.simulation.held(self.now):
-                    self.pointer.hold(held.grab, held.body(), held.time, self.now, held.holds)
+                    self.pointer.hold(held, self.now)
             self.log.append((self.pointer.force, self.pointer.torque))
 
 

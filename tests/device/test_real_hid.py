@@ -18,13 +18,12 @@ import numpy as np
 import pytest
 
 from octo_motion.core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector
+from octo_motion.device import messages as say
 from octo_motion.device.calibration import NONE, corrected
 from octo_motion.device.driver import DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
-from octo_motion.device.held_body import Pull
 from octo_motion.device.hid import force_profile as profile
-from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.client import Client, ClientState
 from octo_motion.device.ipc.message_channel import Listener, MessageChannel, connect
 from octo_motion.device.response import Response
@@ -348,12 +347,7 @@ class Loop:
             elif isinstance(message, say.Notice):
                 self.notices.append(message)
         if self.hand is not None and self.hand.grab:
-            self.there.send(
-                say.HeldMessage(
-                    *(0, self.hand.grab, True, now, 0.0),
-                    *(ZERO, IDENTITY, ZERO, ZERO, Pull(), ZERO, ZERO),
-                )
-            )
+            self.there.send(say.HeldMessage(0, self.hand.grab, held=True, time=now))
 
 
 def test_force_is_reported_in_mid_grab_ends_with_the_plug_and_begins_anew(

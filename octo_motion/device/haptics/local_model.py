@@ -31,7 +31,7 @@ from ...core.rotations.scalars import (
     subtract,
     to_rotation_vector,
 )
-from ..held_body import Held, Pull
+from ..messages import HeldMessage, Pull
 
 _FADE: Final = 0.004
 """s in which a difference falls to a third."""
@@ -52,12 +52,12 @@ class LocalModel:
     _twisted: Vector = ZERO
     """Where the model still is beside the simulation, fading."""
 
-    def begin(self, held: Held) -> None:
+    def begin(self, held: HeldMessage) -> None:
         """Start with what the simulation says, at a grab."""
         self._take(held)
         self._off = self._twisted = ZERO
 
-    def correct(self, held: Held, age: float) -> None:
+    def correct(self, held: HeldMessage, age: float) -> None:
         """Take over what the simulation says; ``age`` s ago that was true."""
         before, turn_before = self.felt()
         self._take(held)
@@ -66,10 +66,10 @@ class LocalModel:
         self._off = subtract(before, self.position)
         self._twisted = to_rotation_vector(multiply(turn_before, conjugate(self.orientation)))
 
-    def _take(self, held: Held) -> None:
+    def _take(self, held: HeldMessage) -> None:
         self.position, self.orientation = held.position, held.orientation
         self.velocity, self.angular_velocity = held.velocity, held.angular_velocity
-        self._pull, self._force, self._torque = held.pull, held.force, held.torque
+        self._pull, self._force, self._torque = Pull(*held.pull), held.force, held.torque
 
     def advance(
         self,

@@ -26,8 +26,7 @@ from ...core.rotations.scalars import (
 )
 from ..calibration import NONE, Calibration, Calibrator, corrected
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
-from ..held_body import Held
-from ..ipc import HandMessage, Settings, Workspace
+from ..messages import HandMessage, HeldMessage, Settings, Workspace
 from .coupling import Gains, gains_for, wrench
 from .local_model import LocalModel
 from .passivity import DAMPING, STORED, Observer
@@ -154,36 +153,27 @@ class Pointer:
         self.want(grab=False)
         self._answered = 0
 
-    def hold(self, grab: int, held: Held, time: float, now: float, holds: float = 0.0) -> None:
+    def hold(self, message: HeldMessage, now: float) -> None:
         """Take over where the simulation says that the held body is.
 
-        Args:
-            grab: The grab that this answers.
-            held: The body at the point where it is held.
-            time: When that was true.
-            now: Now.
-            holds: s for which the simulation will say no more, since its steps take so long. The
-                local model goes on alone until then, and counts as fresh.
+        Where it holds none, only another grab tries anew.
         """
-        if not grab or grab != self.grab:
+        grab = message.grab
+        if not message.held and grab == self.grab:
+            self.want(grab=False)
+        if not message.held or not grab or grab != self.grab:
             self._answered = 0
             return
-        self._holds = max(0.0, min(MOST_HOLDS, holds))
+        self._holds = max(0.0, min(MOST_HOLDS, message.holds))
         if self._answered == grab:
-            self._model.correct(held, max(0.0, min(FRESH_SECONDS, now - time)))
+            self._model.correct(message, max(0.0, min(FRESH_SECONDS, now - message.time)))
         else:
             self._answered = grab
-            self._model.begin(held)
+            self._model.begin(message)
             self._push.forget()
             self._turn.forget()
         self._last_answer = now
         self._silence = 0.0
-
-    def refuse(self, grab: int) -> None:
-        """The simulation has let go, or found nothing to hold: only another grab tries anew."""
-        if grab == self.grab:
-            self.want(grab=False)
-        self._answered = 0
 
     def test(self, now: float) -> None:
         """Let the hand feel that the device works: gently to the right, then to the left."""

@@ -26,7 +26,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from ..ipc import LoopTimesMessage
+from ..messages import LoopTimesMessage
 from .durations import Histogram
 
 _AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015

@@ -18,26 +18,10 @@ from typing import IO, Final
 from ...core.errors import DeviceError
 from ...core.posing.puppet import Figure, Pose
 from ...core.posing.solver import Obstacle
+from .. import messages
 from ..calibration import Phase
+from ..messages import CalibrationMessage, DeviceMessage, Notice, PointerMessage
 from .message_channel import ChannelClosedError
-from .messages import (
-    Button,
-    Calibrate,
-    CalibrationMessage,
-    DeviceMessage,
-    FigureMessage,
-    Goodbye,
-    Hello,
-    Message,
-    Notice,
-    ObstacleMessage,
-    Order,
-    Pins,
-    Place,
-    PointerMessage,
-    PoseMessage,
-    Times,
-)
 from .process import Child
 
 _MOST_WAITING: Final = 100_000_000
@@ -77,8 +61,8 @@ class Client:
     """By pointer: what has been learned so far, of devices that are being calibrated."""
     calibrated: dict[int, CalibrationMessage] = field(default_factory=dict[int, CalibrationMessage])
     """By pointer: what was learned, to be kept, then cleared, by the caller."""
-    times: Times | None = None
-    hello: Hello | None = None
+    times: messages.Times | None = None
+    hello: messages.Hello | None = None
     notices: list[Notice] = field(default_factory=list[Notice])
     """To be shown, then cleared, by the caller."""
     heard: float = 0.0
@@ -139,15 +123,15 @@ class Client:
         if child is not None:
             if child.running:
                 with contextlib.suppress(ChannelClosedError):
-                    child.channel.send(Goodbye())
+                    child.channel.send(messages.Goodbye())
             child.stop()
         self.state = ClientState.OFF
 
-    def send(self, message: Message) -> None:
+    def send(self, message: messages.Message) -> None:
         """Say something to the bridge; without one, nothing happens."""
         if self._child is None:
             return
-        self._placed += isinstance(message, Place)
+        self._placed += isinstance(message, messages.Place)
         try:
             self._child.channel.send(message)
         except ChannelClosedError:
@@ -158,13 +142,13 @@ class Client:
         self._figure = (figure, pose)
         self.pose = pose
         self.steps = 0
-        self.send(FigureMessage.of(figure))
-        self.send(Place(pose.positions, pose.orientations))
+        self.send(messages.FigureMessage.of(figure))
+        self.send(messages.Place(pose.positions, pose.orientations))
 
     def send_pose(self, pose: Pose) -> None:
         """Put the puppet into a pose, at rest; hands let go."""
         self.pose = pose
-        self.send(Place(pose.positions, pose.orientations))
+        self.send(messages.Place(pose.positions, pose.orientations))
 
     def send_pins(self, pins: dict[int, bool]) -> None:
         """Pin these bodies where they are, and no others.
@@ -174,43 +158,43 @@ class Client:
         """
         self._pins = dict(pins)
         count = len(self._figure[0]) if self._figure else 0
-        self.send(Pins.of(pins, count))
+        self.send(messages.Pins.of(pins, count))
 
     def send_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
         """Add or move something solid; None takes it away."""
-        self.send(ObstacleMessage.of(number, obstacle))
+        self.send(messages.ObstacleMessage.of(number, obstacle))
 
-    def poll(self) -> list[Button]:
+    def poll(self) -> list[messages.Button]:
         """Take in all that the bridge has said.
 
         Returns:
             Buttons of devices that were pressed or let go, in order.
         """
-        buttons: list[Button] = []
+        buttons: list[messages.Button] = []
         if self._child is None:
             return buttons
         try:
-            messages = self._child.channel.receive()
+            came = self._child.channel.receive()
         except ChannelClosedError:
             self._lose()
             return buttons
-        for message in messages:
+        for message in came:
             self.heard = time.monotonic()
             match message:
-                case PoseMessage() if message.placed == self._placed:
+                case messages.PoseMessage() if message.placed == self._placed:
                     self.pose = Pose(message.positions, message.orientations)
                     self.steps = message.step
                 case PointerMessage():
                     self.pointers[message.pointer] = message
                 case DeviceMessage():
                     self._take_device(message)
-                case Button():
+                case messages.Button():
                     buttons.append(message)
-                case Times():
+                case messages.Times():
                     self.times = message
                 case CalibrationMessage():
                     self._take_calibration(message)
-                case Hello():
+                case messages.Hello():
                     self.hello = message
                 case Notice():
                     self.notices.append(message)
@@ -218,9 +202,9 @@ class Client:
                     pass
         return buttons
 
-    def calibrate(self, pointer: int, order: Order) -> None:
+    def calibrate(self, pointer: int, order: messages.Order) -> None:
         """Begin to learn a device's zero and range, finish, or give it up."""
-        self.send(Calibrate(pointer, order))
+        self.send(messages.Calibrate(pointer, order))
 
     def _take_calibration(self, message: CalibrationMessage) -> None:
         if message.phase in {Phase.REST, Phase.REACH}:

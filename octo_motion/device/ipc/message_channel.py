@@ -18,8 +18,8 @@ import struct
 import time
 from typing import Final
 
+from ..messages import HEADER, MAGIC, VERSION, Message, MessageError, pack, read_body, read_header
 from ..stream import Stream
-from .messages import HEADER, MAGIC, VERSION, Message, MessageError, pack, read_body, read_header
 
 log = logging.getLogger(__name__)
 

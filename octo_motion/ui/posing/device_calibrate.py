@@ -11,7 +11,7 @@ from bpy.props import EnumProperty, IntProperty
 from ...core.errors import SettingsError
 from ...device.calibration import Phase, reached
 from ...device.driver import Kind
-from ...device.ipc import DeviceMessage
+from ...device.messages import DeviceMessage
 from ..operator_base import OctoOperator
 from .device_hands import DeviceHands
 from .device_ndof import NdofHands

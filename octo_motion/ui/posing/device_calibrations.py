@@ -6,7 +6,8 @@ from __future__ import annotations
 from ...blender.files import load_calibrations, save_calibrations
 from ...core.errors import SettingsError, WriteError
 from ...device.calibration import NONE, Calibration
-from ...device.ipc import CalibrationMessage, Client, DeviceMessage, Notice
+from ...device.ipc import Client
+from ...device.messages import CalibrationMessage, DeviceMessage, Notice
 
 
 class Calibrations:

@@ -16,10 +16,10 @@ from ...core.posing.puppet import Pose
 from ...core.posing.solver import Obstacle
 from ...core.rotations import Floats, from_matrix
 from ...device.driver import Kind
-from ...device.ipc import (
+from ...device.ipc import Client
+from ...device.messages import (
     Button,
     Buzz,
-    Client,
     DeviceMessage,
     Grab,
     Notice,
@@ -28,7 +28,7 @@ from ...device.ipc import (
     Workspace,
     WorldMessage,
 )
-from ...device.ipc import Settings as DeviceSettings
+from ...device.messages import Settings as DeviceSettings
 from .device_calibrations import Calibrations
 from .puppet_session import PuppetSession
 

@@ -15,8 +15,9 @@ import numpy as np
 from ...blender.versions import ndof_sensitivities
 from ...core.posing.picking import nearest_body
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
-from ...device.ipc import Button, Client, Notice
-from ...device.ipc import Settings as DeviceSettings
+from ...device.ipc import Client
+from ...device.messages import Button, Notice
+from ...device.messages import Settings as DeviceSettings
 from .device_hands import HOLD_TO_PIN, NOTHING_NEAR, RATE_WIDTH, Room, Shown
 from .puppet_session import PuppetSession
 

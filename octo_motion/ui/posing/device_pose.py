@@ -12,7 +12,8 @@ from bpy.props import IntProperty
 from ...core.errors import DeviceError, SettingsError
 from ...core.rotations import Floats
 from ...device.driver import Kind
-from ...device.ipc import Client, ClientState, Notice
+from ...device.ipc import Client, ClientState
+from ...device.messages import Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room

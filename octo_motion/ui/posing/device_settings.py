@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 from bpy.props import BoolProperty, FloatProperty, PointerProperty
 
-from ...device.ipc import Settings
+from ...device.messages import Settings
 
 
 class OCTO_MOTION_PG_device(bpy.types.PropertyGroup):

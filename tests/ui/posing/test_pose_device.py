@@ -19,9 +19,9 @@ from mathutils import Matrix
 
 from octo_motion.blender.files import device_store
 from octo_motion.blender.files.device_store import load_calibrations
+from octo_motion.device import messages as say
 from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.driver import Kind
-from octo_motion.device.ipc import messages as say
 from octo_motion.device.ipc.client import Client, ClientState
 from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.controls import Outcome

@@ -8,21 +8,18 @@ docs/device.md has the table. Whoever reads one gets a frozen object or a ``Mess
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
-from typing import Annotated, ClassVar, Final, Self, TypedDict, get_args, get_type_hints
+from typing import Annotated, ClassVar, Final, NamedTuple, Self, get_args, get_type_hints
 
 import numpy as np
 
-from ...core.errors import DeviceError, OctoMotionError
-from ...core.posing.puppet import Elements, Figure, JointRanges
-from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
-from ...core.rotations import Floats
-from ...core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized
-from ..calibration import Calibration, Phase
-from ..driver import Axes
-from ..held_body import Held, Pull
-from ..response import Response
+from ..core.errors import DeviceError, OctoMotionError
+from ..core.posing.puppet import Elements, Figure, JointRanges
+from ..core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
+from ..core.rotations import Floats
+from ..core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized
+from .calibration import Calibration, Phase
 from .codec import (
     F64,
     FLAG,
@@ -40,6 +37,8 @@ from .codec import (
     Table,
     Text,
 )
+from .driver import Axes
+from .response import Response
 
 VERSION: Final = 2
 MAGIC: Final = b"OMDV"
@@ -267,7 +266,6 @@ class PointerMessage(Message):
     orientation: Annotated[Quaternion, QUATERNION]
     coupled_position: Annotated[Vector, VECTOR]
     """World, of the point that is held; the device's own where nothing is."""
-    coupled_orientation: Annotated[Quaternion, QUATERNION]
     force: Annotated[Vector, VECTOR]
     """N on the hand, device axes."""
     torque: Annotated[Vector, VECTOR]
@@ -355,13 +353,32 @@ class WorldMessage(Message):
         """
         if not 1e-4 <= self.step <= 0.02 or self.friction < 0.0 or self.drag < 0.0:
             raise MessageError("settings of the world that cannot be")
-        return WorldSettings(
-            step=self.step,
-            gravity=self.gravity,
-            self_collision=self.self_collision,
-            friction=self.friction,
-            drag=self.drag,
-        )
+        return WorldSettings(**vars(self))
+
+
+def _no_points() -> Floats:
+    return np.zeros((0, 3))
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Which attributes of a kind of obstacle a message carries as size and as points."""
+
+    kind: type[Obstacle]
+    size: str = ""
+    points: str = ""
+    layout: tuple[int, ...] = (0, 3)
+    """Shape of the attribute that is points."""
+
+
+_SHAPES: Final = {
+    1: _Shape(Plane),
+    2: _Shape(Sphere, "radius"),
+    3: _Shape(Capsule, "radius", "ends", (2, 3)),
+    4: _Shape(Box, "", "half", (3,)),
+    5: _Shape(Hull, "", "corners", (-1, 3, 3)),
+    6: _Shape(Mesh, "thickness", "corners", (-1, 3, 3)),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -371,47 +388,35 @@ class ObstacleMessage(Message):
     KIND = 17
     number: Annotated[int, U16]
     """The sender's; the same number replaces."""
-    shape: Annotated[int, U8]
-    """0: gone; 1 plane, 2 sphere, 3 capsule, 4 box, 5 convex hull, 6 mesh."""
-    position: Annotated[Vector, VECTOR]
-    orientation: Annotated[Quaternion, QUATERNION]
-    velocity: Annotated[Vector, VECTOR]
-    angular_velocity: Annotated[Vector, VECTOR]
-    friction: Annotated[float, F64]
+    shape: Annotated[int, U8] = 0
+    """0: gone; else as in ``_SHAPES``."""
+    position: Annotated[Vector, VECTOR] = ZERO
+    orientation: Annotated[Quaternion, QUATERNION] = IDENTITY
+    velocity: Annotated[Vector, VECTOR] = ZERO
+    angular_velocity: Annotated[Vector, VECTOR] = ZERO
+    friction: Annotated[float, F64] = -1.0
     """−1: the world's."""
-    size: Annotated[float, F64]
+    size: Annotated[float, F64] = 0.0
     """Radius of sphere and capsule, thickness of a mesh."""
-    points: Annotated[Floats, Table((3,), MOST_POINTS)]
+    points: Annotated[Floats, Table((3,), MOST_POINTS)] = field(default_factory=_no_points)
     """Ends of a capsule, half sizes of a box, three corners for each triangle; own frame."""
 
     @classmethod
     def of(cls, number: int, obstacle: Obstacle | None) -> ObstacleMessage:
         """The message that carries an obstacle; None takes it away."""
         if obstacle is None:
-            none = np.zeros((0, 3))
-            return cls(number, 0, ZERO, IDENTITY, ZERO, ZERO, -1.0, 0.0, none)
-        size, points = 0.0, np.zeros((0, 3))
-        match obstacle:
-            case Plane():
-                shape = 1
-            case Sphere():
-                shape, size = 2, obstacle.radius
-            case Capsule():
-                shape, size, points = 3, obstacle.radius, obstacle.ends
-            case Box():
-                shape, points = 4, obstacle.half[None]
-            case Hull():
-                shape, points = 5, obstacle.corners.reshape(-1, 3)
-            case Mesh():
-                shape, size = 6, obstacle.thickness
-                points = obstacle.corners.reshape(-1, 3)
-            case _:
-                raise MessageError(f"no message carries a {type(obstacle).__name__}")
+            return cls(number)
+        kinds = (each for each, shape in _SHAPES.items() if type(obstacle) is shape.kind)
+        kind = next(kinds, None)
+        if kind is None:
+            raise MessageError(f"no message carries a {type(obstacle).__name__}")
+        shape = _SHAPES[kind]
         return cls(
-            *(number, shape, tuple(obstacle.position), tuple(obstacle.orientation)),
+            *(number, kind, tuple(obstacle.position), tuple(obstacle.orientation)),
             *(tuple(obstacle.velocity), tuple(obstacle.angular_velocity)),
-            -1.0 if obstacle.friction is None else obstacle.friction,
-            *(size, points),
+            friction=-1.0 if obstacle.friction is None else obstacle.friction,
+            size=getattr(obstacle, shape.size, 0.0),
+            points=getattr(obstacle, shape.points, _no_points()).reshape(-1, 3),
         )
 
     def obstacle(self) -> Obstacle | None:
@@ -420,48 +425,27 @@ class ObstacleMessage(Message):
         Raises:
             MessageError: it makes no sense.
         """
+        if self.shape == 0:
+            return None
         turn = normalized(self.orientation)
-        if turn is None or self.size < 0.0:
+        shape = _SHAPES.get(self.shape)
+        if turn is None or shape is None or self.size < 0.0:
             raise MessageError("an obstacle that cannot be")
-        place = _Placed(
-            position=np.array(self.position),
-            orientation=np.array(turn),
-            velocity=np.array(self.velocity),
-            angular_velocity=np.array(self.angular_velocity),
-            friction=None if self.friction < 0.0 else self.friction,
-        )
-        count = len(self.points)
-        wanted = {0: 0, 1: 0, 2: 0, 3: 2, 4: 1}.get(self.shape, count)
-        if count != wanted or (self.shape >= 5 and (count == 0 or count % 3)):
-            raise MessageError("an obstacle with a wrong number of points")
         try:
-            match self.shape:
-                case 0:
-                    return None
-                case 1:
-                    return Plane(**place)
-                case 2:
-                    return Sphere(**place, radius=self.size)
-                case 3:
-                    return Capsule(**place, ends=self.points, radius=self.size)
-                case 4:
-                    return Box(**place, half=np.abs(self.points[0]))
-                case 5:
-                    return Hull(**place, corners=self.points.reshape(-1, 3, 3))
-                case 6:
-                    corners = self.points.reshape(-1, 3, 3)
-                    return Mesh(**place, corners=corners, thickness=self.size)
+            points = self.points.reshape(shape.layout)
+            own = {shape.size: self.size, shape.points: points}
+            return shape.kind(
+                position=np.array(self.position),
+                orientation=np.array(turn),
+                velocity=np.array(self.velocity),
+                angular_velocity=np.array(self.angular_velocity),
+                friction=None if self.friction < 0.0 else self.friction,
+                **{name: value for name, value in own.items() if name},
+            )
+        except ValueError as error:
+            raise MessageError("an obstacle with a wrong number of points") from error
         except OctoMotionError as error:
             raise MessageError(error.problem) from error
-        raise MessageError(f"an obstacle of shape {self.shape}")
-
-
-class _Placed(TypedDict):
-    position: Floats
-    orientation: Floats
-    velocity: Floats
-    angular_velocity: Floats
-    friction: float | None
 
 
 class Order(IntEnum):
@@ -532,9 +516,26 @@ class HandMessage(Message):
     buttons: Annotated[int, U32]
 
 
+class Pull(NamedTuple):
+    """How the simulation ties the held body to the pointer, and how the body gives way."""
+
+    stiffness: float = 0.0
+    """N/m of the simulation's own coupling."""
+    damping: float = 0.0
+    """N·s/m"""
+    angular_stiffness: float = 0.0
+    """N·m/rad"""
+    angular_damping: float = 0.0
+    """N·m·s/rad"""
+    mobility: float = 0.0
+    """1/kg of the body at the point held; 0: it keeps its velocity whatever pulls."""
+    angular_mobility: float = 0.0
+    """1/(kg·m²)"""
+
+
 @dataclass(frozen=True)
 class HeldMessage(Message):
-    """Bridge to loop, each step: where the held body is."""
+    """Bridge to loop, each step: the held body, at the point where it is held."""
 
     KIND = 21
     pointer: Annotated[int, U8]
@@ -544,22 +545,18 @@ class HeldMessage(Message):
     """False: there was nothing near, or it was let go."""
     time: Annotated[float, F64]
     """When this was true, by ``time.perf_counter``."""
-    holds: Annotated[float, F64]
-    """s for which the next message is not expected: so long does the local model do instead."""
-    position: Annotated[Vector, VECTOR]
-    orientation: Annotated[Quaternion, QUATERNION]
-    velocity: Annotated[Vector, VECTOR]
-    angular_velocity: Annotated[Vector, VECTOR]
-    pull: Annotated[tuple[float, ...], SIX]
-    force: Annotated[Vector, VECTOR]
-    torque: Annotated[Vector, VECTOR]
-
-    def body(self) -> Held:
-        """As the local model takes it."""
-        return Held(
-            *(self.position, self.orientation, self.velocity, self.angular_velocity),
-            *(Pull(*self.pull), self.force, self.torque),
-        )
+    holds: Annotated[float, F64] = 0.0
+    """s for which the next message is not expected, since the simulation's steps take so long: the
+    local model goes on alone until then, and counts as fresh."""
+    position: Annotated[Vector, VECTOR] = ZERO
+    orientation: Annotated[Quaternion, QUATERNION] = IDENTITY
+    velocity: Annotated[Vector, VECTOR] = ZERO
+    angular_velocity: Annotated[Vector, VECTOR] = ZERO
+    pull: Annotated[tuple[float, ...], SIX] = Pull()
+    force: Annotated[Vector, VECTOR] = ZERO
+    """N, that the simulation's own coupling used in its last step."""
+    torque: Annotated[Vector, VECTOR] = ZERO
+    """N·m, likewise."""
 
 
 def _kinds() -> dict[int, type[Message]]:

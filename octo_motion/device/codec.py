@@ -7,11 +7,12 @@ Little endian, no padding. A field is told how it is laid out by an annotation:
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import isfinite
-from typing import Any, Final, Protocol
+from io import BytesIO
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,50 +21,11 @@ class MessageError(ValueError):
     """The bytes are no message of ours."""
 
 
-class Reader:
-    """Bytes taken one after the other."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data = memoryview(data)
-        self._at = 0
-
-    def take(self, count: int) -> memoryview:
-        """The next bytes.
-
-        Raises:
-            MessageError: there are not so many.
-        """
-        end = self._at + count
-        if end > len(self._data):
-            raise MessageError("cut off")
-        taken = self._data[self._at : end]
-        self._at = end
-        return taken
-
-    def end(self) -> None:
-        """Say that all is read.
-
-        Raises:
-            MessageError: something is left.
-        """
-        if self._at != len(self._data):
-            raise MessageError("too long")
-
-
-class Codec(Protocol):
-    """How the value of one field stands in a message."""
-
-    def put(self, value: Any, out: bytearray) -> None:
-        """Append the value's bytes."""
-        ...
-
-    def take(self, reader: Reader) -> Any:
-        """Read the value.
-
-        Raises:
-            MessageError: the bytes are no such value.
-        """
-        ...
+def _take(data: BytesIO, count: int) -> bytes:
+    taken = data.read(count)
+    if len(taken) < count:
+        raise MessageError("cut off")
+    return taken
 
 
 @dataclass(frozen=True)
@@ -84,7 +46,7 @@ class Number:
         Raises:
             MessageError: a number is not finite, or a truth value neither 0 nor 1.
         """
-        if self.code == "d" and not all(map(isfinite, values)):
+        if self.code == "d" and not all(map(math.isfinite, values)):
             raise MessageError("a number is not finite")
         return values if self.count > 1 else values[0]
 
@@ -92,10 +54,10 @@ class Number:
         """Append the value's bytes."""
         out += self.layout().pack(*(value if self.count > 1 else (value,)))
 
-    def take(self, reader: Reader) -> Any:
+    def take(self, data: BytesIO) -> Any:
         """Read the value."""
         layout = self.layout()
-        return self.check(layout.unpack(reader.take(layout.size)))
+        return self.check(layout.unpack(_take(data, layout.size)))
 
 
 U8: Final = Number("B")
@@ -118,16 +80,16 @@ class Text:
 
     def put(self, value: Any, out: bytearray) -> None:
         """Append the text, cut to what fits."""
-        data = str(value).encode()[: self.most].decode(errors="ignore").encode()
-        out += struct.pack("<H", len(data)) + data
+        text = str(value).encode()[: self.most].decode(errors="ignore").encode()
+        out += struct.pack("<H", len(text)) + text
 
-    def take(self, reader: Reader) -> str:
+    def take(self, data: BytesIO) -> str:
         """Read the text."""
-        (length,) = struct.unpack("<H", reader.take(2))
+        (length,) = struct.unpack("<H", _take(data, 2))
         if length > self.most:
             raise MessageError("a text is too long")
         try:
-            return str(reader.take(length), "utf-8")
+            return str(_take(data, length), "utf-8")
         except UnicodeDecodeError as error:
             raise MessageError("a text is not UTF-8") from error
 
@@ -145,15 +107,12 @@ class Many:
         for each in value:
             self.of.put(each, out)
 
-    def take(self, reader: Reader) -> tuple[Any, ...]:
+    def take(self, data: BytesIO) -> tuple[Any, ...]:
         """Read the values."""
-        (count,) = struct.unpack("<H", reader.take(2))
+        (count,) = struct.unpack("<H", _take(data, 2))
         if count > self.most:
             raise MessageError("too many of something")
-        return tuple(self.of.take(reader) for _ in range(count))
-
-
-MOST_BODIES: Final = 4096
+        return tuple(self.of.take(data) for _ in range(count))
 
 
 @dataclass(frozen=True)
@@ -161,7 +120,7 @@ class Table:
     """An array of float64, mostly a row for each body; its shape within a row is fixed."""
 
     row: tuple[int, ...] = ()
-    most: int = MOST_BODIES
+    most: int = 4096
     """Rows."""
     endless: bool = False
     """Whether a number may be infinite: a joint that never gives way."""
@@ -173,18 +132,20 @@ class Table:
             raise MessageError(f"an array of shape {array.shape}")
         out += struct.pack("<I", len(array)) + array.tobytes()
 
-    def take(self, reader: Reader) -> Any:
+    def take(self, data: BytesIO) -> Any:
         """Read the array; it may be written to."""
-        (count,) = struct.unpack("<I", reader.take(4))
+        (count,) = struct.unpack("<I", _take(data, 4))
         if count > self.most:
             raise MessageError("too many rows")
-        width = 1
-        for each in self.row:
-            width *= each
-        array = np.frombuffer(reader.take(8 * count * width), dtype="<f8").astype(np.float64)
+        size = 8 * count * math.prod(self.row)
+        array = np.frombuffer(_take(data, size), dtype="<f8").astype(np.float64)
         if np.isnan(array).any() or not (self.endless or np.isfinite(array).all()):
             raise MessageError("a number is not finite")
         return array.reshape((count, *self.row))
+
+
+Codec = Number | Text | Many | Table
+"""How the value of one field stands in a message."""
 
 
 class Record:
@@ -192,13 +153,11 @@ class Record:
 
     def __init__(self, codecs: tuple[Codec, ...]) -> None:
         self._codecs = codecs
-        numbers = [each for each in codecs if isinstance(each, Number)]
-        self._struct = (
-            struct.Struct("<" + "".join(f"{each.count}{each.code}" for each in numbers))
-            if len(numbers) == len(codecs)
-            else None
-        )
-        self._numbers = numbers
+        self._numbers = [each for each in codecs if isinstance(each, Number)]
+        self._struct: struct.Struct | None = None
+        if len(self._numbers) == len(codecs):
+            numbers = (f"{each.count}{each.code}" for each in self._numbers)
+            self._struct = struct.Struct("<" + "".join(numbers))
 
     def pack(self, values: tuple[Any, ...]) -> bytes:
         """Bytes of a message's fields."""
@@ -225,9 +184,10 @@ class Record:
             if len(data) != self._struct.size:
                 raise MessageError("of another length")
             return tuple(self._split(self._struct.unpack(data)))
-        reader = Reader(data)
-        values = tuple(codec.take(reader) for codec in self._codecs)
-        reader.end()
+        left = BytesIO(data)
+        values = tuple(codec.take(left) for codec in self._codecs)
+        if left.read(1):
+            raise MessageError("too long")
         return values
 
     def _split(self, flat: tuple[Any, ...]) -> Iterator[Any]:
