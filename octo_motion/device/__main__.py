@@ -106,7 +106,8 @@ def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> So
 
 def _list() -> int:
     from ..core.errors import DeviceError  # noqa: PLC0415
-    from .hid import HID_DRIVERS, hid_driver_for, list_devices, model_of, open_device  # noqa: PLC0415
+    from .hid import list_devices, model_of, open_device  # noqa: PLC0415
+    from .sources import HID_DRIVERS, hid_driver_for  # noqa: PLC0415
 
     try:
         listed = [(each, hid_driver_for(each)) for each in list_devices()]
@@ -145,9 +146,8 @@ def _descriptor(*, table: bool) -> int:
 
 
 def _watch(sources: Sources, seconds: float) -> int:
-    from .calibration import NONE, corrected  # noqa: PLC0415
+    from .calibration import NONE, Response, corrected  # noqa: PLC0415
     from .driver import DeviceLostError  # noqa: PLC0415
-    from .response import Response  # noqa: PLC0415
     from .sources import Discovery  # noqa: PLC0415
 
     discovery = Discovery(sources)

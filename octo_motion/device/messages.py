@@ -19,7 +19,7 @@ from ..core.posing.puppet import Elements, Figure, JointRanges
 from ..core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
 from ..core.rotations import Floats
 from ..core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized
-from .calibration import Calibration, Phase
+from .calibration import Calibration, Phase, Response
 from .codec import (
     F64,
     FLAG,
@@ -38,7 +38,6 @@ from .codec import (
     Text,
 )
 from .driver import Axes
-from .response import Response
 
 VERSION: Final = 2
 MAGIC: Final = b"OMDV"

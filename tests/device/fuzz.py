@@ -19,7 +19,7 @@ from octo_motion.device.codec import MessageError
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.descriptor import DescriptorError, parse_descriptor
 from octo_motion.device.hid.force_profile import ReportError
-from octo_motion.device.hid.multi_axis import MultiAxis
+from octo_motion.device.hid.space_mouse import MultiAxis
 from octo_motion.device.sources import haply, network
 from octo_motion.device.sources.network import PacketError
 from octo_motion.device.sources.websocket import FrameReader, WebSocketError, frame

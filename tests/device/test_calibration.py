@@ -17,8 +17,7 @@ from octo_motion.device.calibration import NONE, Calibration, Calibrator, Phase,
 from octo_motion.device.codec import MessageError
 from octo_motion.device.driver import Axes, Kind, Sample
 from octo_motion.device.haptics.pointer import Pointer
-from octo_motion.device.hid.multi_axis import classic_layout
-from octo_motion.device.hid.space_mouse import SpaceMouse
+from octo_motion.device.hid.space_mouse import SpaceMouse, classic_layout
 from octo_motion.device.messages import Settings
 from tests.device.parts import FakeHandle, found
 from tests.device.test_pointer import ROCK, Table

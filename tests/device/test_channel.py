@@ -17,8 +17,8 @@ import pytest
 from octo_motion.core.posing.puppet.figure import Pose
 from octo_motion.device.bridge_process import Bridge
 from octo_motion.device.calibration import NONE, Phase
-from octo_motion.device.ipc import message_channel as line
-from octo_motion.device.ipc.message_channel import (
+from octo_motion.device.ipc import process as line
+from octo_motion.device.ipc.process import (
     ChannelClosedError,
     Listener,
     MessageChannel,

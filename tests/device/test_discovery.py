@@ -34,7 +34,7 @@ class Desk:
         monkeypatch.setattr(finding, "list_devices", self._list)
         monkeypatch.setattr(finding, "_EVERY_COSTLY", 0.0)
         monkeypatch.setattr(finding.time, "monotonic", lambda: self.now)
-        for module in ("space_mouse", "force_device"):
+        for module in ("space_mouse", "force_profile"):
             monkeypatch.setattr(f"octo_motion.device.hid.{module}.open_device", self._open)
         self.discovery = Discovery(Sources(haply=False))
         self.drivers: list[Driver] = []

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.rotations.scalars import from_rotation_vector
 from octo_motion.device.driver import DeviceLostError, Dynamics, Sample
-from octo_motion.device.hid import force_device
 from octo_motion.device.hid import force_profile as profile
-from octo_motion.device.hid.force_device import ForceDevice, is_force_device
+from octo_motion.device.hid.force_profile import ForceDevice
 from tests.device import firmware
 from tests.device.parts import FakeHandle, found
 
@@ -175,9 +174,9 @@ def test_device_that_says_nonsense_of_itself_is_refused_and_closed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     handle = FakeHandle(features=b"\x03\x02rest")
-    monkeypatch.setattr(force_device, "open_device", lambda _: handle)
+    monkeypatch.setattr(profile, "open_device", lambda _: handle)
     with pytest.raises(DeviceError, match="does not follow the profile"):
         ForceDevice.open(found(page=0xFF4F, usage=1))
     assert handle.closed == 1
-    assert is_force_device(found(page=0xFF4F, usage=1))
-    assert not is_force_device(found())
+    assert ForceDevice.drives(found(page=0xFF4F, usage=1))
+    assert not ForceDevice.drives(found())

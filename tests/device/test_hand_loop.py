@@ -18,12 +18,7 @@ from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.driver import Driver, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
-from octo_motion.device.ipc.message_channel import (
-    ChannelClosedError,
-    Listener,
-    MessageChannel,
-    connect,
-)
+from octo_motion.device.ipc.process import ChannelClosedError, Listener, MessageChannel, connect
 from octo_motion.device.simulation import Simulation
 from tests.core.puppets import chain, posed, soft
 from tests.device.parts import FakeDriver

@@ -25,12 +25,23 @@ from octo_motion.core.rotations.scalars import (
     to_rotation_vector,
 )
 from octo_motion.device.driver import FRESH_SECONDS, Dynamics
-from octo_motion.device.haptics.coupling import DAMPER_SHARE, SHARE, gains_for, stiffest, wrench
-from octo_motion.device.haptics.durations import Histogram
+from octo_motion.device.haptics.force import (
+    DAMPER_SHARE,
+    DAMPING,
+    FALL,
+    RISE,
+    SHARE,
+    STORED,
+    ForceLimits,
+    Observer,
+    Shaper,
+    freshness,
+    gains_for,
+    stiffest,
+    wrench,
+)
 from octo_motion.device.haptics.local_model import LocalModel
-from octo_motion.device.haptics.passivity import DAMPING, STORED, Observer
-from octo_motion.device.haptics.safety import FALL, RISE, ForceLimits, Shaper, freshness
-from octo_motion.device.haptics.schedule import Schedule
+from octo_motion.device.haptics.schedule import Histogram, Schedule
 from octo_motion.device.messages import HeldMessage, Pull
 from octo_motion.device.sources.simulated_hand import Hand, rest
 

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from octo_motion.device.hid import descriptor
 from octo_motion.device.hid.descriptor import DescriptorError, ReportField, parse_descriptor
 from octo_motion.device.hid.force_profile import report_descriptor
-from octo_motion.device.hid.models import MODELS, model_of
-from octo_motion.device.hid.multi_axis import MultiAxis, classic_layout
+from octo_motion.device.hid.space_mouse import MODELS, MultiAxis, classic_layout, model_of
 from tests.device.parts import COMBINED, SPACE_MOUSE
 
 KNOWN = (SPACE_MOUSE, COMBINED, report_descriptor())

@@ -7,20 +7,20 @@ import struct
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import pytest
 
-from octo_motion.core.rotations.scalars import Vector
 from octo_motion.device import __main__ as program
 from octo_motion.device.calibration import Calibration
-from octo_motion.device.driver import Description, Driver, Kind, Sample
+from octo_motion.device.driver import Driver, Kind, Sample
 from octo_motion.device.haptics.pointer import Pointer
-from octo_motion.device.hid import drivers
-from octo_motion.device.hid.drivers import HID_DRIVERS, HidDriver, hid_driver_for
-from octo_motion.device.hid.force_profile import USAGE, USAGE_PAGE
-from octo_motion.device.hid.system import Found, Handle, HidReports
+from octo_motion.device.hid.force_profile import USAGE, USAGE_PAGE, ForceDevice
+from octo_motion.device.hid.space_mouse import SpaceMouse
+from octo_motion.device.hid.system import Found, HidDriver
 from octo_motion.device.messages import Settings
+from octo_motion.device.sources import discovery
+from octo_motion.device.sources.discovery import HID_DRIVERS, hid_driver_for
 from tests.device.parts import FakeHandle, found
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
@@ -35,13 +35,14 @@ def knob(monkeypatch: pytest.MonkeyPatch) -> type[Driver]:
     chapter = PAGE.read_text(encoding="utf-8").split("\n## A device\n")[1].split("\n## ")[0]
     code, row = (each.split("```")[0] for each in chapter.split("```text\n")[1:3])
     names: dict[str, Any] = {
-        each.__name__: each for each in (Description, Driver, Found, HidDriver, HidReports, Sample)
+        each.__name__: each for each in (ForceDevice, Found, HidDriver, Kind, Sample, SpaceMouse)
     }
-    names |= {"Handle": Handle, "Kind": Kind, "Vector": Vector, "struct": struct, "time": time}
+    names |= {"Final": Final, "struct": struct, "time": time}
     names["open_device"] = lambda _found: HANDLE
     exec(f"from __future__ import annotations\n{code}", names)  # noqa: S102 - our own page
-    rows = (*HID_DRIVERS, eval(row.strip().rstrip(","), names))  # noqa: S307 - our own page
-    monkeypatch.setattr(drivers, "HID_DRIVERS", rows)
+    exec(f"from __future__ import annotations\n{row}", names)  # noqa: S102 - our own page
+    assert names["HID_DRIVERS"][:-1] == HID_DRIVERS
+    monkeypatch.setattr(discovery, "HID_DRIVERS", names["HID_DRIVERS"])
     return names["Knob"]
 
 

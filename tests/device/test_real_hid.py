@@ -19,14 +19,13 @@ import pytest
 
 from octo_motion.core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector
 from octo_motion.device import messages as say
-from octo_motion.device.calibration import NONE, corrected
+from octo_motion.device.calibration import NONE, Response, corrected
 from octo_motion.device.driver import DeviceLostError, Driver, Dynamics, Kind, Sample
 from octo_motion.device.hand_process import HandLoop
 from octo_motion.device.haptics.schedule import Schedule
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.ipc.client import Client, ClientState
-from octo_motion.device.ipc.message_channel import Listener, MessageChannel, connect
-from octo_motion.device.response import Response
+from octo_motion.device.ipc.process import Listener, MessageChannel, connect
 from octo_motion.device.sources.discovery import Discovery, Sources
 from tests.core.puppets import chain, posed, soft
 from tests.device import firmware, uhid

@@ -12,12 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
-from octo_motion.device.calibration import NONE, corrected
+from octo_motion.device.calibration import NONE, Response, corrected
 from octo_motion.device.driver import Axes, DeviceLostError, Kind, Sample
 from octo_motion.device.hid import space_mouse, system
 from octo_motion.device.hid.descriptor import parse_descriptor
-from octo_motion.device.hid.space_mouse import SpaceMouse, is_space_mouse
-from octo_motion.device.response import Response
+from octo_motion.device.hid.space_mouse import SpaceMouse
 from tests.device.parts import SPACE_MOUSE, FakeHandle, found
 
 
@@ -97,13 +96,13 @@ def test_buttons_have_the_names_that_stand_on_the_device() -> None:
 
 
 def test_any_multi_axis_controller_is_taken_and_other_products_of_the_family_are_not() -> None:
-    assert is_space_mouse(found())
-    assert is_space_mouse(found(vendor=0x1234, product=0x5678))
-    assert not is_space_mouse(found(product=0xC656, page=1, usage=2))  # a CadMouse
-    assert not is_space_mouse(found(page=0xFF00, usage=1))
+    assert SpaceMouse.drives(found())
+    assert SpaceMouse.drives(found(vendor=0x1234, product=0x5678))
+    assert not SpaceMouse.drives(found(product=0xC656, page=1, usage=2))  # a CadMouse
+    assert not SpaceMouse.drives(found(page=0xFF00, usage=1))
     # Where the system tells no usage, the table decides.
-    assert is_space_mouse(found(page=0, usage=0))
-    assert not is_space_mouse(found(product=0xC656, page=0, usage=0))
+    assert SpaceMouse.drives(found(page=0, usage=0))
+    assert not SpaceMouse.drives(found(product=0xC656, page=0, usage=0))
 
 
 unit = st.floats(-1.0, 1.0)

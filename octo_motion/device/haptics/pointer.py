@@ -27,10 +27,8 @@ from ...core.rotations.scalars import (
 from ..calibration import NONE, Calibration, Calibrator, corrected
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..messages import HandMessage, HeldMessage, Settings, Workspace
-from .coupling import Gains, gains_for, wrench
+from .force import DAMPING, STORED, ForceLimits, Gains, Observer, Shaper, gains_for, wrench
 from .local_model import LocalModel
-from .passivity import DAMPING, STORED, Observer
-from .safety import ForceLimits, Shaper
 
 _FULL_PUSH: Final = 0.1
 """s: a rate device that has not been read for so long stands still."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The open HID profile of force devices: three reports of fixed layout, and their descriptor.
+"""The open HID profile of force devices: three reports of fixed layout, and their driver.
 
 Written so that a microcontroller without floating point can speak it: integers alone, little
 endian, each report within one packet of full-speed USB. docs/device.md tells it to makers.
@@ -11,13 +11,18 @@ does, writing states and reading commands, is in tests/device/firmware.py.
 from __future__ import annotations
 
 import struct
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
 from typing import Final
 
+from ...core.errors import DeviceError
 from ...core.rotations.scalars import ZERO, Vector, normalized
-from ..driver import Dynamics, Sample, is_possible
+from ..driver import DeviceLostError, Dynamics, Kind, Sample, is_possible, numbered_buttons
 from .descriptor import item
+from .system import Found, Handle, HidDriver, claim, open_device
 
 VERSION: Final = 1
 USAGE_PAGE: Final = 0xFF4F
@@ -236,3 +241,74 @@ def in_steps(values: tuple[float, ...], step: float, code: str) -> list[int]:
     if not all(map(isfinite, values)):
         raise ReportError("a number is not finite")
     return [max(least, min(most, round(value / step))) for value in values]
+
+
+# --- The driver ----------------------------------------------------------------------------------
+
+
+class ForceDevice(HidDriver):
+    """One force device."""
+
+    name = "force device"
+
+    def __init__(
+        self,
+        found: Found,
+        handle: Handle,
+        features: ForceFeatures,
+        set_free: Callable[[], None] = lambda: None,
+    ) -> None:
+        buttons = numbered_buttons(features.buttons)
+        super().__init__(found, handle, Kind.POSE, buttons, dynamics=features.dynamics)
+        self._sequence = 0
+        self._set_free = set_free
+
+    @classmethod
+    def drives(cls, found: Found) -> bool:
+        """Whether an interface says that it follows the profile."""
+        return (found.page, found.usage) == (USAGE_PAGE, USAGE)
+
+    @classmethod
+    def open(cls, found: Found) -> ForceDevice:
+        """Open a device that was found, and ask what it can do.
+
+        Raises:
+            DeviceError: the system does not let us, another Blender has it, or the device follows
+                another version.
+        """
+        handle = open_device(found)
+        try:
+            set_free = claim(found)
+        except DeviceError:
+            handle.close()
+            raise
+        try:
+            report = bytes(handle.get_feature_report(FEATURES, SIZES[FEATURES]))
+            return cls(found, handle, parse_features(report), set_free)
+        except (OSError, ValueError) as error:
+            handle.close()
+            set_free()
+            raise DeviceError(
+                f"{found.name or 'The force device'} does not follow the profile: {error}.",
+                f"Its firmware must follow version {VERSION} of the profile.",
+            ) from error
+
+    def read(self) -> Sample | None:
+        """The newest pose; None where none came, or only damaged ones."""
+        for report in reversed(self.reports()):
+            with suppress(ReportError):
+                return parse_state(report, time.perf_counter())
+        return None
+
+    def send(self, force: Vector, torque: Vector) -> None:
+        """Ask for a force; the device's own watchdog ends it where no other follows."""
+        self._sequence += 1
+        self.write(pack_command(self._sequence, force, torque))
+
+    def close(self) -> None:
+        """Take force away and let the device go."""
+        with suppress(DeviceLostError, ReportError):
+            self.send(ZERO, ZERO)
+        super().close()
+        set_free, self._set_free = self._set_free, lambda: None
+        set_free()

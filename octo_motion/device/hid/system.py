@@ -11,15 +11,19 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, ClassVar, Final, Protocol
 
 from ...core.errors import DeviceError
-from ..driver import DeviceLostError
-from .models import USAGE, USAGE_PAGE
+from ...core.rotations.scalars import Vector
+from ..driver import Description, DeviceLostError, Driver, Dynamics, Kind
+
+MULTI_AXIS: Final = (0x01, 0x08)
+"""Usage page and usage of a space mouse, which Blender may have itself."""
 
 UDEV_FILE: Final = "/etc/udev/rules.d/70-octo-motion.rules"
 _MOST_REPORT_BYTES: Final = 256
@@ -174,7 +178,7 @@ def _refusal(found: Found) -> DeviceError:
     if sys.platform == "linux":
         path = Path(os.fsdecode(found.path))
         if path.exists() and not os.access(path, os.R_OK | os.W_OK):
-            pushed = (found.page, found.usage) == (USAGE_PAGE, USAGE)
+            pushed = (found.page, found.usage) == MULTI_AXIS
             begin = (
                 "If Blender has it itself, just push it. Else, as root," if pushed else "As root,"
             )
@@ -202,14 +206,49 @@ def descriptor_of(device: Any) -> bytes | None:
         return None
 
 
-class HidReports:
-    """Reports from and to an open device, until it is closed or pulled out."""
+class HidDriver(Driver):
+    """A device that is an interface of the system's list, until it is closed or pulled out."""
 
-    def __init__(self, handle: Handle, name: str) -> None:
+    name: ClassVar[str]
+    """Of the kind, as ``python -m octo_motion.device list`` calls it."""
+
+    def __init__(
+        self,
+        found: Found,
+        handle: Handle,
+        kind: Kind,
+        buttons: tuple[str, ...],
+        *,
+        name: str = "",
+        dynamics: Dynamics | None = None,
+    ) -> None:
+        super().__init__(
+            Description(
+                name=name or found.name or self.name.capitalize(),
+                identity=found.identity,
+                lasting=found.lasting,
+                kind=kind,
+                buttons=buttons,
+                dynamics=dynamics,
+            )
+        )
         self._handle: Handle | None = handle
-        self._name = name
 
-    def read(self) -> list[bytes]:
+    @classmethod
+    @abstractmethod
+    def drives(cls, found: Found) -> bool:
+        """Whether an interface that the system lists is such a device."""
+
+    @classmethod
+    @abstractmethod
+    def open(cls, found: Found) -> HidDriver:
+        """Open a device that was found.
+
+        Raises:
+            DeviceError: the system does not let us, or the device is none that can be used.
+        """
+
+    def reports(self) -> list[bytes]:
         """All reports that wait, oldest first. More than 64 are the next call's.
 
         Raises:
@@ -220,7 +259,7 @@ class HidReports:
             try:
                 data = self._there().read(_MOST_REPORT_BYTES)
             except (OSError, ValueError) as error:
-                raise DeviceLostError(self._name) from error
+                raise DeviceLostError(self.description.name) from error
             if not data:
                 break
             reports.append(bytes(data))
@@ -235,9 +274,12 @@ class HidReports:
         try:
             written = self._there().write(report)
         except (OSError, ValueError) as error:
-            raise DeviceLostError(self._name) from error
+            raise DeviceLostError(self.description.name) from error
         if written < 0:
-            raise DeviceLostError(self._name)
+            raise DeviceLostError(self.description.name)
+
+    def send(self, force: Vector, torque: Vector) -> None:
+        """Nothing, where a device has no motors."""
 
     def close(self) -> None:
         """Let the device go."""
@@ -247,5 +289,5 @@ class HidReports:
 
     def _there(self) -> Handle:
         if self._handle is None:
-            raise DeviceLostError(self._name)
+            raise DeviceLostError(self.description.name)
         return self._handle

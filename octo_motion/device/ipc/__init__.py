@@ -2,8 +2,7 @@
 """Processes of ours that exchange messages."""
 
 from .client import Client, ClientState
-from .message_channel import ChannelClosedError, Listener, MessageChannel
-from .process import Child, Parent, end_now
+from .process import ChannelClosedError, Child, Listener, MessageChannel, Parent, end_now
 
 __all__ = [
     "ChannelClosedError",

@@ -21,8 +21,7 @@ from ...core.posing.solver import Obstacle
 from .. import messages
 from ..calibration import Phase
 from ..messages import CalibrationMessage, DeviceMessage, Notice, PointerMessage
-from .message_channel import ChannelClosedError
-from .process import Child
+from .process import ChannelClosedError, Child
 
 _MOST_WAITING: Final = 100_000_000
 """Bytes: a scene's meshes are sent at one go, two dozen of the largest."""

@@ -20,7 +20,14 @@ from typing import Final
 
 from ...core.errors import DeviceError
 from ..driver import DeviceLostError, Driver
-from ..hid import Found, descriptor_fingerprint, hid_driver_for, list_devices
+from ..hid import (
+    ForceDevice,
+    Found,
+    HidDriver,
+    SpaceMouse,
+    descriptor_fingerprint,
+    list_devices,
+)
 from .haply import PORT as HAPLY_PORT
 from .haply import Haply
 from .network import Port
@@ -28,12 +35,19 @@ from .simulated_hand import SimulatedHand
 
 log = logging.getLogger(__name__)
 
+HID_DRIVERS: Final[tuple[type[HidDriver], ...]] = (ForceDevice, SpaceMouse)
+"""Every kind of HID device that there is a driver for: a new kind is one more name here."""
 _EVERY: Final = 0.5
 """s between two looks at what is plugged in, where looking is cheap."""
 _EVERY_COSTLY: Final = 2.0
 """s, where it is not."""
 _SETTLES: Final = 1.5
 """s that the system may take to let us read what was just plugged in; then it is reported."""
+
+
+def hid_driver_for(found: Found) -> type[HidDriver] | None:
+    """The first kind that an interface belongs to; None where we have no driver for it."""
+    return next((each for each in HID_DRIVERS if each.drives(found)), None)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From hand and body to the force on the hand: what the coupling asks for, and what is left of it.
+
+*The virtual coupling* is a spring and a damper in six degrees of freedom between hand and body. How
+stiff it may be follows from the device. A spring K and damper B, sampled every T and held in
+between, act on a hand that the device itself damps with b. Colgate and Brown ("Factors affecting
+the Z-width of a haptic display", 1994): the whole is passive, whoever holds it, if
+
+    b > K T / 2 + |B|.
+
+A further delay d between pose and force counts as more of T / 2. Abbott and Okamura ("Effects of
+position quantization and sampling rate on virtual-wall passivity", 2005): where the device measures
+in steps Δ and has dry friction c, also
+
+    K <= min(2 b / T, 2 c / Δ).
+
+The second bound is left out where a device does not know its friction or its steps. What neither
+sees (a slow simulation, a scaled-up device) is the passivity controller's business.
+
+*Passivity observer and controller*: the hand never gets more energy than it gave. After Hannaford
+and Ryu, "Time-domain passivity control of haptic interfaces" (2002), in impedance form: the device
+tells how it moved, and is given a force. The observer sums the work that the hand did against the
+force of each period; this is exact, since the force is held while the hand moves. Where the sum
+would fall below zero, the controller adds damping, as much as brings it back.
+
+Three things beyond the source. The sum has a ceiling: energy spent long ago on bending a joint is
+no licence to shake the hand now, so what can ever come back is bounded by ``most``. And the damping
+has one: a damper of α on a hand of mass m sampled every T is itself active from α T = 2 m on. Ten
+times the device's own damping calms all from 0.05 to 0.4 kg at eight times the passive stiffness.
+So damping alone cannot keep back a strong slow push, as of a puppet that was bent with more work
+than the hand did (the simulation's own coupling helps); while the store is nearly empty, what
+drives the hand fades, and smoothly, for a hand that trembles would feel leaps as a buzz.
+
+*The shaper* is last: how much force, how fast it may change, and when it ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Final
+
+from ...core.rotations.scalars import (
+    ZERO,
+    Vector,
+    add,
+    add_scaled,
+    clamp_length,
+    dot,
+    scale,
+    subtract,
+)
+from ..driver import FRESH_SECONDS, Dynamics
+
+SHARE: Final = 0.8
+"""Of the largest stiffness that is passive on paper, this is used: no device is what it says."""
+DAMPER_SHARE: Final = 0.2
+"""Of the device's own damping, this is left for the coupling's damper."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Stiffness and damping, of pushing and of turning, at the hand."""
+
+    stiffness: float
+    """N/m"""
+    damping: float
+    """N·s/m"""
+    angular_stiffness: float
+    """N·m/rad"""
+    angular_damping: float
+    """N·m·s/rad"""
+
+
+def stiffest(damping: float, late: float, damper: float = 0.0) -> float:
+    """The largest passive stiffness: ``(b − |B|) / late``, after Colgate and Brown.
+
+    Args:
+        damping: b of the device.
+        late: s from a pose to the force that answers it, on average: T / 2 + d.
+        damper: B of the coupling.
+    """
+    return max(0.0, damping - abs(damper)) / late
+
+
+def gains_for(device: Dynamics, period: float, share: float = SHARE) -> Gains:
+    """The coupling for a device and a loop.
+
+    Args:
+        device: What the device says of its mechanics.
+        period: s of the loop.
+        share: Of the bound; above 1 the coupling may become active.
+    """
+    half = 0.5 * period + device.delay
+    return Gains(
+        *_gains(device.damping, device.friction, device.resolution, half, share),
+        *_gains(
+            *(device.angular_damping, device.angular_friction, device.angular_resolution),
+            *(half, share),
+        ),
+    )
+
+
+def _gains(
+    damping: float, friction: float, resolution: float, late: float, share: float
+) -> tuple[float, float]:
+    damper = DAMPER_SHARE * damping
+    most = stiffest(damping, late, damper)
+    if friction > 0.0 and resolution > 0.0:
+        most = min(most, 2.0 * friction / resolution)
+    return share * most, min(share, 1.0) * damper
+
+
+def wrench(
+    gains: Gains, apart: Vector, turned: Vector, drift: Vector, spin: Vector
+) -> tuple[Vector, Vector]:
+    """Force and torque on the hand.
+
+    Args:
+        gains: Of the coupling.
+        apart: m from the hand to where the body is.
+        turned: rad, rotation vector from the hand's orientation to the body's.
+        drift: m/s of the body less the hand's.
+        spin: rad/s of the body less the hand's.
+    """
+    return (
+        add_scaled(scale(apart, gains.stiffness), drift, gains.damping),
+        add_scaled(scale(turned, gains.angular_stiffness), spin, gains.angular_damping),
+    )
+
+
+# --- Passivity -----------------------------------------------------------------------------------
+
+DAMPING: Final = 10.0
+"""Times the device's own damping, the most that the controller adds."""
+_EMPTYING: Final = 0.5
+"""Share of the store, below which what drives the hand fades."""
+_FADE_OUT: Final = 0.005
+_FADE_IN: Final = 0.03
+"""s in which it fades, and comes back: by leaps it would buzz."""
+STORED: Final = 0.02
+"""J of pushing that can be given back, a 2 N push over 1 cm; of turning likewise."""
+
+
+@dataclass
+class Observer:
+    """Energy that flowed from the hand into the loop, of pushing or of turning."""
+
+    most: float
+    """J that can be stored, and so given back."""
+    most_damping: float
+    """N·s/m (N·m·s/rad) that the controller may add."""
+    energy: float = 0.0
+    """J, of the hand's, that the loop holds."""
+    _share: float = 1.0
+    """Of the coupling's force: less while it drives the hand and the store is nearly empty."""
+    given: float = 0.0
+    """J that the loop gave beyond what it had got: stays near 0 unless damping was capped."""
+
+    def observe(self, force: Vector, moved: Vector) -> None:
+        """Account for one period.
+
+        Args:
+            force: What acted on the hand throughout it.
+            moved: How the hand moved (turned) in it.
+        """
+        self.energy = min(self.most, self.energy - dot(force, moved))
+        self.given = max(self.given, -self.energy)
+
+    def damping(self, force: Vector, velocity: Vector, period: float) -> Vector:
+        """Force to add so that the coming period does not give what is not there.
+
+        Args:
+            force: What the coupling asks for.
+            velocity: The hand's, expected to go on for this period.
+            period: s
+        """
+        speed_squared = dot(velocity, velocity)
+        if speed_squared <= 0.0:
+            return ZERO
+        left = self.energy - dot(force, velocity) * period
+        if left >= 0.0:
+            return ZERO
+        amount = min(self.most_damping, -left / (speed_squared * period))
+        return scale(velocity, -amount)
+
+    def allowed(self, force: Vector, velocity: Vector, period: float) -> Vector:
+        """What is left of a force that drives the hand while the store runs out.
+
+        Args:
+            force: What the coupling asks for.
+            velocity: The hand's.
+            period: s
+        """
+        drives = dot(force, velocity) > 0.0
+        wanted = max(0.0, min(1.0, self.energy / (_EMPTYING * self.most))) if drives else 1.0
+        self._share += min(1.0, period / (_FADE_OUT if wanted < self._share else _FADE_IN)) * (
+            wanted - self._share
+        )
+        return scale(force, self._share)
+
+    def forget(self) -> None:
+        """Start anew, at a grab: nothing is stored, nothing may be given."""
+        self.energy, self._share = 0.0, 1.0
+
+
+# --- Limits --------------------------------------------------------------------------------------
+
+RISE: Final = 0.2
+"""s from nothing to all of the force after a grab."""
+FALL: Final = 0.03
+"""s from all of the force to nothing after letting go."""
+_FULL: Final = 0.5
+"""Of the time that data counts as fresh, this much is without any loss of force."""
+
+
+@dataclass(frozen=True)
+class ForceLimits:
+    """The most that a hand is ever given."""
+
+    force: float
+    """N"""
+    torque: float
+    """N·m"""
+    full_in: float = 0.01
+    """s: from no force to the most, or from the most to none, takes at least so long. As fast as
+    force fades when data grows old."""
+
+
+def freshness(age: float) -> float:
+    """Share of the force for data of an age: 1 while fresh, fading, 0 from 20 ms on."""
+    if not age < FRESH_SECONDS:  # an age that is no number is not fresh
+        return 0.0
+    return min(1.0, (FRESH_SECONDS - age) / (FRESH_SECONDS * (1.0 - _FULL)))
+
+
+@dataclass
+class Shaper:
+    """Turns what the coupling asks for into what the hand gets."""
+
+    limits: ForceLimits
+    share: float = 0.0
+    """Of the asked force: rises after a grab, falls after letting go."""
+    force: Vector = ZERO
+    """What the hand gets now."""
+    torque: Vector = ZERO
+
+    def shape(
+        self, force: Vector, torque: Vector, period: float, *, holding: bool, age: float
+    ) -> None:
+        """Set ``force`` and ``torque`` for the coming period.
+
+        Args:
+            force: What is asked for, N.
+            torque: What is asked for, N·m.
+            period: s since the last call.
+            holding: Whether something is held; else the force fades.
+            age: s of the older of the two, the device's sample and the simulation's state.
+        """
+        fresh = freshness(age)
+        if fresh <= 0.0 or not isfinite(dot(force, force) + dot(torque, torque)):
+            # Not a fade but the end of one: it began when half of the time was over. And what is
+            # no number, or beyond all of them, must not reach a motor.
+            self.share, self.force, self.torque = 0.0, ZERO, ZERO
+            return
+        step = period / RISE if holding else -period / FALL
+        self.share = max(0.0, min(1.0, self.share + step))
+        part = self.share * fresh
+        most, most_torque = self.limits.force, self.limits.torque
+        change = period / self.limits.full_in
+        self.force = _toward(self.force, force, part, most, most * change)
+        self.torque = _toward(self.torque, torque, part, most_torque, most_torque * change)
+
+    def drop(self) -> None:
+        """No force from now on: the device is gone, or the loop ends."""
+        self.share, self.force, self.torque = 0.0, ZERO, ZERO
+
+
+def _toward(now: Vector, asked: Vector, part: float, most: float, step: float) -> Vector:
+    wanted = scale(clamp_length(asked, most), part)
+    return add(now, clamp_length(subtract(wanted, now), step))
