@@ -401,8 +401,7 @@ NOT_IN_THE_PANELS = (
     # What a session asks of the simulation always makes sense.
     *("The figure has no bodies.", "The step of the simulation is not positive."),
     *("A pinned body does not exist.", "There is no material ….", "An obstacle has no faces."),
-    *("The strength of the joints is not positive.", "Nothing moved in the recorded drag."),
-    "The recorded drag is too short or broken.",
+    *("The strength of the joints is not positive.",),
     # An empty list is filled before.
     "The list of arms is empty.",
     # Limits of a splice's properties, and what is asked for before.

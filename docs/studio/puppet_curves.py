@@ -41,7 +41,7 @@ def _experiment() -> plot.Panel:
         answer = law.respond(spring * axis, speed * axis)
         speed += step * (force + answer.load[0, 0]) / (0.1 + step * answer.slope[0, 0, 0])
         answer = law.respond(spring * axis, speed * axis)
-        flow = 0.0 if answer.flow is None else float(answer.flow[0, 0])
+        flow = 0.0 if answer.flows is None else float(answer.flow_of(np.array([0]))[0, 0])
         spring += step * (speed - flow)
         moved[number + 1] = moved[number] + step * speed
         springs[number + 1] = spring

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from octo_motion.core.posing.puppet import Pose
 from octo_motion.core.posing.solver.world import World
 from octo_motion.core.rotations import Floats
 
@@ -35,7 +36,7 @@ def energy_of(world: World) -> Energy:
     )
     springs = world.joint_springs()
     elastic = 0.5 * float((world._law.stiffness * springs * springs).sum())
-    weight = -float(masses @ (bodies.centres() @ world.settings.gravity))
+    weight = -float(masses @ (_centres(world) @ world.settings.gravity))
     return Energy(kinetic, elastic, weight)
 
 
@@ -47,13 +48,32 @@ def set_velocities(world: World, velocities: Floats) -> None:
     bodies, tree, warm = world._bodies, world._tree, world._warm
     bodies.linear = np.array(velocities[:, :3], dtype=np.float64)
     bodies.angular = np.array(velocities[:, 3:], dtype=np.float64)
-    bodies.spin = (bodies.inertias() @ bodies.angular[:, :, None])[:, :, 0]
+    bodies.spin = (_inertias(world) @ bodies.angular[:, :, None])[:, :, 0]
     warm.contacts.slips = np.zeros(0)
     # Where the solver begins; it ends in the same place from anywhere.
     before = np.where(bodies.is_root[:, None], 0.0, bodies.angular[bodies.parent_or_self])
     warm.speeds = np.zeros_like(warm.speeds)
     warm.speeds[tree.joint_slot] = bodies.angular - before
-    lever = bodies.positions[tree.roots] - bodies.centres()[tree.roots]
+    lever = bodies.positions[tree.roots] - _centres(world)[tree.roots]
     warm.speeds[tree.shift_slot] = bodies.linear[tree.roots] + np.cross(
         bodies.angular[tree.roots], lever
     )
+
+
+def bend_springs(world: World, pose: Pose) -> None:
+    """Put the figure into a pose, at rest, with springs that pull towards where they were."""
+    rest = world._bodies.rest
+    world.set_pose(pose)
+    world._bodies.rest = rest
+
+
+def _centres(world: World) -> Floats:
+    """(bodies, 3) of mass, world."""
+    bodies = world._bodies
+    return bodies.positions + (bodies.matrices @ world.figure.centres[:, :, None])[:, :, 0]
+
+
+def _inertias(world: World) -> Floats:
+    """(bodies, 3, 3) about the centres of mass, world axes."""
+    matrices = world._bodies.matrices
+    return matrices @ world.figure.inertias @ matrices.transpose(0, 2, 1)

@@ -66,7 +66,8 @@ def solve(
     count = len(parents)
     inverse = np.zeros((count, 6, 6))
     inverse[:, :3, :3] = np.eye(3) / problem.masses[:, None, None]
-    inverse[:, 3:, 3:] = np.linalg.inv(problem.inertias)
+    around = problem.masses[:, None, None] * (problem.skewed @ problem.skewed)
+    inverse[:, 3:, 3:] = np.linalg.inv(problem.spatial[:, :3, :3] + around)
     linear = problem.momenta[:, 3:]
     spin = problem.momenta[:, :3] - np.cross(problem.centres, linear)
     velocities = (inverse @ np.concatenate([linear, spin], axis=1)[:, :, None])[:, :, 0]

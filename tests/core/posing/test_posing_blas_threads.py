@@ -4,7 +4,12 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.solver.blas_threads import OneThread, thread_counts
+from octo_motion.core.posing.solver.blas_threads import OneThread, _call, _libraries
+
+
+def thread_counts() -> list[int]:
+    """How many threads each OpenBLAS that is found may use."""
+    return [_call(library, name.format("get")) for library, name in _libraries()]
 
 
 def test_threads_are_one_for_a_while_and_then_as_before() -> None:

@@ -136,7 +136,8 @@ def test_trunk_and_branches_solve_what_the_whole_matrix_does(seed: int, count: i
         blocks[one.joint_slot] = 0.5 * np.eye(3)
         composite = (one.beyond @ inertias.reshape(-1, 36)).reshape(slots, 6, 6)
         one.assemble(one.motion @ composite, blocks)
-        speeds = one.solve(one.along(momenta))
+        summed = (one.beyond @ momenta.reshape(count, -1)).reshape(slots, 6, 2)
+        speeds = one.solve(one.motion @ summed)
         answers.append(
             np.stack([one.velocities(speeds[..., column].copy()) for column in range(2)])
         )

@@ -88,20 +88,12 @@ class ElementResponse:
         return slope
 
     def flow_of(self, which: NDArray[np.int64]) -> Floats:
-        """(which, 3) w_d of those elements, of which each flows."""
+        """(which, 3) w_d, rad/s, of those elements, of which each flows."""
         law = self.law
         size = self.size.take(which)
         excess = (size - law.yield_torque.take(which)) / (size + _TINY)
         toward = self.trial.take(which, 0) * excess[:, None]
         return -toward * law.compliance.take(which, 0)
-
-    @property
-    def flow(self) -> Floats | None:
-        """(…, 3) w_d: how fast the series damper moves, rad/s; None where all hold."""
-        if self.flows is None:
-            return None
-        excess = np.where(self.flows, self.size - self.law.yield_torque, 0.0)
-        return -self.trial * (excess / (self.size + _TINY))[..., None] * self.law.compliance
 
 
 class PlasticLaw:
@@ -140,17 +132,13 @@ class PlasticLaw:
         )
         """Whether all axes of an element are alike, so that no axes are needed at all."""
 
-    def trial(self, spring: Floats, speed: Floats) -> Floats:
-        """λ_e, the load without flow, from q_f at the step's start and w at its end."""
-        return self.at_rest(spring) - self.backward * speed
-
     def at_rest(self, spring: Floats) -> Floats:
         """−K_f q_f (…, 3), the load at rest without flow."""
         return -self.stiffness * spring
 
     def respond(self, spring: Floats, speed: Floats) -> ElementResponse:
         """Load, its slope and the flow, from q_f at the step's start and w at its end."""
-        return self.answer(self.trial(spring, speed))
+        return self.answer(self.at_rest(spring) - self.backward * speed)
 
     def answer(self, trial: Floats) -> ElementResponse:
         """The same from λ_e (…, 3)."""

@@ -10,7 +10,6 @@ another library, or none, there is nothing to do.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Final
@@ -42,22 +41,14 @@ class OneThread:
             _call(library, name.format("set"), count)
 
 
-def thread_counts() -> list[int]:
-    """How many threads each OpenBLAS that is found may use."""
-    return [_call(library, name.format("get")) for library, name in _libraries()]
-
-
 def _call(library: ctypes.CDLL, name: str, *arguments: int) -> int:
     return int(getattr(library, name)(*arguments) or 0)
 
 
 @cache
 def _libraries() -> tuple[tuple[ctypes.CDLL, str], ...]:
-    return tuple(_find())
-
-
-def _find() -> Iterator[tuple[ctypes.CDLL, str]]:
     """The libraries that numpy brings along, and what their functions are called."""
+    found: list[tuple[ctypes.CDLL, str]] = []
     package = Path(np.__file__).parent
     folders = (package.parent / "numpy.libs", package / ".libs", package / ".dylibs")
     for folder in folders:
@@ -69,5 +60,6 @@ def _find() -> Iterator[tuple[ctypes.CDLL, str]]:
                 continue
             for name in _NAMES:
                 if hasattr(library, name.format("set")) and hasattr(library, name.format("get")):
-                    yield library, name
+                    found.append((library, name))
                     break
+    return tuple(found)

@@ -69,14 +69,6 @@ class Bodies:
         self.positions = tree.above @ arms
         """(bodies, 3) of the joints."""
 
-    def centres(self) -> Floats:
-        """(bodies, 3) of mass, world."""
-        return self.positions + (self.matrices @ self._figure.centres[:, :, None])[:, :, 0]
-
-    def inertias(self) -> Floats:
-        """(bodies, 3, 3) about the centres of mass, world axes."""
-        return self.matrices @ self._figure.inertias @ self.matrices.transpose(0, 2, 1)
-
     def _parent_turns(self) -> Floats:
         parents = self.orientations.take(self.parent_or_self, 0)
         parents[self._tree.roots] = _UNTURNED
@@ -100,10 +92,6 @@ class Bodies:
         return small_batches.to_rotation_vector(
             small_batches.multiply_conjugate(self.orientations, at_rest)
         )
-
-    def relax(self) -> None:
-        """Let the springs have their rest where the joints are."""
-        self.rest = self.turns()
 
     def rest_springs_at(self, springs: Floats, which: Integers) -> None:
         """Move springs' rest so that they are bent by ``springs`` (which, 3), parents' frames."""
@@ -129,7 +117,8 @@ class Bodies:
         self.refresh()
 
     def stop(self) -> None:
-        """Take all velocities away."""
+        """Take all velocities away, and let the springs have their rest where the joints are."""
+        self.rest = self.turns()
         for array in (self.linear, self.angular, self.spin):
             array[:] = 0.0
 

@@ -75,12 +75,6 @@ class Problem:
         """(bodies, 6, 6) inertias about the origin: from (ω, v) to (L, l)."""
         return (self.moments @ SPATIAL).reshape(-1, 6, 6)
 
-    @property
-    def inertias(self) -> Floats:
-        """(bodies, 3, 3) about the centres of mass, world axes."""
-        around = self.masses[:, None, None] * (self.skewed @ self.skewed)
-        return self.spatial[:, :3, :3] + around
-
 
 def moments(masses: Floats, centres: Floats, inertias: Floats) -> Floats:
     """(bodies, 4, 4) Σ m [r; 1] [r; 1]ᵀ, the whole of a body's mass in one matrix.

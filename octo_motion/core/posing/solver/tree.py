@@ -138,12 +138,6 @@ class Tree:
         """V (bodies, 6) of u (slots, 3)."""
         return self.chain @ (speeds[:, None, :] @ self.motion)[:, 0, :]
 
-    def along(self, momenta: Floats) -> Floats:
-        """Sᵀ of impulses or momenta (bodies, 6, columns), as (slots, 3, columns)."""
-        count = momenta.shape[-1]
-        summed = self.beyond @ momenta.reshape(len(momenta), 6 * count)
-        return self.motion @ summed.reshape(-1, 6, count)
-
     def assemble(self, carried: Floats, joints: Floats) -> None:
         """Fill the matrix of (1).
 

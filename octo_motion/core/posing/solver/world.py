@@ -126,21 +126,13 @@ class World:
 
     # What the caller changes
 
-    def set_pose(self, pose: Pose, *, keep_rest: bool = False) -> None:
-        """Put the figure into a pose, at rest.
+    def set_pose(self, pose: Pose) -> None:
+        """Put the figure into a pose, at rest and with relaxed springs.
 
         Positions of all but the roots follow from the orientations.
-
-        Args:
-            pose: the new one.
-            keep_rest: whether the springs' rest stays, so that they pull towards the pose that
-                the figure had; otherwise they are relaxed in the new pose.
         """
-        bodies = self._bodies
-        bodies.place(pose)
-        if not keep_rest:
-            bodies.relax()
-        bodies.stop()
+        self._bodies.place(pose)
+        self._bodies.stop()
         self._warm.forget()
         self._loads = np.zeros_like(self._loads)
 
