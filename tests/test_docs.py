@@ -400,7 +400,7 @@ NOT_IN_THE_PANELS = (
     *("A joint's weight is not between 0 and 1.", "The stride is … m.", "The speed is … m/s."),
     # What a session asks of the simulation always makes sense.
     *("The figure has no bodies.", "The step of the simulation is not positive."),
-    *("A pinned body does not exist.", "There is no material ….", "An obstacle has no faces."),
+    *("There is no material ….", "An obstacle has no faces."),
     *("The strength of the joints is not positive.",),
     # An empty list is filled before.
     "The list of arms is empty.",

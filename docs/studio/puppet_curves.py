@@ -10,7 +10,7 @@ import numpy as np
 import plot
 from stage import Pixels
 
-from octo_motion.core.posing.puppet.figure import Elements, Figure, JointRanges, Pose
+from octo_motion.core.posing.puppet.figure import Elements, Figure, Pose
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.puppet.plastic_element import PlasticLaw
 from octo_motion.core.posing.solver.world import World, WorldSettings
@@ -61,7 +61,8 @@ def _energy() -> plot.Panel:
         np.stack([np.zeros(_BONES), _LENGTH * np.arange(float(_BONES)), np.zeros(_BONES)], axis=1),
         np.tile([1.0, 0.0, 0.0, 0.0], (_BONES, 1)),
     )
-    world = World(figure, pose, WorldSettings(pinned=frozenset({0})))
+    world = World(figure, pose, WorldSettings())
+    world.pin(0)
     tip = np.array([0.0, _BONES * _LENGTH, 0.0])
     grab = world.grab(_BONES - 1, tip)
     rows: list[tuple[float, float, float]] = []
@@ -117,7 +118,7 @@ def _arm() -> Figure:
         inertias=np.tile(np.diag([across, 0.5 * mass * _RADIUS**2, across]), (_BONES, 1, 1)),
         capsules=ends,
         radii=np.full(_BONES, _RADIUS),
-        limits=JointRanges(np.tile([-np.pi, np.pi], (_BONES, 3, 1))),
+        limits=np.tile([-np.pi, np.pi], (_BONES, 3, 1)),
         elements=Elements(zeros, zeros, zeros, np.zeros(_BONES)),
     )
     return replace(figure, elements=elements_for(figure, "wire"))

@@ -15,7 +15,7 @@ from typing import Annotated, ClassVar, Final, NamedTuple, Self, get_args, get_t
 import numpy as np
 
 from ..core.errors import DeviceError, OctoMotionError
-from ..core.posing.puppet import Elements, Figure, JointRanges
+from ..core.posing.puppet import Elements, Figure
 from ..core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
 from ..core.rotations import Floats
 from ..core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized
@@ -97,7 +97,7 @@ class FigureMessage(Message):
         return cls(
             *(figure.names, tuple(map(int, figure.parents)), figure.anchors, figure.rest),
             *(figure.lengths, figure.masses, figure.centres, figure.inertias),
-            *(figure.capsules, figure.radii, figure.limits.ranges),
+            *(figure.capsules, figure.radii, figure.limits),
             *(figure.elements.stiffness, figure.elements.damping, figure.elements.flow),
             figure.elements.yield_torque,
         )
@@ -124,7 +124,7 @@ class FigureMessage(Message):
         return Figure(
             *(self.names, self.parents, self.anchors, self.rest, self.lengths, self.masses),
             *(self.centres, self.inertias, self.capsules, self.radii),
-            JointRanges(self.limits),
+            self.limits,
             Elements(self.stiffness, self.damping, self.flow, self.yield_torque),
         )
 

@@ -12,11 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from ..core.posing.picking import capsules_in_world, nearest_body
-from ..core.posing.puppet import Figure, Pose
-from ..core.posing.session import HandSample, Session
+from ..core.posing.picking import nearest_body
+from ..core.posing.puppet import Figure, Pose, capsules_in_world
+from ..core.posing.session import HandSample, Session, StepLength
 from ..core.posing.solver import Coupling, HandSpring, Obstacle, World, WorldSettings
-from ..core.posing.step_length import StepLength
 from ..core.rotations import Floats, conjugate, multiply, rotate
 from ..core.rotations.scalars import Vector
 from .messages import DeviceMessage, HandMessage, HeldMessage, Pull, Settings

@@ -24,7 +24,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from octo_motion.core.posing.puppet.figure import Figure, JointRanges
+from octo_motion.core.posing.puppet.figure import Figure
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.session import hand_for
 from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane, Sphere
@@ -258,7 +258,7 @@ def _tell(name: str, found: Torn, seconds: float) -> None:
 def _limited(figure: Figure) -> Figure:
     """With ends to the range of every joint."""
     ends = np.radians([[-10.0, 130.0], [-30.0, 60.0], [-40.0, 40.0]])
-    return replace(figure, limits=JointRanges(np.tile(ends, (len(figure), 1, 1))))
+    return replace(figure, limits=np.tile(ends, (len(figure), 1, 1)))
 
 
 if __name__ == "__main__":

@@ -232,8 +232,8 @@ def test_limits_of_a_constraint_become_ranges_each_way_as_they_are() -> None:
     figure = read_rig(armature).figure
     joint = figure.names.index("arm1.03.L")
     wanted = [[-0.2, 0.6], [-0.1, 0.3], [-0.5, 0.5]]
-    assert figure.limits.ranges[joint] == pytest.approx(np.array(wanted))
-    assert figure.limits.ranges[joint + 1] == pytest.approx(np.tile([-np.pi, np.pi], (3, 1)))
+    assert figure.limits[joint] == pytest.approx(np.array(wanted))
+    assert figure.limits[joint + 1] == pytest.approx(np.tile([-np.pi, np.pi], (3, 1)))
 
 
 def test_limits_of_inverse_kinematics_count_too() -> None:
@@ -242,7 +242,7 @@ def test_limits_of_inverse_kinematics_count_too() -> None:
     bone.use_ik_limit_x, bone.ik_min_x, bone.ik_max_x = True, -0.3, 0.1
     bone.lock_ik_z = True
     figure = read_rig(armature).figure
-    ranges = figure.limits.ranges[figure.names.index("arm1.03.L")]
+    ranges = figure.limits[figure.names.index("arm1.03.L")]
     assert ranges[0] == pytest.approx([-0.3, 0.1])
     assert ranges[1] == pytest.approx([-np.pi, np.pi])
     # Locked is a hair's breadth wide: the pose that is shown lies in it.
@@ -250,7 +250,7 @@ def test_limits_of_inverse_kinematics_count_too() -> None:
     # What a constraint says about an axis goes before.
     limit = bone.constraints.new("LIMIT_ROTATION")
     limit.owner_space, limit.use_limit_x, limit.min_x, limit.max_x = "LOCAL", True, 0.0, 2.0
-    ranges = read_rig(armature).figure.limits.ranges[figure.names.index("arm1.03.L")]
+    ranges = read_rig(armature).figure.limits[figure.names.index("arm1.03.L")]
     assert ranges[0] == pytest.approx([0.0, 2.0], abs=2e-3)
     assert ranges[2] == pytest.approx([0.0, 0.0], abs=2e-3)
 
@@ -261,7 +261,7 @@ def test_muted_limit_limits_nothing() -> None:
     limit.owner_space, limit.mute = "LOCAL", True
     limit.use_limit_y, limit.min_y, limit.max_y = True, -0.1, 0.3
     figure = read_rig(armature).figure
-    ranges = figure.limits.ranges[figure.names.index("arm1.03.L")]
+    ranges = figure.limits[figure.names.index("arm1.03.L")]
     assert ranges[1] == pytest.approx([-np.pi, np.pi])
 
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from octo_motion.core.posing.puppet.figure import Elements, Figure, JointRanges, Pose
+from octo_motion.core.posing.puppet.figure import Elements, Figure, Pose, pose_of
 from octo_motion.core.posing.puppet.joint_limits import bends
-from octo_motion.core.posing.puppet.kinematics import pose_of
-from octo_motion.core.posing.solver.hand_spring import Coupling
+from octo_motion.core.posing.solver.holds import Coupling
 from octo_motion.core.posing.solver.world import World
 from octo_motion.core.rotations import Floats, from_rotation_vector, multiply, normalized, rotate
 from tests.core.world_probes import energy_of
@@ -51,7 +50,7 @@ def puppet(
     elements: Elements | None = None,
     *,
     rest: Floats | None = None,
-    limits: JointRanges | None = None,
+    limits: Floats | None = None,
 ) -> Figure:
     """Capsules along Y from each joint."""
     count = len(parents)
@@ -73,7 +72,7 @@ def puppet(
         inertias=np.array([inertia for _, inertia in bodies]),
         capsules=ends,
         radii=np.array(radii, dtype=np.float64),
-        limits=limits or JointRanges(np.tile([-np.pi, np.pi], (count, 3, 1))),
+        limits=np.tile([-np.pi, np.pi], (count, 3, 1)) if limits is None else limits,
         elements=elements or free(count),
     )
 
@@ -195,7 +194,7 @@ def torn(
     found = Torn()
     unrest = figure.rest * [1.0, -1.0, -1.0, -1.0]
     limited = np.array(figure.parents) >= 0
-    least, most = np.moveaxis(figure.limits.ranges, -1, 0)
+    least, most = np.moveaxis(figure.limits, -1, 0)
     energy = energy_of(world).total
     for _ in range(steps):
         if len(world.grabs) < HANDS and rng.random() < 0.03:

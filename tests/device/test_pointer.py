@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.solver.hand_spring import Coupling
+from octo_motion.core.posing.solver.holds import Coupling
 from octo_motion.core.posing.solver.world import WorldSettings
 from octo_motion.core.rotations import from_rotation_vector
 from octo_motion.core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, length

@@ -14,7 +14,6 @@ import numpy as np
 from ...core.errors import RigError, WriteError
 from ...core.posing.puppet import (
     BODY,
-    DENSITY,
     FOLLOW,
     FREE,
     SIZE,
@@ -83,14 +82,11 @@ class PuppetRig:
         return body
 
 
-def read_rig(
-    armature: bpy.types.Object, *, density: float = DENSITY, smallest: float = SMALLEST
-) -> PuppetRig:
+def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> PuppetRig:
     """Make a figure of an armature as it stands now. Nothing in the file is changed.
 
     Args:
         armature: the armature object.
-        density: kg/m³.
         smallest: share of the figure's size below which bones only follow.
 
     Raises:
@@ -133,7 +129,6 @@ def read_rig(
         _scaled(posed, unit),
         skin={bone: points * unit for bone, points in skin.points.items()},
         limits=joint_limits(armature),
-        density=density,
     )
     return PuppetRig(skeleton, roles, figure, pose, unit)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rotations import Floats, rotate
-from .puppet import Figure, Pose
+from ..rotations import Floats
+from .puppet import Figure, Pose, capsules_in_world
 
 _TINY = 1e-12
 
@@ -22,12 +22,6 @@ class Hit:
     """(3,) world."""
     distance: float
     """Along the ray."""
-
-
-def capsules_in_world(figure: Figure, pose: Pose) -> Floats:
-    """Ends (bodies, 2, 3) of the capsules' axes."""
-    turned = rotate(pose.orientations[:, None, :], figure.capsules)
-    return pose.positions[:, None, :] + turned
 
 
 def pick(

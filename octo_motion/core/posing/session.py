@@ -25,7 +25,6 @@ from ..rotations import (
 )
 from .puppet import Elements, Figure, Pose, joints_of, turned_bodies
 from .solver import Coupling, HandSpring, Obstacle, World, WorldSettings, WorldState
-from .step_length import StepLength
 
 COARSEST: Final = 4e-3
 """Seconds: longer steps would let a fast hand shake the puppet."""
@@ -46,6 +45,42 @@ ELSEWHERE: Final = 1e-5
 MOST_STEPS_BACK: Final = 64
 GENTLE: Final = 0.1
 """Of the firmest coupling, with joints that just bear what hangs on them."""
+
+
+@dataclass
+class StepLength:
+    """Lengthens steps that take too long, and shortens them when there is time again."""
+
+    nominal: float
+    """s of the shortest step, which is the most exact."""
+    coarsest: float
+    """s of the longest: beyond, a fast hand would shake the puppet."""
+    busy: float
+    """Share of real time that steps may take; above, they get longer."""
+    idle: float
+    """Of ``busy``: below, they get shorter again."""
+    learning: float
+    """Of one more measurement, in ``load``."""
+    load: float = 0.0
+    """s of work for a simulated second, of late."""
+
+    def after(self, spent: float, simulated: float, step: float) -> float:
+        """The step, s, to go on with.
+
+        Args:
+            spent: s that were worked.
+            simulated: s that came of it, above zero.
+            step: s of a step now.
+        """
+        self.load += self.learning * (spent / simulated - self.load)
+        wanted = step
+        if self.load > self.busy and step < self.coarsest:
+            wanted = min(2.0 * step, self.coarsest)
+        elif self.load < self.idle * self.busy and step > self.nominal:
+            wanted = max(0.5 * step, self.nominal)
+        # A step costs about the same, however long it is.
+        self.load *= step / wanted
+        return wanted
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +197,6 @@ class Session:
         self._ratio = 1.0
         self._calm = 0.0
         self._before: list[WorldState] = []
-        for body in sorted(settings.pinned):
-            self.pin(body, state=True)
 
     @property
     def figure(self) -> Figure:
@@ -199,20 +232,9 @@ class Session:
         orientation: Floats | None = None,
         coupling: Coupling | None = None,
     ) -> HandSpring:
-        """Take hold of a body with one more hand.
-
-        Args:
-            body: its index.
-            point: (3,) where, world.
-            orientation: (4,) of the hand, world, where it keeps the body from turning from the
-                start; else it does so once it has turned, and its turns count from here.
-            coupling: how firmly; as all grabs do, by default.
-        """
+        """Take hold of a body with one more hand, see ``World.grab``."""
         self.remember()
-        turn = IDENTITY if orientation is None else orientation
-        spring = self.world.grab(body, point, turn, coupling or self.coupling)
-        if orientation is None:
-            spring.target_orientation = None
+        spring = self.world.grab(body, point, orientation, coupling or self.coupling)
         self.wake()
         return spring
 
@@ -309,9 +331,8 @@ class Session:
 
     def change(self, **settings: Any) -> None:
         """Take other settings of the world (see ``WorldSettings``); motion goes on."""
-        before = self.world.settings
-        wanted = replace(before, **{**settings, "pinned": before.pinned})
-        if wanted != before:
+        wanted = replace(self.world.settings, **settings)
+        if wanted != self.world.settings:
             self.world.change(wanted)
             self.wake()
 
@@ -346,9 +367,7 @@ class Session:
         if (apart > ELSEWHERE * self.figure.lengths).any():
             # Bones are stretched there, or moved: another figure.
             figure = replace(self.figure, anchors=anchors)
-            self.world = World(
-                figure, pose, replace(old.settings, pinned=frozenset()), old.obstacles
-            )
+            self.world = World(figure, pose, old.settings, old.obstacles)
             for body, firm in old.pins.items():
                 self.world.pin(body, firm=firm)
         self.show(pose)

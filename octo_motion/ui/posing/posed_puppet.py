@@ -12,8 +12,8 @@ import numpy as np
 
 from ...blender.rig import Puppet, read_rig
 from ...core.errors import OctoMotionError, RigError
-from ...core.posing.picking import Hit, capsules_in_world, pick
-from ...core.posing.puppet import Elements, Figure, Material, Pose, joint_loads
+from ...core.posing.picking import Hit, pick
+from ...core.posing.puppet import Elements, Figure, Material, Pose, capsules_in_world, joint_loads
 from ...core.posing.session import Session, hand_for
 from ...core.posing.solver import HandSpring
 from ...core.rotations import Floats

@@ -343,7 +343,8 @@ def test_a_moving_floor_takes_along_what_lies_on_it():
 def test_a_rising_box_lifts_a_limb():
     figure = chain(2)
     figure = replace(figure, elements=elements_for(figure, "clay"))
-    world = World(figure, posed(figure), WorldSettings(step=2e-3, pinned=frozenset({0})))
+    world = World(figure, posed(figure), WorldSettings(step=2e-3))
+    world.pin(0)
     half = np.array([0.1, 0.1, 0.1])
     for number in range(300):
         height = -0.14 + 0.2 * number / 300.0

@@ -115,7 +115,8 @@ def test_turning_joint_of_a_world_repeats_the_source_experiment():
     # A pinned root whose inertia about its joint is the source's mass; small angles, no limits.
     figure = puppet([-1], [[0.0, 0.0, 0.0]], [0.1], [0.02], soft(1, K_F, D_F, D_D, 0.0))
     centred = replace(figure, centres=np.zeros((1, 3)), inertias=MASS * np.eye(3)[None])
-    world = World(centred, posed(centred), WorldSettings(step=0.02, pinned=frozenset({0})))
+    world = World(centred, posed(centred), WorldSettings(step=0.02))
+    world.pin(0)
     world.forces[0, 3] = FORCE
     for _ in range(250):
         world.step()
@@ -230,8 +231,9 @@ def test_a_made_figure_bears_its_own_weight_in_any_pose(material: str):
     world = World(
         figure,
         flat,
-        WorldSettings(step=4e-3, gravity=(0.0, 0.0, -9.81), pinned=frozenset({0}), drag=2.0),
+        WorldSettings(step=4e-3, gravity=(0.0, 0.0, -9.81), drag=2.0),
     )
+    world.pin(0)
     for _ in range(750):
         world.step()
     before = world.pose().orientations
@@ -246,7 +248,8 @@ def test_rubber_comes_back_and_limp_falls():
     figure = chain(3)
     start = posed(figure, np.array([[0.0, 0.0, 0.0], [0.6, 0.0, 0.0], [0.0, 0.0, 0.6]]))
     rubber = replace(figure, elements=elements_for(figure, "rubber"))
-    world = World(rubber, posed(rubber), WorldSettings(pinned=frozenset({0}), drag=5.0))
+    world = World(rubber, posed(rubber), WorldSettings(drag=5.0))
+    world.pin(0)
     bend_springs(world, start)
     for _ in range(3000):
         world.step()
@@ -256,8 +259,9 @@ def test_rubber_comes_back_and_limp_falls():
     world = World(
         limp,
         posed(limp),
-        WorldSettings(step=2e-3, gravity=(0.0, 0.0, -9.81), pinned=frozenset({0})),
+        WorldSettings(step=2e-3, gravity=(0.0, 0.0, -9.81)),
     )
+    world.pin(0)
     for _ in range(2000):
         world.step()
     tips = rotate(world.pose().orientations, [0.0, 1.0, 0.0])

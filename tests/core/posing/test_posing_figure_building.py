@@ -13,8 +13,7 @@ from octo_motion.core.posing.puppet.build import (
     build_figure,
     turned_bodies,
 )
-from octo_motion.core.posing.puppet.figure import Figure, Pose
-from octo_motion.core.posing.puppet.kinematics import pose_of
+from octo_motion.core.posing.puppet.figure import Figure, Pose, pose_of
 from octo_motion.core.rotations import (
     IDENTITY,
     Floats,
@@ -146,7 +145,7 @@ def test_pose_beyond_a_limit_widens_it_so_that_nothing_snaps() -> None:
     knee = JointLimits(x=(0.0, 0.5), twist=(-0.1, 0.1))
     figure, _ = built(BODY, posed(BODY, basis), limits={"shin.L": knee, "shin.R": knee})
     left, right = figure.names.index("shin.L"), figure.names.index("shin.R")
-    ranges = figure.limits.ranges
+    ranges = figure.limits
     # A pose at the very end of a range is given room as well.
     assert ranges[left, 0] == pytest.approx([0.0, 1.2], abs=2e-3)
     assert ranges[left, 0, 1] > 1.2

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.posing.puppet.figure import Figure, JointRanges
+from octo_motion.core.posing.puppet.figure import Figure
 from octo_motion.core.posing.puppet.joint_limits import bends, slopes
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.session import hand_for
-from octo_motion.core.posing.solver.hand_spring import Coupling
+from octo_motion.core.posing.solver.holds import Coupling
 from octo_motion.core.posing.solver.obstacle_shapes import Plane
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import (
@@ -37,7 +37,7 @@ def limited(figure: Figure, *ranges: tuple[tuple[float, float], ...]) -> Figure:
     """The figure with these ranges, degrees, at its last joints."""
     whole = np.tile(FREE, (len(figure), 3, 1))
     whole[-len(ranges) :] = np.radians(np.array(ranges))
-    return replace(figure, limits=JointRanges(whole))
+    return replace(figure, limits=whole)
 
 
 def elbow(material: str = "limp") -> Figure:
@@ -169,7 +169,7 @@ def test_energy_never_grows_at_the_ends_of_ranges(seed: int, touching: bool):  #
     ends = np.sort(rng.uniform(-1.0, 1.0, (count, 3, 2)), axis=2)
     ends[..., 0] = np.minimum(ends[..., 0], 0.0)
     ends[..., 1] = np.maximum(ends[..., 1], 0.0)
-    figure = replace(figure, limits=JointRanges(ends))
+    figure = replace(figure, limits=ends)
     world = World(
         figure,
         posed(figure, at=(0.0, 0.0, 0.3)),
@@ -192,7 +192,7 @@ def test_a_limited_doll_that_is_thrown_about_stays_in_its_ranges():
     figure = doll()
     figure = replace(figure, elements=elements_for(figure, "limp"))
     ends = np.radians([[-10.0, 90.0], [-20.0, 40.0], [-30.0, 30.0]])
-    figure = replace(figure, limits=JointRanges(np.tile(ends, (20, 1, 1))))
+    figure = replace(figure, limits=np.tile(ends, (20, 1, 1)))
     rng = np.random.default_rng(3)
     world = World(figure, posed(figure), WorldSettings(step=2e-3, gravity=(0.0, 0.0, -9.81)))
     worst = 0.0

@@ -10,13 +10,15 @@ import pytest
 
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.posing.puppet.joint_limits import bends
-from octo_motion.core.posing.puppet.material_fit import Bend, measure_bend, measure_shown
 from octo_motion.core.posing.puppet.materials import (
     MATERIALS,
+    Bend,
     Material,
     elements_for,
     joint_loads,
     material_of,
+    measure_bend,
+    measure_shown,
 )
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats

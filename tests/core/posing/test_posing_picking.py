@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.picking import capsules_in_world, pick
+from octo_motion.core.posing.picking import pick
+from octo_motion.core.posing.puppet import capsules_in_world
 from tests.core.puppets import doll, octopus, posed
 
 UP = np.array([0.0, 0.0, 1.0])

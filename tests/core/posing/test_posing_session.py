@@ -35,8 +35,9 @@ class Clock:
 def session_of(step: float = 4e-3, clock: Clock | None = None) -> Session:
     """A session with long steps: most of what it does hangs on none of that."""
     figure = clay()
-    settings = WorldSettings(step=step, pinned=frozenset({0}))
-    return Session(figure, posed(figure), settings, clock=clock)
+    session = Session(figure, posed(figure), WorldSettings(step=step), clock=clock)
+    session.pin(0, state=True)
+    return session
 
 
 def ticks(session: Session, count: int, seconds: float = TICK) -> TickReport:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.posing.puppet.figure import Elements, JointRanges
+from octo_motion.core.posing.puppet.figure import Elements
 from octo_motion.core.posing.solver.constraint_rows import Holds, RowImpulses, Rows
 from octo_motion.core.posing.solver.contact_detection import Contacts
 from octo_motion.core.posing.solver.newton import Start
@@ -46,7 +46,7 @@ def busy_world(seed: int) -> World:
     figure = tree(rng, count, elements)
     if seed % 2 == 0:
         ends = np.array([[-0.4, 0.2], [-0.3, 0.3], [-0.1, 0.4]])
-        figure = replace(figure, limits=JointRanges(np.tile(ends, (count, 1, 1))))
+        figure = replace(figure, limits=np.tile(ends, (count, 1, 1)))
     return World(
         figure,
         posed(figure, 0.5 * rng.normal(size=(count, 3)), (0.0, 0.0, 0.12)),

@@ -3,7 +3,6 @@
 
 from .bone_roles import BODY, FOLLOW, SMALLEST, RigFacts, Roles, diagonal, find_roles
 from .build import (
-    DENSITY,
     FREE,
     SIZE,
     JointLimits,
@@ -12,27 +11,33 @@ from .build import (
     joints_of,
     turned_bodies,
 )
-from .figure import Elements, Figure, JointRanges, Pose
-from .joint_limits import _ONES, bends, slopes
-from .kinematics import rest_pose
-from .material_fit import Bend, MeasuredBend, measure_bend, measure_shown
-from .materials import Material, elements_for, joint_loads, material_of
+from .figure import Elements, Figure, Flags, Integers, Pose, capsules_in_world, rest_pose
+from .joint_limits import bends, slopes
+from .materials import (
+    Bend,
+    Material,
+    MeasuredBend,
+    elements_for,
+    joint_loads,
+    material_of,
+    measure_bend,
+    measure_shown,
+)
 from .plastic_element import ElementResponse, PlasticLaw
 
 __all__ = [
     "BODY",
-    "DENSITY",
     "FOLLOW",
     "FREE",
     "SIZE",
     "SMALLEST",
-    "_ONES",
     "Bend",
     "ElementResponse",
     "Elements",
     "Figure",
+    "Flags",
+    "Integers",
     "JointLimits",
-    "JointRanges",
     "Material",
     "MeasuredBend",
     "PlasticLaw",
@@ -42,6 +47,7 @@ __all__ = [
     "Roles",
     "bends",
     "build_figure",
+    "capsules_in_world",
     "diagonal",
     "elements_for",
     "find_roles",

@@ -12,7 +12,7 @@ import numpy as np
 from ...rotations import Floats, conjugate, multiply, rotate, to_rotation_vector
 from ...skeleton import Skeleton
 from .bone_roles import Roles
-from .figure import Elements, Figure, JointRanges, Pose
+from .figure import Elements, Figure, Pose
 from .joint_limits import bends
 
 DENSITY: Final = 1000.0
@@ -82,7 +82,6 @@ def build_figure(
     *,
     skin: Mapping[int, Floats] | None = None,
     limits: Mapping[str, JointLimits] | None = None,
-    density: float = DENSITY,
 ) -> tuple[Figure, Pose]:
     """Rigid bodies for the bones that are bodies, jointed as the bones stand now.
 
@@ -96,7 +95,6 @@ def build_figure(
         posed: where they are.
         skin: (points, 3) in the world, by the bone that moves them most; limbs without are slim.
         limits: by name of the bone.
-        density: kg/m³.
 
     Returns:
         The figure, and the pose it has now.
@@ -117,7 +115,7 @@ def build_figure(
     inset = np.minimum(radius, 0.5 * lengths)
     # Caps end where the limb does; one that is shorter than it is thick becomes a ball.
     capsules = np.stack([inset[:, None] * along, (lengths - inset)[:, None] * along], axis=1)
-    masses, inertias = _bulk(lengths - 2.0 * inset, along, radius, lengths, density)
+    masses, inertias = _bulk(lengths - 2.0 * inset, along, radius, lengths)
 
     figure = Figure(
         names=tuple(skeleton.names[bone] for bone in bones),
@@ -215,7 +213,7 @@ def _radii(roles: Roles, heads: Floats, ends: Floats, clouds: Sequence[Floats]) 
 
 
 def _bulk(
-    straight: Floats, along: Floats, radius: Floats, lengths: Floats, density: float
+    straight: Floats, along: Floats, radius: Floats, lengths: Floats
 ) -> tuple[Floats, Floats]:
     """Masses (bodies,) and inertias (bodies, 3, 3) of solid capsules about their middles.
 
@@ -224,10 +222,9 @@ def _bulk(
         along: (bodies, 3) unit vectors.
         radius: (bodies,)
         lengths: (bodies,)
-        density: kg/m³.
     """
-    tube = density * np.pi * radius**2 * straight
-    ball = density * 4.0 / 3.0 * np.pi * radius**3
+    tube = DENSITY * np.pi * radius**2 * straight
+    ball = DENSITY * 4.0 / 3.0 * np.pi * radius**3
     masses = tube + ball
     masses = np.maximum(masses, _LEAST_MASS * masses.max())
     share = tube / (tube + ball)
@@ -258,7 +255,7 @@ def _in_parents(parents: np.ndarray, rotations: Floats) -> Floats:
 
 def _limits(
     skeleton: Skeleton, bones: list[int], limits: Mapping[str, JointLimits], turns: Floats
-) -> JointRanges:
+) -> Floats:
     given = [limits.get(skeleton.names[bone], JointLimits()) for bone in bones]
     ranges = np.array([(each.x, each.twist, each.z) for each in given])
     ranges = np.clip(np.sort(ranges, axis=2), *FREE)
@@ -268,7 +265,7 @@ def _limits(
     most = np.where(held, -np.inf, ranges[..., 1])
     least = np.minimum(least, now - _SLACK)
     most = np.maximum(most, now + _SLACK)
-    return JointRanges(np.clip(np.stack([least, most], axis=2), *FREE))
+    return np.clip(np.stack([least, most], axis=2), *FREE)
 
 
 def joints_of(parents: Sequence[int], pose: Pose) -> Floats:

@@ -12,7 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...rotations import Floats
+from ...rotations import Floats, multiply, rotate
+
+Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +45,14 @@ class Figure:
     """(bodies, 2, 3) ends of the capsule's axis in the body's frame."""
     radii: Floats
     """(bodies,) of the capsules."""
-    limits: JointRanges
+    limits: Floats
+    """(bodies, 3, 2) least and greatest bend about X, twist about Y (the bone) and bend about Z, in
+    the bone's axes at rest (see ``joint_limits``); −π and π where there is no end."""
     elements: Elements
 
     def __len__(self) -> int:
         """Number of bodies."""
         return len(self.names)
-
-
-@dataclass(frozen=True, eq=False)
-class JointRanges:
-    """How far each joint turns from rest, see ``limits``."""
-
-    ranges: Floats
-    """(bodies, 3, 2) least and greatest bend about X, twist about Y (the bone) and bend about Z, in
-    the bone's axes at rest; −π and π where there is no end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +77,7 @@ class Elements:
         nothing = np.zeros((count, 3))
         return cls(nothing, nothing, nothing, np.zeros(count))
 
-    def where(self, works: NDArray[np.bool_]) -> Elements:
+    def where(self, works: Flags) -> Elements:
         """These in the joints (bodies,) of a mask, and others limp."""
         mask = works[:, None]
         return Elements(
@@ -100,3 +96,32 @@ class Pose:
     """(bodies, 3) of the joints, world."""
     orientations: Floats
     """(bodies, 4), world."""
+
+
+def rest_pose(figure: Figure) -> Pose:
+    """The figure as it was made, its roots' joints at the origin."""
+    return pose_of(figure, figure.rest, np.zeros((len(figure), 3)))
+
+
+def pose_of(figure: Figure, turns: Floats, roots: Floats) -> Pose:
+    """The pose with joints turned so; every joint is closed.
+
+    Args:
+        figure: the puppet.
+        turns: (bodies, 4) orientation of each body in its parent's frame.
+        roots: (bodies, 3) world position of the roots' joints; other rows count for nothing.
+    """
+    positions = np.array(roots, dtype=np.float64)
+    orientations = np.array(turns, dtype=np.float64)
+    for body, parent in enumerate(figure.parents):
+        if parent >= 0:
+            orientations[body] = multiply(orientations[parent], orientations[body])
+            arm = rotate(orientations[parent], figure.anchors[body])
+            positions[body] = positions[parent] + arm
+    return Pose(positions, orientations)
+
+
+def capsules_in_world(figure: Figure, pose: Pose) -> Floats:
+    """Ends (bodies, 2, 3) of the capsules' axes."""
+    turned = rotate(pose.orientations[:, None, :], figure.capsules)
+    return pose.positions[:, None, :] + turned

@@ -11,7 +11,7 @@ bends and twist, for a relative angular velocity ω,
 
     ∂(θ n)/∂ω = n nᵀ + θ cot θ e eᵀ − θ e y₀ᵀ,      ∂(twist)/∂ω = y₀ + tan(θ/2) e
 
-all in the bone's axes at rest. Each end of a range that is near is one row (``problem.Stops``).
+all in the bone's axes at rest. Each end of a range that is near is one row (``joint_stops.Stops``).
 """
 
 from __future__ import annotations

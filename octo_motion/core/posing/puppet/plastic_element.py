@@ -24,10 +24,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rotations import Floats
-from .figure import Elements
+from .figure import Elements, Flags, Integers
 
 _TINY = 1e-300
 _ONES = np.ones(3)
@@ -46,7 +45,7 @@ class ElementResponse:
     """(…, 3) λ_e, what it would be without flow."""
     size: Floats
     """(…) |λ_e|; of no account where nothing flows."""
-    flows: NDArray[np.bool_] | None
+    flows: Flags | None
     """(…) where the series damper moves; None where all hold, and the load is linear in w."""
 
     @property
@@ -72,7 +71,7 @@ class ElementResponse:
             law.diagonal,
         )
 
-    def _slope_alike(self, flows: NDArray[np.bool_]) -> Floats:
+    def _slope_alike(self, flows: Flags) -> Floats:
         """The same for elements whose axes are alike, worked out only for those that flow."""
         law = self.law
         which = flows.nonzero()[0]
@@ -87,7 +86,7 @@ class ElementResponse:
         slope[which] = blocks
         return slope
 
-    def flow_of(self, which: NDArray[np.int64]) -> Floats:
+    def flow_of(self, which: Integers) -> Floats:
         """(which, 3) w_d, rad/s, of those elements, of which each flows."""
         law = self.law
         size = self.size.take(which)

@@ -2,7 +2,7 @@
 """What moves a puppet: one step of a rigid-body world with plastic joints and contacts."""
 
 from .blas_threads import OneThread
-from .hand_spring import Coupling, HandSpring
+from .holds import Coupling, HandSpring
 from .obstacle_shapes import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from .world import World, WorldSettings, WorldState
 

@@ -8,15 +8,13 @@ would add to its energy.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rotations import Floats, normalized, small_batches
-from ..puppet import Figure, Pose
-from .state import BodiesState
+from ..puppet import Figure, Flags, Integers, Pose
 from .tree import Tree
-
-Integers = NDArray[np.int64]
 
 
 class Bodies:
@@ -27,7 +25,7 @@ class Bodies:
         count = len(figure)
         self._figure = figure
         self._tree = tree
-        self.is_root: NDArray[np.bool_] = tree.parents < 0
+        self.is_root: Flags = tree.parents < 0
         """(bodies,)"""
         self.parent_or_self = np.where(self.is_root, np.arange(count), tree.parents)
         """(bodies,) the parent, of a root itself."""
@@ -104,16 +102,14 @@ class Bodies:
 
     # How they move
 
-    def state(self) -> BodiesState:
-        """All that changes from step to step."""
-        parts = (self.roots, self.orientations, self.rest, self.linear, self.angular, self.spin)
-        return BodiesState(*(each.copy() for each in parts))
+    def state(self) -> dict[str, Floats]:
+        """All that changes from step to step, as copies."""
+        return {name: getattr(self, name).copy() for name in _CHANGING}
 
-    def restore(self, state: BodiesState) -> None:
+    def restore(self, state: Mapping[str, Floats]) -> None:
         """Go back to what was."""
-        self.roots, self.orientations = state.roots.copy(), state.orientations.copy()
-        self.rest, self.spin = state.rest.copy(), state.spin.copy()
-        self.linear, self.angular = state.linear.copy(), state.angular.copy()
+        for name in _CHANGING:
+            setattr(self, name, state[name].copy())
         self.refresh()
 
     def stop(self) -> None:
@@ -163,6 +159,7 @@ class Bodies:
         self.refresh()
 
 
+_CHANGING = ("roots", "orientations", "rest", "linear", "angular", "spin")
 _ONES = np.ones(3)
 _FOUR_ONES = np.ones(4)
 _UNIT = np.eye(3)

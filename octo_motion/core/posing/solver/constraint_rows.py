@@ -26,13 +26,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rotations import Floats
 from ...rotations.small_batches import skew
+from ..puppet import Flags, Integers
 from .contact_detection import Contacts
-
-Integers = NDArray[np.int64]
 
 _GAIN = 10.0
 """a in masses of the body: a contact settles within a step, as from a push against a wall."""
@@ -52,7 +50,7 @@ class Holds:
     """(holds,)"""
     points: Floats
     """(holds, 3) world; of no account where a turn is held."""
-    turns: NDArray[np.bool_]
+    turns: Flags
     """(holds,) whether the row holds the body's turn, not a point."""
     gains: Floats
     """(holds,) a: N·s per m/s, or N·m·s per rad/s."""
@@ -68,7 +66,6 @@ class Holds:
         return len(self.bodies)
 
 
-Flags = NDArray[np.bool_]
 _Touch = tuple[Flags, Flags | None, Floats, Floats, Floats | Flags]
 
 
@@ -382,11 +379,6 @@ class Rows:
         planes = ways @ ways.transpose(0, 2, 1)
         planes += answer.sticks[:, None, None] * _UNIT
         return planes
-
-    @property
-    def weighted(self) -> Floats:
-        """(rows, 3, 6) what a row gives less for a spatial velocity: a times ``reach``."""
-        return self.reach * self.pattern.gains[:, None, None]
 
     def corrections(self, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.

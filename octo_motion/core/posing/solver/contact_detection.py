@@ -8,17 +8,15 @@ nearest one to the obstacle, found on samples no further apart than the radius a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from operator import attrgetter
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rotations import Floats, cross, rotate, to_matrix
-from ..puppet import Figure, rest_pose
+from ..puppet import Figure, Flags, Integers, capsules_in_world, rest_pose
 from .obstacle_shapes import Obstacle, Plane
-
-Integers = NDArray[np.int64]
 
 _MOST_SAMPLES: Final = 9
 _MOST_KEPT: Final = 1024
@@ -51,15 +49,11 @@ class Contacts:
         return len(self.bodies)
 
 
+_NOBODY: Final = np.zeros(0, np.int64)
+_NO_ROWS: Final = np.zeros((0, 3))
+_NO_ONES: Final = np.zeros(0)
 _NONE: Final = Contacts(
-    np.zeros(0, np.int64),
-    np.zeros(0, np.int64),
-    np.zeros((0, 3)),
-    np.zeros((0, 3)),
-    np.zeros(0),
-    np.zeros((0, 3)),
-    np.zeros(0),
-    np.zeros(0, np.int64),
+    *(_NOBODY, _NOBODY, _NO_ROWS, _NO_ROWS, _NO_ONES, _NO_ROWS, _NO_ONES, _NOBODY)
 )
 
 
@@ -76,7 +70,7 @@ class _Touched:
     """First label, and which ends were near."""
     found: Contacts | None = None
     """Their contacts, of which places and gaps are old."""
-    inward: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    inward: Floats = field(default_factory=_NO_ROWS.copy)
     """(contacts, 3) from the surface to the end's middle."""
 
 
@@ -348,7 +342,7 @@ def _middle(shares: Floats, distances: Floats, slack: Floats) -> Floats:
     return (shares * least).sum(axis=1) / least.sum(axis=1)
 
 
-def _separate_ends(figure: Figure) -> NDArray[np.bool_]:
+def _separate_ends(figure: Figure) -> Flags:
     """(bodies, 2) which end spheres can touch first: none that lies within a neighbour's."""
     keep = np.ones((len(figure), 2), dtype=bool)
     for body, parent in enumerate(figure.parents):
@@ -366,7 +360,7 @@ def _separate_ends(figure: Figure) -> NDArray[np.bool_]:
     return keep
 
 
-def _pairs(figure: Figure) -> NDArray[np.bool_]:
+def _pairs(figure: Figure) -> Flags:
     """(bodies, bodies) which capsules may collide: no neighbours, none that overlap at rest."""
     count = len(figure)
     parents = np.array(figure.parents)
@@ -375,7 +369,7 @@ def _pairs(figure: Figure) -> NDArray[np.bool_]:
         if parent >= 0:
             allowed[parent, body] = False
             allowed[np.ix_([body], np.flatnonzero(parents == parent))] = False
-    ends = rest_ends(figure)
+    ends = capsules_in_world(figure, rest_pose(figure))
     first, second = np.nonzero(allowed)
     if len(first):
         a, b = nearest_on_segments(ends[first], ends[second])
@@ -385,10 +379,7 @@ def _pairs(figure: Figure) -> NDArray[np.bool_]:
     return allowed
 
 
-def rest_ends(figure: Figure) -> Floats:
-    """(bodies, 2, 3) ends of the capsules' axes in the rest pose, from the first root's joint."""
-    pose = rest_pose(figure)
-    return pose.positions[:, None] + rotate(pose.orientations[:, None], figure.capsules)
+_columns: Final = attrgetter(*(each.name for each in fields(Contacts)))
 
 
 def _joined(found: list[Contacts]) -> Contacts:
@@ -396,16 +387,7 @@ def _joined(found: list[Contacts]) -> Contacts:
         return _NONE
     if len(found) == 1:
         return found[0]
-    return Contacts(
-        np.concatenate([each.bodies for each in found]),
-        np.concatenate([each.others for each in found]),
-        np.concatenate([each.points for each in found]),
-        np.concatenate([each.normals for each in found]),
-        np.concatenate([each.gaps for each in found]),
-        np.concatenate([each.speeds for each in found]),
-        np.concatenate([each.friction for each in found]),
-        np.concatenate([each.labels for each in found]),
-    )
+    return Contacts(*(np.concatenate(column) for column in zip(*map(_columns, found), strict=True)))
 
 
 _AROUND: Final = np.linspace(-1.0, 1.0, 7)

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ...rotations import Floats, small_batches
-from ..puppet import _ONES, Figure, bends, slopes
-from .problem import Stops
+from ..puppet import Figure, Integers, bends, slopes
 
+_ONES = np.ones(3)
 _ENDLESS = np.pi - 1e-9
 
 _NEAR = 0.1
@@ -22,6 +24,28 @@ _OPEN = 5e-4
 """cos² of half the swing; a bone that points backwards has no way to say which way it is bent."""
 
 
+@dataclass(frozen=True, eq=False)
+class Stops:
+    """Ends of joints' ranges that are near: one row each, ``axis · w ≥ −rate``.
+
+    The impulse about the axis is max(0, −a (axis·w + rate)).
+    """
+
+    joints: Integers
+    """(stops,) bodies."""
+    axes: Floats
+    """(stops, 3) world, unit: the turn that leads back."""
+    rates: Floats
+    """(stops,) rad/s, gap/h: how fast the joint may turn towards the end; a little below zero
+    where it is beyond."""
+    gains: Floats
+    """(stops,) a, N·m·s per rad/s."""
+    spread: Floats
+    """(bodies, stops) 1 where the stop is the joint's: sums what a joint's stops do."""
+    labels: Integers
+    """(stops,) the same number for the same end of the same joint in every step."""
+
+
 class JointStops:
     """The joints of a figure that have limits, and the rows that hold them."""
 
@@ -32,7 +56,7 @@ class JointStops:
             figure: the puppet; limits of roots count for nothing.
             gains: (bodies,) a of a row at each joint, N·m·s per rad/s.
         """
-        ranges = np.array(figure.limits.ranges, dtype=np.float64)
+        ranges = np.array(figure.limits, dtype=np.float64)
         least = np.where(ranges[..., 0] <= -_ENDLESS, -np.inf, ranges[..., 0])
         most = np.where(ranges[..., 1] >= _ENDLESS, np.inf, ranges[..., 1])
         limited = np.isfinite(least).any(axis=1) | np.isfinite(most).any(axis=1)

@@ -29,27 +29,38 @@ import numpy as np
 from ...rotations import Floats
 from ..puppet import ElementResponse
 from .constraint_rows import Flags, Pattern, RowImpulses, Rows, Tangent
-from .problem import SPATIAL, Problem, Stops
+from .joint_stops import Stops
+from .problem import SPATIAL, Problem
 from .tree import Tree
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
-    """Velocities and impulses after a step."""
+class Point:
+    """Velocities, and what all laws do there."""
 
     speeds: Floats
     """(slots, 3) u."""
     velocities: Floats
     """(bodies, 6) V."""
-    moving: Floats | None
-    """(slots, 3) u with which positions move, with corrections that are not kept; None where there
-    are none."""
+    joint_speeds: Floats
+    """(bodies, 3) relative angular velocities, world axes."""
+    joint_impulses: Floats
+    """(bodies, 3) of elements and stops, world axes."""
     response: ElementResponse
     """Loads and flow of the elements, in the problem's axes."""
     pressed: Flags | None
     """(stops,) which ends of ranges bear; None where none is near."""
     rows: RowImpulses | None
     """What the rows do; None where there are none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution(Point):
+    """Velocities and impulses after a step."""
+
+    moving: Floats | None
+    """(slots, 3) u with which positions move, with corrections that are not kept; None where there
+    are none."""
     iterations: int
     """Linear systems solved."""
     miss: float
@@ -73,23 +84,6 @@ class Start:
     """What the elements did then; None where none flowed, and then it begins as if none will."""
     pressed: Flags | None = None
     """(stops,) which ends of ranges bore; None begins with what they do at ``speeds``."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """Velocities, and what all laws do there."""
-
-    speeds: Floats
-    """(slots, 3) u."""
-    velocities: Floats
-    """(bodies, 6)"""
-    joint_speeds: Floats
-    """(bodies, 3) relative angular velocities, world axes."""
-    joint_impulses: Floats
-    """(bodies, 3) of elements and stops, world axes."""
-    response: ElementResponse
-    pressed: Flags | None
-    rows: RowImpulses | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,19 +155,11 @@ class Newton:
             elif miss <= self._tolerance:
                 break
             tangents = self._tangents(problem, end)
-        return Solution(
-            end.speeds,
-            end.velocities,
-            # Added to what was settled on, which need not be where the last system led.
-            None if shift is None else end.speeds + shift,
-            end.response,
-            end.pressed,
-            end.rows,
-            count,
-            miss,
-        )
+        # The shift is added to what was settled on, which need not be where the last system led.
+        moving = None if shift is None else end.speeds + shift
+        return Solution(**vars(end), moving=moving, iterations=count, miss=miss)
 
-    def _begin(self, problem: Problem, start: Start) -> tuple[_Point | None, _Tangents]:
+    def _begin(self, problem: Problem, start: Start) -> tuple[Point | None, _Tangents]:
         """The first tangents, and the velocities where they touch if all do at the same."""
         if start.rows is None and len(problem.rows.bodies):
             point = self._at(problem, start.speeds)
@@ -193,13 +179,13 @@ class Newton:
         speeds = (self._base - response.trial) * law.mobility
         return None, self._bent(problem, response, speeds, pressed, rows)
 
-    def _follow(self, problem: Problem, point: _Point) -> bool:
+    def _follow(self, problem: Problem, point: Point) -> bool:
         rows = problem.rows
         if point.rows is None or (point.rows.slips is None and not rows.followed):
             return False
         return rows.follow(rows.slip(point.rows), problem.blow)
 
-    def _at(self, problem: Problem, speeds: Floats) -> _Point:
+    def _at(self, problem: Problem, speeds: Floats) -> Point:
         """All laws at u (slots, 3)."""
         tree = self._tree
         velocities = tree.velocities(speeds)
@@ -207,7 +193,7 @@ class Newton:
         response, impulses, pressed = self._joints(problem, joint_speeds)
         rows = problem.rows
         answer = rows.respond(rows.wanted(velocities)) if len(rows.bodies) else None
-        return _Point(speeds, velocities, joint_speeds, impulses, response, pressed, answer)
+        return Point(speeds, velocities, joint_speeds, impulses, response, pressed, answer)
 
     def _elements(self, problem: Problem, speeds: Floats) -> tuple[ElementResponse, Floats]:
         """Elements, and their impulses (bodies, 3), at relative turns of joints (bodies, 3)."""
@@ -233,7 +219,7 @@ class Newton:
             impulses += stops.spread @ (np.maximum(push, 0.0)[:, None] * stops.axes)
         return response, impulses, pressed
 
-    def _tangents(self, problem: Problem, point: _Point) -> _Tangents:
+    def _tangents(self, problem: Problem, point: Point) -> _Tangents:
         """All laws as planes that touch them at a point."""
         rows = None if point.rows is None else problem.rows.tangent(point.rows)
         if point.response.flows is None and problem.frames is None:
@@ -330,11 +316,11 @@ class Newton:
     def _lowest(
         self,
         problem: Problem,
-        start: _Point,
-        end: _Point,
+        start: Point,
+        end: Point,
         joints: Floats,
         rows: Floats | None,
-    ) -> _Point:
+    ) -> Point:
         """The lowest point of the convex function between two, or a little before the end.
 
         Along the way d its slope is d·SᵀMS(u − u*) − Σ p·dw. At the end the first part is what
@@ -351,7 +337,7 @@ class Newton:
             row_way = (start.rows.wanted - end.rows.wanted) / problem.rows.pattern.column
             pull += float((rows * row_way).sum())
 
-        def slope(at: _Point, share: float) -> float:
+        def slope(at: Point, share: float) -> float:
             value = pull - (1.0 - share) * mass - float((at.joint_impulses * joint_way).sum())
             if at.rows is not None:
                 value -= float((at.rows.impulses * row_way).sum())
@@ -375,7 +361,7 @@ class Newton:
                 low, at_low = share, value
         return best
 
-    def _between(self, problem: Problem, start: _Point, end: _Point, share: float) -> _Point:
+    def _between(self, problem: Problem, start: Point, end: Point, share: float) -> Point:
         """All laws on the way from one point to another, where velocities need no products."""
         joint_speeds = start.joint_speeds + share * (end.joint_speeds - start.joint_speeds)
         response, impulses, pressed = self._joints(problem, joint_speeds)
@@ -383,7 +369,7 @@ class Newton:
         if start.rows is not None and end.rows is not None:
             wanted = start.rows.wanted + share * (end.rows.wanted - start.rows.wanted)
             answer = problem.rows.respond(wanted)
-        return _Point(
+        return Point(
             start.speeds + share * (end.speeds - start.speeds),
             start.velocities + share * (end.velocities - start.velocities),
             joint_speeds,
@@ -403,7 +389,7 @@ def _with_columns(count: int) -> Floats:
 def _lowered(rows: Rows, planes: Tangent, corrections: Floats | None, columns: int) -> Floats:
     """(rows, 3, 6 + columns) P a X, and P y₀ with what is left at rest: the rows' tangents."""
     whole = np.empty((len(rows.bodies), 3, 6 + columns))
-    whole[:, :, :6] = rows.weighted
+    np.multiply(rows.reach, rows.pattern.gains[:, None, None], out=whole[:, :, :6])
     whole[:, :, 6] = rows.asked
     if corrections is not None:
         np.add(rows.asked, rows.pattern.column * corrections, out=whole[:, :, 7])
@@ -438,7 +424,7 @@ def _planes(
     return _Tangents(slopes, right, linear and pressed is None, rows)
 
 
-def _predicted(tangents: _Tangents, end: _Point) -> tuple[Floats, Floats | None]:
+def _predicted(tangents: _Tangents, end: Point) -> tuple[Floats, Floats | None]:
     """Impulses at the end by the tangents: joints (bodies, 3), rows (rows, 3)."""
     joints, rows = end.joint_impulses, None
     if not (tangents.linear and end.response.flows is None):
@@ -451,7 +437,7 @@ def _predicted(tangents: _Tangents, end: _Point) -> tuple[Floats, Floats | None]
     return joints, rows
 
 
-def _miss(end: _Point, joints: Floats, rows: Floats | None) -> float:
+def _miss(end: Point, joints: Floats, rows: Floats | None) -> float:
     miss = 0.0
     right = end.joint_impulses
     if joints is not right:

@@ -11,18 +11,16 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import SettingsError
 from ...rotations import IDENTITY, Floats, cross, normalized
+from ..puppet import Integers
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _TINY: Final = 1e-12
 _MOST_CELLS: Final = 100_000
 _MOST_EACH: Final = 64
 """In so many cells, and so many for each triangle, the triangles of a mesh may lie."""
-
-Integers = NDArray[np.int64]
 
 
 def _origin() -> Floats:
@@ -129,20 +127,40 @@ class Box(Obstacle):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Hull(Obstacle):
-    """A convex body within triangles that are turned outwards (Blender makes them)."""
+class _Triangles(Obstacle):
+    """What is bounded by triangles; those without an area are left out."""
 
     corners: Floats
     """(triangles, 3 corners, 3) in its own frame."""
     _normals: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        corners, normals = _checked(self.corners)
+        given = np.asarray(self.corners, dtype=np.float64).reshape(-1, 3, 3)
+        normals = cross(given[:, 1] - given[:, 0], given[:, 2] - given[:, 0])
+        flat = (normals * normals).sum(axis=-1) <= _TINY**2
+        if flat.all():
+            raise SettingsError(
+                "An obstacle has no faces.", "Mark objects whose mesh has faces, or none of them."
+            )
+        object.__setattr__(self, "corners", given[~flat])
+        object.__setattr__(self, "_normals", normalized(normals[~flat]))
+
+    @property
+    def bounds(self) -> Floats:
+        flat = self.corners.reshape(-1, 3)
+        return np.stack([flat.min(axis=0), flat.max(axis=0)])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Hull(_Triangles):
+    """A convex body within triangles that are turned outwards (Blender makes them)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         # Whichever way they were given: outwards is away from the middle.
-        middle = corners.reshape(-1, 3).mean(axis=0)
-        inward = ((corners[:, 0] - middle) * normals).sum(axis=-1) < 0.0
-        object.__setattr__(self, "corners", corners)
-        object.__setattr__(self, "_normals", np.where(inward[:, None], -normals, normals))
+        middle = self.corners.reshape(-1, 3).mean(axis=0)
+        inward = ((self.corners[:, 0] - middle) * self._normals).sum(axis=-1) < 0.0
+        self._normals[inward] *= -1.0
 
     def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:  # noqa: ARG002
         shape = points.shape[:-1]
@@ -166,29 +184,19 @@ class Hull(Obstacle):
             )
         return depth.reshape(shape), normal.reshape(points.shape)
 
-    @property
-    def bounds(self) -> Floats:
-        flat = self.corners.reshape(-1, 3)
-        return np.stack([flat.min(axis=0), flat.max(axis=0)])
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Mesh(Obstacle):
+class Mesh(_Triangles):
     """A surface of triangles: solid behind their faces, down to ``thickness``."""
 
-    corners: Floats
-    """(triangles, 3 corners, 3) in its own frame."""
     thickness: float = 0.0
     """How deep a point may sink and still be pushed back out of the front; 0 takes the size of
     the triangles."""
-    _normals: Floats = field(init=False, repr=False)
     _grid: TriangleGrid = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        corners, normals = _checked(self.corners)
-        grid = TriangleGrid(corners)
-        object.__setattr__(self, "corners", corners)
-        object.__setattr__(self, "_normals", normals)
+        super().__post_init__()
+        grid = TriangleGrid(self.corners)
         object.__setattr__(self, "_grid", grid)
         if self.thickness <= 0.0:
             object.__setattr__(self, "thickness", grid.usual)
@@ -225,11 +233,6 @@ class Mesh(Obstacle):
             # Further behind than the thickness: it is on the other side, or inside, and left be.
             distances[distances < -self.thickness] = np.inf
         return distances.reshape(shape), normals.reshape(points.shape)
-
-    @property
-    def bounds(self) -> Floats:
-        flat = self.corners.reshape(-1, 3)
-        return np.stack([flat.min(axis=0), flat.max(axis=0)])
 
 
 class TriangleGrid:
@@ -325,15 +328,3 @@ def _from_core(away: Floats, radius: float) -> tuple[Floats, Floats]:
     length = np.sqrt((away * away).sum(axis=-1))
     out = np.where((length > _TINY)[..., None], away / (length + _TINY)[..., None], _UP)
     return length - radius, out
-
-
-def _checked(corners: Floats) -> tuple[Floats, Floats]:
-    """Triangles that have an area, and their normals."""
-    given = np.asarray(corners, dtype=np.float64).reshape(-1, 3, 3)
-    normal = cross(given[:, 1] - given[:, 0], given[:, 2] - given[:, 0])
-    flat = (normal * normal).sum(axis=-1) <= _TINY**2
-    if flat.all():
-        raise SettingsError(
-            "An obstacle has no faces.", "Mark objects whose mesh has faces, or none of them."
-        )
-    return given[~flat], normalized(normal[~flat])

@@ -10,35 +10,15 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rotations import Floats
-from ..puppet import PlasticLaw
+from ...rotations.scalars import Vector
+from ...rotations.small_batches import skew
+from ..puppet import Figure, PlasticLaw
+from .bodies import Bodies
 from .constraint_rows import Rows
-
-Integers = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Stops:
-    """Ends of joints' ranges that are near: one row each, ``axis · w ≥ −rate``.
-
-    The impulse about the axis is max(0, −a (axis·w + rate)).
-    """
-
-    joints: Integers
-    """(stops,) bodies."""
-    axes: Floats
-    """(stops, 3) world, unit: the turn that leads back."""
-    rates: Floats
-    """(stops,) rad/s, gap/h: how fast the joint may turn towards the end; a little below zero
-    where it is beyond."""
-    gains: Floats
-    """(stops,) a, N·m·s per rad/s."""
-    spread: Floats
-    """(bodies, stops) 1 where the stop is the joint's: sums what a joint's stops do."""
-    labels: Integers
-    """(stops,) the same number for the same end of the same joint in every step."""
+from .joint_stops import JointStops, Stops
+from .tree import Tree
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,3 +94,109 @@ def _spatial_map() -> Floats:
 
 SPATIAL: Final = _spatial_map()
 """(16, 36) from ``moments`` to spatial inertias, entry by entry."""
+
+
+# --- How it is put together -----------------------------------------------------------------------
+
+
+_STOP_GAIN = 1e3
+_BLOW = 50.0
+"""m/s²: a change of speed in a step that only a blow makes."""
+
+
+class Gathering:
+    """Puts together the problems of one figure; what hangs on it alone is worked out once."""
+
+    def __init__(
+        self, figure: Figure, tree: Tree, step: float, gravity: Vector, drag: float
+    ) -> None:
+        count = len(figure)
+        self._figure = figure
+        self._tree = tree
+        self._step = step
+        self._kept = 1.0 / (1.0 + step * drag)
+        self._masses = np.tile(figure.masses[:, None], 3)
+        self._lightness = 1.0 / self._masses
+        self._moments = moments(figure.masses, figure.centres, figure.inertias)
+        # (bodies, 6) h m g.
+        self._weight = np.zeros((count, 6))
+        self._weight[:, 3:] = step * self._masses * np.array(gravity, dtype=np.float64)
+        self._stops = JointStops(figure, _STOP_GAIN * carried_inertias(figure))
+
+    def problem(
+        self, bodies: Bodies, law: PlasticLaw, forces: Floats, rows: Rows, speeds: Floats
+    ) -> Problem:
+        """The question of the coming step.
+
+        Args:
+            bodies: as they are now; their matrices get their places from the origin.
+            law: of the elements.
+            forces: (bodies, 6) N and N·m from outside.
+            rows: contacts and holds, from the same origin: the first root's joint.
+            speeds: (slots, 3) with which joints turn now.
+        """
+        h = self._step
+        joints = bodies.positions - bodies.roots[0]
+        bodies.transforms[:, :3, 3] = joints
+        bodies.transposed[:, 3, :3] = joints
+        spread = bodies.transforms @ self._moments @ bodies.transposed
+        centres = spread[:, :3, 3] * self._lightness
+        skewed = skew(centres)
+        # M v + h f, with the angular momentum that each body kept.
+        momenta = self._weight.copy()
+        linear = momenta[:, 3:]
+        linear += self._masses * bodies.linear
+        if forces.any():
+            linear += h * forces[:, :3]
+            momenta[:, :3] = h * forces[:, 3:]
+        momenta[:, :3] += (skewed @ linear[:, :, None])[:, :, 0]
+        momenta[:, :3] += bodies.kept_spin()
+        if self._kept < 1.0:
+            momenta *= self._kept
+        if law.alike:
+            springs, axes = bodies.springs_in_world(), None
+        else:
+            springs, axes = bodies.springs(), bodies.parent_matrices
+        stops = ()
+        if len(self._stops.joints):
+            turning = speeds[self._tree.joint_slot]
+            stops = self._stops.near(bodies.turns(), bodies.parent_matrices, turning, h)
+        return Problem(
+            h,
+            joints,
+            centres,
+            skewed,
+            self._figure.masses,
+            spread.reshape(-1, 16),
+            momenta,
+            law,
+            springs,
+            axes,
+            stops,
+            rows,
+            _BLOW * h,
+        )
+
+
+def carried_inertias(figure: Figure) -> Floats:
+    """(bodies,) kg·m²: about each joint, of all that hangs on it when stretched out."""
+    count = len(figure)
+    result = np.zeros(count)
+    masses = figure.masses.copy()
+    for body in range(count - 1, -1, -1):
+        own = np.trace(figure.inertias[body]) + figure.masses[body] * float(
+            figure.centres[body] @ figure.centres[body]
+        )
+        result[body] += own
+        parent = figure.parents[body]
+        if parent >= 0:
+            arm = float(np.linalg.norm(figure.anchors[body]))
+            masses[parent] += masses[body]
+            result[parent] += result[body] + masses[body] * arm * arm
+    return result
+
+
+def typical_size(figure: Figure) -> float:
+    """Of a bone, metres."""
+    lengths = figure.lengths[figure.lengths > 0.0]
+    return float(np.median(lengths)) if len(lengths) else float(np.max(figure.radii, initial=1e-3))

@@ -27,13 +27,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rotations import Floats
 from ...rotations.small_batches import skew
-from ..puppet import Figure
-
-Integers = NDArray[np.int64]
+from ..puppet import Figure, Flags, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +44,7 @@ class Layout:
     width: int
     bodies: Integers
     """(slots,) the body whose joint (or root shift) a slot is; −1 for an empty one."""
-    shifts: NDArray[np.bool_]
+    shifts: Flags
     """(slots,) whether it is the shift of a root."""
 
 
@@ -94,7 +91,7 @@ class Tree:
         self._fixed = self.motion[:, :, 3:].copy()
         self._prepare_blocks(filled)
 
-    def _prepare_blocks(self, filled: NDArray[np.bool_]) -> None:
+    def _prepare_blocks(self, filled: Flags) -> None:
         layout = self.layout
         trunk, branches, width = layout.trunk, layout.branches, layout.width
         slots = len(layout.bodies)

@@ -3,18 +3,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import NDArray
 
 from ...rotations import Floats
-from ..puppet import ElementResponse, PlasticLaw
+from ..puppet import ElementResponse, Flags, Integers, PlasticLaw
 from .bodies import Bodies
 from .constraint_rows import RowImpulses, Rows
 from .contact_detection import Contacts
 from .newton import Solution, Start
 from .problem import Problem
-from .state import StartState
 from .tree import Tree
+
+
+@dataclass(frozen=True, eq=False)
+class WarmStartState:
+    """Where the solver begins, to come back to."""
+
+    speeds: Floats
+    """(slots, 3)"""
+    trial: Floats | None
+    """(bodies, 3) load that the elements would have borne without flow, N·m, in the problem's axes;
+    None where none flowed."""
+    pressed: Integers
+    """Labels of the ends of joints' ranges that bore."""
+    contacts: tuple[Integers, Floats, Floats, Floats]
+    """See ``ContactMemory``."""
 
 
 class WarmStart:
@@ -71,26 +86,16 @@ class WarmStart:
             self._pressed = problem.stops[0].labels[solution.pressed]
         self.contacts.keep(problem.rows, solution.rows, most)
 
-    def state(self) -> StartState:
-        """All of it."""
-        contacts = self.contacts
-        return StartState(
-            self.speeds.copy(),
-            _NO_ROWS if self._response is None else self._response.trial.copy(),
-            self._pressed.copy(),
-            contacts.grips.copy(),
-            contacts.wanted.copy(),
-            contacts.slips.copy(),
-            contacts.labels.copy(),
-        )
+    def state(self) -> WarmStartState:
+        """All of it. No array of these is changed later: each step makes its own."""
+        trial = None if self._response is None else self._response.trial
+        return WarmStartState(self.speeds, trial, self._pressed, self.contacts.state())
 
-    def restore(self, state: StartState, law: PlasticLaw) -> None:
+    def restore(self, state: WarmStartState, law: PlasticLaw) -> None:
         """Go back to what was."""
-        self.speeds, self._pressed = state.speeds.copy(), state.pressed.copy()
-        self._response = law.answer(state.trial.copy()) if len(state.trial) else None
-        self.contacts.set(
-            state.labels.copy(), state.grips.copy(), state.wanted.copy(), state.slips.copy()
-        )
+        self.speeds, self._pressed = state.speeds, state.pressed
+        self._response = None if state.trial is None else law.answer(state.trial)
+        self.contacts.set(*state.contacts)
 
 
 class ContactMemory:
@@ -103,7 +108,7 @@ class ContactMemory:
         """Begin anew."""
         self.set(np.zeros(0, np.int64), _NO_ROWS, _NO_ROWS, _NO_ONES)
 
-    def set(self, labels: NDArray[np.int64], grips: Floats, wanted: Floats, slips: Floats) -> None:
+    def set(self, labels: Integers, grips: Floats, wanted: Floats, slips: Floats) -> None:
         """Take over what a snapshot has."""
         self.labels = labels
         self._key = labels.tobytes()
@@ -115,6 +120,10 @@ class ContactMemory:
         """(contacts,) μ |w_t| at its end, m/s; none where it is not known, or nothing slipped."""
         self._answer: RowImpulses | None = None
         self._normals: Floats | None = None
+
+    def state(self) -> tuple[Integers, Floats, Floats, Floats]:
+        """What ``set`` takes over."""
+        return self.labels, self.grips, self.wanted, self.slips
 
     def grips_of(self, contacts: Contacts) -> Floats | None:
         """(contacts, 3) b of these contacts, zero for those that are new; None where all are."""
@@ -145,7 +154,7 @@ class ContactMemory:
             there[:count] = np.where(same, self.wanted.take(found, 0), there[:count])
         return rows.respond(there)
 
-    def _places(self, contacts: Contacts) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def _places(self, contacts: Contacts) -> tuple[Integers, Flags]:
         """Where contacts are in what is remembered, and (contacts, 1) whether they are there."""
         order = self.labels.argsort()
         ordered = self.labels.take(order)

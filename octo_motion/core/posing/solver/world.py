@@ -16,31 +16,66 @@ moving obstacles bring in.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...rotations import Floats, conjugate, multiply, normalized, rotate
-from ..puppet import Elements, Figure, PlasticLaw, Pose
-from .assembly import Gathering, typical_size
+from ...errors import SettingsError
+from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rotate
+from ..puppet import Elements, Figure, Integers, PlasticLaw, Pose
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
 from .contact_detection import Contacts, Detector
-from .hand_spring import Coupling, HandSpring
-from .holds import Holding, Pin
+from .holds import Coupling, HandSpring, Holding, Pin
 from .newton import Newton, Solution, Start
 from .obstacle_shapes import Obstacle
-from .problem import Problem
-from .state import WorldSettings, WorldState
+from .problem import Gathering, Problem, typical_size
 from .tree import Tree
-from .warm_start import WarmStart
-
-__all__ = ["World", "WorldSettings", "WorldState"]
-
-Integers = NDArray[np.int64]
+from .warm_start import WarmStart, WarmStartState
 
 _WEIGHT = 9.81
+
+
+@dataclass(frozen=True)
+class WorldSettings:
+    """What holds for the whole simulation."""
+
+    step: float = 1e-3
+    """h, seconds."""
+    gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """m/s²; off by default, a puppet is posed more easily without weight."""
+    self_collision: bool = False
+    """Whether limbs that are no neighbours push each other away."""
+    friction: float = 0.6
+    """Coulomb's coefficient where an obstacle has none of its own."""
+    drag: float = 0.0
+    """1/s: how fast all motion dies away, as under water; calms a free puppet without weight."""
+    tolerance: float = 1e-3
+    """Error of an impulse, against the largest, with which the solver is content. Where contacts
+    neither slip nor open, and in all joints that hold, its answer is exact whatever this says."""
+    iterations: int = 12
+    """Most linear systems solved in a step; after that the best answer so far is taken."""
+
+    def check(self, figure: Figure) -> None:
+        """See whether a figure can be simulated so.
+
+        Raises:
+            SettingsError: a setting that makes no sense, or a figure without bodies.
+        """
+        if not len(figure):
+            raise SettingsError("The figure has no bodies.", "Choose an armature with bones.")
+        if not (np.isfinite(self.step) and self.step > 0.0):
+            raise SettingsError(
+                "The step of the simulation is not positive.", "Take 0.001 seconds, for example."
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class WorldState:
+    """All that a simulation remembers from step to step; holds are not part of it."""
+
+    bodies: dict[str, Floats]
+    start: WarmStartState
 
 
 class World:
@@ -64,7 +99,6 @@ class World:
         self.forces: Floats = np.zeros((len(figure), 6))
         """(bodies, 6) force N at the centre of mass and torque N·m, world axes, from outside. Kept
         until changed."""
-        self.time = 0.0
         self.last: Solution | None = None
         """The solver's answer in the last step."""
         self.contacts: Contacts | None = None
@@ -79,8 +113,6 @@ class World:
         self._warm = WarmStart(self._tree)
         self._loads = np.zeros((len(figure), 3))
         self._use(settings)
-        for body in sorted(settings.pinned):
-            self.pin(body)
 
     def _use(self, settings: WorldSettings) -> None:
         """All that hangs on the settings; what moves stays as it is."""
@@ -94,7 +126,9 @@ class World:
         )
         # A blow is not held on to: no more than twice the figure's weight on a point.
         self._firmest = 2.0 * _WEIGHT * settings.step * mass
-        self._gathering = Gathering(figure, self._tree, settings)
+        self._gathering = Gathering(
+            figure, self._tree, settings.step, settings.gravity, settings.drag
+        )
         self._holding = Holding(mass, self._size, settings.step)
         self._pattern: Pattern | None = None
         self._use_elements()
@@ -204,12 +238,12 @@ class World:
         Args:
             body: its index.
             point: (3,) where, world; it need not lie on the surface.
-            orientation: (4,) of the hand now, if its turns are to count; those of later targets
-                are seen against it. None takes the body's own, so that targets are the body's.
+            orientation: (4,) of the hand, world, where it keeps the body from turning from the
+                start; else it does so once it has turned, and its turns count from here.
             coupling: how firmly; one for this figure by default.
         """
         own = self._bodies.orientations[body]
-        hand = own if orientation is None else normalized(orientation)
+        hand = IDENTITY if orientation is None else normalized(orientation)
         at = np.array(point, dtype=np.float64)
         spring = HandSpring(
             body,
@@ -217,7 +251,7 @@ class World:
             rotate(conjugate(own), at - self._bodies.positions[body]),
             multiply(conjugate(hand), own),
             at,
-            None if orientation is None else np.array(hand),
+            None if orientation is None else hand,
         )
         self._springs.append(spring)
         return spring
@@ -240,11 +274,10 @@ class World:
 
     def state(self) -> WorldState:
         """A snapshot for ``restore``. Pins and grabs are the caller's and not part of it."""
-        return WorldState(self.time, self._bodies.state(), self._warm.state())
+        return WorldState(self._bodies.state(), self._warm.state())
 
     def restore(self, state: WorldState) -> None:
         """Go back to a snapshot; the same steps after it give the same result."""
-        self.time = state.time
         self._bodies.restore(state.bodies)
         self._warm.restore(state.start, self._law)
 
@@ -259,7 +292,6 @@ class World:
         self.last, self.contacts = solution, rows.contacts
         self._take(problem, solution)
         self._move(problem, solution)
-        self.time += self.settings.step
 
     def problem(self) -> tuple[Problem, Start]:
         """The question of the coming step, and where to begin with its answer."""
