@@ -18,7 +18,14 @@ from ..blender.scene import add_octopus, add_route_curve, remove_markers
 from ..core.errors import OctoMotionError, RigError, SettingsError, WriteError
 from ..core.locomotion.gait import gait_from_json
 from ..core.locomotion.rig import detect_arms
-from ..ui.locomotion import Summary, generate, locomotion_settings, once_called, set_gait, store
+from ..ui.locomotion import (
+    Summary,
+    generate_locomotion,
+    locomotion_settings,
+    once_called,
+    set_gait,
+    store,
+)
 from ..ui.posing import play_file
 from .job_report import ShotSummary, check_limits
 from .outputs import blender_said, check_export, export
@@ -77,7 +84,7 @@ def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
             summary = _pose(armature, scene, shot.script)
         else:
             _apply(shot, armature, scene)
-            summary = generate(armature, bpy.context)
+            summary = generate_locomotion(armature, bpy.context)
             check_limits(shot.limits, summary)
         if shot.octopus is not None or motion is not None:
             scene.frame_start, scene.frame_end = summary.frame_start, summary.frame_end

@@ -3,10 +3,61 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any, Final, TypeVar
+from weakref import WeakKeyDictionary
+
+import bpy
+import numpy as np
+from bpy import props
 
 from ..core.settings import Setting, declared_settings
-from .overridable import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+BoolProperty: Final = partial(props.BoolProperty, override={"LIBRARY_OVERRIDABLE"})
+EnumProperty: Final = partial(props.EnumProperty, override={"LIBRARY_OVERRIDABLE"})
+FloatProperty: Final = partial(props.FloatProperty, override={"LIBRARY_OVERRIDABLE"})
+FloatVectorProperty: Final = partial(props.FloatVectorProperty, override={"LIBRARY_OVERRIDABLE"})
+IntProperty: Final = partial(props.IntProperty, override={"LIBRARY_OVERRIDABLE"})
+PointerProperty: Final = partial(props.PointerProperty, override={"LIBRARY_OVERRIDABLE"})
+StringProperty: Final = partial(props.StringProperty, override={"LIBRARY_OVERRIDABLE"})
+CollectionProperty: Final = partial(
+    props.CollectionProperty, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
+)
+
+
+# --- Groups of properties in a library override ---------------------------------------------------
+
+
+def make_overridable(armature: bpy.types.Object) -> None:
+    """Let a library override keep its settings where the linked object has none.
+
+    Blender 5.2 compares groups of properties with those of the linked object. Where that has
+    never had any, it saves an override of the group as a whole, which it cannot read back. A
+    group comes into being when it is looked at.
+    """
+    override = armature.override_library
+    if override is not None and isinstance(override.reference, bpy.types.Object):
+        _look_at(override.reference.octo_motion)  # type: ignore[attr-defined]
+
+
+def assign(group: Any, name: str, value: Any) -> None:
+    """Set a property only if it differs: in a library override, what is set no longer follows."""
+    before = getattr(group, name)
+    is_array = isinstance(value, tuple | list | np.ndarray)
+    if list(before) != list(value) if is_array else before != value:
+        setattr(group, name, value)
+
+
+def _look_at(group: bpy.types.PropertyGroup) -> None:
+    for definition in group.bl_rna.properties:
+        if definition.type == "POINTER" and definition.identifier != "rna_type":
+            value = getattr(group, definition.identifier)
+            if isinstance(value, bpy.types.PropertyGroup):
+                _look_at(value)
+
+
+# --- Properties made from the settings that core declares, and core's dataclasses from properties
+
 
 Settings = TypeVar("Settings")
 
@@ -70,3 +121,53 @@ def _value(value: Any, setting: Setting) -> Any:
     if setting.low is not None:
         value = max(value, setting.low)
     return value if setting.high is None else min(value, setting.high)
+
+
+# --- Groups of properties as plain data, for JSON -------------------------------------------------
+
+
+_PASSED = frozenset({"rna_type"})
+
+_known: WeakKeyDictionary[type, list[tuple[str, str, bool]]] = WeakKeyDictionary()
+"""The properties of each kind of group, as long as it is registered."""
+
+
+def plain(group: Any, *, without: frozenset[str] = frozenset()) -> dict[str, Any]:
+    """All properties of a group by name: groups become dictionaries, data-blocks their names.
+
+    Args:
+        group: any property group.
+        without: names that are left out, at every level.
+    """
+    result: dict[str, Any] = {}
+    for name, kind, is_array in _properties(type(group), group):
+        if name in without:
+            continue
+        value = getattr(group, name)
+        if kind == "COLLECTION":
+            result[name] = [plain(each, without=without) for each in value]
+        elif isinstance(value, bpy.types.ID):
+            result[name] = value.name
+        elif kind == "POINTER":
+            result[name] = None if value is None else plain(value, without=without)
+        elif is_array:
+            result[name] = list(value)
+        elif isinstance(value, set):
+            result[name] = sorted(value)
+        else:
+            result[name] = value
+    return result
+
+
+def _properties(kind: type, group: Any) -> list[tuple[str, str, bool]]:
+    """Name, type and whether it is an array of each property that groups of a kind have.
+
+    Blender takes longer to tell than all of their values.
+    """
+    if kind not in _known:
+        _known[kind] = [
+            (each.identifier, each.type, getattr(each, "is_array", False))
+            for each in group.bl_rna.properties
+            if each.identifier not in _PASSED
+        ]
+    return _known[kind]

@@ -3,9 +3,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
 
-from ..core.errors import OctoMotionError
+import bpy
+from bpy.props import EnumProperty
+
+from ..blender.overrides import linked_names
+from ..blender.rig import active_armature
+from ..core.errors import OctoMotionError, RigError
 
 if TYPE_CHECKING:
     import bpy
@@ -31,3 +38,141 @@ class OctoOperator:
             self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
             return {"CANCELLED"}
         return {"FINISHED"}
+
+
+# --- What operators on the active armature share --------------------------------------------------
+
+
+class ArmatureOperator(OctoOperator):
+    """An operator on the armature that the user works on, see ``active_armature``."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode not in {"OBJECT", "POSE"}:
+            # Undo in other modes takes back what was done in that mode, and nothing else.
+            cls.poll_message_set("Go to object mode or pose mode first")  # type: ignore[attr-defined]
+            return False
+        try:
+            active_armature(context)
+        except RigError as error:
+            cls.poll_message_set(str(error).rstrip("."))  # type: ignore[attr-defined]
+            return False
+        return True
+
+
+# --- What operators on the lists of an armature's settings share: arms, splices -------------------
+
+
+@dataclass(frozen=True)
+class ListKind:
+    """A list, and the words for its items."""
+
+    settings: Callable[[bpy.types.Object], Any]
+    """The settings of an armature object that have the list."""
+    check: Callable[[bpy.types.Object], None]
+    """Raises if what is changed on the armature would not be saved."""
+    items: str
+    """Name of the list, also for people: "arms"."""
+    active: str
+    """Name of the setting with the number of the active item."""
+    one: str
+    """An item, for people: "an arm"."""
+    instead: str
+    """What to do with a linked item that cannot be removed: a sentence."""
+
+    def active_item(self, settings: Any) -> Any:
+        """The list's active item, ``None`` in an empty list."""
+        items, number = getattr(settings, self.items), getattr(settings, self.active)
+        return items[number] if 0 <= number < len(items) else None
+
+
+class ListOperator(ArmatureOperator):
+    """An operator on the list of the active armature."""
+
+    # A value and no annotation: what Blender 4.5 evaluates of one keeps it from ending.
+    KIND = cast("ListKind", None)
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        self.KIND.check(armature)
+        self.edit(context, armature, self.KIND.settings(armature))
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
+        """Do the work on an armature that can be edited."""
+        raise NotImplementedError
+
+
+class ItemOperator(ListOperator):
+    """An operator on the list's active item."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not super().poll(context):
+            return False
+        if cls.KIND.active_item(cls.KIND.settings(active_armature(context))) is None:
+            cls.poll_message_set(f"Choose {cls.KIND.one} in the list first")  # type: ignore[attr-defined]
+            return False
+        return True
+
+
+class RemoveOperator(ItemOperator):
+    """Takes the active item off the list."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    def edit(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        armature: bpy.types.Object,  # noqa: ARG002
+        settings: Any,
+    ) -> None:
+        kind = self.KIND
+        name = kind.active_item(settings).name
+        if name in linked_names(settings, kind.items):
+            raise RigError(
+                f"'{name}' is in the linked file and cannot be removed here.", kind.instead
+            )
+        items, number = getattr(settings, kind.items), getattr(settings, kind.active)
+        items.remove(number)
+        setattr(settings, kind.active, max(0, min(number, len(items) - 1)))
+
+
+class MoveOperator(ItemOperator):
+    """Moves the active item by one place."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    direction: EnumProperty(
+        name="Direction",
+        items=(
+            ("UP", "Up", "Towards the first"),
+            ("DOWN", "Down", "Towards the last"),
+        ),
+    )
+
+    def execute(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
+        settings = self.KIND.settings(active_armature(context))
+        if not 0 <= self._target(settings) < len(getattr(settings, self.KIND.items)):
+            # It is the first or the last already: no undo step for that.
+            return {"CANCELLED"}
+        return super().execute(context)
+
+    def edit(
+        self,
+        context: bpy.types.Context,  # noqa: ARG002
+        armature: bpy.types.Object,  # noqa: ARG002
+        settings: Any,
+    ) -> None:
+        kind = self.KIND
+        name = kind.active_item(settings).name
+        if name in linked_names(settings, kind.items):
+            raise RigError(
+                f"'{name}' is in the linked file, where the order of its {kind.items} is set.",
+                f"Move {kind.items} that were added in this file, or change the order there.",
+            )
+        target = self._target(settings)
+        getattr(settings, kind.items).move(getattr(settings, kind.active), target)
+        setattr(settings, kind.active, target)
+
+    def _target(self, settings: Any) -> int:
+        return getattr(settings, self.KIND.active) + (-1 if self.direction == "UP" else 1)

@@ -8,9 +8,8 @@ from typing import Final
 import bpy
 from bpy.app.handlers import persistent
 
+from .declared_settings import PointerProperty, make_overridable
 from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion
-from .overridable import PointerProperty
-from .override_groups import make_overridable
 from .posing import OCTO_MOTION_PG_posing
 from .splicing import OCTO_MOTION_PG_splicing
 

@@ -18,7 +18,7 @@ import bpy
 import octo_motion
 from octo_motion.blender.animation import actions
 from octo_motion.core.locomotion.gait import gait_poser as generator
-from octo_motion.ui.locomotion import generate_motion as workflow
+from octo_motion.ui.locomotion.writing import shot as workflow
 from tests.bench import blender_way, scene
 from tests.bench.stopwatch import Place, Stopwatch
 

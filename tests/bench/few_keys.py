@@ -54,7 +54,7 @@ def _measured(
     """How many times fewer keys there are, and the seconds that it takes to find them."""
     import numpy as np
 
-    from octo_motion.ui.locomotion.generate_motion import generate
+    from octo_motion.ui.locomotion.writing.shot import generate_locomotion
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.octo_motion.add_octopus(with_mesh=False)
@@ -69,6 +69,6 @@ def _measured(
         settings.key_angle, settings.key_distance = np.radians(degrees), distance
         settings.key_columns = columns
         start = time.perf_counter()
-        summary = generate(armature, bpy.context)
+        summary = generate_locomotion(armature, bpy.context)
         seconds.append(time.perf_counter() - start)
     return summary.dense_keys / summary.keys, seconds[1] - seconds[0]

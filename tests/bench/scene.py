@@ -9,11 +9,12 @@ import bpy
 import numpy as np
 
 from octo_motion.blender.scene.curves import add_route_curve
-from octo_motion.core.locomotion.gait.joint_groups import group_lengths, split_groups
-from octo_motion.core.locomotion.gait.pseudo_targets import (
+from octo_motion.core.locomotion.gait.ccd import (
     contraction,
+    group_lengths,
     link_rotations,
     pseudo_targets,
+    split_groups,
 )
 from octo_motion.core.locomotion.gait.table import gait_angles
 from octo_motion.core.locomotion.path.travel import plan_travel

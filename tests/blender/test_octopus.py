@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion
 from octo_motion.blender.rig.armature import SUCKER_PROPERTY, read_skeleton
 from octo_motion.blender.scene.octopus import add_octopus
 from octo_motion.core.errors import WriteError
-from octo_motion.core.locomotion.gait.joint_groups import segment_lengths
+from octo_motion.core.locomotion.gait.ccd import segment_lengths
 from octo_motion.core.locomotion.octopus.mesh import build_mesh
 from octo_motion.core.locomotion.octopus.rig import (
     FIRST_ARM_BONE,

@@ -9,11 +9,20 @@ import numpy as np
 
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
 from octo_motion.core.locomotion.gait.table import gait_presets
-from octo_motion.core.locomotion.ground.body_height import BodyLine, body_line, leaning
-from octo_motion.core.locomotion.ground.contact_timing import EvenTiming, timing_at_rest
+from octo_motion.core.locomotion.ground.contact_timing import (
+    BodyLine,
+    EvenTiming,
+    body_line,
+    leaning,
+    timing_at_rest,
+)
 from octo_motion.core.locomotion.ground.footholds import ContactOverride, cycles_at
-from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
-from octo_motion.core.locomotion.ground.surface import Ground, HeightField, LevelGround
+from octo_motion.core.locomotion.ground.surface import (
+    Ground,
+    HeightField,
+    LevelGround,
+    StanceSettings,
+)
 from octo_motion.core.locomotion.ground.walk import GroundedPoses, GroundedWalk
 from octo_motion.core.locomotion.path.route import Route
 from octo_motion.core.locomotion.path.travel import (
@@ -23,7 +32,7 @@ from octo_motion.core.locomotion.path.travel import (
     unhurried,
 )
 from octo_motion.core.locomotion.rig.arm_chains import BodyFrame
-from octo_motion.core.locomotion.rig.placement import object_transforms
+from octo_motion.core.locomotion.rig.poses import object_transforms
 from octo_motion.core.rotations import Floats, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import body_with_arms

@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 
 import octo_motion
-from octo_motion.ui.plain import plain
+from octo_motion.ui.declared_settings import plain
 
 # What is worked out when it is read, and what would begin to work when the file is opened.
 COMPUTED = frozenset({"as_text"})

@@ -20,8 +20,8 @@ from octo_motion.core.locomotion.motion.standing import Standing
 from octo_motion.core.locomotion.path import Route, Travel, TravelSettings
 from octo_motion.core.locomotion.rig import BodyFrame
 from octo_motion.core.skeleton import Skeleton
-from octo_motion.ui.locomotion import generate_motion
 from octo_motion.ui.locomotion.writing import Shot, Summary
+from octo_motion.ui.locomotion.writing import prepare as shot_of
 
 
 @dataclass(frozen=True)
@@ -160,4 +160,4 @@ class Made:
 
 def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Made:
     """Read what a motion needs."""
-    return Made(generate_motion.prepare(armature, context, live=live))
+    return Made(shot_of(armature, context, live=live))

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from octo_motion.blender.scene.curves import add_route_curve
-from octo_motion.ui.plain import plain
+from octo_motion.ui.declared_settings import plain
 
 ROUTE = ((0.0, 0.0, 0.0), (0.0, -2.0, 0.0), (1.0, -3.0, 0.5), (3.0, -3.0, 0.5))
 

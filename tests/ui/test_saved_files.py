@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.ui.plain import plain
+from octo_motion.ui.declared_settings import plain
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 

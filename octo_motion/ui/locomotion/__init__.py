@@ -2,7 +2,6 @@
 """Locomotion, as an artist sees it."""
 
 from . import operators, panels, settings
-from .generate_motion import generate
 from .operators import MENUS, STEPS
 from .settings import (
     ChangeItem,
@@ -15,7 +14,7 @@ from .settings import (
     set_gait,
     store,
 )
-from .writing import Summary
+from .writing import Summary, generate_locomotion
 
 CLASSES = (*settings.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
@@ -29,7 +28,7 @@ __all__ = [
     "OCTO_MOTION_PG_locomotion",
     "ReachItem",
     "Summary",
-    "generate",
+    "generate_locomotion",
     "locomotion_settings",
     "once_called",
     "set_gait",

@@ -11,8 +11,7 @@ from bpy.props import EnumProperty
 from ...blender.animation import writable_armature
 from ...blender.rig import active_armature, mark_bones, selected_bones
 from ...core.errors import RigError, WriteError
-from ..armature_operator import ArmatureOperator
-from ..operator_base import OctoOperator
+from ..operator_base import ArmatureOperator, OctoOperator
 from .properties import OBSTACLES
 
 

@@ -19,7 +19,7 @@ from ...blender.rig import (
 )
 from ...core.errors import RigError
 from ...core.posing.puppet import Bend, Figure
-from ..armature_operator import ArmatureOperator
+from ..operator_base import ArmatureOperator
 from .custom_material import coefficients, keep_material, measured_joint
 from .measuring_hand import BEARS
 from .properties import posing_settings

@@ -10,8 +10,13 @@ import numpy as np
 
 from ...blender.rig import armature_data
 from ...core.posing.puppet import SMALLEST
-from ..overridable import BoolProperty, EnumProperty, FloatProperty, PointerProperty
-from ..override_groups import make_overridable
+from ..declared_settings import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    PointerProperty,
+    make_overridable,
+)
 
 MATERIALS: Final = (
     ("CLAY", "Clay", "Gives way slowly and stays: as soft as it is pulled", 0),

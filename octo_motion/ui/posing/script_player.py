@@ -14,7 +14,7 @@ from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
 from ...core.posing.pose_script import PoseScript, Step, parse_script
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
-from ..armature_operator import ArmatureOperator
+from ..operator_base import ArmatureOperator
 from .properties import posing_settings
 from .puppet_session import PuppetSession
 

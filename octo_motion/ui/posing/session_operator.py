@@ -12,7 +12,7 @@ import bpy
 from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError
 from .. import at_work
-from ..armature_operator import ArmatureOperator
+from ..operator_base import ArmatureOperator
 from .controls import Outcome
 from .puppet_session import PuppetSession, active_session
 

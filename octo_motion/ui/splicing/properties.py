@@ -15,7 +15,7 @@ import bpy
 from ...blender.rig import armature_data
 from ...core.splicing.humanoid import LANDMARKS, Landmarks
 from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
-from ..overridable import (
+from ..declared_settings import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -23,8 +23,8 @@ from ..overridable import (
     IntProperty,
     PointerProperty,
     StringProperty,
+    make_overridable,
 )
-from ..override_groups import make_overridable
 
 
 def _bone(name: str, description: str) -> Any:

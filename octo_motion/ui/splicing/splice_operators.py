@@ -14,8 +14,8 @@ from ...blender.rig import active_armature
 from ...core.errors import ClipError
 from ...core.rotations import Floats
 from ...core.splicing.transfer import Suggestion
-from ..list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
-from ..override_groups import assign
+from ..declared_settings import assign
+from ..operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ..panel_base import ItemRows
 from .properties import PARTS, splicing_settings
 from .stack import ClipReader, SpliceSummary, Stack, prepare_splices, suggestions, write_splices

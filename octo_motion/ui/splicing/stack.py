@@ -40,7 +40,7 @@ from ...core.splicing.transfer import (
     part_named,
     suggest_timings,
 )
-from ..plain import plain
+from ..declared_settings import plain
 from .properties import OCTO_MOTION_PG_splicing, read_landmarks, splicing_settings, write_landmarks
 
 _FINER: Final = 4

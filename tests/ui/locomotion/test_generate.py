@@ -15,8 +15,8 @@ from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser
 from octo_motion.core.locomotion.motion import pipeline
 from octo_motion.ui import at_work
-from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion.operators.generate import OCTO_MOTION_OT_generate_locomotion
+from octo_motion.ui.locomotion.writing import shot as workflow
 from octo_motion.ui.modal_job import ModalJob
 from tests.ui.made import prepare
 from tests.ui.rig import (
@@ -205,7 +205,7 @@ def test_cycle_time_is_the_time_of_one_cycle_at_full_speed(octopus: Any) -> None
     settings = settings_of(octopus)
     settings.timing, settings.cycle_time = "CADENCE", 2.0
     settings.ease_in = settings.ease_out = 0.0
-    summary = workflow.generate(octopus, bpy.context)
+    summary = workflow.generate_locomotion(octopus, bpy.context)
     length = read_route(settings.route).length
     # An octopus of 1 m arms walks table.stride metres in a cycle.
     assert summary.seconds == pytest.approx(2.0 * length / settings.table.stride, rel=1e-5)
@@ -250,7 +250,7 @@ def test_a_route_may_hang_on_an_object_that_stays(octopus: Any) -> None:
     assert {key: values.tobytes() for key, values in keys(generate(octopus)).items()} == before
     settings.route.parent_type, settings.route.parent_bone = "BONE", "Root"
     with pytest.raises(OctoMotionError, match="would move with it"):
-        workflow.generate(octopus, bpy.context)
+        workflow.generate_locomotion(octopus, bpy.context)
 
 
 @pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
@@ -465,12 +465,12 @@ def test_the_scene_is_extended_where_the_motion_lasts_longer_and_never_shortened
     generate(octopus)
     assert (scene.frame_start, scene.frame_end) == (1, 250)
     settings_of(octopus).frame_end = 400
-    summary = workflow.generate(octopus, bpy.context)
+    summary = workflow.generate_locomotion(octopus, bpy.context)
     assert scene.frame_end == 400
     assert summary.notes == ("The scene now ends at frame 400.",)
     settings_of(octopus).frame_end = 500
     settings_of(octopus).extend_scene_range = False
-    summary = workflow.generate(octopus, bpy.context)
+    summary = workflow.generate_locomotion(octopus, bpy.context)
     assert scene.frame_end == 400
     assert summary.notes == ("It lasts to frame 500, the scene ends at 400.",)
     assert summary.message.startswith("Walk of 500 frames")
@@ -686,7 +686,7 @@ def test_what_is_wrong_is_told_before_anything_changes(
     bpy.context.view_layer.update()
     before = scene_contents()
     with pytest.raises(OctoMotionError, match=told) as error:
-        workflow.generate(octopus, bpy.context)
+        workflow.generate_locomotion(octopus, bpy.context)
     assert error.value.remedy
     with pytest.raises(RuntimeError, match=told):
         click("generate_locomotion")
@@ -714,19 +714,22 @@ def test_constraints_that_hide_the_keys_are_told(octopus: Any) -> None:
     bpy.ops.octo_motion.detect_arms()
     octopus.pose.bones["Arm1_2.L"].constraints.new("COPY_ROTATION").target = octopus
     octopus.constraints.new("LIMIT_LOCATION")
-    warnings = workflow.generate(octopus, bpy.context).warnings
+    warnings = workflow.generate_locomotion(octopus, bpy.context).warnings
     assert any("move one bone of the arms ('Arm1_2.L')" in told for told in warnings)
     assert any("away from its route" in told for told in warnings)
     settings_of(octopus).travel_on = "BONE"
     octopus.pose.bones["Root"].constraints.new("LIMIT_LOCATION")
-    warnings = workflow.generate(octopus, bpy.context).warnings
+    warnings = workflow.generate_locomotion(octopus, bpy.context).warnings
     assert any("root bone 'Root'" in told for told in warnings)
 
 
 def test_drivers_and_layers_that_hide_the_motion_are_told(octopus: Any) -> None:
     generate(octopus)
     driver = octopus.driver_add("location", 0)
-    assert any("Drivers move" in told for told in workflow.generate(octopus, bpy.context).warnings)
+    assert any(
+        "Drivers move" in told
+        for told in workflow.generate_locomotion(octopus, bpy.context).warnings
+    )
     driver.mute = True
     data = octopus.animation_data
     below = bpy.data.actions.new("Below")
@@ -734,7 +737,7 @@ def test_drivers_and_layers_that_hide_the_motion_are_told(octopus: Any) -> None:
     track.strips.new("Below", 1, below)
 
     def told_of_layers() -> list[str]:
-        told = workflow.generate(octopus, bpy.context).warnings
+        told = workflow.generate_locomotion(octopus, bpy.context).warnings
         return [each for each in told if "NLA" in each]
 
     assert told_of_layers() == []
@@ -750,7 +753,7 @@ def test_drivers_and_layers_that_hide_the_motion_are_told(octopus: Any) -> None:
 
 def test_what_keeps_the_motion_from_being_seen_as_it_is_is_told(octopus: Any) -> None:
     def told() -> list[str]:
-        warnings = workflow.generate(octopus, bpy.context).warnings
+        warnings = workflow.generate_locomotion(octopus, bpy.context).warnings
         return [each for each in warnings if "rest position" in each or "stretches" in each]
 
     assert told() == []
@@ -786,13 +789,13 @@ def test_a_root_bone_that_is_posed_and_gets_keys_moves_nothing(
 def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
     settings_of(octopus).tell_overlaps = False
     settings_of(octopus).frame_end = 120
-    assert workflow.generate(octopus, bpy.context).warnings == ()
+    assert workflow.generate_locomotion(octopus, bpy.context).warnings == ()
     octopus.pose.bones["Arm1_1.L"].location.x = 0.1
     octopus.pose.bones["Arm1_2.L"].scale.y = 2.0
-    (told,) = workflow.generate(octopus, bpy.context).warnings
+    (told,) = workflow.generate_locomotion(octopus, bpy.context).warnings
     assert told.startswith("The pose of 2 bones moves the arms ('Arm1_1.L')")
     settings_of(octopus).travel_on = "BONE"
-    (told,) = workflow.generate(octopus, bpy.context).warnings
+    (told,) = workflow.generate_locomotion(octopus, bpy.context).warnings
     assert told.startswith("The pose of 2 bones")
     for name in ("Arm1_1.L", "Arm1_2.L"):
         octopus.pose.bones[name].matrix_basis.identity()
@@ -800,7 +803,7 @@ def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
         octopus.pose.bones[name].scale.y = 1.0
     # What was keyed on the root bone goes back to rest by itself.
     settings_of(octopus).travel_on = "OBJECT"
-    assert workflow.generate(octopus, bpy.context).warnings == ()
+    assert workflow.generate_locomotion(octopus, bpy.context).warnings == ()
 
 
 def test_targets_that_are_missed_are_told(octopus: Any) -> None:

@@ -11,8 +11,8 @@ import pytest
 
 from octo_motion.blender.scene.curves import read_route
 from octo_motion.core.rotations import rotate
-from octo_motion.ui.locomotion import generate_motion as workflow
-from octo_motion.ui.locomotion.reading.arm_items import bones_of
+from octo_motion.ui.locomotion.reading.rig import bones_of
+from octo_motion.ui.locomotion.writing import shot as workflow
 from tests.ui.made import prepare
 from tests.ui.rig import click, joints_in_world
 
@@ -54,7 +54,7 @@ def test_a_real_rig_follows_its_route(
     settings.gait, settings.timing, settings.frame_end = gait, "RANGE", 48
     settings.ease_in = settings.ease_out = 0.0
 
-    summary = workflow.generate(armature, bpy.context)
+    summary = workflow.generate_locomotion(armature, bpy.context)
 
     assert count in (None, len(settings.arms))
     # The solver's own promise, in arm lengths.

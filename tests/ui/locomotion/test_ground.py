@@ -11,10 +11,10 @@ import pytest
 from octo_motion.blender.scene.contact_markers import markers
 from octo_motion.core.errors import GroundError
 from octo_motion.core.locomotion.ground.surface import LevelGround
-from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
 from octo_motion.ui.locomotion.settings import ground as ground_properties
-from octo_motion.ui.locomotion.settings.contact_overrides import (
+from octo_motion.ui.locomotion.settings.ground import (
     ContactEdit,
     changed_by_hand,
     read_overrides,

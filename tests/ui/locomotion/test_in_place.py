@@ -9,7 +9,7 @@ import pytest
 
 from octo_motion.blender.animation.actions import is_edited
 from octo_motion.core.locomotion.gait.table import gait_presets
-from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
 from tests.ui.made import prepare
 from tests.ui.rig import Octopus, generate, joints_in_world, keys

@@ -10,12 +10,12 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import rotate
 from octo_motion.ui.locomotion.operators import quality as quality_operators
-from octo_motion.ui.locomotion.settings import quality as quality_report
+from octo_motion.ui.locomotion.settings import properties as quality_report
 from tests.blender.test_ground import make_mesh
 from tests.ui.made import Made, prepare
 from tests.ui.rig import Octopus, click, generate, give_route, joints_in_world, make_octopus

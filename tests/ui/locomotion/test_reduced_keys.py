@@ -10,8 +10,8 @@ import pytest
 from octo_motion.blender.animation import actions
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import angle_between, from_matrix
-from octo_motion.ui.locomotion import generate_motion as workflow
 from octo_motion.ui.locomotion import panels
+from octo_motion.ui.locomotion.writing import shot as workflow
 from tests.ui.made import prepare
 from tests.ui.rig import (
     ROUTE,
@@ -128,7 +128,7 @@ def test_the_message_and_the_panel_tell_keys_before_and_after(octopus: Any) -> N
     assert "instead of" not in drawn(octopus)
     settings = settings_of(octopus)
     settings.keys, settings.frame_end = "REDUCED", 400
-    summary = workflow.generate(octopus, bpy.context)
+    summary = workflow.generate_locomotion(octopus, bpy.context)
     found = sum(len(each) for each in keys(octopus.animation_data.action).values())
     assert (summary.keys, summary.dense_keys) == (found, 400 * (4 * 24 + 6))
     told = f"{summary.keys:,} keys instead of 40,800"
@@ -194,7 +194,7 @@ def test_without_tolerance_it_says_so_and_changes_nothing(octopus: Any, name: st
     setattr(settings_of(octopus), name, 0.0)
     before = scene_contents()
     with pytest.raises(OctoMotionError, match="Without any tolerance"):
-        workflow.generate(octopus, bpy.context)
+        workflow.generate_locomotion(octopus, bpy.context)
     assert scene_contents() == before
     settings_of(octopus).keys = "DENSE"
     generate(octopus)
@@ -239,7 +239,7 @@ def test_the_default_walk_has_many_times_fewer_keys_that_keep_its_pace(
     give_route(octopus)
     settings = settings_of(octopus)
     settings.keys, settings.key_columns, settings.tell_overlaps = "REDUCED", columns, False
-    summary = workflow.generate(octopus, bpy.context)
+    summary = workflow.generate_locomotion(octopus, bpy.context)
     assert summary.dense_keys > times * summary.keys
 
 

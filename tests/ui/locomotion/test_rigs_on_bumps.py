@@ -9,8 +9,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.ui.locomotion import generate_motion as workflow
-from octo_motion.ui.locomotion.reading.arm_items import bones_of
+from octo_motion.ui.locomotion.reading.rig import bones_of
+from octo_motion.ui.locomotion.writing import shot as workflow
 from tests.ui.locomotion.test_generate_on_rigs import opened
 from tests.ui.made import prepare
 from tests.ui.rig import click
@@ -77,7 +77,7 @@ def figures_on_bumps(armature: Any, setup: str) -> dict[str, float]:
     bpy.context.scene.collection.objects.link(ground)
     bpy.context.view_layer.update()
     settings.ground.object = ground
-    workflow.generate(armature, bpy.context)
+    workflow.generate_locomotion(armature, bpy.context)
     found = {each.kind: each.value for each in settings.figures}
     found["TURN"] = float(np.degrees(found["TURN"]))
     return found
@@ -133,11 +133,13 @@ def test_what_is_told_of_arms_that_cannot_stretch_helps_them() -> None:
     figures_on_bumps(armature, "tiptoe")
     settings = armature.octo_motion.locomotion
     settings.height_mode, settings.height = "MANUAL", 0.95
-    summary = workflow.generate(armature, bpy.context)
+    summary = workflow.generate_locomotion(armature, bpy.context)
     (told,) = [each for each in summary.warnings if "out of reach" in each]
     assert "lower Height" in told
     assert "Stretch" not in told
     settings.height_mode = "AUTO"
     assert not [
-        each for each in workflow.generate(armature, bpy.context).warnings if "out of reach" in each
+        each
+        for each in workflow.generate_locomotion(armature, bpy.context).warnings
+        if "out of reach" in each
     ]

@@ -10,17 +10,16 @@ import pytest
 
 from octo_motion.core.errors import RigError
 from octo_motion.core.locomotion.gait.gait_poser import GaitSettings
-from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
+from octo_motion.core.locomotion.ground.surface import StanceSettings
 from octo_motion.core.locomotion.path.travel import TravelSettings
 from octo_motion.core.settings import declared_settings
 from octo_motion.ui import registration
-from octo_motion.ui.declared_settings import read_settings
+from octo_motion.ui.declared_settings import plain, read_settings
 from octo_motion.ui.job import Job
 from octo_motion.ui.locomotion.settings.properties import (
     OCTO_MOTION_PG_locomotion,
     locomotion_settings,
 )
-from octo_motion.ui.plain import plain
 from tests.ui.rig import give_route, make_octopus
 
 # What scripts rely on: a name is never changed or removed.
@@ -145,7 +144,7 @@ def test_the_weight_curve_is_made_when_it_is_switched_on_and_kept_when_off() -> 
 
 
 def test_the_weight_curve_moves_the_arms_as_weights_do() -> None:
-    from octo_motion.ui.locomotion.reading.gait import gait_settings
+    from octo_motion.ui.locomotion.reading.motion import gait_settings
     from octo_motion.ui.locomotion.settings import read_gait
 
     settings = locomotion_settings(make_octopus())

@@ -10,9 +10,9 @@ import bpy
 import pytest
 
 from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.ui.declared_settings import plain
 from octo_motion.ui.locomotion.operators import setups
 from octo_motion.ui.locomotion.settings import locomotion_settings, read_gait
-from octo_motion.ui.plain import plain
 from tests.ui.rig import click, make_octopus
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"

@@ -12,8 +12,8 @@ import pytest
 
 from octo_motion.blender.animation.actions import curves_of
 from octo_motion.core.rotations import rotate
-from octo_motion.ui.locomotion.generate_motion import generate
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
+from octo_motion.ui.locomotion.writing.shot import generate_locomotion
 from tests.ui.locomotion.test_changes import HUMP, computed, steps
 from tests.ui.locomotion.test_generate_on_rigs import opened
 from tests.ui.made import prepare
@@ -48,7 +48,7 @@ def test_it_swims_backwards_with_its_back_to_the_sky(lying: Any) -> None:
     assert np.all(np.sum(rotate(orientations, np.array([0.0, 1.0, 0.0])) * way, axis=1) > 0.97)
     assert np.all(rotate(orientations, np.array([0.0, 0.0, 1.0]))[:, 2] > 0.97)
     # Nothing is bent up: the head is before it.
-    generate(octopus, bpy.context)
+    generate_locomotion(octopus, bpy.context)
     paths = {curve.data_path for curve in curves_of(octopus.animation_data.action)}
     assert not any("Mantle" in path for path in paths)
 

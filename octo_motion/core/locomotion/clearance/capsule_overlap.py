@@ -17,10 +17,11 @@ from typing import Final
 
 import numpy as np
 
+from ...easing import smooth_step
 from ...rotations import Floats
 from ...rotations.components_first import dot
 
-_TINY: Final = 1e-30
+_NO_LENGTH: Final = 1e-30
 """Squares of lengths that are none, however small a rig's unit makes its bones."""
 _PARALLEL: Final = 1e-10
 """Square of the sine of the angle between two segments that are as good as parallel."""
@@ -231,7 +232,7 @@ def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> 
     s, t, gap = nearest(p, u, q, v)
     here = (1.0 - s) * radii[0][one] + s * radii[1][one]
     there = (1.0 - t) * radii[0][other] + t * radii[1][other]
-    return (here + there - np.sqrt(dot(gap, gap))) / np.maximum(np.minimum(here, there), _TINY)
+    return (here + there - np.sqrt(dot(gap, gap))) / np.maximum(np.minimum(here, there), _NO_LENGTH)
 
 
 def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
@@ -251,12 +252,12 @@ def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats,
     a, b, e = dot(u, u), dot(u, v), dot(v, v)
     c, f = dot(u, w), dot(v, w)
     room = a * e - b * b
-    whole = 1.0 / np.maximum(a, _TINY)
-    s = np.where(room > _PARALLEL * a * e, (b * f - c * e) / np.maximum(room, _TINY), 0.0)
+    whole = 1.0 / np.maximum(a, _NO_LENGTH)
+    s = np.where(room > _PARALLEL * a * e, (b * f - c * e) / np.maximum(room, _NO_LENGTH), 0.0)
     # A capsule that is a ball is nearest to one point of the other.
-    s = np.where(e > _TINY, s, -c * whole)
+    s = np.where(e > _NO_LENGTH, s, -c * whole)
     np.clip(s, 0.0, 1.0, out=s)
-    t = (b * s + f) / np.maximum(e, _TINY)
+    t = (b * s + f) / np.maximum(e, _NO_LENGTH)
     s = np.where(t < 0.0, np.clip(-c * whole, 0.0, 1.0), s)
     s = np.where(t > 1.0, np.clip((b - c) * whole, 0.0, 1.0), s)
     np.clip(t, 0.0, 1.0, out=t)
@@ -283,3 +284,271 @@ def _pairs(
         for i in best
     ]
     return tuple(sorted(found, key=lambda each: -each.depth))
+
+
+# --- What is near to what in a crowd of arms, and which way it is to part -------------------------
+#
+# Two capsules part straight away from each other, unless their middles have nearly met, or met and
+# gone on. Then there is no telling from the moment alone, and an arm that passes through another
+# would be pushed one way and then the other. So it is told from where the arms begin: each stays on
+# its own side of the other, and outside of the body. That changes with nothing, so what comes of it
+# has no jumps.
+
+
+GIVEN: Final = 0.05
+"""Share of the thinner radius by which arms may overlap: flesh gives."""
+_SOFT: Final = 0.15
+"""The same from which on, before that, they begin to make way."""
+NEAR: Final = 1.0
+"""Sums of radii between arms up to which one may be on the wrong side of the other."""
+_BESIDE: Final = 0.4
+"""How much less that is where it is on the right side."""
+_TINY: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """Arms that stand otherwise round the body for some time than they do at rest."""
+
+    outward: Floats
+    """(arms, 3) unit: where each leads to then, seen from the body, armature space."""
+    share: Floats
+    """(frames,) how far they do so, 0…1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """All arms of a body over time, in the armature's space."""
+
+    joints: Floats
+    """(frames, arms, joints, 3); of an arm that has fewer the last ones are the same."""
+    radii: Floats
+    """(arms, joints)"""
+    at_rest: Floats
+    """(arms, joints, 3)"""
+    in_contact: np.ndarray
+    """(frames, arms, joints) which joints rest on the ground and must not move."""
+    kept: np.ndarray
+    """(frames, arms) which arms are to stay as they are."""
+    upward: Floats
+    """(3,) unit: the body's."""
+    up: Floats
+    """(frames, 3) unit: the world's."""
+    opened: Opened | None = None
+    """Where arms stand for some time; none if that is where they do at rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Touches:
+    """Capsules that are near to each other, the one of an arm and the other of any chain."""
+
+    frame: np.ndarray
+    """(touches,)"""
+    arms: tuple[np.ndarray, np.ndarray]
+    """Numbers of their chains; those of the body come after all arms."""
+    segments: tuple[np.ndarray, np.ndarray]
+    shares: tuple[Floats, Floats]
+    """Where on the segment, 0…1."""
+    gap: Floats
+    """(3, touches) from the other to the one."""
+    distance: Floats
+    wide: Floats
+    """Sum of the radii there."""
+    thin: Floats
+    """The smaller of them."""
+    side: Floats
+    """(3, touches) on which side of the other the one belongs, unit."""
+    pair: np.ndarray
+    """(touches,) a number for each two capsules, the same at all frames."""
+
+    @property
+    def depth(self) -> Floats:
+        """(touches,) by how much they overlap, as a share of the thinner radius."""
+        return (self.wide - self.distance) / self.thin
+
+    def part(self, chosen: np.ndarray) -> Touches:
+        """Some of them."""
+        return Touches(
+            frame=self.frame[chosen],
+            arms=(self.arms[0][chosen], self.arms[1][chosen]),
+            segments=(self.segments[0][chosen], self.segments[1][chosen]),
+            shares=(self.shares[0][chosen], self.shares[1][chosen]),
+            gap=self.gap[:, chosen],
+            distance=self.distance[chosen],
+            wide=self.wide[chosen],
+            thin=self.thin[chosen],
+            side=self.side[:, chosen],
+            pair=self.pair[chosen],
+        )
+
+
+class Touching:
+    """The capsules that are so near to each other that they may ever touch, at all frames.
+
+    Args:
+        crowd: the arms.
+        still: parts of the body, one frame each.
+    """
+
+    def __init__(self, crowd: Crowd, still: Sequence[Capsules]) -> None:
+        frames, arms, joints, _ = crowd.joints.shape
+        chains = [
+            Capsules("", crowd.joints[:, arm], crowd.radii[arm], crowd.at_rest[arm])
+            for arm in range(arms)
+        ]
+        body = [
+            Capsules("", np.broadcast_to(each.joints, (frames, *each.joints.shape[1:])), *rest)
+            for each, rest in ((each, (each.radii, each.at_rest)) for each in still)
+        ]
+        parts = parts_of([*chains, *body])
+        self._crowd, self._parts = crowd, parts
+        self._arms, self._joints = arms, joints
+        self._radii, self._owner = parts.radii, parts.owner
+        places = _places(crowd, len(body))
+        self._sides = _sides(places)
+        self._apart: Floats | None = None
+        if crowd.opened is not None:
+            # The same before they are made unit, at rest and opened: (2, 3, chains, chains).
+            both = (places, _opened_places(crowd.opened, places))
+            self._apart = np.stack([each.T[:, :, None] - each.T[:, None] for each in both])
+        own = arms * (joints - 1)
+        # Points of the body after those of all arms: where a capsule starts and, next, ends.
+        self._body = np.stack([parts.starts[:, 0, own:], parts.ends[:, 0, own:]], axis=2)
+        one, other = pairs_of([*chains, *body], arms)
+        frame, pair, self._least = near(parts, one, other, NEAR)
+        self._frame, self._one, self._other = frame, one[pair], other[pair]
+        widest = np.maximum(*parts.radii)
+        self._wide = (widest[one] + widest[other])[pair]
+
+    def now(self) -> Touches:
+        """What touches while nobody has made way yet."""
+        chosen = np.flatnonzero(self._least <= self._wide)
+        rows = self._frame[chosen], self._one[chosen], self._other[chosen]
+        return self._at(self._crowd.joints, *rows)
+
+    def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:
+        """Look from now on only at what is near enough for arms that make way.
+
+        Args:
+            frames: (frames,) whether anybody may have to, then.
+            without: pairs of capsules (``Touches.pair``) that are left as they are.
+        """
+        chosen = frames[self._frame]
+        if len(without):
+            chosen &= ~np.isin(self._one * len(self._owner) + self._other, without)
+        # On its own side an arm has less far to be looked for.
+        far = np.flatnonzero(chosen & (self._least > (1.0 + _BESIDE * NEAR) * self._wide))
+        chosen[far] = self._may_be_wrong(self._frame[far], self._one[far], self._other[far])
+        rows = np.flatnonzero(chosen)
+        frame, one, other = self._frame[rows], self._one[rows], self._other[rows]
+        seen = self._at(self._crowd.joints, frame, one, other)
+        wrong = dot(seen.gap, seen.side) < 0.0
+        kept = seen.distance <= (1.0 + np.where(wrong, NEAR, _BESIDE * NEAR)) * seen.wide
+        self._frame, self._one, self._other = frame[kept], one[kept], other[kept]
+
+    def _may_be_wrong(self, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Which may be on the wrong side of each other, told from where their middles are."""
+        starts, ends = self._parts.starts, self._parts.ends
+        middles, steps = (0.5 * (starts + ends)).reshape(3, -1), ends - starts
+        half = 0.5 * np.sqrt(dot(*[np.moveaxis(steps, 0, -2)] * 2)).ravel()
+        first, second = frame * len(self._owner) + one, frame * len(self._owner) + other
+        apart = middles.take(first, axis=1) - middles.take(second, axis=1)
+        return dot(apart, self._side(frame, one, other)) <= half[first] + half[second]
+
+    def _side(self, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Floats:
+        """On which side (3, capsules) of others some belong at a frame."""
+        chains = self._owner[one] * self._sides.shape[2] + self._owner[other]
+        if self._apart is None or self._crowd.opened is None:
+            return self._sides.reshape(3, -1).take(chains, axis=1)
+        share = self._crowd.opened.share[frame]
+        closed, opened = (each.reshape(3, -1).take(chains, axis=1) for each in self._apart)
+        apart = (1.0 - share) * closed + share * opened
+        return apart / np.maximum(np.sqrt(dot(apart, apart)), _TINY)
+
+    def at(self, joints: Floats) -> Touches:
+        """What is near to what, for joints (frames, arms, joints, 3)."""
+        return self._at(joints, self._frame, self._one, self._other)
+
+    def _at(self, joints: Floats, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Touches:
+        """The same of some capsules."""
+        arms = self._owner[one], self._owner[other]
+        each = self._joints - 1
+        moving = joints.shape[0] * self._arms * self._joints
+        points = np.empty((3, moving + self._body.shape[1] * 2))
+        points[:, :moving] = joints.reshape(moving, 3).T
+        points[:, moving:] = self._body.reshape(3, -1)
+        # Of each arm there is a joint more than there are segments; of the body, pairs of points.
+        first = (frame * self._arms + arms[0]) * self._joints + one - each * arms[0]
+        second = np.where(
+            arms[1] < self._arms,
+            (frame * self._arms + arms[1]) * self._joints + other - each * arms[1],
+            moving + 2 * (other - each * self._arms),
+        )
+        p, q = points.take(first, axis=1), points.take(second, axis=1)
+        u, v = points.take(first + 1, axis=1) - p, points.take(second + 1, axis=1) - q
+        s, t, gap = nearest(p, u, q, v)
+        here, there = (
+            (1.0 - share) * self._radii[0][which] + share * self._radii[1][which]
+            for share, which in ((s, one), (t, other))
+        )
+        return Touches(
+            frame=frame,
+            arms=arms,
+            segments=(one % each, other % each),
+            shares=(s, t),
+            gap=gap,
+            distance=np.sqrt(dot(gap, gap)),
+            wide=here + there,
+            thin=np.maximum(np.minimum(here, there), _TINY),
+            side=self._side(frame, one, other),
+            pair=one * len(self._owner) + other,
+        )
+
+
+def _places(crowd: Crowd, body: int) -> Floats:
+    """Where chains (chains, 3) begin, seen from above: arms round the body, the body inside."""
+    roots = crowd.at_rest[:, 1]
+    middle = np.broadcast_to(crowd.at_rest[:, 0].mean(axis=0), (body, 3))
+    places = np.concatenate([roots, middle])
+    return places - (places @ crowd.upward)[:, None] * crowd.upward
+
+
+def _opened_places(opened: Opened, places: Floats) -> Floats:
+    """Where chains (chains, 3) begin that have opened, as far from the body as before."""
+    arms = len(opened.outward)
+    middle = places[:arms].mean(axis=0)
+    away = np.sqrt(np.mean(np.sum((places[:arms] - middle) ** 2, axis=1)))
+    result = np.broadcast_to(middle, places.shape).copy()
+    result[:arms] += away * opened.outward
+    return result
+
+
+def _sides(places: Floats) -> Floats:
+    """On which side of each chain (3, chains, chains), the second, each one, the first, belongs."""
+    apart = places.T[:, :, None] - places.T[:, None]
+    return apart / np.maximum(np.sqrt(np.sum(apart * apart, axis=0)), _TINY)
+
+
+def aside(touches: Touches) -> tuple[Floats, Floats]:
+    """How the one of each pair has to move against the other for them to touch no more.
+
+    Returns:
+        Unit vectors (3, touches) which way, and how far (touches,), 0 where they are apart.
+    """
+    apart = touches.distance / touches.wide
+    straight = touches.gap / np.maximum(touches.distance, _TINY)
+    wrong = np.maximum(-dot(straight, touches.side), 0.0)
+    # From too far it is not to be told whether they have passed through each other at all.
+    told = smooth_step((1.0 + NEAR - apart) / NEAR)
+    back = np.maximum(1.0 - apart, 0.0) + wrong * told
+    inside = np.minimum(apart, 1.0)
+    way = inside * straight + (inside * wrong + back) * touches.side
+    way /= np.maximum(np.sqrt(dot(way, way)), _TINY)
+    along = dot(touches.gap, way)
+    # |gap + far · way| is to be as long as that.
+    least = touches.wide - GIVEN * touches.thin
+    across = touches.distance**2 - along**2
+    far = np.sqrt(np.maximum(least**2 - across, 0.0)) - along
+    soft = _SOFT * touches.thin
+    far = np.where(far > soft, far, np.maximum(far + soft, 0.0) ** 2 / (4.0 * soft))
+    return way, told * far

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The free arm: gait table → pseudo-targets → weighted CCD."""
 
-from .builds import Build, bone_twists
-from .ccd import close_group
-from .gait_poser import Arm, GaitPoser, GaitSettings
-from .joint_groups import diameters
+from .ccd import close_group, diameters
+from .gait_poser import Arm, Build, GaitPoser, GaitSettings, bone_twists
 from .table import (
     ANGLES,
     CYCLE,

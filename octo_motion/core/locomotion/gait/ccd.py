@@ -21,9 +21,141 @@ from typing import Final
 
 import numpy as np
 
-from ...rotations import Floats, components_first
+from ...rotations import Floats, components_first, from_axis_angle, multiply, rotate
 from ...rotations.components_first import cumulative_sum
 from ..rig import lift_to_floor
+
+GROUPS = 3
+
+
+def diameters(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
+    """Diameters ``w_i = w₀ (1 − τ i)``, i = 0 … joints − 1 [Octopus, eq. 3.1].
+
+    Args:
+        joints: number of segments n.
+        first: diameter w₀ at the root, in metres.
+        taper: τ, the share of w₀ that each joint loses; 1/n makes a cone, and more would leave
+            joints that are thinner than nothing.
+
+    Returns:
+        (joints,) in metres.
+    """
+    return first * (1.0 - taper * np.arange(joints, dtype=np.float64))
+
+
+def segment_lengths(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
+    """Lengths ``l_i = w_i / 2`` (joints,) of the segments, root to tip [Octopus, eq. 3.2]."""
+    return 0.5 * diameters(joints, first, taper)
+
+
+def split_groups(lengths: Floats) -> tuple[int, int, int]:
+    """Sizes of the three groups, as equal in length as whole segments allow.
+
+    The source cuts n segments, n a multiple of three, into thirds. Artists' arms have any number
+    of segments of any length, so the cuts are made where the three sums differ least (the sum of
+    their squares is smallest); of equal cuts the one nearest to equal counts wins.
+
+    Args:
+        lengths: (segments,), at least three of them, not all zero.
+    """
+    count = len(lengths)
+    reach = np.concatenate([[0.0], np.cumsum(lengths)])
+    first = np.arange(1, count - 1)[:, None]
+    second = np.arange(2, count)[None, :]
+    sums = np.stack(
+        np.broadcast_arrays(
+            reach[first], reach[second] - reach[first], reach[count] - reach[second]
+        )
+    )
+    cost = np.sum(sums**2, axis=0) / reach[count] ** 2
+    counts = np.stack(np.broadcast_arrays(first, second - first, count - second))
+    # The second term only decides between cuts of equal cost.
+    cost = cost + 1e-9 * np.sum((counts / count) ** 2, axis=0)
+    cost = np.where(second > first, cost, np.inf)
+    row, column = np.unravel_index(np.argmin(cost), cost.shape)
+    cut_first, cut_second = int(first[row, 0]), int(second[0, column])
+    return cut_first, cut_second - cut_first, count - cut_second
+
+
+def group_lengths(lengths: Floats, sizes: tuple[int, int, int]) -> Floats:
+    """Rest length H_g of each group, (3,) [Octopus, eq. 3.4–3.6].
+
+    As printed, the sum of eq. 3.4 takes one segment too many; a group's own segments are meant,
+    so that the straight arm reaches its own targets.
+    """
+    ends = np.cumsum(sizes)
+    return np.add.reduceat(lengths, [0, ends[0], ends[1]])
+
+
+# --- Pseudo-targets: the chain Q₀ → Q₁ → Q₂ → Q₃ that an arm's groups converge to [Octopus, §3.1.3]
+#
+# Everything is in the arm's own frame: x outward, z up, y across, Q₀ = P₀ at the origin.
+
+
+HEAD, PITCH, BANK = range(3)
+
+_OUTWARD = np.array([1.0, 0.0, 0.0])
+_ACROSS = np.array([0.0, 1.0, 0.0])
+_UP = np.array([0.0, 0.0, 1.0])
+
+# A link shrinks by |F|/2π, so that a table with turns of 360° would leave nothing of it.
+SHORTEST = 0.05
+
+
+def contraction(angles: Floats, factor: float = 1.0) -> Floats:
+    """Contraction ``e_g = −|F_g| / 2π`` of each link [Octopus, eq. 3.11].
+
+    The source has one angle for each link; where head and pitch turn it together, F is the length
+    of the two as a vector, which equals the one angle when the other is zero. Bank only twists.
+
+    Args:
+        angles: (…, links, 3) head, pitch, bank in radians.
+        factor: 1 as in the source, 0 for links of fixed width.
+
+    Returns:
+        (…, links), from ``SHORTEST − 1`` to 0.
+    """
+    turn = np.hypot(angles[..., HEAD], angles[..., PITCH])
+    return np.maximum(-factor * turn / (2.0 * np.pi), SHORTEST - 1.0)
+
+
+def link_rotations(angles: Floats) -> Floats:
+    """Orientation of each link, carried by those before it [Octopus, §3.1.3].
+
+    Within a link, pitch turns first about the vertical axis, then head about the lateral axis so
+    turned. Bank does not turn the chain: the source moves targets by head and pitch alone.
+
+    Args:
+        angles: (…, links, 3) head, pitch, bank in radians; positive pitch turns x towards y.
+
+    Returns:
+        (…, links, 4) quaternions.
+    """
+    own = multiply(
+        from_axis_angle(_UP, angles[..., PITCH]), from_axis_angle(-_ACROSS, angles[..., HEAD])
+    )
+    result = np.empty_like(own)
+    result[..., 0, :] = own[..., 0, :]
+    for link in range(1, own.shape[-2]):
+        result[..., link, :] = multiply(result[..., link - 1, :], own[..., link, :])
+    return result
+
+
+def pseudo_targets(rotations: Floats, widths: Floats) -> Floats:
+    """Positions Q₀ … Q₃.
+
+    Args:
+        rotations: (…, links, 4) from ``link_rotations``.
+        widths: (…, links) width ``H_g (1 + e_g)`` of each link [Octopus, eq. 3.12–3.14, which
+            reuse the name H for the change of the width].
+
+    Returns:
+        (…, links + 1, 3).
+    """
+    steps = rotate(rotations, _OUTWARD * widths[..., None])
+    zero = np.zeros_like(steps[..., :1, :])
+    return np.concatenate([zero, np.cumsum(steps, axis=-2)], axis=-2)
+
 
 SWEEPS: Final = 4
 SOFTENINGS: Final = 4

@@ -21,7 +21,7 @@ from ...easing import smooth_step
 from ...rotations import Floats, from_axis_angle, less_whole_turns, to_matrix
 from ...skeleton import Skeleton
 from ..rig import BodyFrame, arm_azimuths
-from .pseudo_targets import HEAD
+from .ccd import HEAD
 
 _OPEN: Final = np.radians(45.0)
 """Lean from which on arms have opened all the way."""

@@ -2,16 +2,29 @@
 """The ground, footholds, contact timing, stance and swing."""
 
 from .arm_curves import drawn, raise_over_ground
-from .body_height import BodyLine, body_line, leaning
-from .contact_timing import ContactTiming, EvenTiming, crawling, crawling_in_place, timing_at_rest
+from .contact_timing import (
+    BodyLine,
+    ContactTiming,
+    EvenTiming,
+    body_line,
+    crawling,
+    crawling_in_place,
+    leaning,
+    timing_at_rest,
+)
 from .crawl_planner import CrawlSettings
-from .foothold_reach import easy_height, span
-from .footholds import ContactOverride
-from .grounded_poses import GroundedPoses, Raise
-from .stance_settings import StanceSettings
-from .surface import Ground, LevelGround, ground_along_path, passes_over_itself, sample_ground
-from .swing_smoothing import SwingSmoothing, frames_around
-from .walk import GroundedWalk
+from .footholds import ContactOverride, easy_height, span
+from .surface import (
+    Ground,
+    GroundedPoses,
+    LevelGround,
+    Raise,
+    StanceSettings,
+    ground_along_path,
+    passes_over_itself,
+    sample_ground,
+)
+from .walk import GroundedWalk, SwingSmoothing, frames_around
 
 __all__ = [
     "BodyLine",

@@ -26,7 +26,40 @@ from numpy.typing import NDArray
 
 from ...errors import SettingsError
 from ...rotations import Floats, normalized, rotate_in_plane
-from .arm_clearance import Outline, clearance
+
+_FREE: Final = np.linspace(0.4, 1.0, 6)
+"""Places that are looked at between body and ground: near the body all arms are close …"""
+_OUTLINE_SHARES: Final = np.linspace(0.2, 1.0, 5)
+"""… and those on the ground."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """Arms from above, metres; shapes that go together."""
+
+    roots: Floats
+    """(…, 2) where they begin."""
+    places: Floats
+    """(…, 2) where they meet the ground."""
+    tips: Floats
+    """(…, 2) where they end."""
+
+    def points(self) -> Floats:
+        """(…, points, 2) along them, but for where they are close to the body."""
+        roots, places, tips = (each[..., None, :] for each in (self.roots, self.places, self.tips))
+        free, lying = _FREE[:, None], _OUTLINE_SHARES[:, None]
+        before, after = roots + free * (places - roots), places + lying * (tips - places)
+        shape = np.broadcast_shapes(before.shape[:-2], after.shape[:-2])
+        return np.concatenate(
+            [np.broadcast_to(each, (*shape, *each.shape[-2:])) for each in (before, after)], axis=-2
+        )
+
+
+def clearance(one: Outline, other: Outline) -> Floats:
+    """How far (…,) each of some arms is from one of others."""
+    apart = one.points()[..., :, None, :] - other.points()[..., None, :, :]
+    return np.sqrt(np.min(np.sum(apart * apart, axis=-1), axis=(-2, -1)))
+
 
 _PUSHING: Final = np.radians(70.0)
 """Largest angle between an arm's push and the way to go of an arm that pushes. At 50° none does for

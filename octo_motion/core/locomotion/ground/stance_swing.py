@@ -28,10 +28,8 @@ from ...rotations import Floats, components_first
 from ...rotations.components_first import dot
 from ..rig import MARGIN, JointRoom, loose_from_root, room_needed
 from .arm_curves import bent, curve, drawn, evened, lerp_bends, raise_over_ground, spread_chain
-from .foothold_reach import PEELING
-from .footholds import UNROLLING, Footholds
-from .stance_settings import Limbs, StanceSettings
-from .surface import Ground
+from .footholds import PEELING, UNROLLING, Footholds
+from .surface import Ground, Limbs, StanceSettings
 
 _STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised."""

@@ -7,18 +7,95 @@ on both may slide in between, where the way from one key to the next is no arc.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from ...rotations import Floats, rotate
+from ...keyframes import Channel, RigChannels, rotation_property, values_at
+from ...rotations import Floats, angle_between, from_mode_values, rotate
+from ...skeleton import Skeleton
 from ..clearance import DEEP, Separation
 from ..ground import Ground
-from ..rig import ArmFrames, Poses, halfway_linear
-from . import measures as quality
-from .measures import Worst
+from ..rig import ArmFrames, Poses, carried_by_root_bone, halfway_linear
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The largest value of its kind."""
+
+    value: float
+    sample: int
+    """Number of the frame among those that were given."""
+    arm: int
+    """Number of the arm among those that were given; of bones, of the bone."""
+
+
+def slip(joints: Floats, lying: np.ndarray, cycles: np.ndarray, lengths: Floats) -> Worst:
+    """How far a joint that rests on the ground has moved since it came to rest, in arm lengths.
+
+    Args:
+        joints: (frames, arms, joints, 3) world, frames in their order.
+        lying: (frames, arms, joints) which rest.
+        cycles: (frames, arms) number of each arm's cycle: in another cycle it rests anew.
+        lengths: (arms,) in the units of the joints.
+    """
+    fresh = lying.copy()
+    same = cycles[1:] == cycles[:-1]
+    fresh[1:] &= ~(lying[:-1] & same[..., None])
+    numbers = np.arange(len(joints))[:, None, None]
+    since = np.maximum.accumulate(np.where(fresh, numbers, 0), axis=0)
+    start = np.take_along_axis(joints, since[..., None], axis=0)
+    moved = np.linalg.norm(joints - start, axis=-1) * lying
+    return _worst(moved.max(axis=-1, initial=0.0) / lengths)
+
+
+def depth(joints: Floats, ground: Ground, lengths: Floats, radii: Floats | None = None) -> Worst:
+    """How far a joint is below the ground, in arm lengths; negative if all are above.
+
+    The root is left out: it is the body's.
+
+    Args:
+        joints: (frames, arms, joints, 3) world.
+        ground: what they should be above of.
+        lengths: (arms,) in the units of the joints.
+        radii: (arms, joints) of the skin below the joints, or none for the joints themselves.
+    """
+    below = ground.height(joints[..., 1:, :]) - joints[..., 1:, 2]
+    if radii is not None:
+        below = below + radii[:, 1:]
+    return _worst(below.max(axis=-1) / lengths)
+
+
+def strain(strains: Floats) -> Worst:
+    """By how much a bone is longer or shorter than at rest, as a share: (frames, bones)."""
+    return _worst(np.abs(strains))
+
+
+def miss(misses: Floats) -> Worst:
+    """How far an arm is from its target or its foothold: (frames, arms) arm lengths."""
+    return _worst(misses)
+
+
+def change(rotations: Floats, frames: Floats) -> Worst:
+    """How far a bone turns from one frame to the next, radians per frame.
+
+    Args:
+        rotations: (frames, bones, 4) unit quaternions.
+        frames: (frames,) ascending; need not be whole.
+    """
+    angle = angle_between(rotations[:-1], rotations[1:])
+    return _worst(angle / np.diff(frames)[:, None])
+
+
+def _worst(values: Floats) -> Worst:
+    """The largest of values (frames, arms)."""
+    if values.size == 0:
+        return Worst(0.0, 0, 0)
+    sample, arm = np.unravel_index(int(np.argmax(values)), values.shape)
+    return Worst(float(values[sample, arm]), int(sample), int(arm))
+
 
 KINDS: Final = ("SLIP", "DEPTH", "STRAIN", "MISS", "TURN", "OVERLAP")
 """What is measured: arm lengths that an arm slides over the ground that it holds, that its joints
@@ -89,12 +166,12 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
         for number, name in enumerate(measured.names):
             joints, lying, cycles = _looked_at(measured, number)
             length = np.array([measured.arms[number].length * measured.scale])
-            keep("SLIP", quality.slip(joints, lying, cycles, length), [name], per_frame=2)
-            keep("DEPTH", quality.depth(joints, measured.ground, length), [name], per_frame=2)
-        keep("STRAIN", quality.strain(poses.strains), _owners(measured))
-    keep("MISS", quality.miss(measured.misses), measured.names)
+            keep("SLIP", slip(joints, lying, cycles, length), [name], per_frame=2)
+            keep("DEPTH", depth(joints, measured.ground, length), [name], per_frame=2)
+        keep("STRAIN", strain(poses.strains), _owners(measured))
+    keep("MISS", miss(measured.misses), measured.names)
     if len(measured.frames) > 1:
-        keep("TURN", quality.change(poses.rotations, measured.frames), _owners(measured))
+        keep("TURN", change(poses.rotations, measured.frames), _owners(measured))
     if measured.separation is not None:
         found["OVERLAP"] = _overlap(measured.separation, measured)
     return tuple(found[kind] for kind in KINDS if kind in found)
@@ -158,3 +235,101 @@ def _owners(measured: Measured) -> list[str]:
     """The arm of each bone."""
     pairs = zip(measured.names, measured.arms, strict=True)
     return [name for name, arm in pairs for _ in arm.bones]
+
+
+# --- The motion that few keys play, on frames and half way between them, to be measured -----------
+
+
+@dataclass(frozen=True, eq=False)
+class KeyedRig:
+    """Whose keys they are."""
+
+    channels: RigChannels
+    skeleton: Skeleton
+    arms: Sequence[Sequence[str]]
+    """Bones of each arm, root to tip."""
+    travels: bool
+    """Whether anything takes it along; in place it is measured as if something did."""
+    root_bone: str
+    """"" where the object travels."""
+    world: Floats
+    """(4, 4) of the object, of uniform scale, where a bone travels."""
+
+
+def measure_keyed(measured: Measured, rig: KeyedRig, channels: Sequence[Channel]) -> Measured:
+    """What is measured of a motion, of what its keys play in place of what was computed.
+
+    Whether arms overlap, and how far they are from their targets, stays as it was computed.
+
+    Args:
+        measured: the motion as it was computed.
+        rig: whose keys they are.
+        channels: all that the motion has, those that have few keys and those that have one on
+            each frame.
+    """
+    frames = measured.frames
+    halves = 0.5 * (frames[:-1] + frames[1:])
+    by_path = {channel.data_path: channel for channel in channels}
+    poses = _poses(measured.poses, rig, by_path, frames, frames)
+    computed = measured.poses
+    halfway = Poses(
+        halfway_linear(computed.rotations, turns=True),
+        halfway_linear(computed.strains),
+        halfway_linear(computed.locations),
+        halfway_linear(computed.orientations, turns=True),
+    )
+    return replace(measured, poses=poses, halfway=_poses(halfway, rig, by_path, frames, halves))
+
+
+def _poses(
+    computed: Poses,
+    rig: KeyedRig,
+    channels: Mapping[str, Channel],
+    frames: Floats,
+    times: Floats,
+) -> Poses:
+    """What channels play at some times; what they do not move is as it was computed."""
+
+    def played(path: str) -> Floats | None:
+        channel = channels.get(path)
+        if channel is None:
+            return None
+        if channel.keys is not None:
+            return values_at(channel.keys, times)
+        columns = [np.interp(times, frames, column) for column in channel.values.T]
+        return np.stack(columns, axis=-1)
+
+    own, named = rig.channels, [name for arm in rig.arms for name in arm]
+    rotations = computed.rotations.copy()
+    alongs: dict[str, Floats] = {}
+    for place, name in enumerate(named):
+        turned = played(own.rotation_path(name))
+        if turned is not None:
+            rotations[:, place] = from_mode_values(turned, own.modes[name])
+        scaled = played(own.path(name, "scale"))
+        if scaled is not None:
+            alongs[name] = scaled[:, 1]
+    strains = own.strains(rig.arms, alongs, len(times))
+    if not rig.travels:
+        return Poses(rotations, strains, computed.locations, computed.orientations)
+    if rig.root_bone:
+        bone = rig.root_bone
+        location, rotation, mode = (
+            own.path(bone, "location"),
+            own.rotation_path(bone),
+            own.modes[bone],
+        )
+    else:
+        assert own.own is not None
+        mode = own.own.rotation_mode
+        location, rotation = "location", rotation_property(mode)
+    moved, turned = played(location), played(rotation)
+    if moved is None or turned is None:
+        return Poses(rotations, strains, computed.locations, computed.orientations)
+    turns = from_mode_values(turned, mode)
+    if rig.root_bone:
+        places = carried_by_root_bone(rig.skeleton, rig.root_bone, rig.world, moved, turns)
+    else:
+        assert own.own is not None
+        places = own.own.places(moved, turns)
+    return Poses(rotations, strains, *places)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The whole motion, worked out on plain arrays: MotionJob → compute → MotionResult."""
 
-from .few_keys import Tolerances
 from .job import (
     Breathing,
     ChangeAt,
@@ -12,10 +11,10 @@ from .job import (
     MotionJob,
     ShownContact,
     Timing,
+    Tolerances,
 )
-from .pipeline import MISS, compute
+from .pipeline import MISS, MotionResult, compute
 from .planning import MotionPlan, plan_motion, schedule, shown_contacts
-from .result import MotionResult
 
 __all__ = [
     "MISS",

@@ -27,25 +27,12 @@ from ...keyframes import (
 from ...rotations import Floats
 from ...skeleton import Skeleton
 from ..gait import Arm
+from .job import Tolerances
 
 MANTLE_GROUP: Final = "Mantle"
 
 _TRAVEL_SHARE: Final = 0.25
 """Of the distance that a tip may be off, what travel may take at most."""
-
-
-@dataclass(frozen=True, eq=False)
-class Tolerances:
-    """How far the motion may be off at any frame."""
-
-    angle: float
-    """Radians, of each bone against its parent."""
-    distance: float | Floats
-    """Of each arm's tip, in the armature's units; at each moment, where that differs."""
-    by_bone: bool = True
-    """Whether each bone has key frames of its own, rather than each arm."""
-    held: float | Floats = np.inf
-    """Of joints that rest on the ground, in the armature's units."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from ...keyframes import RigChannels
 from ...rotations import Floats
 from ...skeleton import Skeleton
@@ -16,7 +18,6 @@ from ..ground import ContactOverride, StanceSettings
 from ..path import Route, TravelSettings
 from ..reaching import Reaching
 from ..rig import ArmSkin, BodyFrame
-from .few_keys import Tolerances
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,3 +188,17 @@ class ShownContact:
     frame_off: float
     cycle_frames: float
     """Frames of the arm's cycle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerances:
+    """How far the motion may be off at any frame."""
+
+    angle: float
+    """Radians, of each bone against its parent."""
+    distance: float | Floats
+    """Of each arm's tip, in the armature's units; at each moment, where that differs."""
+    by_bone: bool = True
+    """Whether each bone has key frames of its own, rather than each arm."""
+    held: float | Floats = np.inf
+    """Of joints that rest on the ground, in the armature's units."""

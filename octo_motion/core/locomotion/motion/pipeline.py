@@ -8,31 +8,58 @@ dropped between any two.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
 
 from ...keyframes import Channel
 from ...rotations import IDENTITY, Floats, from_matrix, slerp
-from ..clearance import (
-    ArmsOverGround,
-    Opened,
-    keep_off_ground,
-    raise_between_frames,
-    separate_arms,
-)
+from ..clearance import ArmsOverGround, Opened, keep_off_ground, raise_between_frames, separate_arms
 from ..ground import Ground
-from ..metrics import TOLD, KeyedRig, Measured, figures, measure_keyed
+from ..metrics import TOLD, Figure, KeyedRig, Measured, figures, measure_keyed
 from ..path import plan_travel
 from ..reaching import Carried, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
-from .cached import frames_of_arms
-from .few_keys import Body, Motion, Tolerances, reduced
-from .job import MotionJob
-from .planning import MotionPlan, plan_motion
-from .result import MotionResult
+from .few_keys import Body, Motion, reduced
+from .job import MotionJob, Tolerances
+from .planning import MotionPlan, frames_of_arms, plan_motion
 from .segments import SegmentedMotion
+
+
+@dataclass(frozen=True, eq=False)
+class MotionResult:
+    """What a motion has come to."""
+
+    plan: MotionPlan
+    channels: Sequence[Channel]
+    """All that gets keys."""
+    automatic: bool
+    """Whether keys without handles of their own have automatic ones."""
+    arms: ArmMotion
+    """The arms at all moments at which they were worked out: frames, or those and half frames."""
+    swimming: Floats | None
+    """(frames,) how far the body swims, 0…1, where the gait changes."""
+    carried: tuple[Carried, ...] = ()
+    """Where arms that reach take objects."""
+    measured: Measured | None = None
+    """What the figures are taken from, none where they are not wanted."""
+    figures: tuple[Figure, ...] = ()
+    """The worst of each kind."""
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    """What arms that reach do."""
+
+    @property
+    def frames(self) -> Floats:
+        """(frames,) whole numbers."""
+        return self.plan.schedule.frames
+
+    @property
+    def miss(self) -> float:
+        """Arm lengths that an arm is from the targets of its gait at most."""
+        return float(self.arms.misses[:: self.plan.stride].max())
+
 
 MISS: Final = TOLD["MISS"]
 """Arm lengths by which a target may be missed without a word."""

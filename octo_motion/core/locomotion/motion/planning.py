@@ -11,10 +11,12 @@ from typing import Final
 
 import numpy as np
 
+from ...content_cache import ContentCache, content_key
 from ...errors import SettingsError
 from ...keyframes import Channel
 from ...rotations import Floats
-from ..gait import CYCLE, GaitPoser
+from ...skeleton import Skeleton
+from ..gait import CYCLE, Arm, GaitPoser, GaitSettings
 from ..ground import ContactOverride, GroundedWalk
 from ..path import (
     Course,
@@ -37,13 +39,106 @@ from ..path import (
     unhurried,
     whole_frames,
 )
-from ..rig import find_mantle, joint_positions, lies_back, stretch_mantle
-from .cached import poser_of
-from .few_keys import Tolerances
-from .job import ChangesByHeight, GaitJob, MotionJob, ShownContact
-from .pace import Pace, pace_of, too_few_frames
+from ..rig import (
+    ArmFrames,
+    BodyFrame,
+    find_mantle,
+    frames_of_arm,
+    joint_positions,
+    lies_back,
+    stretch_mantle,
+)
+from .job import ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
 from .segments import Gait, Segments, Transitions
 from .standing import Standing, stand
+
+_posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
+
+_frames_known: Final[ContentCache[list[ArmFrames]]] = ContentCache(4)
+
+
+def frames_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -> list[ArmFrames]:
+    """What leads from bones of each arm to its joints."""
+    bones = [arm.bones for arm in arms]
+    return _frames_known.get(
+        content_key(skeleton, bones, body),
+        lambda: [frames_of_arm(skeleton, each, body) for each in bones],
+    )
+
+
+def poser_of(
+    skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame, settings: GaitSettings
+) -> GaitPoser:
+    """What moves these arms, the same as before while nothing of it has changed."""
+    key = content_key(skeleton, arms, body, settings)
+    return _posers.get(key, lambda: GaitPoser(skeleton, arms, body, settings))
+
+
+# --- Whether a gait has frames enough to be seen, and what to change if not -----------------------
+
+
+_HURRIED: Final = 40.0
+"""Frames of a cycle below which keys that lead on from frame to frame by themselves would let arms
+slide and dip in between."""
+_SWING: Final = 5.0
+"""Frames that an arm needs at least to let go, swing and lie down: with fewer it jumps."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How many frames a cycle of the gait has."""
+
+    mean: float
+    """Over all of the motion."""
+    fastest: float
+    """Where the body goes at full speed."""
+
+    @property
+    def hurried(self) -> bool:
+        """Whether what is between frames is to be looked at, too."""
+        return self.mean < _HURRIED
+
+
+def pace_of(route: Route, travel: TravelSettings, frames: float) -> Pace:
+    """The pace of a journey that takes so many frames, which need not be whole."""
+    mean = frames / max(strides(route, travel), 1e-9)
+    # While it eases in and out, the body is slower than in between.
+    return Pace(mean, mean * route.length / duration(route, travel, 1.0))
+
+
+def too_few_frames(timing: Timing, pace: Pace) -> list[str]:
+    """What there is to say of arms that have no frames to swing in, with what would do.
+
+    Args:
+        timing: how the motion's frames are found.
+        pace: of the motion.
+    """
+    swing = (1.0 - timing.duty) * pace.fastest
+    if swing >= _SWING:
+        return []
+    longer = _SWING / swing
+    if timing.kind == "RANGE":
+        length = (timing.end - timing.start) * longer
+        end = timing.start + math.ceil(length - 1e-6)
+        remedy = f"Let it end at frame {end:,} or later"
+    elif timing.kind == "SPEED":
+        slowest = math.floor(1e3 * timing.speed / longer) / 1e3
+        remedy = f"Lower Speed to {slowest:g} m/s"
+    else:
+        cycle = math.ceil(1e2 * timing.cycle_time * longer) / 1e2
+        remedy = f"Raise Cycle to {cycle:g} s"
+    had = math.floor(10.0 * swing) / 10.0
+    return [
+        (
+            f"At full speed an arm has {had:g} frames for a swing and jumps from pose to pose: "
+            f"{pace.fastest / timing.rate:.2g} s a cycle are too short. {remedy}, or give the gait "
+            "a longer stride."
+        )
+    ]
+
+
+# --- From what was read to what is to be computed: gaits on this rig, the way, when, and footholds
+
 
 MOST_FRAMES: Final = 100_000
 """A journey of more is a slip of the hand: over an hour at 24 frames a second."""

@@ -1,7 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the body is and which way it faces, over time."""
 
-from .course import Course, Line, SwumLine, WalkedLine
+from .course import (
+    Course,
+    Line,
+    SwumLine,
+    WalkedLine,
+    breathing_scales,
+    route_in_place,
+    travel_in_place,
+    whole_frames,
+)
 from .gait_changes import (
     GaitTransition,
     Windows,
@@ -13,7 +22,6 @@ from .gait_changes import (
     way_weights,
 )
 from .heading import Bearings
-from .in_place import breathing_scales, route_in_place, travel_in_place, whole_frames
 from .route import Route, s_bend
 from .travel import (
     Travel,

@@ -9,22 +9,22 @@ place in a straight line and its bearing by the shortest turn.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...easing import least_jerk
+from ...errors import SettingsError
 from ...rotations import Floats, rotation_vector_between, slerp_in_sense
 from ..gait import CYCLE
 from ..rig import lift_to_floor
-from .burst_glide import stroke_distance
 from .gait_changes import GaitTransition
 from .heading import Bearings
 from .route import Route
-from .travel import Travel, TravelSettings, travel_at, walked_at
+from .travel import Travel, TravelSettings, stroke_distance, travel_at, walked_at
 
 
 class Line(Protocol):
@@ -160,3 +160,68 @@ class CourseLine:
     def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
         """World positions (…, 3) and orientations (…, 4) of the body at distances (…,)."""
         return self.course.at(distance)
+
+
+# --- Motion in place that repeats: whole cycles of a gait, and a breath ---------------------------
+#
+# The arms' phases are whole turns apart at the two ends, whatever offsets they have and whatever
+# the gait; so the last frame is the first one in position, and what comes after the first frame
+# is what would come after the last: the seam is a moment like any other.
+
+
+_BULGE: Final = 0.35
+"""How much shorter a mantle gets, as a share of how much wider it gets."""
+_INHALE: Final = 0.42
+"""Share of a breath spent breathing in, which is quicker than breathing out."""
+
+
+def route_in_place(stride: float, cycles: int) -> Route:
+    """A straight way that takes so many strides: what a body in place would have travelled.
+
+    Args:
+        stride: metres.
+        cycles: of the gait.
+
+    Raises:
+        SettingsError: there is not one whole cycle.
+    """
+    if cycles < 1:
+        raise SettingsError(f"The loop has {cycles} cycles.", "Give at least 1.")
+    return Route.poly([[0.0, 0.0, 0.0], [0.0, -stride * cycles, 0.0]])
+
+
+def travel_in_place(travel: TravelSettings) -> TravelSettings:
+    """The same gait at even speed from the first frame to the last."""
+    return replace(travel, speed="EVEN", ease_in=0.0, ease_out=0.0)
+
+
+def whole_frames(frames: float) -> float:
+    """As many frames as a loop of about that length has."""
+    return float(max(round(frames), 2))
+
+
+def breathing_scales(times: Floats, amount: float, *, breath: float, whole: float | None) -> Floats:
+    """Scales (frames, 3) of a mantle that breathes: across, along the bone, across.
+
+    It fills rather quickly and empties slowly, without a corner between the two.
+
+    Args:
+        times: (frames,) seconds.
+        amount: by how much it gets wider, as a share.
+        breath: seconds that a breath takes.
+        whole: seconds of a loop, which takes a whole number of breaths, at least one; none: it
+            is no loop.
+
+    Raises:
+        SettingsError: a breath takes no time.
+    """
+    if not breath > 0.0:
+        raise SettingsError(f"A breath takes {breath:g} seconds.", "Give more than 0.")
+    if whole is not None:
+        breath = whole / max(round(whole / breath), 1)
+    share = np.mod(times / breath, 1.0)
+    # Half a turn for breathing in and half a turn for breathing out.
+    turn = np.interp(share, [0.0, _INHALE, 1.0], [0.0, 0.5, 1.0])
+    filled = amount * 0.5 * (1.0 - np.cos(2.0 * np.pi * turn))
+    across, along = 1.0 + filled, 1.0 - _BULGE * filled
+    return np.stack([across, along, across], axis=-1)

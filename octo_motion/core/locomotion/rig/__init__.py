@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which bones are arms, and what leads from bones to joints and back."""
 
-from .arm_batches import ArmBatch, batches_by_bones
 from .arm_chains import (
     ArmChain,
     BodyFrame,
@@ -14,23 +13,47 @@ from .arm_chains import (
     nearest_axis,
     place_added,
 )
-from .arm_frames import ArmFrames, bend_rotations, frame_of, frames_of_arm, transport_frames
-from .bone_rotations import ArmRest, Facing, arm_rest, carried_to, rotate_bones, sucker_sides
+from .bone_rotations import (
+    ArmBatch,
+    ArmFrames,
+    ArmRest,
+    Facing,
+    arm_rest,
+    batches_by_bones,
+    bend_rotations,
+    carried_to,
+    frame_of,
+    frames_of_arm,
+    rotate_bones,
+    sucker_sides,
+    transport_frames,
+)
 from .detection import Detection, detect_arms
 from .joint_room import (
     MARGIN,
     TOLERATED,
+    ArmSkin,
     JointRoom,
+    arm_skin,
     lift_to_floor,
     loose_from_root,
     lowest_allowed,
+    nearest_bones,
     room_needed,
     smooth_floor,
 )
-from .mantle import find_mantle, lies_back, stretch_mantle
-from .placement import carried_by_root_bone, object_transforms, root_bone_transforms
-from .poses import ArmMotion, Poses, halfway_automatic, halfway_linear
-from .skin_offset import ArmSkin, arm_skin, nearest_bones
+from .poses import (
+    ArmMotion,
+    Poses,
+    carried_by_root_bone,
+    find_mantle,
+    halfway_automatic,
+    halfway_linear,
+    lies_back,
+    object_transforms,
+    root_bone_transforms,
+    stretch_mantle,
+)
 
 __all__ = [
     "MARGIN",

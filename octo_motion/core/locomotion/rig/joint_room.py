@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from ...easing import smooth_step
-from ...rotations import Floats
+from ...rotations import Floats, conjugate, rotate, shortest_arc
 
 MARGIN: Final = 0.03
 """Arm lengths that joints which do not lie keep between their skin and the ground: between two of
@@ -91,3 +91,183 @@ class JointRoom:
         below = np.where(below > self.soft, below, near * near * (0.25 / self.soft))
         below *= self.loose
         return below
+
+
+# --- How far an arm's skin reaches from its bones: on many rigs these are not in the middle of it
+#
+# An arm that lies rests on its skin. Where that is round about its bones it is as far from them on
+# whichever side it lies; an imported creature's bones may as well run along its back, and taken as
+# round it would hover. So the skin is seen from all sides, bone by bone, once for a rig.
+
+
+_SIDES: Final = 36
+"""Sides that a bone is seen from, all round it."""
+_SIDE: Final = 2.0 * np.pi / _SIDES
+_LIES: Final = 6
+"""Sides either way of its suckers' that an arm comes to lie on."""
+_ROLL: Final = np.radians(10.0)
+"""How far a bone may roll from how it was seen to lie."""
+_MOST: Final = 0.97
+"""Share of a bone's points that do not reach further than it says."""
+_FEW: Final = 4
+"""Points of a bone's half that do not yet tell how far its skin reaches."""
+_ASKEW: Final = 0.6
+"""Share of its radius up to which a skin that reaches no further counts as it is …"""
+_ROUND: Final = 0.8
+"""… and from which on it is round: points are few, and none may be just below a bone."""
+_NEAREST: Final = 0.12
+"""Radii that a skin is taken to reach at least: bones that lie need room for what keys lose."""
+_FARTHEST: Final = 1.5
+"""Radii that a skin is taken to reach at most: what is further is a web, or a fin."""
+_TINY: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class ArmSkin:
+    """The skin of one arm."""
+
+    radii: Floats
+    """(bones + 1,) armature units from each joint to the skin about it, as if it were round."""
+    across: Floats
+    """(bones, 2, 3) unit vectors across each bone, in its rest frame, the second a quarter round
+    from the first."""
+    reaches: Floats
+    """(bones, 2, sides) armature units that the skin reaches from the bone's axis, at its head and
+    at its tail, to sides all round from the first of ``across`` to the second and on."""
+
+    def is_round(self, sides: Floats, first: int) -> bool:
+        """Whether it reaches as far to whichever side joints may lie on, as nearly as can be told.
+
+        Args:
+            sides: (bones, 3) where the suckers are, in the bones' rest frames; none of a bone whose
+                any side may come to be below.
+            first: the first joint that may lie.
+        """
+        seen = np.einsum("bc,bac->ba", sides, self.across)
+        middle = np.rint(np.arctan2(seen[:, 1], seen[:, 0]) / _SIDE).astype(np.int64)
+        aside = np.arange(-_LIES, _LIES + 1)
+        bones, ends = np.arange(len(sides))[:, None, None], np.arange(2)[:, None]
+        parts = self._parts
+        facing = parts[bones, ends, (middle[:, None] + aside)[:, None] % _SIDES]
+        anyhow = np.all(sides == 0.0, axis=1)
+        facing[anyhow] = np.min(parts[anyhow], axis=-1, keepdims=True)
+        at_joints = np.concatenate([np.maximum(facing[:-1, 1], facing[1:, 0]), facing[-1:, 1]])
+        return bool(np.all(at_joints[first - 1 :] >= _ROUND))
+
+    @property
+    def _parts(self) -> Floats:
+        """``reaches``, of the skin's radius there."""
+        ends = np.stack([self.radii[:-1], self.radii[1:]], axis=-1)
+        return self.reaches / np.maximum(ends, _TINY)[..., None]
+
+    def below(self, down: Floats, first: int = 0) -> Floats:
+        """How far the skin reaches down at both ends of bones (…, bones, 2), armature units.
+
+        A bone that is outside its skin is not in the ground either.
+
+        Args:
+            down: (…, bones, 2, 3) which way is down there, in the bones' rest frames.
+            first: the first of these bones.
+        """
+        seen = np.einsum("...bec,bac->...bea", down, self.across[first:])
+        place = np.arctan2(seen[..., 1], seen[..., 0]) / _SIDE
+        lower = np.floor(place)
+        share = place - lower
+        low = lower.astype(np.int64) % _SIDES
+        bones, ends = np.arange(first, len(self.across))[:, None], np.arange(2)
+        # Whichever side it may come to show, if it rolls a little.
+        steps = int(np.ceil(_ROLL / _SIDE))
+        rolled = np.max(
+            [np.roll(self._parts, step, axis=-1) for step in range(-steps, steps + 1)], axis=0
+        )
+        one, other = rolled[bones, ends, low], rolled[bones, ends, (low + 1) % _SIDES]
+        part = np.clip(one + share * (other - one), _NEAREST, _FARTHEST)
+        rounder = smooth_step((part - _ASKEW) / (_ROUND - _ASKEW))
+        part += np.maximum(1.0 - part, 0.0) * rounder
+        return part * np.stack([self.radii[first:-1], self.radii[first + 1 :]], axis=-1)
+
+
+def arm_skin(points: Floats, joints: Floats, frames: Floats, radii: Floats) -> ArmSkin:
+    """The skin of an arm from points of it at rest.
+
+    Args:
+        points: (n, 3) of its skin, armature space.
+        joints: (bones + 1, 3) of the arm, armature space.
+        frames: (bones, 4) the bones' rest orientations.
+        radii: (bones + 1,) from each joint to the skin about it, as if it were round.
+    """
+    steps = np.diff(joints, axis=0)
+    segments = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), _TINY)
+    across = _across(segments)
+    angles = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+    ways = np.stack([np.cos(angles), np.sin(angles)])
+    bone, share, off = nearest_bones(points, joints)
+    ends = np.stack([radii[:-1], radii[1:]], axis=-1)[..., None]
+    parts = np.full((len(steps), 2, _SIDES), np.nan)
+    for number, sides in enumerate(across):
+        own = bone == number
+        parts[number] = _at_ends(off[own] @ sides.T @ ways, share[own])
+    parts /= np.maximum(ends, _TINY)
+    parts = _filled(parts.reshape(-1, _SIDES)).reshape(parts.shape)
+    return ArmSkin(radii, rotate(conjugate(frames)[:, None], across), parts * ends)
+
+
+def _across(segments: Floats) -> Floats:
+    """Unit vectors across each bone (bones, 2, 3): along the arm they turn as little as it does."""
+    first = np.empty(segments.shape)
+    # Across the first bone, any way: the axis that is least along it.
+    before = np.eye(3)[np.abs(segments[0]).argmin()]
+    for number, segment in enumerate(segments):
+        if number:
+            before = rotate(shortest_arc(segments[number - 1], segment), before)
+        across = before - (before @ segment) * segment
+        before = across / max(float(np.linalg.norm(across)), _TINY)
+        first[number] = before
+    return np.stack([first, np.cross(segments, first)], axis=1)
+
+
+def _filled(parts: Floats) -> Floats:
+    """Rows (ends, sides) of what is not known taken from those before and after; else 1."""
+    known = np.flatnonzero(np.isfinite(parts[:, 0]))
+    if len(known) == 0:
+        return np.ones(parts.shape)
+    rows = np.arange(len(parts))
+    return np.stack([np.interp(rows, known, side[known]) for side in parts.T], axis=1)
+
+
+def nearest_bones(points: Floats, joints: Floats) -> tuple[np.ndarray, Floats, Floats]:
+    """The bone that each point is nearest to.
+
+    Args:
+        points: (n, 3).
+        joints: (bones + 1, 3) of a chain.
+
+    Returns:
+        Its number (n,), where along it that is (n,), 0…1, and the way from there (n, 3).
+    """
+    starts, steps = joints[:-1], np.diff(joints, axis=0)
+    seen = points[:, None] - starts
+    share = np.einsum("nsc,sc->ns", seen, steps) / np.maximum(np.sum(steps**2, axis=1), _TINY)
+    share = np.clip(share, 0.0, 1.0)
+    off = seen - share[..., None] * steps
+    bone = np.einsum("nsc,nsc->ns", off, off).argmin(axis=1)
+    rows = np.arange(len(points))
+    return bone, share[rows, bone], off[rows, bone]
+
+
+def _at_ends(reach: Floats, share: Floats) -> Floats:
+    """How far a bone's skin reaches at its ends (2, sides), nan where its points are too few.
+
+    Args:
+        reach: (n, sides) how far each of its points does.
+        share: (n,) where along it they are, 0…1.
+    """
+    ends = np.full((2, reach.shape[1]), np.nan)
+    for end, near in enumerate((share <= 0.5, share >= 0.5)):
+        if np.count_nonzero(near) >= _FEW:
+            ends[end] = np.quantile(reach[near], _MOST, axis=0)
+    if np.all(np.isfinite(ends)):
+        # A bone is straight: what bulges between its ends must not be in the ground either.
+        line = ends[0] + share[:, None] * (ends[1] - ends[0])
+        ends += np.maximum(np.quantile(reach - line, _MOST, axis=0), 0.0)
+    return ends

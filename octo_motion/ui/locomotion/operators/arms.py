@@ -22,8 +22,8 @@ from ....blender.rig import (
 )
 from ....core.errors import RigError
 from ....core.locomotion.rig import ArmChain, body_frame, chain_of, detect_arms, place_added
-from ...list_operators import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
-from ...override_groups import assign
+from ...declared_settings import assign
+from ...operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ...panel_base import ItemRows
 from ..reading import (
     active_arm,

@@ -10,7 +10,7 @@ from bpy.props import FloatProperty, StringProperty
 
 from ....blender.animation import writable_armature
 from ....blender.files import gait_names, has_gait, load_gait
-from ...list_operators import ListKind, ListOperator, RemoveOperator
+from ...operator_base import ListKind, ListOperator, RemoveOperator
 from ...panel_base import ItemRows
 from ..settings import OCTO_MOTION_PG_locomotion, locomotion_settings
 

@@ -11,10 +11,8 @@ from bpy.props import FloatProperty
 from ....blender.rig import active_armature, require_editable
 from ....blender.scene import markers, remove_markers
 from ....core.errors import OctoMotionError, SettingsError
-from ...armature_operator import ArmatureOperator
 from ...local_view import show_in_local_view
-from ...operator_base import OctoOperator
-from ..generate_motion import prepare
+from ...operator_base import ArmatureOperator, OctoOperator
 from ..reading import resting
 from ..settings import (
     OCTO_MOTION_PG_locomotion,
@@ -24,7 +22,7 @@ from ..settings import (
     read_overrides,
     store,
 )
-from ..writing import show_contacts
+from ..writing import prepare, show_contacts
 
 
 class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):

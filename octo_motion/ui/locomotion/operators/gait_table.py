@@ -24,7 +24,7 @@ from ....blender.files import (
 from ....blender.rig import active_armature
 from ....core.errors import GaitError
 from ....core.locomotion.gait import CYCLE, GaitCurve, renamed_gait
-from ...armature_operator import ArmatureOperator
+from ...operator_base import ArmatureOperator
 from ..settings import (
     SIDES,
     OCTO_MOTION_PG_locomotion,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The button that makes the armature walk: from the settings to keys."""
+"""The button that makes the armature walk: read → plain arrays → compute → write."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import bpy
 
 from ....blender.rig import active_armature
 from ....core.errors import OctoMotionError
-from ...armature_operator import ArmatureOperator
 from ...modal_job import ModalJob
-from ..generate_motion import generate, prepare
-from ..writing import Shot, Summary
+from ...operator_base import ArmatureOperator
+from ..writing import Shot, Summary, generate_locomotion, prepare
 from . import live
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
-        self._tell(generate(armature, context))
+        self._tell(generate_locomotion(armature, context))
         live.made(armature)
 
     def invoke(

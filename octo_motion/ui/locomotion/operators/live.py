@@ -24,8 +24,7 @@ from ....blender.animation import is_edited, may_replace
 from ....blender.rig import deformed_meshes, read_skeleton
 from ....core.content_cache import clear_caches, content_key
 from ....core.errors import OctoMotionError, RigError
-from ...plain import plain
-from ..generate_motion import RESULTS, prepare
+from ...declared_settings import plain
 from ..reading import playing_action, previous_action
 from ..settings import (
     SWITCHED,
@@ -34,6 +33,7 @@ from ..settings import (
     once_called,
     read_overrides,
 )
+from ..writing import RESULTS, prepare
 
 _SOON: Final = 0.01
 """Seconds from a change to the new motion at least: what changes together is made together."""

@@ -12,7 +12,7 @@ from bpy.props import EnumProperty
 from ....blender.rig import active_armature
 from ....core.errors import RigError, SettingsError
 from ....core.locomotion.metrics import TOLD
-from ...armature_operator import ArmatureOperator
+from ...operator_base import ArmatureOperator
 from ..settings import (
     KIND_NAMES,
     KINDS,

@@ -11,8 +11,7 @@ from bpy.props import EnumProperty, StringProperty
 from ....blender.rig import active_armature, require_editable
 from ....blender.scene import WITH_SURFACE
 from ....core.errors import RigError, SettingsError
-from ...armature_operator import ArmatureOperator
-from ...list_operators import ListKind, RemoveOperator
+from ...operator_base import ArmatureOperator, ListKind, RemoveOperator
 from ...panel_base import ItemRows
 from ..reading import bones_of
 from ..settings import MODES, OCTO_MOTION_PG_locomotion, locomotion_settings

@@ -20,10 +20,9 @@ from ....blender.animation import writable_armature
 from ....blender.files import load_gait
 from ....blender.rig import active_armature
 from ....core.errors import SettingsError
-from ...armature_operator import ArmatureOperator
 from ...armature_preset import ARMATURE, ArmaturePresetAdd
-from ...override_groups import assign
-from ...plain import plain
+from ...declared_settings import assign, plain
+from ...operator_base import ArmatureOperator
 from ..settings import (
     DEFAULT_GAIT,
     OCTO_MOTION_PG_locomotion,

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, cast
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
@@ -15,26 +16,160 @@ from ....blender.animation import (
     animated_bones,
     as_posed,
     displaced_bones,
+    is_generated,
     read_channels,
 )
-from ....blender.rig import armature_data, is_driven_object, read_skeleton, world_directions
+from ....blender.overrides import linked_names
+from ....blender.rig import (
+    armature_data,
+    is_driven_object,
+    radii_of_skin,
+    read_skeleton,
+    skin_key,
+    skin_parts,
+    world_directions,
+)
+from ....core.content_cache import ContentCache, content_key
 from ....core.errors import RigError
+from ....core.locomotion.clearance import BodyVolume, Capsules
 from ....core.locomotion.gait import Arm
 from ....core.locomotion.motion import Creature
 from ....core.locomotion.rig import (
+    ArmChain,
     BodyFrame,
     Detection,
     Side,
     body_frame,
     chain_of,
     detect_arms,
+    frames_of_arm,
     is_driven,
+    nearest_axis,
 )
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
+from ...declared_settings import assign
 from ..settings import OCTO_MOTION_PG_locomotion
-from .arm_items import bones_of
-from .previous_action import previous_action
+
+# Names that detection gives, and the numbers that keep them apart.
+_GIVEN_NAME: Final = re.compile(r"Arm \d+( [LR])?(\.\d+)?")
+
+
+def list_owner(settings: OCTO_MOTION_PG_locomotion) -> bpy.types.Object:
+    """The armature object that the settings belong to."""
+    return cast("bpy.types.Object", settings.id_data)
+
+
+def active_arm(settings: OCTO_MOTION_PG_locomotion) -> Any:
+    """The list's active arm, ``None`` in an empty list."""
+    number = settings.active_arm
+    return settings.arms[number] if 0 <= number < len(settings.arms) else None
+
+
+def bones_of(arm: Any) -> tuple[str, ...]:
+    """Names of an arm's bones, root to tip."""
+    return tuple(bone.name for bone in arm.bones)
+
+
+def placed_arms(
+    settings: OCTO_MOTION_PG_locomotion, skeleton: Skeleton
+) -> list[tuple[tuple[str, ...], Side, int]]:
+    """Bones, side and pair of the arms in the list whose bones all exist."""
+    return [
+        (bones, cast("Side", arm.side), arm.pair)
+        for arm in settings.arms
+        if (bones := bones_of(arm)) and skeleton.index.keys() >= set(bones)
+    ]
+
+
+def body_axes(settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object) -> tuple[str, str]:
+    """The body's up and front: as set, or as the armature stands in the world."""
+    if settings.arms or settings.is_property_set("body_front"):
+        return settings.body_up, settings.body_front
+    world_up, world_front = world_directions(armature)
+    up = nearest_axis(world_up)
+    return up, nearest_axis(world_front, across=up)
+
+
+def write_arms(settings: OCTO_MOTION_PG_locomotion, arms: Iterable[ArmChain]) -> int:
+    """Make the list these arms, keeping what the artist has set on those it had.
+
+    Returns how many arms of a linked file could only be switched off.
+    """
+    linked = linked_names(settings, "arms")
+    kept: dict[tuple[str, ...], dict[str, Any]] = {}
+    for number in reversed(range(len(settings.arms))):
+        item = settings.arms[number]
+        if item.name not in linked:
+            kept[bones_of(item)] = _set_by_hand(item)
+            settings.arms.remove(number)
+    remaining = {bones_of(item): item.name for item in settings.arms}
+    for arm in arms:
+        name = remaining.pop(arm.bones, None)
+        if name is None:
+            item = add_item(settings, arm, **kept.get(arm.bones, {}))
+        else:
+            item = settings.arms[name]
+        assign(item, "side", arm.side)
+        assign(item, "pair", arm.pair)
+    for name in remaining.values():
+        assign(settings.arms[name], "enabled", value=False)
+    settings.active_arm = min(settings.active_arm, max(0, len(settings.arms) - 1))
+    return len(remaining)
+
+
+def _set_by_hand(item: Any) -> dict[str, Any]:
+    values = {"phase": item.phase, "flip": item.flip, "enabled": item.enabled}
+    if not _GIVEN_NAME.fullmatch(item.name):
+        values["name"] = item.name
+    return values
+
+
+def add_item(settings: OCTO_MOTION_PG_locomotion, arm: ArmChain, **values: Any) -> Any:
+    """Append an arm under a name that no other has, with these values of its properties."""
+    name = values.pop("name", arm.name)
+    taken = {each.name for each in settings.arms}
+    number = 1
+    unique = name
+    while unique in taken:
+        unique = f"{name}.{number:03}"
+        number += 1
+    item = settings.arms.add()
+    item.name, item.side, item.pair = unique, arm.side, arm.pair
+    for bone in arm.bones:
+        item.bones.add().name = bone
+    for key, value in values.items():
+        setattr(item, key, value)
+    return item
+
+
+def write_body(settings: OCTO_MOTION_PG_locomotion, found: Detection) -> None:
+    """Set which way the body faces; the root bone stays as it is if it is one."""
+    assign(settings, "body_up", found.up)
+    assign(settings, "body_front", found.front)
+    if settings.root_bone not in armature_data(list_owner(settings)).bones:
+        assign(settings, "root_bone", found.root_bone)
+
+
+# --- The action that a motion is made anew in place of --------------------------------------------
+
+
+def playing_action(armature: bpy.types.Object) -> bpy.types.Action | None:
+    """The action that an armature has."""
+    data = armature.animation_data
+    return data.action if data is not None else None
+
+
+def previous_action(
+    armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion
+) -> bpy.types.Action | None:
+    """The action to make anew: the one that plays if it was generated, else the last result."""
+    spliced = cast("Any", armature).octo_motion.splicing.result
+    playing = playing_action(armature)
+    if playing is not None and playing != spliced and is_generated(playing):
+        return playing
+    return settings.result
+
 
 _UNEQUAL: Final = 1e-3
 
@@ -343,3 +478,68 @@ def warnings_for_poses(
         "that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not."
     )
     return [told]
+
+
+# --- Whether arms keep apart: from the rig and its skin to what is said of it ---------------------
+
+
+_known: Final[ContentCache[BodyVolume]] = ContentCache(2)
+
+
+def read_volume(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    creature: Creature,
+    *,
+    live: bool = False,
+) -> BodyVolume | None:
+    """The arms and the parts of the body as thick as their skin, where that is asked for.
+
+    Args:
+        settings: of the armature.
+        armature: the armature object.
+        creature: its rig.
+        live: whether it is to be quick: which bones a skin follows is then looked at anew only
+            where the skin has changed its form, and nothing is told of overlaps.
+    """
+    if not settings.keep_apart and (live or not settings.tell_overlaps):
+        return None
+    if not live:
+        _known.clear()
+    rig = creature.skeleton, creature.arms, creature.body
+    key = content_key(*rig, skin_key(armature))
+    return _known.get(key, lambda: _read_volume(armature, *rig))
+
+
+def _read_volume(
+    armature: bpy.types.Object, skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame
+) -> BodyVolume:
+    limbs = {bone for arm in arms for bone in arm.bones}
+    parts = [
+        name
+        for number, name in enumerate(skeleton.names)
+        if skeleton.deform[number]
+        and skeleton.weighted[number]
+        and not _hangs(skeleton, name, limbs)
+    ]
+    radii = radii_of_skin(armature, [arm.bones for arm in arms])
+    still = [
+        Capsules(name, ends[None], thick, ends) for name, ends, thick in skin_parts(armature, parts)
+    ]
+    return BodyVolume(
+        arms=tuple(frames_of_arm(skeleton, arm.bones, body) for arm in arms),
+        names=tuple(arm.name for arm in arms),
+        radii=tuple(radii),
+        still=tuple(still),
+        upward=body.rotation[:, 2],
+    )
+
+
+def _hangs(skeleton: Skeleton, name: str, limbs: set[str]) -> bool:
+    """Whether a bone is of an arm, or hangs on one."""
+    bone = skeleton.index[name]
+    while bone >= 0:
+        if skeleton.names[bone] in limbs:
+            return True
+        bone = skeleton.parents[bone]
+    return False

@@ -1,19 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist sets, kept with the armature object."""
 
-from . import arms, changes, gait, ground, properties, quality, reaches
+from . import arms, changes, gait, ground, properties, reaches
 from .arms import AXES
 from .changes import ChangeItem, OCTO_MOTION_PG_change
-from .contact_overrides import (
-    ContactEdit,
-    Place,
-    changed_by_hand,
-    note_shown,
-    once_called,
-    overrides_for_core,
-    read_overrides,
-    store,
-)
 from .gait import (
     DEFAULT_GAIT,
     SIDES,
@@ -25,11 +15,31 @@ from .gait import (
     matched,
     used,
 )
-from .ground import ContactItem, OCTO_MOTION_PG_contact, OCTO_MOTION_PG_ground
-from .live import SWITCHED
-from .movement import fill_gait_table, read_gait, set_gait
-from .properties import OCTO_MOTION_PG_locomotion, locomotion_settings
-from .quality import KIND_NAMES, KINDS, known_figures, write_figures
+from .ground import (
+    ContactEdit,
+    ContactItem,
+    OCTO_MOTION_PG_contact,
+    OCTO_MOTION_PG_ground,
+    Place,
+    changed_by_hand,
+    note_shown,
+    once_called,
+    overrides_for_core,
+    read_overrides,
+    store,
+)
+from .properties import (
+    KIND_NAMES,
+    KINDS,
+    SWITCHED,
+    OCTO_MOTION_PG_locomotion,
+    fill_gait_table,
+    known_figures,
+    locomotion_settings,
+    read_gait,
+    set_gait,
+    write_figures,
+)
 from .reaches import MODES, ReachItem
 
 CLASSES = (
@@ -38,7 +48,6 @@ CLASSES = (
     *reaches.CLASSES,
     *ground.CLASSES,
     *changes.CLASSES,
-    *quality.CLASSES,
     *properties.CLASSES,
 )
 

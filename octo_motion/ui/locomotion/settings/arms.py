@@ -13,7 +13,7 @@ from typing import Final
 
 import bpy
 
-from ...overridable import (
+from ...declared_settings import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -21,8 +21,8 @@ from ...overridable import (
     IntProperty,
     StringProperty,
 )
-from .contact_overrides import rename_arm
 from .gait import SIDES
+from .ground import rename_arm
 
 AXES: Final = (
     ("X", "X", "The armature's own +X", 0),

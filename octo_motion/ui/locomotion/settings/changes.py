@@ -8,7 +8,7 @@ from typing import Any, Final
 import bpy
 
 from ....blender.files import gait_names
-from ...overridable import (
+from ...declared_settings import (
     CollectionProperty,
     EnumProperty,
     FloatProperty,

@@ -29,7 +29,7 @@ from ....core.locomotion.gait import (
     gait_to_json,
 )
 from ....core.rotations import Floats
-from ...overridable import (
+from ...declared_settings import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -37,8 +37,8 @@ from ...overridable import (
     FloatVectorProperty,
     IntProperty,
     StringProperty,
+    assign,
 )
-from ...override_groups import assign
 
 DEFAULT_GAIT: Final = "walk"
 _DEFAULT: Final = gait_presets()[DEFAULT_GAIT]

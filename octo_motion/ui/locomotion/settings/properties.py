@@ -7,24 +7,529 @@ core/settings.py.
 
 from __future__ import annotations
 
-from typing import Final, cast
+from collections.abc import Sequence
+from typing import Any, Final, cast
 
 import bpy
+import numpy as np
 
+from ....blender.files import curve_node, ensure_weight_curve, gait_names, load_gait
+from ....blender.overrides import linked_names
 from ....blender.rig import armature_data
-from ...overridable import PointerProperty
-from ...override_groups import make_overridable
+from ....core.errors import GaitError
+from ....core.locomotion.gait import GaitSettings, GaitTable
+from ....core.locomotion.metrics import Figure
+from ....core.locomotion.path import TravelSettings
+from ...declared_settings import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+    declared,
+    make_overridable,
+)
 from .arms import ArmList
 from .changes import OCTO_MOTION_PG_change
+from .gait import DEFAULT_GAIT, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
 from .ground import OCTO_MOTION_PG_ground
-from .in_place import InPlace
-from .keep_apart import KeepingApart
-from .live import LiveSettings
-from .movement import Movement
-from .quality import QualityReport
 from .reaches import Reaches
-from .route import RouteSettings
-from .timing import Keys, Timing
+
+KINDS: Final = (
+    ("SLIP", "Slip", "How far an arm slides over the ground that it holds, in arm lengths", 0),
+    ("DEPTH", "Depth", "How far an arm's bones are below the ground, in arm lengths", 1),
+    ("STRAIN", "Strain", "By how much a bone is longer or shorter than at rest, as a share", 2),
+    ("MISS", "Miss", "How far an arm is from its target or foothold, in arm lengths", 3),
+    ("TURN", "Turn", "How far a bone turns from one frame to the next", 4),
+    ("OVERLAP", "Overlap", "How deep arms pass through each other or the body, in radii", 5),
+)
+
+KIND_NAMES: Final = {kind: name for kind, name, _, _ in KINDS}
+
+
+class FigureItem(bpy.types.PropertyGroup):
+    """The worst of one kind, as it is kept with the settings."""
+
+    kind: EnumProperty(name="Kind", description="What was measured", items=KINDS)
+    value: FloatProperty(
+        name="Value",
+        description="Slip, depth and miss in arm lengths, strain as a share, turn in radians per "
+        "frame, overlap in radii",
+        precision=5,
+    )
+    frame: IntProperty(
+        name="Frame",
+        description="Where it is worst; between two frames the first of them",
+    )
+    arm: StringProperty(name="Arm", description="Of which arm; of an overlap both")
+    known: BoolProperty(
+        name="Known",
+        description="Whether it was measured in this motion. Off for what a linked file tells of "
+        "another one",
+        default=True,
+    )
+
+
+class QualityReport:
+    """What ``Object.octo_motion.locomotion`` has of it."""
+
+    figures: CollectionProperty(
+        name="Quality",
+        description="The worst of each kind in the motion that was generated last",
+        type=FigureItem,
+    )
+
+
+def known_figures(settings: Any) -> list[Any]:
+    """Items of the figures that were measured, in the order of ``KINDS``."""
+    items = settings.figures
+    found = {item.kind: item for item in items if item.known}
+    return [found[kind] for kind in KIND_NAMES if kind in found]
+
+
+def write_figures(settings: Any, found: Sequence[Figure]) -> None:
+    """Keep figures with the settings.
+
+    What a library override has from its linked file can be changed, but not removed.
+    """
+    items = settings.figures
+    linked = linked_names(settings, "figures")
+    for number in reversed(range(len(items))):
+        if items[number].name in linked:
+            items[number].known = False
+        else:
+            items.remove(number)
+    for figure in found:
+        item = items.get(figure.kind)
+        if item is None:
+            item = items.add()
+            item.name = item.kind = figure.kind
+        item.value, item.frame, item.arm = figure.value, figure.frame, figure.arm
+        item.known = True
+
+
+def _is_weight_curve(_settings: Any, candidate: bpy.types.NodeTree) -> bool:
+    return curve_node(candidate) is not None
+
+
+def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
+    return gait_names()
+
+
+def _load_gait(settings: Any, _context: bpy.types.Context) -> None:
+    if used(settings.table.curves) and settings.table.name == settings.gait:
+        return
+    try:
+        fill_gait_table(settings, settings.gait)
+    except GaitError:
+        # Generating says it, and the panel shows it: here is nobody to tell.
+        return
+
+
+def _make_weight_curve(settings: Any, _context: bpy.types.Context) -> None:
+    if settings.use_weight_curve:
+        settings.weight_curve = ensure_weight_curve(
+            settings.weight_curve, settings.weight_root, settings.weight_tip
+        )
+
+
+class Movement:
+    """What ``Object.octo_motion.locomotion`` has of the gait."""
+
+    gait: StringProperty(
+        name="Gait",
+        description="The gait that is loaded. Choosing one loads its table, which can be edited",
+        default=DEFAULT_GAIT,
+        search=_gait_names,
+        search_options=set(),
+        update=_load_gait,
+    )
+    table: PointerProperty(
+        name="Gait Table",
+        description="The gait itself: angles of the arms over one cycle",
+        type=OCTO_MOTION_PG_gait_table,
+    )
+    contraction: declared(GaitSettings, "contraction")
+    softness: declared(GaitSettings, "softness")
+    give: declared(GaitSettings, "stretch_slack")
+    steady: declared(GaitSettings, "smoothing_cycles")
+    sway: declared(GaitSettings, "lateral_bend")
+    stand: declared(GaitSettings, "raise_to_floor")
+    phase_spread: declared(GaitSettings, "phase_spread")
+    turning: declared(GaitSettings, "turning")
+    variation_min: FloatProperty(
+        name="Variation Min",
+        description="Least random addition to the gait's angles, drawn anew for each cycle",
+        subtype="ANGLE",
+        default=GaitSettings.variation[0],
+        soft_min=-0.5 * np.pi,
+        soft_max=0.0,
+        min=-np.pi,
+        max=np.pi,
+        step=100,
+        precision=1,
+    )
+    variation_max: FloatProperty(
+        name="Max",
+        description="Greatest random addition to the gait's angles, drawn anew for each cycle",
+        subtype="ANGLE",
+        default=GaitSettings.variation[1],
+        soft_min=0.0,
+        soft_max=0.5 * np.pi,
+        min=-np.pi,
+        max=np.pi,
+        step=100,
+        precision=1,
+    )
+    seed: declared(GaitSettings, "seed")
+    weight_root: FloatProperty(
+        name="Weight Root",
+        description="How readily joints at the arm's root bend. Lower weights spread a bend over "
+        "more joints",
+        subtype="FACTOR",
+        default=GaitSettings.weights[0],
+        min=0.01,
+        max=1.0,
+    )
+    weight_tip: FloatProperty(
+        name="Tip",
+        description="How readily joints at the arm's tip bend. Lower than at the root, the bend "
+        "moves to the root",
+        subtype="FACTOR",
+        default=GaitSettings.weights[-1],
+        min=0.01,
+        max=1.0,
+    )
+    use_weight_curve: BoolProperty(
+        name="Curve",
+        description="Draw the weights as a curve from the arm's root, left, to its tip, right",
+        update=_make_weight_curve,
+    )
+    weight_curve: PointerProperty(
+        name="Weight Curve",
+        description="Node group that keeps the curve of joint weights",
+        type=bpy.types.NodeTree,
+        poll=_is_weight_curve,
+    )
+
+
+def fill_gait_table(settings: Movement, name: str) -> None:
+    """Fill the editable table with a gait of the extension or of the user's.
+
+    Raises:
+        GaitError: there is no such gait, or its file is damaged.
+    """
+    set_gait(settings, load_gait(name))
+
+
+def set_gait(settings: Movement, table: GaitTable) -> None:
+    """Fill the editable table with any gait, of the user's presets or not."""
+    # In this order: the gait that is in the table already is not loaded once more.
+    fill_table(settings.table, table)
+    settings.gait = table.name
+
+
+def read_gait(settings: Movement) -> GaitTable:
+    """The gait as it is set.
+
+    Raises:
+        GaitError: no gait of the chosen name could be loaded, or the table is no gait.
+    """
+    if used(settings.table.curves) and settings.table.name == settings.gait:
+        return read_table(settings.table)
+    preset = load_gait(settings.gait)
+    if used(settings.table.curves):
+        raise GaitError(
+            f"The gait '{settings.gait}' is not loaded, '{settings.table.name}' is.",
+            "Choose the gait anew.",
+        )
+    return read_table(settings.table, preset)
+
+
+# --- The route, and how it is travelled -----------------------------------------------------------
+
+
+def _is_curve(_settings: Any, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "CURVE"
+
+
+class RouteSettings:
+    """What ``Object.octo_motion.locomotion`` has of the route."""
+
+    route: PointerProperty(
+        name="Route",
+        description="Curve to travel along. For a walk it lies on the ground",
+        type=bpy.types.Object,
+        poll=_is_curve,
+    )
+    spline: IntProperty(
+        name="Spline",
+        description="Which of the curve's splines to follow, counted from 0; -1 takes the longest",
+        default=-1,
+        min=-1,
+    )
+    speed_mode: declared(TravelSettings, "speed")
+    ease_in: declared(TravelSettings, "ease_in")
+    ease_out: declared(TravelSettings, "ease_out")
+    heading: declared(TravelSettings, "heading")
+    heading_angle: declared(TravelSettings, "heading_angle")
+    keep_upright: declared(TravelSettings, "keep_upright")
+    look_ahead: declared(TravelSettings, "look_ahead")
+    corner: declared(TravelSettings, "corner")
+    burst: declared(TravelSettings, "burst")
+    bank_in_turns: declared(TravelSettings, "bank")
+    streamline: FloatProperty(
+        name="Streamline",
+        description="Swimming: how far head and mantle stretch out along the way. At 0 they lean "
+        "back as they do at rest. A body whose mantle lies flat behind it swims as it lies instead",
+        subtype="FACTOR",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+    )
+    height_mode: EnumProperty(
+        name="Height",
+        description="How high above the route the body's center travels",
+        items=(
+            (
+                "AUTO",
+                "Automatic",
+                "Walking: as high as the arms need to stand on the route. Swimming: on it",
+                0,
+            ),
+            ("MANUAL", "Manual", "As high as given", 1),
+        ),
+    )
+    height: FloatProperty(
+        name="Height",
+        description="Distance of the body's center above the route",
+        subtype="DISTANCE",
+        soft_min=-10.0,
+        soft_max=10.0,
+    )
+
+
+# --- Settings of motion in place, and of breath ---------------------------------------------------
+
+
+_IN_PLACE: Final = (
+    "Nothing travels: whole cycles on the spot, whose last frame meets the first, for games and "
+    "for a creature that stays. No route is needed; a root bone lifts the body to its height over "
+    "the armature's origin"
+)
+TRAVEL_IN_PLACE: Final = ("NONE", "In Place", _IN_PLACE, 2)
+
+
+class InPlace:
+    """What ``Object.octo_motion.locomotion`` has of motion in place, and of breath."""
+
+    cycles: IntProperty(
+        name="Cycles",
+        description="In place: how many cycles of the gait the loop has. Random additions repeat "
+        "with the loop, so more cycles look less even",
+        default=1,
+        min=1,
+        soft_max=12,
+        max=10_000,
+    )
+    repeat: BoolProperty(
+        name="Repeat",
+        description="In place: curves repeat before and after the loop, by Cycles modifiers. "
+        "Exporters take the loop alone",
+        default=True,
+    )
+    breathing: FloatProperty(
+        name="Breathing",
+        description="How much wider the mantle gets with each breath; 0 gives it no keys",
+        subtype="FACTOR",
+        default=0.0,
+        min=0.0,
+        soft_max=0.3,
+        max=1.0,
+        step=1,
+    )
+    breath_time: FloatProperty(
+        name="Breath",
+        description="Time that one breath takes. A loop takes a whole number of breaths",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        default=3.0,
+        min=0.05,
+        soft_max=20.0,
+        step=10,
+    )
+
+
+# --- When the motion is, what it moves, and which keys it gets ------------------------------------
+
+
+class Timing:
+    """What ``Object.octo_motion.locomotion`` has of the time and of what carries the body."""
+
+    timing: EnumProperty(
+        name="Timing",
+        description="What decides how long the journey takes",
+        items=(
+            ("CADENCE", "Cycle", "The time that one cycle of the gait takes", 0),
+            ("SPEED", "Speed", "The speed of the body", 1),
+            ("RANGE", "Frames", "The first and the last frame", 2),
+        ),
+    )
+    cycle_time: FloatProperty(
+        name="Cycle",
+        description="Time that one cycle of the gait takes at full speed",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        default=2.0,
+        min=0.01,
+        soft_min=0.2,
+        soft_max=20.0,
+        step=10,
+    )
+    speed: FloatProperty(
+        name="Speed",
+        description="Full speed of the body along the route",
+        unit="VELOCITY",
+        default=0.5,
+        min=1e-5,
+        soft_max=10.0,
+        step=10,
+    )
+    frame_start: IntProperty(name="Start", description="First frame of the motion", default=1)
+    frame_end: IntProperty(name="End", description="Last frame of the motion", default=250)
+    travel_on: EnumProperty(
+        name="Travel on",
+        description="What carries the body along the route",
+        items=(
+            ("OBJECT", "Object", "The armature object moves", 0),
+            ("BONE", "Root Bone", "The object stays; its root bone moves, as game engines like", 1),
+            TRAVEL_IN_PLACE,
+        ),
+    )
+    extend_scene_range: BoolProperty(
+        name="Extend Scene Range",
+        description="Move the scene's end frame if the motion lasts longer, so that playback and "
+        "rendering show all of it. The range is never shortened, and the message says so when it "
+        "is extended. Switch it off where a shot has its length",
+        default=True,
+    )
+
+
+class Keys:
+    """What ``Object.octo_motion.locomotion`` has of the keys."""
+
+    keys: EnumProperty(
+        name="Keys",
+        description="How many keys the motion gets",
+        items=(
+            ("DENSE", "All", "A key on every frame: the motion exactly as computed", 0),
+            (
+                "REDUCED",
+                "Few",
+                "As few keys as the tolerance allows, with handles; each arm in one group",
+                1,
+            ),
+        ),
+    )
+    key_angle: FloatProperty(
+        name="Angle",
+        description="How far any bone may be turned away, at any frame, where there are few keys",
+        subtype="ANGLE",
+        default=np.radians(0.5),
+        min=0.0,
+        max=np.pi,
+        soft_max=np.radians(10.0),
+        step=10,
+        precision=2,
+    )
+    key_distance: FloatProperty(
+        name="Distance",
+        description="How far any arm's tip may be away, at any frame, where there are few keys. "
+        "In arm lengths",
+        default=0.005,
+        min=0.0,
+        soft_max=0.1,
+        step=0.1,
+        precision=4,
+    )
+    key_columns: EnumProperty(
+        name="Columns",
+        description="Which channels have their keys at the same frames, where there are few keys",
+        items=(
+            (
+                "ARM",
+                "Each Arm",
+                "An arm's pose is one column, easy to retime. Some two thirds more keys",
+                0,
+            ),
+            (
+                "BONE",
+                "Each Bone",
+                "Each bone has keys where it needs them: the fewest. Arms stay channel groups",
+                1,
+            ),
+        ),
+        default="BONE",
+    )
+    result: PointerProperty(
+        name="Result",
+        description="The action that was generated last. It is made anew in place until you edit "
+        "it; then it is yours, and the next one is a new action",
+        type=bpy.types.Action,
+    )
+
+
+# --- Settings of how arms keep apart --------------------------------------------------------------
+
+
+class KeepingApart:
+    """What ``Object.octo_motion.locomotion`` has of it."""
+
+    keep_apart: BoolProperty(
+        name="Keep Apart",
+        description="Arms that would pass through each other or through the body make way: those "
+        "in the air, and what does not lie on the ground of those that hold on",
+        default=True,
+    )
+    tell_overlaps: BoolProperty(
+        name="Tell Overlaps",
+        description="After generating, say at which frame an arm passes deepest through another "
+        "or through the body, if by more than a tenth of its thickness",
+        default=True,
+    )
+
+
+# --- What ``Object.octo_motion.locomotion`` has of live motion ------------------------------------
+
+
+SWITCHED: Final[set[str]] = set()
+"""Names of the armatures whose Live was switched, until somebody has looked."""
+
+
+def _tell(settings: Any, _context: bpy.types.Context) -> None:
+    """A change in the panel is told to everyone by Blender, one by a script only like this."""
+    SWITCHED.add(settings.id_data.name)
+    settings.id_data.update_tag(refresh={"OBJECT"})
+
+
+class LiveSettings:
+    """Whether the motion follows its route and its settings by itself."""
+
+    live: BoolProperty(
+        name="Live",
+        description="Make the motion anew by itself whenever its route, its ground or a setting "
+        "changes, with a key on every frame. Generate measures it and leaves out keys. Switches "
+        "itself off when you edit the action",
+        update=_tell,
+    )
+    live_error: StringProperty(
+        name="Live Error",
+        description="Why the motion does not follow at the moment; the last one that could be "
+        "made is still there",
+        options={"HIDDEN"},
+    )
 
 
 class OCTO_MOTION_PG_locomotion(
@@ -54,7 +559,7 @@ class OCTO_MOTION_PG_locomotion(
     )
 
 
-CLASSES: Final = (OCTO_MOTION_PG_locomotion,)
+CLASSES: Final = (FigureItem, OCTO_MOTION_PG_locomotion)
 
 
 def locomotion_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import bpy
 
 from ....blender.scene import WITH_SURFACE
-from ...overridable import (
+from ...declared_settings import (
     BoolProperty,
     CollectionProperty,
     EnumProperty,

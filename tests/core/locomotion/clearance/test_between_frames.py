@@ -4,14 +4,10 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.subframe_clearance import (
-    ArmsOverGround,
-    raise_between_frames,
-)
+from octo_motion.core.locomotion.clearance.corrections import ArmsOverGround, raise_between_frames
 from octo_motion.core.locomotion.ground.walk import Raise
-from octo_motion.core.locomotion.rig.arm_frames import frames_of_arm
-from octo_motion.core.locomotion.rig.placement import object_transforms
-from octo_motion.core.locomotion.rig.poses import Poses
+from octo_motion.core.locomotion.rig.bone_rotations import frames_of_arm
+from octo_motion.core.locomotion.rig.poses import Poses, object_transforms
 from octo_motion.core.rotations import Floats, from_axis_angle, multiply, rotate
 from tests.core.grounds import GROUNDS, Walker, largest_turn, walker
 

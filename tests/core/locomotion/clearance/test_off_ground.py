@@ -4,10 +4,13 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.subframe_clearance import ArmsOverGround
-from octo_motion.core.locomotion.clearance.swim_clearance import afloat, keep_off_ground
+from octo_motion.core.locomotion.clearance.corrections import (
+    ArmsOverGround,
+    afloat,
+    keep_off_ground,
+)
 from octo_motion.core.locomotion.ground.surface import LevelGround
-from octo_motion.core.locomotion.rig.arm_frames import frames_of_arm
+from octo_motion.core.locomotion.rig.bone_rotations import frames_of_arm
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.grounds import GROUNDS, largest_turn, walker

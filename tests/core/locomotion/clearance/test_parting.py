@@ -8,18 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
-from octo_motion.core.locomotion.clearance.chain_solver import joints_of, turned_towards
-from octo_motion.core.locomotion.clearance.overlap_contacts import (
+from octo_motion.core.locomotion.clearance.capsule_overlap import (
     GIVEN,
     NEAR,
+    Capsules,
     Crowd,
     Opened,
     Touches,
     Touching,
     aside,
+    measure_overlap,
 )
-from octo_motion.core.locomotion.clearance.overlap_solver import parted
+from octo_motion.core.locomotion.clearance.overlap_solver import joints_of, parted, turned_towards
 from octo_motion.core.rotations import Floats
 from octo_motion.core.temporal_filter import blur_reach, blurred, covered
 

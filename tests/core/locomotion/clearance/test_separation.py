@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
-from octo_motion.core.locomotion.rig.arm_frames import frames_of_arm
+from octo_motion.core.locomotion.rig.bone_rotations import frames_of_arm
 from octo_motion.core.rotations import Floats
 from tests.core.rigs import body_with_arms
 

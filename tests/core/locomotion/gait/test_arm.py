@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.gait import joint_groups as arm
+from octo_motion.core.locomotion.gait import ccd as arm
 from tests.core import oracle
 
 

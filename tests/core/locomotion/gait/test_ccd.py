@@ -147,11 +147,7 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
     mirrored = np.array([1.0, -1.0])
 
     def solved(angles: Floats, sway: Floats) -> Floats:
-        from octo_motion.core.locomotion.gait.pseudo_targets import (
-            contraction,
-            link_rotations,
-            pseudo_targets,
-        )
+        from octo_motion.core.locomotion.gait.ccd import contraction, link_rotations, pseudo_targets
 
         with_bank = np.concatenate([angles, np.zeros((20, 3, 1))], axis=-1)
         links = link_rotations(with_bank)
@@ -170,7 +166,7 @@ def test_the_solver_does_not_know_left_from_right(seed: int, softness: float) ->
 def test_the_asked_shape_joins_smoothly_from_link_to_link() -> None:
     chain = ccd.JointChain(np.full(300, 1 / 300), (100, 100, 100), np.full(300, 0.4))
     angles = np.radians(np.array([[[20.0, 0.0], [-50.0, 10.0], [30.0, -20.0]]]))
-    from octo_motion.core.locomotion.gait.pseudo_targets import link_rotations
+    from octo_motion.core.locomotion.gait.ccd import link_rotations
 
     shape = columns(ccd.asked_shape(chain, np.moveaxis(angles, 0, -1), np.zeros((2, 1))))
     links = link_rotations(np.concatenate([angles, np.zeros((1, 3, 1))], axis=-1))

@@ -95,11 +95,7 @@ def test_the_reported_miss_is_the_one_that_the_bones_show(name: str) -> None:
     solved = posed_joints(skeleton, arm, poses.rotations, generator.bones)
     local = rotate(from_axis_angle(UP, 0.25 * np.pi), solved - solved[:, :1])
 
-    from octo_motion.core.locomotion.gait.pseudo_targets import (
-        contraction,
-        link_rotations,
-        pseudo_targets,
-    )
+    from octo_motion.core.locomotion.gait.ccd import contraction, link_rotations, pseudo_targets
 
     angles = generator.settings.gait.curve(arm.pair).evaluate(generator.arm_phases(cycle(48))[:, 0])
     angles[..., 1] *= -1.0  # left: towards the front is clockwise
@@ -113,7 +109,7 @@ def test_the_reported_miss_is_the_one_that_the_bones_show(name: str) -> None:
 
 
 def generator_sizes(lengths: Floats) -> tuple[int, int, int]:
-    from octo_motion.core.locomotion.gait.joint_groups import split_groups
+    from octo_motion.core.locomotion.gait.ccd import split_groups
 
     return split_groups(lengths)
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from octo_motion.core.locomotion.gait.pseudo_targets import (
+from octo_motion.core.locomotion.gait.ccd import (
     SHORTEST,
     contraction,
     link_rotations,

@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion.ground.arm_clearance import Outline
 from octo_motion.core.locomotion.ground.crawl_planner import (
     CrawlPath,
     CrawlSettings,
     CrawlStances,
+    Outline,
     plan_crawl,
 )
-from octo_motion.core.locomotion.ground.foothold_reach import span
-from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
+from octo_motion.core.locomotion.ground.footholds import span
+from octo_motion.core.locomotion.ground.surface import StanceSettings
 
 EIGHT = np.radians([22.5, -22.5, 67.5, -67.5, 112.5, -112.5, 157.5, -157.5])
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from octo_motion.core.locomotion.ground.foothold_relaxation import settled
+from octo_motion.core.locomotion.ground.footholds import settled
 from octo_motion.core.locomotion.ground.surface import Ground, HeightField, LevelGround
 from octo_motion.core.rotations import rotate_in_plane
 

@@ -9,19 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.ground.body_height import body_line
 from octo_motion.core.locomotion.ground.contact_timing import (
     EvenTiming,
     TabledTiming,
+    body_line,
     crawl_timing,
     crawling_in_place,
     timing_at_rest,
 )
 from octo_motion.core.locomotion.ground.crawl_planner import CrawlSettings, CrawlStances, plan_crawl
-from octo_motion.core.locomotion.ground.foothold_reach import span
-from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
-from octo_motion.core.locomotion.ground.surface import LevelGround
-from octo_motion.core.locomotion.path.in_place import route_in_place
+from octo_motion.core.locomotion.ground.footholds import span
+from octo_motion.core.locomotion.ground.surface import LevelGround, StanceSettings
+from octo_motion.core.locomotion.path.course import route_in_place
 from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import from_axis_angle
 from tests.core.locomotion.ground.test_crawl import journey

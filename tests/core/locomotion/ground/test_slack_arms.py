@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.locomotion.ground.arm_curves import bent, curve, drawn, spread_chain
-from octo_motion.core.locomotion.ground.body_height import body_line
-from octo_motion.core.locomotion.ground.foothold_reach import easy_height
-from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
+from octo_motion.core.locomotion.ground.contact_timing import body_line
+from octo_motion.core.locomotion.ground.footholds import easy_height
+from octo_motion.core.locomotion.ground.surface import StanceSettings
 from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import Floats
 from octo_motion.core.rotations.components_first import normalized

@@ -9,9 +9,8 @@ import pytest
 
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.ground.footholds import ContactOverride
-from octo_motion.core.locomotion.ground.stance_settings import StanceSettings
-from octo_motion.core.locomotion.ground.surface import normals
-from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.ground.surface import StanceSettings, normals
+from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.rotations import multiply, rotate
 from tests.core.grounds import FRAMES, GROUNDS, STRAIGHT, TURN, Walker, largest_turn, walker
 

@@ -11,8 +11,12 @@ from hypothesis import strategies as st
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitSettings
-from octo_motion.core.locomotion.ground.swing_smoothing import SwingSmoothing, frames_around
-from octo_motion.core.locomotion.ground.walk import GroundedPoses, Raise
+from octo_motion.core.locomotion.ground.walk import (
+    GroundedPoses,
+    Raise,
+    SwingSmoothing,
+    frames_around,
+)
 from octo_motion.core.rotations import Floats, continuous
 from tests.core.grounds import FRAMES, GROUNDS, Walker, walker
 

@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.ground.contact_curve import laid
-from octo_motion.core.locomotion.ground.stance_settings import Limbs
-from octo_motion.core.locomotion.ground.surface import HeightField
+from octo_motion.core.locomotion.ground.arm_curves import laid
+from octo_motion.core.locomotion.ground.surface import HeightField, Limbs
 from octo_motion.core.rotations import Floats
 from tests.core.grounds import largest_turn, walker
 

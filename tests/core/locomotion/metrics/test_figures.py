@@ -10,8 +10,7 @@ import pytest
 from octo_motion.core.locomotion.clearance.capsule_overlap import Overlap, Separation
 from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, figures
-from octo_motion.core.locomotion.rig.arm_frames import ArmFrames
-from octo_motion.core.locomotion.rig.bone_rotations import ArmRest
+from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, ArmRest
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import IDENTITY, from_axis_angle
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.ground.surface import LevelGround
-from octo_motion.core.locomotion.metrics import measures as quality
+from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.rotations import from_axis_angle
 
 

@@ -9,7 +9,7 @@ import pytest
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import Arm, GaitPoser, GaitSettings
-from octo_motion.core.locomotion.path.in_place import (
+from octo_motion.core.locomotion.path.course import (
     breathing_scales,
     route_in_place,
     travel_in_place,

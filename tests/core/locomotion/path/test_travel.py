@@ -11,18 +11,16 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.locomotion.path.burst_glide import (
-    phase_at_distance,
-    stroke_distance,
-    stroke_speed,
-)
 from octo_motion.core.locomotion.path.route import Route
 from octo_motion.core.locomotion.path.travel import (
     Travel,
     TravelSettings,
     duration,
+    phase_at_distance,
     plan_travel,
     strides,
+    stroke_distance,
+    stroke_speed,
     unhurried,
 )
 from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, multiply, rotate

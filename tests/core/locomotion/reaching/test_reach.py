@@ -14,7 +14,7 @@ from octo_motion.core.locomotion.reaching.curl import curled
 from octo_motion.core.locomotion.reaching.grasp import Grasp, Mode, Places, Target, plan_grasp
 from octo_motion.core.locomotion.reaching.timeline import Timeline, first_place, front_width
 from octo_motion.core.locomotion.reaching.winding import profile_of
-from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, frames_of_arm
+from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle, rotate
 from tests.core import objects
 from tests.core.rigs import body_with_arms, posed_joints

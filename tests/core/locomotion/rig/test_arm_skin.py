@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.rig.skin_offset import ArmSkin, arm_skin, nearest_bones
+from octo_motion.core.locomotion.rig.joint_room import ArmSkin, arm_skin, nearest_bones
 from octo_motion.core.rotations import Floats, conjugate, from_axis_angle, multiply, rotate
 
 BONES = 5

@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.rig.arm_batches import batches_by_bones
-from octo_motion.core.locomotion.rig.arm_frames import ArmFrames, frames_of_arm
+from octo_motion.core.locomotion.rig.bone_rotations import (
+    ArmFrames,
+    batches_by_bones,
+    frames_of_arm,
+)
 from octo_motion.core.rotations import Floats, normalized
 from tests.core.rigs import body_with_arms
 

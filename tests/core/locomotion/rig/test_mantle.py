@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.rig.arm_chains import BodyFrame, body_frame
-from octo_motion.core.locomotion.rig.mantle import find_mantle, lies_back, stretch_mantle
+from octo_motion.core.locomotion.rig.poses import find_mantle, lies_back, stretch_mantle
 from octo_motion.core.rotations import Floats, angle_between, rotate
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import body_with_arms, bone_matrix, skeleton_of

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.locomotion.rig.arm_chains import body_frame
-from octo_motion.core.locomotion.rig.placement import object_transforms, root_bone_transforms
+from octo_motion.core.locomotion.rig.poses import object_transforms, root_bone_transforms
 from octo_motion.core.rotations import (
     angle_between,
     from_matrix,

@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a shot's settings and scene are for core: gaits, route, timing, ground, changes, reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import bpy
+import numpy as np
+
+from ....blender.animation import may_stretch, standing_of, writable_object
+from ....blender.files import load_gait, sample_weight_curve
+from ....blender.rig import radii_of_skin
+from ....blender.scene import (
+    arm_skins,
+    can_be_carried,
+    hangs_on,
+    home_of,
+    is_carried,
+    is_enabled,
+    read_form,
+    read_places,
+    read_route,
+    read_triangles,
+)
+from ....core.errors import SettingsError
+from ....core.keyframes import check_bounds
+from ....core.locomotion.gait import GaitSettings, GaitTable
+from ....core.locomotion.ground import StanceSettings
+from ....core.locomotion.motion import (
+    Breathing,
+    ChangeAt,
+    ChangesByHeight,
+    Creature,
+    GaitJob,
+    GroundJob,
+    Timing,
+    Tolerances,
+)
+from ....core.locomotion.path import Route, TravelSettings
+from ....core.locomotion.reaching import Reach, Reaching, Timeline, profile_of
+from ....core.locomotion.rig import frames_of_arm
+from ....core.rotations import Floats
+from ...declared_settings import read_settings
+from ..settings import (
+    ContactEdit,
+    OCTO_MOTION_PG_change,
+    OCTO_MOTION_PG_locomotion,
+    Place,
+    overrides_for_core,
+    read_gait,
+)
+from .rig import RigRead, keyed_anew
+
+_HELD: Final = 0.003
+"""Arm lengths that few keys may be off where a joint rests on the ground: it would slide."""
+_WEIGHT_SAMPLES: Final = 33
+_HEADING_STEP: Final = 0.2
+"""Radians: no arm that stands half way between two others is a matter of rounding."""
+
+
+def gait_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> GaitSettings:
+    """How the arms move in a gait."""
+    if settings.use_weight_curve:
+        drawn = sample_weight_curve(settings.weight_curve, _WEIGHT_SAMPLES)
+        weights = tuple(float(each) for each in np.clip(drawn, 0.01, 1.0))
+    else:
+        weights = (settings.weight_root, settings.weight_tip)
+    return read_settings(
+        GaitSettings,
+        settings,
+        gait=gait,
+        weights=weights,
+        variation=(settings.variation_min, settings.variation_max),
+        period=settings.cycles if settings.travel_on == "NONE" else 0,
+        heading=_heading(settings),
+    )
+
+
+def _heading(settings: OCTO_MOTION_PG_locomotion) -> float:
+    """Radians from the way that the body goes to its front, in steps in which arms change roles."""
+    if settings.heading != "ALONG":
+        return 0.0
+    return _HEADING_STEP * round(settings.heading_angle / _HEADING_STEP)
+
+
+def travel_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> TravelSettings:
+    """How the body travels in a gait; its stride is in arm lengths."""
+    return read_settings(
+        TravelSettings,
+        settings,
+        manner="WALK" if gait.on_ground else "SWIM",
+        stride=gait.stride,
+        stroke_phase=gait.power_phase,
+    )
+
+
+def read_gaits(settings: OCTO_MOTION_PG_locomotion, others: Sequence[str]) -> tuple[GaitJob, ...]:
+    """The gait that is set, and those of these names that it changes to.
+
+    Raises:
+        GaitError: a gait is missing, or its table cannot be used.
+    """
+    tables = [read_gait(settings), *(load_gait(name) for name in others)]
+    return tuple(
+        GaitJob(gait_settings(settings, each), travel_settings(settings, each)) for each in tables
+    )
+
+
+def tolerances_of(settings: OCTO_MOTION_PG_locomotion) -> Tolerances | None:
+    """How far few keys may be off, in arm lengths; none where every frame has a key.
+
+    Raises:
+        SettingsError: without tolerance, no key can be left out.
+    """
+    if settings.keys != "REDUCED":
+        return None
+    check_bounds(settings.key_angle, settings.key_distance)
+    by_bone = settings.key_columns == "BONE"
+    return Tolerances(settings.key_angle, settings.key_distance, by_bone, _HELD)
+
+
+# --- Where a motion goes, and when: the settings' route and timing --------------------------------
+
+
+def read_route_of(settings: OCTO_MOTION_PG_locomotion, depsgraph: bpy.types.Depsgraph) -> Route:
+    """The route that is set; the caller sees to it that there is one.
+
+    Raises:
+        RouteError: the curve has no such spline, or it cannot be travelled.
+    """
+    return read_route(settings.route, depsgraph, settings.spline)
+
+
+def read_timing(settings: OCTO_MOTION_PG_locomotion, render: bpy.types.RenderSettings) -> Timing:
+    """When it moves, and how fast."""
+    return Timing(
+        kind=settings.timing,
+        start=settings.frame_start,
+        end=settings.frame_end,
+        speed=settings.speed,
+        cycle_time=settings.cycle_time,
+        rate=render.fps / render.fps_base,
+        duty=settings.ground.duty,
+    )
+
+
+def breathing(settings: OCTO_MOTION_PG_locomotion) -> Breathing:
+    """How its mantle breathes."""
+    return Breathing(settings.breathing, settings.breath_time)
+
+
+# --- Where the gait changes, as the settings say --------------------------------------------------
+
+
+def read_changes(
+    settings: OCTO_MOTION_PG_change, first: str, *, in_place: bool
+) -> tuple[ChangesByHeight | tuple[ChangeAt, ...], list[str]]:
+    """Where the gait changes, and the names of the gaits that it changes to.
+
+    Args:
+        settings: what decides.
+        first: name of the gait that the motion begins with.
+        in_place: whether nothing travels, and the gait stays what it is.
+
+    Raises:
+        SettingsError: there is no place to change at.
+    """
+    if in_place or settings.by == "NONE":
+        return (), []
+    if settings.by == "MARKERS" and not len(settings.places):
+        raise SettingsError(
+            "The gait is to change at places, and there are none.",
+            "Add a place, or set Change Gait to Never.",
+        )
+    by_height = settings.by == "HEIGHT"
+    asked = [settings.gait] if by_height else [item.gait for item in settings.places]
+    names = [name for name in dict.fromkeys(asked) if name != first]
+    numbers = {first: 0, **{name: number + 1 for number, name in enumerate(names)}}
+    if by_height:
+        above = numbers[settings.gait]
+        return ChangesByHeight(settings.height, settings.length, above), names
+    places = [ChangeAt(item.position, item.length, numbers[item.gait]) for item in settings.places]
+    return tuple(places), names
+
+
+# --- What a walk holds on to: the settings, the ground's mesh and the skin of the arms ------------
+
+
+_BARE: Final = (
+    "The ground '{name}' is disabled in viewports or excluded: its modifiers do not count. Hide it "
+    "with its eye in the outliner instead."
+)
+
+
+def resting(settings: OCTO_MOTION_PG_locomotion) -> tuple[bool, bool]:
+    """Whether all arms lie on the ground at the start of a walk, and at its end."""
+    ground = settings.ground
+    if not ground.use or settings.travel_on == "NONE":
+        return False, False
+    return (
+        ground.start_at_rest and settings.ease_in > 0.0,
+        ground.come_to_rest and settings.ease_out > 0.0,
+    )
+
+
+def read_ground(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    creature: Creature,
+    edits: Mapping[Place, ContactEdit],
+    *,
+    walks: bool,
+) -> GroundJob | None:
+    """The ground under a walk, none where nothing holds it.
+
+    Args:
+        settings: of the armature.
+        armature: the armature object.
+        depsgraph: the evaluated scene.
+        creature: its rig.
+        edits: the artist's, of single contacts.
+        walks: whether any of its gaits goes over the ground.
+
+    Raises:
+        GroundError: the ground is no mesh, or has no faces.
+    """
+    ground = settings.ground
+    if not ground.use or not walks:
+        return None
+    mesh, warnings = None, ()
+    if ground.object is not None and settings.travel_on != "NONE":
+        mesh = read_triangles(ground.object, depsgraph)
+        if len(ground.object.modifiers) > 0 and not is_enabled(ground.object, depsgraph):
+            warnings = (_BARE.format(name=ground.object.name),)
+    return GroundJob(
+        stance=read_settings(StanceSettings, ground),
+        skins=arm_skins(armature, creature.at_rest, creature.bones),
+        may_stretch=[may_stretch(armature, bones) for bones in creature.bones],
+        mesh=mesh,
+        overrides=tuple(overrides_for_core(dict(edits), creature.arms)),
+        rest=resting(settings),
+        rest_within=ground.rest_within,
+        warnings=warnings,
+    )
+
+
+# --- Reaches of the list: what is reached for, and where that is meanwhile ------------------------
+
+
+_AXES: Final = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+
+
+def read_reaches(
+    armature: bpy.types.Object, settings: Any, rig: RigRead, frames: Floats
+) -> Reaching | None:
+    """What the list of reaches asks for; none if it is empty or muted.
+
+    Args:
+        armature: the armature object.
+        settings: its settings.
+        rig: as it was read.
+        frames: (frames,) of the motion.
+
+    Raises:
+        OctoMotionError: an object is missing, has no surface, or moves with the armature; frames
+            are out of order.
+    """
+    items = [item for item in settings.reaches if not item.mute]
+    if not items:
+        return None
+    creature = rig.creature
+    bones, arms = creature.bones, creature.arms
+    anew = keyed_anew(settings, armature, creature.root_bone)
+    return Reaching(
+        arms=arms,
+        frames=tuple(frames_of_arm(creature.at_rest, each, rig.rest_body) for each in bones),
+        radii=tuple(radii_of_skin(armature, bones)),
+        standings=tuple(standing_of(armature, each[0], left_out=anew) for each in bones),
+        up=rig.rest_body.rotation[:, 2],
+        reaches=tuple(_reach(item, armature, frames) for item in items),
+    )
+
+
+def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
+    closed = item.frame_contact + (item.coil_frames if item.mode == "COIL" else 0)
+    timeline = Timeline(
+        *(item.frame_start, item.frame_contact, min(closed, item.frame_release)),
+        *(item.frame_release, item.frame_release + item.back_frames),
+    )
+    still = np.zeros((len(frames), 3)), np.tile([1.0, 0.0, 0.0, 0.0], (len(frames), 1))
+    if item.mode == "CURL":
+        return Reach(item.name, item.arm, item.mode, 0.0, timeline, "", None, *still)
+    if item.target is None:
+        raise SettingsError(
+            f"The reach '{item.name}' has no object.", "Choose what it reaches for, or mute it."
+        )
+    if hangs_on(item.target, armature):
+        raise SettingsError(
+            f"'{item.target.name}' hangs on '{armature.name}', which reaches for it.",
+            "Clear its parent and its constraints to the armature.",
+        )
+    carry = item.carry and item.mode == "COIL"
+    if carry:
+        writable_object(item.target)
+        if not can_be_carried(item.target):
+            raise SettingsError(
+                f"'{item.target.name}' moves by itself and cannot be carried.",
+                "Remove its action, constraints and physics, or switch Carry off.",
+            )
+    axis = np.array(_AXES[item.axis]) if item.axis in _AXES else None
+    profile = profile_of(*read_form(item.target), axis)
+    asked = (frames >= timeline.start) & (frames <= timeline.end)
+    positions, rotations = still
+    if carry or is_carried(item.target, armature.name):
+        # Keys that it got before are made anew, or taken away.
+        position, rotation = home_of(item.target)
+        positions, rotations = (
+            np.tile(position, (len(frames), 1)),
+            np.tile(rotation, (len(frames), 1)),
+        )
+    elif np.any(asked):
+        positions[asked], rotations[asked] = read_places(item.target, frames[asked])
+        # Before and after, nothing asks where it is.
+        first, last = np.flatnonzero(asked)[[0, -1]]
+        positions[:first], rotations[:first] = positions[first], rotations[first]
+        positions[last + 1 :], rotations[last + 1 :] = positions[last], rotations[last]
+    return Reach(
+        item.name, item.arm, item.mode, item.turns, timeline, item.target.name, profile,
+        positions, rotations, carry,
+    )  # fmt: skip

@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One shot from settings to keys: read → plain arrays → compute → write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import bpy
+
+from ....blender.animation import (
+    SCALE,
+    animated_bones,
+    key_counts,
+    object_channels,
+    rest_bones,
+    unscale_bones,
+    writable_armature,
+    write_action,
+)
+from ....blender.rig import world_matrix
+from ....blender.scene import Contact, carrying_note, left_behind, put_back, write_markers
+from ....core.errors import RouteError, WriteError
+from ....core.locomotion.metrics import Figure
+from ....core.locomotion.motion import (
+    MotionJob,
+    MotionPlan,
+    MotionResult,
+    compute,
+    plan_motion,
+    schedule,
+    shown_contacts,
+)
+from ....core.locomotion.reaching import Carried
+from ....core.locomotion.rig import Detection
+from ...declared_settings import plain
+from ..reading import (
+    bones_of,
+    breathing,
+    previous_action,
+    read_changes,
+    read_creature,
+    read_gaits,
+    read_ground,
+    read_reaches,
+    read_route_of,
+    read_timing,
+    read_volume,
+    tolerances_of,
+    warnings_for_display,
+    write_arms,
+    write_body,
+)
+from ..settings import (
+    ContactEdit,
+    OCTO_MOTION_PG_locomotion,
+    Place,
+    locomotion_settings,
+    note_shown,
+    once_called,
+    read_overrides,
+    store,
+    write_figures,
+)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What was made, for people and for reports."""
+
+    gait: str
+    manner: str
+    """"WALK" or "SWIM"."""
+    action: str
+    """Name of the action."""
+    frames: int
+    frame_start: int
+    frame_end: int
+    seconds: float
+    """Length of the motion."""
+    miss: float
+    """Largest distance of a group of joints from its target, in arm lengths."""
+    keys: int
+    dense_keys: int
+    """How many keys there would be with one per frame."""
+    warnings: tuple[str, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    """The worst of each kind."""
+    notes: tuple[str, ...] = ()
+    """Things that happened as they should, but that one may want to know."""
+
+    @property
+    def message(self) -> str:
+        """One sentence, and the notes."""
+        told = (
+            f"{self.manner.capitalize()} of {self.frames} frames ({self.seconds:.1f} s): "
+            f"'{self.action}'."
+        )
+        fewer = f"{self.keys:,} keys instead of {self.dense_keys:,}."
+        return " ".join([told, *([fewer] * (self.keys < self.dense_keys)), *self.notes])
+
+
+# --- Objects that arms carry: the keys of their ways ----------------------------------------------
+
+
+def write_carried(armature: bpy.types.Object, carried: Sequence[Carried]) -> None:
+    """Give objects the keys of their ways; those that they got before are made anew.
+
+    What is no longer carried loses them, and stands where it stood before.
+
+    Raises:
+        WriteError: an object has become read-only.
+    """
+    for target in left_behind(armature.name, {each.target for each in carried}):
+        put_back(target)
+    for each in carried:
+        target = bpy.data.objects.get(each.target)
+        if target is None:
+            continue
+        data = target.animation_data
+        write_action(
+            target,
+            f"{target.name} Carried",
+            each.frames,
+            object_channels(target, each.positions, each.rotations),
+            previous=data.action if data is not None else None,
+            settings_note=carrying_note(armature.name),
+        )
+
+
+# --- A motion that was worked out, written: the action, markers, figures and what is carried ------
+
+
+@dataclass(eq=False)
+class Shot:
+    """A motion of one armature: what it is made from, and what is written when it is there.
+
+    Armature and scene are kept by name: references to Blender's data do not outlive a modal
+    operator's tick.
+    """
+
+    armature: str
+    scene: str
+    job: MotionJob
+    detection: Detection | None
+    """What was found, if the settings had no arms."""
+    edits: dict[Place, ContactEdit]
+    """What the artist wants of single contacts."""
+    extend_scene_range: bool
+    note: str
+    """The settings as JSON, kept with the action."""
+    result: MotionResult | None = None
+    """What :meth:`compute` has come to."""
+
+    def compute(self) -> Iterator[float]:
+        """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
+        self.result = yield from compute(self.job)
+
+    def plan(self) -> MotionPlan:
+        """What is computed, without computing it.
+
+        Raises:
+            OctoMotionError: something is wrong that the user can put right.
+        """
+        steps = plan_motion(self.job)
+        while True:
+            try:
+                next(steps)
+            except StopIteration as finished:
+                return finished.value
+
+    def write(self, *, unedited: bool = False) -> Summary:
+        """Give the armature its action, in place of the one that was generated before.
+
+        Args:
+            unedited: whether it is known already that the one before may be made anew.
+
+        Raises:
+            WriteError: the object is gone, or has become read-only.
+        """
+        made = self.result
+        assert made is not None
+        armature = _local_object(self.armature)
+        writable_armature(armature)
+        settings = locomotion_settings(armature)
+        action = self._write_action(armature, settings, made, unedited=unedited)
+        if self.detection is not None:
+            # What was moved is what the list shows from now on.
+            write_arms(settings, self.detection.arms)
+            write_body(settings, self.detection)
+        if made.plan.keeps_contacts:
+            store(settings.ground, self.edits)
+            if settings.ground.shown:
+                show_contacts(armature, made.plan, self.edits)
+        write_carried(armature, made.carried)
+        write_figures(settings, made.figures)
+        notes = self._extend_range(int(made.frames[-1]))
+        keys, dense_keys = key_counts(action)
+        return Summary(
+            gait=made.plan.first.table.name,
+            manner=made.plan.first.table.manner,
+            action=action.name,
+            frames=len(made.frames),
+            frame_start=int(made.frames[0]),
+            frame_end=int(made.frames[-1]),
+            seconds=made.plan.schedule.seconds,
+            miss=made.miss,
+            keys=keys,
+            dense_keys=dense_keys,
+            warnings=made.warnings,
+            figures=made.figures,
+            notes=(*notes, *made.notes),
+        )
+
+    def _write_action(
+        self,
+        armature: bpy.types.Object,
+        settings: OCTO_MOTION_PG_locomotion,
+        made: MotionResult,
+        *,
+        unedited: bool,
+    ) -> bpy.types.Action:
+        """Write the keys, and lay to rest what the action before moved and this one does not."""
+        previous = previous_action(armature, settings)
+        left_behind = animated_bones(previous) if previous is not None else set[str]()
+        scaled = animated_bones(previous, SCALE) if previous is not None else set[str]()
+        # An arm that was switched off is left to the artist, in the pose that it has.
+        for item in settings.arms:
+            left_behind.difference_update(() if item.enabled else bones_of(item))
+        # The settings' own pointer must not count as a user when it comes to saving an edited
+        # action from being purged.
+        settings.result = None
+        try:
+            action = write_action(
+                armature,
+                f"{armature.name} Locomotion",
+                made.frames,
+                made.channels,
+                previous=previous,
+                settings_note=self.note,
+                repeats=self.job.repeats,
+                replaceable=unedited,
+                automatic=made.automatic,
+            )
+        except WriteError:
+            settings.result = previous
+            raise
+        settings.result = action
+        rest_bones(armature, left_behind - animated_bones(action))
+        unscale_bones(armature, scaled - animated_bones(action, SCALE))
+        return action
+
+    def _extend_range(self, last: int) -> tuple[str, ...]:
+        """Let the scene end with the motion, if that is wanted; what there is to say of it."""
+        scene = bpy.data.scenes.get(self.scene)
+        if scene is None or last <= scene.frame_end:
+            return ()
+        if self.extend_scene_range and scene.is_editable:
+            scene.frame_end = last
+            return (f"The scene now ends at frame {last}.",)
+        return (f"It lasts to frame {last}, the scene ends at {scene.frame_end}.",)
+
+
+def show_contacts(
+    armature: bpy.types.Object, plan: MotionPlan, edits: dict[Place, ContactEdit]
+) -> int:
+    """Put markers where a motion's contacts are; how many.
+
+    Args:
+        armature: whose they are.
+        plan: of a motion that has contacts.
+        edits: the artist's.
+    """
+    settings = locomotion_settings(armature).ground
+    store(settings, edits)
+    contacts = []
+    for each in shown_contacts(plan):
+        edit = edits.get((each.arm, each.cycle), ContactEdit())
+        contacts.append(
+            Contact(
+                each.arm,
+                each.cycle,
+                each.position,
+                each.heading,
+                locked=edit.position is not None,
+                shift=edit.shift,
+                frame_on=each.frame_on,
+                frame_off=each.frame_off,
+                cycle_frames=each.cycle_frames,
+            )
+        )
+    length = plan.first.poser.arm_length * plan.job.creature.scale
+    write_markers(armature, contacts, length, once_called(settings))
+    note_shown(settings, armature, contacts)
+    return len(contacts)
+
+
+def _local_object(name: str) -> bpy.types.Object:
+    try:
+        return bpy.data.objects[name, None]  # type: ignore[index]
+    except KeyError:
+        raise WriteError(f"'{name}' is gone.", "Generate again.") from None
+
+
+RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
+"""What is no setting, though it is kept with them."""
+
+
+def generate_locomotion(armature: bpy.types.Object, context: bpy.types.Context) -> Summary:
+    """Prepare, compute and write in one go.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right; nothing has changed.
+    """
+    shot = prepare(armature, context)
+    for _ in shot.compute():
+        pass
+    return shot.write()
+
+
+def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Shot:
+    """Read all that the motion of an armature needs. Nothing is changed, nothing worked out.
+
+    Args:
+        armature: the armature object, with its settings.
+        context: for the scene, its frame rate and its evaluated state.
+        live: whether it is to be quick: the same motion with a key on every frame, and without
+            figures of how good it is.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    settings = locomotion_settings(armature)
+    writable_armature(armature)
+    scene = context.scene
+    assert scene is not None
+    in_place = settings.travel_on == "NONE"
+    _check_route(settings, armature)
+    _write_back(settings.route, settings.ground.object)
+    depsgraph = context.evaluated_depsgraph_get()
+    found = read_creature(armature, settings, world_matrix(armature))
+    creature, edits = found.creature, read_overrides(settings.ground, armature)
+    changes, names = read_changes(settings.change, settings.gait, in_place=in_place)
+    gaits = read_gaits(settings, names)
+    walks = any(each.settings.gait.on_ground for each in gaits)
+    job = MotionJob(
+        creature=creature,
+        route=None if in_place else read_route_of(settings, depsgraph),
+        cycles=settings.cycles,
+        repeats=in_place and settings.repeat,
+        gaits=gaits,
+        changes=changes,
+        timing=read_timing(settings, scene.render),
+        height=settings.height if settings.height_mode == "MANUAL" else None,
+        streamline=settings.streamline,
+        breathing=breathing(settings),
+        ground=read_ground(settings, armature, depsgraph, creature, edits, walks=walks),
+        volume=read_volume(settings, armature, creature, live=live),
+        keep_apart=settings.keep_apart,
+        tell_overlaps=settings.tell_overlaps and not live,
+        reaching=None,
+        tolerances=None if live else tolerances_of(settings),
+        live=live,
+        warnings=(*found.warnings, *warnings_for_display(armature, scene.render), *found.poses),
+    )
+    if any(not item.mute for item in settings.reaches):
+        frames = schedule(job).frames
+        job = replace(job, reaching=read_reaches(armature, settings, found, frames))
+    return Shot(
+        armature=armature.name,
+        scene=scene.name,
+        job=job,
+        detection=found.detection,
+        edits=edits,
+        extend_scene_range=settings.extend_scene_range,
+        note=settings_note(settings),
+    )
+
+
+def settings_note(settings: OCTO_MOTION_PG_locomotion) -> str:
+    """The settings as JSON, without what is no setting."""
+    return json.dumps(plain(settings, without=RESULTS), sort_keys=True)
+
+
+def _write_back(*objects: bpy.types.Object | None) -> None:
+    """Let what is being edited count as it is: else it would be one drag behind."""
+    for each in objects:
+        if each is not None and each.mode == "EDIT":
+            each.update_from_editmode()
+            assert each.data is not None
+            each.data.update_tag()
+
+
+def _check_route(settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object) -> None:
+    """A route has to be there; one that its own traveller carries would be elsewhere each time."""
+    if settings.route is None and settings.travel_on != "NONE":
+        raise RouteError(
+            f"'{armature.name}' has no route.", "Choose a curve as its route, or add one."
+        )
+    route = child = settings.route
+    while route is not None and child is not None and child.parent is not None:
+        carried = settings.travel_on == "OBJECT" or child.parent_type == "BONE"
+        if child.parent == armature and carried:
+            raise RouteError(
+                f"The route '{route.name}' hangs on '{armature.name}' and would move with it.",
+                "Clear its parent (Alt P).",
+            )
+        child = child.parent
