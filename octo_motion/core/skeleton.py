@@ -61,6 +61,13 @@ class Skeleton:
                 lists[parent].append(bone)
         return tuple(tuple(each) for each in lists)
 
+    def ancestors(self, bone: int) -> list[int]:
+        """Parents of a bone up to the root, nearest first."""
+        found = []
+        while (bone := self.parents[bone]) >= 0:
+            found.append(bone)
+        return found
+
     @cached_property
     def heads(self) -> Floats:
         """(bones, 3), armature space."""

@@ -30,7 +30,7 @@ from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.parts import LEG, PARTS, part_bones
-from octo_motion.core.splicing.transfer.splice import Splice, spliced
+from octo_motion.core.splicing.transfer.splice import Splice
 from tests.bench.plain_copy import plain_copy
 from tests.bench.splice_quality import (
     feet_at_rest,
@@ -41,6 +41,7 @@ from tests.bench.splice_quality import (
     seams,
     turn_error,
 )
+from tests.core.splice_bodies import spliced
 
 LEGS = PARTS["legs"]
 

@@ -235,7 +235,7 @@ def test_landmarks_of(rig: str, shared_data: Data, tmp_path: Path) -> None:
     found = map_skeleton(skeleton)
 
     assert dict(found.landmarks.bones) == expected_names(rig)
-    assert found.complete
+    assert found.asked == ()
     assert found.problem == ""
     palms = rig.endswith("RobotExpressive.glb")
     assert len(found.notes) == (2 if palms else 0)

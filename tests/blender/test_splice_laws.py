@@ -28,8 +28,9 @@ from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.body_frames import chest_frame, pelvis_frame
 from octo_motion.core.splicing.transfer.limb_rotation import SOFT
 from octo_motion.core.splicing.transfer.parts import LEG, PARTS, Part, part_bones
-from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices, spliced
+from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices
 from tests.bench.splice_quality import feet_at_rest, limb_length
+from tests.core.splice_bodies import spliced
 
 LEFT_ARM, LEGS, RIGHT_ARM = (PARTS[name] for name in ("left_arm", "legs", "right_arm"))
 

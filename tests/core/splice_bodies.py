@@ -18,6 +18,7 @@ from octo_motion.core.skeleton import Skeleton
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.clip.posture import unposed
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.transfer.splice import Splice, build_splices
 from tests.core.rigs import skeleton_of
 
 _TRUNK = (
@@ -39,6 +40,11 @@ _SIDE = (
     ("foot", "shin", (0.1, 0.03, 0.08)),
     ("toe", "foot", (0.1, -0.12, 0.02)),
 )
+
+
+def spliced(base: Clip, landmarks: Landmarks | None, splice: Splice) -> Clip:
+    """One splice onto a clip."""
+    return build_splices(base, landmarks, [splice])
 
 
 def humanoid(random: np.random.Generator, *, same_proportions: bool = True) -> Skeleton:

@@ -39,10 +39,17 @@ def changed(old: str, new: str) -> bytes:
     return SOUND.replace(old, new).encode()
 
 
+def frames_and_joints(text: str) -> tuple[int, int]:
+    """What the plain text of a file says and has."""
+    hierarchy, _, rest = text.partition("MOTION\nFrames: ")
+    return int(rest.split()[0]), hierarchy.count("CHANNELS")
+
+
 def test_a_sound_file_keeps_its_numbers_to_the_digit() -> None:
     checked = check_bvh(SOUND.encode())
 
-    assert (checked.frames, checked.joints, checked.notes) == (2, 2, ())
+    assert checked.notes == ()
+    assert frames_and_joints(checked.text) == (2, 2)
     assert checked.rate == pytest.approx(20.0, rel=1e-12)
     assert "1.0 2.0 3.0 10.5 -20.25 30.0 1e-3 .5 6." in checked.text
     # Its plainest form is a sound file again, and the same.
@@ -76,7 +83,8 @@ def test_the_same_motion_written_otherwise_is_the_same_motion(how: str) -> None:
         rows = text.split("Frame Time:")[1].splitlines()[1:]
         return [float(word) for row in rows for word in row.split()]
 
-    assert (found.frames, found.joints, found.rate) == (2, 2, expected.rate)
+    assert frames_and_joints(found.text) == (2, 2)
+    assert found.rate == expected.rate
     assert values(found.text) == values(expected.text)
 
 
@@ -120,7 +128,7 @@ def test_a_damaged_file_is_refused_with_the_line(how: str) -> None:
 
 def test_a_wrong_count_of_frames_is_told_and_all_frames_are_kept() -> None:
     checked = check_bvh(changed("Frames: 2", "Frames: 7"))
-    assert checked.frames == 2
+    assert frames_and_joints(checked.text) == (2, 2)
     assert checked.notes == ("It says that it has 7 frames, but has 2.",)
 
 

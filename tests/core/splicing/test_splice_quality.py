@@ -12,7 +12,7 @@ from octo_motion.core.rotations import Floats, from_rotation_vector, multiply, r
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.clip.splice_timing import Timing
 from octo_motion.core.splicing.transfer.parts import ARM, PARTS, Part
-from octo_motion.core.splicing.transfer.splice import Splice, spliced
+from octo_motion.core.splicing.transfer.splice import Splice
 from tests.bench.plain_copy import plain_copy
 from tests.bench.splice_quality import (
     Seam,
@@ -31,6 +31,7 @@ from tests.core.splice_bodies import (
     in_another_file,
     motion,
     moved,
+    spliced,
     turned_about,
 )
 

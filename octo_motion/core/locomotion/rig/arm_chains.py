@@ -130,7 +130,7 @@ def chain_of(skeleton: Skeleton, names: Iterable[str]) -> tuple[str, ...]:
     """
     depth: dict[int, int] = {}
     for bone in sorted({_bone_index(skeleton, name) for name in names}):
-        depth[bone] = sum(ancestor in depth for ancestor in _ancestors(skeleton, bone))
+        depth[bone] = sum(ancestor in depth for ancestor in skeleton.ancestors(bone))
     order = sorted(depth, key=depth.__getitem__)
     for upper, lower in pairwise(order):
         if depth[upper] == depth[lower]:
@@ -405,10 +405,3 @@ def _bone_index(skeleton: Skeleton, name: str) -> int:
     if bone is None:
         raise RigError(f"The armature has no bone '{name}'.", "Detect the arms again.")
     return bone
-
-
-def _ancestors(skeleton: Skeleton, bone: int) -> Iterable[int]:
-    parent = skeleton.parents[bone]
-    while parent >= 0:
-        yield parent
-        parent = skeleton.parents[parent]

@@ -204,22 +204,13 @@ def _twin(skeleton: Skeleton, facts: RigFacts, bone: int, size: float) -> int | 
     return None if best is None else best[1]
 
 
-def _ancestors(skeleton: Skeleton, bone: int) -> list[int]:
-    found: list[int] = []
-    parent = skeleton.parents[bone]
-    while parent >= 0:
-        found.append(parent)
-        parent = skeleton.parents[parent]
-    return found
-
-
 def _roots(skeleton: Skeleton, chosen: set[int]) -> list[int]:
-    return [bone for bone in sorted(chosen) if not chosen & set(_ancestors(skeleton, bone))]
+    return [bone for bone in sorted(chosen) if not chosen & set(skeleton.ancestors(bone))]
 
 
 def _end_nearby(skeleton: Skeleton, chosen: set[int], root: int, size: float) -> int | None:
     """The body at whose end the limb of a root begins, of another limb than its own."""
-    others = [bone for bone in chosen if bone != root and root not in _ancestors(skeleton, bone)]
+    others = [bone for bone in chosen if bone != root and root not in skeleton.ancestors(bone)]
     if not others:
         return None
     gaps = np.linalg.norm(skeleton.tails[others] - skeleton.heads[root], axis=1)
@@ -258,13 +249,13 @@ def _movable(skeleton: Skeleton, facts: RigFacts, chosen: set[int]) -> set[int]:
 
 
 def _limb_size(skeleton: Skeleton, chosen: set[int], root: int) -> float:
-    beneath = [bone for bone in chosen if bone == root or root in _ancestors(skeleton, bone)]
+    beneath = [bone for bone in chosen if bone == root or root in skeleton.ancestors(bone)]
     return float(skeleton.lengths[beneath].sum())
 
 
 def _common_ancestor(skeleton: Skeleton, facts: RigFacts, bones: Sequence[int]) -> int | None:
     """The lowest bone that carries all of these and that nothing else moves."""
-    paths = [_ancestors(skeleton, bone) for bone in bones]
+    paths = [skeleton.ancestors(bone) for bone in bones]
     for bone in paths[0]:
         free = skeleton.names[bone] not in facts.moved
         if free and all(bone in path for path in paths[1:]):
@@ -274,7 +265,7 @@ def _common_ancestor(skeleton: Skeleton, facts: RigFacts, bones: Sequence[int]) 
 
 def _tree(skeleton: Skeleton, chosen: set[int], size: float) -> Roles:
     above = {
-        bone: next((each for each in _ancestors(skeleton, bone) if each in chosen), -1)
+        bone: next((each for each in skeleton.ancestors(bone) if each in chosen), -1)
         for bone in chosen
     }
     roots = [bone for bone in sorted(chosen) if above[bone] < 0]
@@ -295,7 +286,7 @@ def _tree(skeleton: Skeleton, chosen: set[int], size: float) -> Roles:
         place[
             bone
             if bone in chosen
-            else next((each for each in _ancestors(skeleton, bone) if each in chosen), -1)
+            else next((each for each in skeleton.ancestors(bone) if each in chosen), -1)
         ]
         for bone in range(len(skeleton))
     ]
@@ -309,7 +300,7 @@ def _tree(skeleton: Skeleton, chosen: set[int], size: float) -> Roles:
 
 def _nearest(skeleton: Skeleton, chosen: set[int], root: int) -> int | None:
     """The body that passes nearest to where a limb begins."""
-    others = [bone for bone in chosen if root not in [bone, *_ancestors(skeleton, bone)]]
+    others = [bone for bone in chosen if root not in [bone, *skeleton.ancestors(bone)]]
     if not others:
         return None
     distances = _to_axes(skeleton, others, skeleton.heads[root])

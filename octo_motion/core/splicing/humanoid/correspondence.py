@@ -147,7 +147,7 @@ def find_correspondence(
         other = pairs[bone]
         landmark = kinds.get(base.names[bone], "")
         kind = landmark.partition(".")[0]
-        lay = laid.get(base.parents[bone], _nearest(laid, base, bone))
+        lay = next((laid[each] for each in base.ancestors(bone) if each in laid), IDENTITY)
         follower = _follower(base, bone, pairs, marks, landmark)
         if follower is not None:
             ours = rotate(our_back, base.heads[follower] - base.heads[bone])
@@ -181,13 +181,6 @@ def chain_length(skeleton: Skeleton, bones: Sequence[int]) -> float:
 
 def _plain(name: str) -> str:
     return name.rpartition(":")[2].casefold()
-
-
-def _nearest(laid: Mapping[int, Floats], base: Skeleton, bone: int) -> Floats:
-    parent = base.parents[bone]
-    while parent >= 0 and parent not in laid:
-        parent = base.parents[parent]
-    return laid[parent] if parent >= 0 else IDENTITY
 
 
 def _follower(

@@ -10,7 +10,7 @@ out, with the reason, for the artist to say.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -34,8 +34,6 @@ class SkeletonMapping:
     """What was found on a skeleton."""
 
     landmarks: Landmarks
-    confidence: Mapping[str, float]
-    """0…1 by landmark: 1 the name says it, 0.5 the shape does."""
     missing: Mapping[str, str]
     """Why a landmark could not be told, by landmark, optional ones included."""
     notes: tuple[str, ...]
@@ -47,11 +45,6 @@ class SkeletonMapping:
     def asked(self) -> tuple[str, ...]:
         """Required landmarks that could not be told."""
         return tuple(each for each in self.missing if each not in OPTIONAL)
-
-    @property
-    def complete(self) -> bool:
-        """Whether all required landmarks are known."""
-        return not self.asked
 
 
 def map_skeleton(skeleton: Skeleton) -> SkeletonMapping:
@@ -76,8 +69,7 @@ def map_skeleton(skeleton: Skeleton) -> SkeletonMapping:
         f"{part}.{side}": bone for (_, side), limb in limbs.items() for part, bone in limb.items()
     }
     _drop_crossed_sides(skeleton, found, missing)
-    trunk = _trunk(_with_mid_plane(body, found), found)
-    found.update(trunk)
+    found.update(_trunk(body, found))
     _look_at_sides(skeleton, found, notes)
     problem = ""
     if not any(_has_core(kind, limb) for (kind, _), limb in limbs.items()):
@@ -89,7 +81,7 @@ def map_skeleton(skeleton: Skeleton) -> SkeletonMapping:
 
 def _named_limb(
     body: BodyProportions, kind: str, side: str, notes: list[str], missing: dict[str, str]
-) -> dict[str, tuple[int, float]]:
+) -> dict[str, int]:
     """A limb by names; parts that several bones may be are told."""
     limb, rivals = find_limb(body, LIMBS[kind], side)
     if "toe" in rivals:
@@ -97,11 +89,9 @@ def _named_limb(
         del limb["toe"]
         missing[f"toe.{side}"] = "The foot has several toes."
     if "hand" in rivals:
-        bone, weight = limb["hand"]
-        limb["hand"] = bone, 0.8 * weight
         notes.append(
             f"The {_TITLES[side]} hand has {len(rivals['hand']) + 1} bones: "
-            f"'{body.skeleton.names[bone]}' was taken."
+            f"'{body.skeleton.names[limb['hand']]}' was taken."
         )
     return limb
 
@@ -112,7 +102,7 @@ def _has_core(kind: str, limb: Mapping[str, object]) -> bool:
 
 def _complete_from_shape(
     body: BodyProportions,
-    limbs: dict[tuple[str, str], dict[str, tuple[int, float]]],
+    limbs: dict[tuple[str, str], dict[str, int]],
     notes: list[str],
     missing: dict[str, str],
 ) -> None:
@@ -133,14 +123,12 @@ def _complete_from_shape(
             known = limbs[kind, side]
             if _has_core(kind, known):
                 continue
-            agrees = all(limb.get(part, bone) == bone for part, (bone, _) in known.items())
-            if not agrees:
+            if any(limb.get(part, bone) != bone for part, bone in known.items()):
                 notes.append(
                     f"Names and shape of the {_TITLES[side]} {kind} do not agree: look at it."
                 )
                 continue
-            for part, bone in limb.items():
-                known.setdefault(part, (bone, 0.5))
+            known |= {part: bone for part, bone in limb.items() if part not in known}
             notes.append(
                 f"The bones of the {kind}s were told by their lengths, not by names: look at them."
             )
@@ -149,41 +137,39 @@ def _complete_from_shape(
 def _sides_of_shape(
     body: BodyProportions,
     shape: Shape,
-    limbs: Mapping[tuple[str, str], Mapping[str, tuple[int, float]]],
+    limbs: Mapping[tuple[str, str], Mapping[str, int]],
 ) -> tuple[str, str] | None:
     """Which side the first and the second limb of each pair of a shape are on."""
     named = 0
     for pair in (shape.arms, shape.legs):
         for sign, limb in zip((1, -1), pair, strict=True):
-            for bone in limb.values():
-                named += sign * {"L": 1, "R": -1}.get(body.names[bone].side, 0)
+            sides = [body.names[bone].side for bone in limb.values()]
             # A limb of the other pair that names told says it for both.
             for (_, side), other in limbs.items():
-                if {bone for bone, _ in other.values()} & set(limb.values()):
-                    named += sign * (1 if side == "L" else -1)
+                sides += [side] if set(other.values()) & set(limb.values()) else []
+            named += sign * (sides.count("L") - sides.count("R"))
     if named:
         return ("L", "R") if named > 0 else ("R", "L")
     heads = body.skeleton.heads
-    legs = [[limb[part] for part in _CORE["leg"]] for limb in shape.legs]
-    toes = [limb.get("toe") for limb in shape.legs]
-    head = heads[shape.trunk["head"]]
-    left = _left_by_feet(body.skeleton, legs, toes, head - heads[shape.trunk["hips"]])
+    up = heads[shape.trunk["head"]] - heads[shape.trunk["hips"]]
+    left = _left_by_feet(body.skeleton, shape.legs, up)
     if left is None:
         return None
-    first, second = (heads[leg[1]] for leg in legs)
+    first, second = (heads[leg["shin"]] for leg in shape.legs)
     return ("L", "R") if float((first - second) @ left) > 0.0 else ("R", "L")
 
 
 def _left_by_feet(
-    skeleton: Skeleton, legs: Sequence[Sequence[int]], toes: Sequence[int | None], up: Floats
+    skeleton: Skeleton, legs: Sequence[Mapping[str, int]], up: Floats
 ) -> Floats | None:
     """The body's left, (3,) of any length, from the way its feet point; none where that is open."""
     forward, down = np.zeros((2, 3))
     upward = up / max(float(np.linalg.norm(up)), 1e-12)
-    for (thigh, _, foot), toe in zip(legs, toes, strict=True):
-        tip = skeleton.heads[toe] if toe is not None else skeleton.tails[foot]
-        forward += tip - skeleton.heads[foot]
-        down += skeleton.heads[foot] - skeleton.heads[thigh]
+    for leg in legs:
+        foot = skeleton.heads[leg["foot"]]
+        tip = skeleton.heads[leg["toe"]] if "toe" in leg else skeleton.tails[leg["foot"]]
+        forward += tip - foot
+        down += foot - skeleton.heads[leg["thigh"]]
     leg_lengths = float(np.linalg.norm(down))
     forward -= (forward @ upward) * upward
     # Some files rest with all bones along one axis: there, feet say nothing.
@@ -194,66 +180,47 @@ def _left_by_feet(
     return np.cross(upward, forward)
 
 
-def _drop_crossed_sides(
-    skeleton: Skeleton, found: dict[str, tuple[int, float]], missing: dict[str, str]
-) -> None:
+def _pair(found: Mapping[str, int], part: str) -> list[int]:
+    """The bones of a part on left and right, as far as they were found."""
+    return [found[f"{part}.{side}"] for side in "LR" if f"{part}.{side}" in found]
+
+
+def _drop_crossed_sides(skeleton: Skeleton, found: dict[str, int], missing: dict[str, str]) -> None:
     """Forget both arms and legs if the left arm is on the side of the right leg."""
-    across = []
-    for part in ("upper_arm", "thigh"):
-        if f"{part}.L" not in found or f"{part}.R" not in found:
-            return
-        left, right = (skeleton.heads[found[f"{part}.{side}"][0]] for side in "LR")
-        across.append(left - right)
-    lengths = float(np.linalg.norm(across[0]) * np.linalg.norm(across[1]))
-    if float(across[0] @ across[1]) < -0.3 * lengths:
+    pairs = [_pair(found, part) for part in ("upper_arm", "thigh")]
+    if any(len(pair) < 2 for pair in pairs):
+        return
+    arms, legs = (skeleton.heads[left] - skeleton.heads[right] for left, right in pairs)
+    if float(arms @ legs) < -0.3 * float(np.linalg.norm(arms) * np.linalg.norm(legs)):
         for name in [name for name in found if "." in name]:
             del found[name]
             missing[name] = "The left arm is on the side of the right leg."
 
 
-def _trunk(
-    body: BodyProportions, found: Mapping[str, tuple[int, float]]
-) -> dict[str, tuple[int, float]]:
-    def pair(part: str) -> list[int]:
-        return [found[f"{part}.{side}"][0] for side in "LR" if f"{part}.{side}" in found]
-
-    shoulders = pair("clavicle") if len(pair("clavicle")) == 2 else pair("upper_arm")
-    if len(shoulders) < 2 or len(pair("thigh")) < 2 or len(pair("shin")) < 2:
+def _trunk(body: BodyProportions, found: Mapping[str, int]) -> dict[str, int]:
+    arms, thighs, shins, clavicles = (
+        _pair(found, part) for part in ("upper_arm", "thigh", "shin", "clavicle")
+    )
+    shoulders = clavicles if len(clavicles) == 2 else arms
+    if len(shoulders) < 2 or len(thighs) < 2 or len(shins) < 2:
         return {}
-    return find_trunk(body, pair("thigh"), pair("shin"), shoulders)
+    if body.left is None:
+        # Names have told no mid plane: it is between the limbs.
+        body = body.between([pair for pair in (arms, thighs) if len(pair) == 2])
+    return find_trunk(body, thighs, shins, shoulders)
 
 
-def _with_mid_plane(
-    body: BodyProportions, found: Mapping[str, tuple[int, float]]
-) -> BodyProportions:
-    """The body with the mid plane between its limbs, where its names have told none."""
-    if body.left is not None:
-        return body
-    pairs = [
-        [found[f"{part}.{side}"][0] for side in "LR"]
-        for part in ("upper_arm", "thigh")
-        if f"{part}.L" in found and f"{part}.R" in found
-    ]
-    if not pairs:
-        return body
-    left, right = body.skeleton.heads[np.array(pairs).T]
-    across = (left - right).sum(axis=0)
-    across = across / max(float(np.linalg.norm(across)), 1e-12)
-    return replace(body, left=across, middle=(0.5 * (left + right)).mean(axis=0))
-
-
-def _look_at_sides(
-    skeleton: Skeleton, found: Mapping[str, tuple[int, float]], notes: list[str]
-) -> None:
+def _look_at_sides(skeleton: Skeleton, found: Mapping[str, int], notes: list[str]) -> None:
     """Say so where the feet point the other way than the names of left and right mean."""
-    needed = ["hips", "head", *(f"{part}.{side}" for side in "LR" for part in _CORE["leg"])]
-    if any(each not in found for each in needed):
+    legs = [
+        {part: found[f"{part}.{side}"] for part in LEG if f"{part}.{side}" in found}
+        for side in "LR"
+    ]
+    if not {"hips", "head"} <= found.keys() or not all(_has_core("leg", leg) for leg in legs):
         return
     heads = skeleton.heads
-    legs = [[found[f"{part}.{side}"][0] for part in _CORE["leg"]] for side in "LR"]
-    toes = [found[f"toe.{side}"][0] if f"toe.{side}" in found else None for side in "LR"]
-    left = _left_by_feet(skeleton, legs, toes, heads[found["head"][0]] - heads[found["hips"][0]])
-    if left is not None and float((heads[legs[0][0]] - heads[legs[1][0]]) @ left) < 0.0:
+    left = _left_by_feet(skeleton, legs, heads[found["head"]] - heads[found["hips"]])
+    if left is not None and float((heads[legs[0]["thigh"]] - heads[legs[1]["thigh"]]) @ left) < 0.0:
         notes.append(
             "The feet point backward if left is where the names say: look at left and right."
         )
@@ -261,21 +228,15 @@ def _look_at_sides(
 
 def _result(
     skeleton: Skeleton,
-    found: Mapping[str, tuple[int, float]],
+    found: Mapping[str, int],
     missing: Mapping[str, str],
     notes: Sequence[str],
     problem: str,
 ) -> SkeletonMapping:
-    said = {}
-    for each in LANDMARKS:
-        if each not in found:
-            said[each] = missing.get(each) or problem or "No bone's name or place tells it."
-    return SkeletonMapping(
-        landmarks=Landmarks(
-            {each: skeleton.names[found[each][0]] for each in LANDMARKS if each in found}
-        ),
-        confidence={each: min(found[each][1], 1.0) for each in LANDMARKS if each in found},
-        missing=said,
-        notes=tuple(dict.fromkeys(notes)),
-        problem=problem,
-    )
+    bones = {each: skeleton.names[found[each]] for each in LANDMARKS if each in found}
+    reasons = {
+        each: missing.get(each) or problem or "No bone's name or place tells it."
+        for each in LANDMARKS
+        if each not in found
+    }
+    return SkeletonMapping(Landmarks(bones), reasons, tuple(dict.fromkeys(notes)), problem)

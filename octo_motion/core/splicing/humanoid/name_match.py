@@ -7,7 +7,7 @@ Limbs are the sequences that fit names and lengths best, the trunk is what carri
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -39,26 +39,22 @@ class BodyProportions:
     middle: Floats
     """(3,) a point of the mid plane."""
 
-    def is_ancestor(self, bone: int, other: int) -> bool:
-        """Whether a bone carries another one."""
-        return bone in self.ancestors(other)
-
-    def ancestors(self, bone: int) -> list[int]:
-        """Parents up to the root, nearest first."""
-        found = []
-        parent = self.skeleton.parents[bone]
-        while parent >= 0:
-            found.append(parent)
-            parent = self.skeleton.parents[parent]
-        return found
-
     def common_ancestor(self, bones: Sequence[int]) -> int | None:
         """The lowest bone that is or carries all of these."""
-        shared = [bones[0], *self.ancestors(bones[0])]
-        for other in bones[1:]:
-            chain = {other, *self.ancestors(other)}
-            shared = [bone for bone in shared if bone in chain]
-        return shared[0] if shared else None
+        first, *others = ([bone, *self.skeleton.ancestors(bone)] for bone in bones)
+        return next((bone for bone in first if all(bone in chain for chain in others)), None)
+
+    def between(self, pairs: Sequence[Sequence[int]]) -> BodyProportions:
+        """The same with the mid plane between pairs of bones, left and right."""
+        left, right = self.skeleton.heads[np.array(pairs).T]
+        across = (left - right).sum(axis=0)
+        length = float(np.linalg.norm(across))
+        axis = across / length if length > 1e-6 * self.size else None
+        return replace(self, left=axis, middle=(0.5 * (left + right)).mean(axis=0))
+
+    def weight(self, bone: int, part: str) -> float:
+        """How well a bone's name fits a landmark without side, 0…1."""
+        return self.names[bone].weights.get(part, 0.0)
 
     def off_middle(self, bone: int) -> float:
         """Distance of a bone's head from the mid plane, as a share of the body's size."""
@@ -85,21 +81,14 @@ def body_of(skeleton: Skeleton, names: tuple[BoneName, ...]) -> BodyProportions:
         for (side, stem), bone in stems.items()
         if side == "L" and ("R", stem) in stems
     ]
-    if not pairs:
-        return BodyProportions(skeleton, names, tuple(sides), size, None, heads.mean(axis=0))
-    left, right = skeleton.heads[np.array(pairs).T]
-    across = (left - right).sum(axis=0)
-    length = float(np.linalg.norm(across))
-    axis = across / length if length > 1e-6 * size else None
-    return BodyProportions(
-        skeleton, names, tuple(sides), size, axis, (0.5 * (left + right)).mean(axis=0)
-    )
+    body = BodyProportions(skeleton, names, tuple(sides), size, None, heads.mean(axis=0))
+    return body.between(pairs) if pairs else body
 
 
 def find_limb(
     body: BodyProportions, parts: tuple[str, ...], side: str
-) -> tuple[dict[str, tuple[int, float]], dict[str, list[int]]]:
-    """The bones of a limb by what their names say, each with the weight of its name.
+) -> tuple[dict[str, int], dict[str, list[int]]]:
+    """The bones of a limb by what their names say, and those that may as well be hand or toe.
 
     Of all ways to choose one bone for each part, the one with the best sum of the names' weights
     and of how well neighbours follow one another, found by dynamic programming.
@@ -125,8 +114,7 @@ def find_limb(
         ]
         if part == "hand" and rivals[part] and "forearm" in chosen:
             chosen[part] = _straightest(body, chosen["forearm"], [bone, *rivals[part]])
-    found = {part: (bone, candidates[part][bone]) for part, bone in chosen.items()}
-    return found, {part: others for part, others in rivals.items() if others}
+    return chosen, {part: others for part, others in rivals.items() if others}
 
 
 def _are_beside(body: BodyProportions, one: int, other: int) -> bool:
@@ -134,9 +122,9 @@ def _are_beside(body: BodyProportions, one: int, other: int) -> bool:
     return (
         one != other
         and body.names[one].layer == body.names[other].layer
-        and not body.is_ancestor(one, other)
-        and not body.is_ancestor(other, one)
-        and bool(set(body.ancestors(one)[:2]) & set(body.ancestors(other)[:2]))
+        and one not in body.skeleton.ancestors(other)
+        and other not in body.skeleton.ancestors(one)
+        and bool(set(body.skeleton.ancestors(one)[:2]) & set(body.skeleton.ancestors(other)[:2]))
     )
 
 
@@ -156,14 +144,14 @@ def _straightest(body: BodyProportions, before: int, bones: Sequence[int]) -> in
 
 def _fit(body: BodyProportions, bone: int, part: str) -> float:
     """Weight of a bone for a part by its own name and place."""
-    weight = body.names[bone].weights.get(part, 0.0)
+    weight = body.weight(bone, part)
     if weight == 0.0:
         return 0.0
     if body.skeleton.constrained[bone]:
         # Keys have no effect on it; there is another one that moves it.
         weight -= 0.3 * weight
     parent = body.skeleton.parents[bone]
-    if parent >= 0 and body.names[parent].weights.get(part, 0.0) >= body.names[bone].weights[part]:
+    if parent >= 0 and body.weight(parent, part) >= body.weight(bone, part):
         # "upperarm01 → upperarm02": the first one is the joint.
         weight -= 0.1 * weight
     if part in {"upper_arm", "thigh"} and body.off_middle(bone) < 0.005:
@@ -218,7 +206,7 @@ def _follows(body: BodyProportions, before: int, bone: int, chain: Mapping[str, 
         score -= 1.0
     if skeleton.parents[bone] == before:
         return score + 0.2
-    if body.is_ancestor(before, bone):
+    if before in body.skeleton.ancestors(bone):
         return score + 0.2 - _skipped(body, before, bone, part, gap)
     near = 0.05 * body.size + 0.2 * skeleton.lengths[before]
     if float(np.linalg.norm(skeleton.heads[bone] - skeleton.tails[before])) < near:
@@ -255,7 +243,7 @@ def _skipped(body: BodyProportions, before: int, bone: int, part: str, gap: floa
     heads = body.skeleton.heads
     cost = 0.0
     child = bone
-    for between in body.ancestors(bone):
+    for between in body.skeleton.ancestors(bone):
         if between == before:
             break
         name = body.names[between]
@@ -276,8 +264,8 @@ _NEAR_THE_LEGS: Final = 0.9
 
 def find_trunk(
     body: BodyProportions, thighs: Sequence[int], shins: Sequence[int], shoulders: Sequence[int]
-) -> dict[str, tuple[int, float]]:
-    """The bones of the trunk, each with how sure it is, 0…1.
+) -> dict[str, int]:
+    """The bones of the trunk.
 
     Args:
         body: the skeleton.
@@ -285,68 +273,58 @@ def find_trunk(
         shins: left and right.
         shoulders: left and right, clavicles or upper arms.
     """
-    found: dict[str, tuple[int, float]] = {}
-    head = _named(body, "head") or _end_of_middle(body, thighs, shoulders)
+    head = _named(body, "head")
     if head is None:
-        return found
-    found["head"] = head
-    chest = _carrier(body, [*shoulders, head[0]], "chest")
+        head = _end_of_middle(body, thighs, shoulders)
+    if head is None:
+        return {}
+    found = {"head": head}
+    chest = _carrier(body, [*shoulders, head], "chest")
     if chest is not None:
         found["chest"] = chest
-    hips = _hips(body, thighs, shins, chest[0] if chest is not None else head[0])
+    hips = _hips(body, thighs, shins, head if chest is None else chest)
     if hips is not None:
         found["hips"] = hips
     if hips is None or chest is None:
         return found
-    between = _between(body, hips[0], chest[0])
     # "Body → Hips → Abdomen": what is named after the pelvis does not bend the trunk.
-    bending = [bone for bone in between if not body.names[bone].weights.get("hips", 0.0) >= 1.0]
+    bending = [bone for bone in _between(body, hips, chest) if body.weight(bone, "hips") < 1.0]
     if bending:
-        found["spine"] = (bending[0], 0.9)
-    necks = _between(body, chest[0], head[0])
+        found["spine"] = bending[0]
+    necks = _between(body, chest, head)
     if necks:
-        named = [bone for bone in necks if body.names[bone].weights.get("neck", 0.0) > 0.5]
-        found["neck"] = (named[0], 1.0) if named else (necks[0], 0.7)
+        named = (bone for bone in necks if body.weight(bone, "neck") > 0.5)
+        found["neck"] = next(named, necks[0])
     return found
 
 
 def _hips(
     body: BodyProportions, thighs: Sequence[int], shins: Sequence[int], upper: int
-) -> tuple[int, float] | None:
+) -> int | None:
     """The bone that carries legs and trunk, if it is at the pelvis; else the one so named."""
     heads = body.skeleton.heads
     middle = heads[list(thighs)].mean(axis=0)
     length = float(np.linalg.norm(heads[list(thighs)] - heads[list(shins)], axis=1).mean())
     carrier = _carrier(body, [*thighs, upper], "hips")
-    if carrier is not None:
-        distance = float(np.linalg.norm(heads[carrier[0]] - middle))
-        if distance < _NEAR_THE_LEGS * length:
-            return carrier
+    if carrier is not None and np.linalg.norm(heads[carrier] - middle) < _NEAR_THE_LEGS * length:
+        return carrier
+    carriers = {bone for thigh in thighs for bone in body.skeleton.ancestors(thigh)}
     named = [
         bone
-        for bone in range(len(body.skeleton))
-        if body.names[bone].weights.get("hips", 0.0) >= 0.7
-        and not body.sides[bone]
-        and any(body.is_ancestor(bone, thigh) for thigh in thighs)
+        for bone in sorted(carriers)
+        if body.weight(bone, "hips") >= 0.7 and not body.sides[bone]
     ]
-    if named:
-        return max(named, key=lambda bone: body.names[bone].weights["hips"]), 0.7
-    return None
+    return max(named, key=lambda bone: body.weight(bone, "hips"), default=None)
 
 
-def _carrier(body: BodyProportions, bones: Sequence[int], part: str) -> tuple[int, float] | None:
+def _carrier(body: BodyProportions, bones: Sequence[int], part: str) -> int | None:
     """The lowest bone that carries all of these and that keys can move."""
     shared = body.common_ancestor(bones)
     if shared is None:
-        named = _named(body, part)
-        return (named[0], 0.6) if named is not None else None
-    if shared in bones:
-        shared = body.skeleton.parents[shared]
-    chain = [shared, *body.ancestors(shared)] if shared >= 0 else []
-    free = [bone for bone in chain if _is_free(body, bone)]
-    if not free:
-        return None
-    return free[0], 1.0 if body.names[free[0]].weights.get(part, 0.0) >= 0.5 else 0.8
+        return _named(body, part)
+    above = body.skeleton.ancestors(shared)
+    chain = above if shared in bones else [shared, *above]
+    return next((bone for bone in chain if _is_free(body, bone)), None)
 
 
 def _is_free(body: BodyProportions, bone: int) -> bool:
@@ -360,7 +338,7 @@ def _is_free(body: BodyProportions, bone: int) -> bool:
 
 def _between(body: BodyProportions, lower: int, upper: int) -> list[int]:
     """The free bones between two, from the lower one up."""
-    chain = body.ancestors(upper)
+    chain = body.skeleton.ancestors(upper)
     if lower not in chain:
         return []
     between = chain[: chain.index(lower)][::-1]
@@ -369,21 +347,22 @@ def _between(body: BodyProportions, lower: int, upper: int) -> list[int]:
     return free or between
 
 
-def _named(body: BodyProportions, part: str) -> tuple[int, float] | None:
+def _named(body: BodyProportions, part: str) -> int | None:
     """The bone of the middle whose name says it is this part, the first one down the tree."""
-    best: tuple[int, float] | None = None
-    for bone, name in enumerate(body.names):
-        weight = name.weights.get(part, 0.0) if not body.sides[bone] else 0.0
+    best: int | None = None
+    most = 0.5
+    for bone, side in enumerate(body.sides):
+        weight = 0.0 if side else body.weight(bone, part)
         if body.skeleton.constrained[bone]:
             weight *= 0.7
-        if weight > 0.5 and (best is None or weight > best[1] + 1e-9):
-            best = bone, weight
+        if weight > most + 1e-9:
+            best, most = bone, weight
     return best
 
 
 def _end_of_middle(
     body: BodyProportions, thighs: Sequence[int], shoulders: Sequence[int]
-) -> tuple[int, float] | None:
+) -> int | None:
     """The last bone of the row that goes up from between the shoulders, where none is named."""
     skeleton = body.skeleton
     start = body.common_ancestor(shoulders)
@@ -400,7 +379,9 @@ def _end_of_middle(
             if body.off_middle(child) < 0.012
             and not body.sides[child]
             and not body.names[child].machinery
-            and not any(child == each or body.is_ancestor(child, each) for each in shoulders)
+            and not any(
+                child == each or child in body.skeleton.ancestors(each) for each in shoulders
+            )
             # Jaw and hair turn back.
             and float(skeleton.rest_matrices[child][:3, 1] @ up) > 0.0
             # A face starts within the head.
@@ -410,4 +391,4 @@ def _end_of_middle(
             break
         bone = children[0]
         row.append(bone)
-    return (row[-1], 0.6) if row else None
+    return row[-1] if row else None

@@ -81,16 +81,16 @@ def shape_of(skeleton: Skeleton, names: Sequence[BoneName]) -> Shape:
         for bone, pairs in forks.items()
         # Fingers and toes fork too, within a limb.
         if not any(
-            _within(skeleton, bone, limb)
+            limb in (bone, *skeleton.ancestors(bone))
             for each in forks.values()
             for pair in each
             for limb in pair
         )
     }
-    many = [bone for bone, pairs in forks.items() if _limbs(tree, pairs) > _MOST_LIMBS]
+    many = [bone for bone, pairs in forks.items() if _count(tree, pairs) > _MOST_LIMBS]
     if many:
         return Shape(
-            problem=f"This is no humanoid: {_limbs(tree, forks[many[0]])} limbs of one length "
+            problem=f"This is no humanoid: {_count(tree, forks[many[0]])} limbs of one length "
             f"start at '{skeleton.names[many[0]]}'."
         )
     if len(forks) != 2:
@@ -99,9 +99,9 @@ def shape_of(skeleton: Skeleton, names: Sequence[BoneName]) -> Shape:
             problem=f"This is no humanoid by its shape: it has {told} of limbs that mirror each "
             "other instead of two."
         )
-    lower, upper = sorted(forks, key=lambda bone: _depth(skeleton, bone))
-    legs = _legs(tree, forks[lower][0])
-    arms = _arms(tree, forks[upper][0])
+    lower, upper = sorted(forks, key=lambda bone: len(skeleton.ancestors(bone)))
+    legs = _limbs(tree, forks[lower][0], ("thigh", "shin", "foot"))
+    arms = _limbs(tree, forks[upper][0], ("upper_arm", "forearm", "hand"))
     if legs is None or arms is None:
         return Shape(problem="The limbs have too few bones for a humanoid.")
     head = _head(tree, upper, forks[upper][0])
@@ -151,28 +151,12 @@ def _pairs(
     return sorted(found, key=lambda pair: -tree.reach[pair[0]])
 
 
-def _limbs(tree: _Tree, pairs: Sequence[tuple[int, int]]) -> int:
+def _count(tree: _Tree, pairs: Sequence[tuple[int, int]]) -> int:
     """Number of limbs; copies that a rig keeps of one count once."""
     limbs = sorted({limb for pair in pairs for limb in pair})
     ends = np.array([tree.skeleton.heads[tree.path(limb)[-1]] for limb in limbs])
     coarse = 0.02 * max(tree.reach[limb] for limb in limbs)
     return len(np.unique(np.round(ends / coarse), axis=0))
-
-
-def _within(skeleton: Skeleton, bone: int, limb: int) -> bool:
-    while bone >= 0:
-        if bone == limb:
-            return True
-        bone = skeleton.parents[bone]
-    return False
-
-
-def _depth(skeleton: Skeleton, bone: int) -> int:
-    depth = 0
-    while skeleton.parents[bone] >= 0:
-        bone = skeleton.parents[bone]
-        depth += 1
-    return depth
 
 
 def _steps(tree: _Tree, path: Sequence[int]) -> list[float]:
@@ -237,28 +221,21 @@ def _bends(tree: _Tree, path: Sequence[int]) -> list[bool]:
     return [True, *(not each for each in straight), True]
 
 
-def _arms(tree: _Tree, pair: Sequence[int]) -> list[dict[str, int]] | None:
+def _limbs(tree: _Tree, pair: Sequence[int], names: Sequence[str]) -> list[dict[str, int]] | None:
+    """The three joints of both limbs of a pair, none where they have too few bones."""
     paths = [tree.path(limb) for limb in pair]
     cuts = _two_long_parts(tree, paths)
     if cuts is None:
         return None
-    arms = []
-    for path, (start, bend, end) in zip(paths, cuts, strict=True):
-        arm = {"upper_arm": path[start], "forearm": path[bend], "hand": path[end]}
-        arms.append({"clavicle": path[0], **arm} if start > 0 else arm)
-    return arms
-
-
-def _legs(tree: _Tree, pair: Sequence[int]) -> list[dict[str, int]] | None:
-    paths = [tree.path(limb) for limb in pair]
-    cuts = _two_long_parts(tree, paths)
-    if cuts is None:
-        return None
-    legs = []
-    for path, (start, bend, end) in zip(paths, cuts, strict=True):
-        leg = {"thigh": path[start], "shin": path[bend], "foot": path[end]}
-        legs.append({**leg, "toe": path[end + 1]} if end + 1 < len(path) else leg)
-    return legs
+    limbs = []
+    for path, cut in zip(paths, cuts, strict=True):
+        limb = {name: path[place] for name, place in zip(names, cut, strict=True)}
+        if "foot" in limb and cut[-1] + 1 < len(path):
+            limb["toe"] = path[cut[-1] + 1]
+        if "hand" in limb and cut[0] > 0:
+            limb["clavicle"] = path[0]
+        limbs.append(limb)
+    return limbs
 
 
 def _head(tree: _Tree, chest: int, arms: tuple[int, int]) -> int | None:

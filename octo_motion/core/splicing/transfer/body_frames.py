@@ -199,8 +199,8 @@ def _child_towards(
     skeleton: Skeleton, landmarks: Landmarks, bone: int, landmark: str
 ) -> int | None:
     """The child of a bone on the way to a landmark: its head is fixed to the bone."""
-    name = landmarks.get(landmark)
-    child = skeleton.index.get(name, -1) if name is not None else -1
-    while child >= 0 and skeleton.parents[child] != bone:
-        child = skeleton.parents[child]
-    return child if child >= 0 else None
+    end = skeleton.index.get(landmarks.get(landmark) or "")
+    if end is None:
+        return None
+    path = (end, *skeleton.ancestors(end))
+    return next((child for child in path if skeleton.parents[child] == bone), None)

@@ -178,17 +178,14 @@ def path_down(skeleton: Skeleton, top: int, end: int, what: str) -> list[int]:
     Raises:
         ClipError: ``end`` does not hang on ``top``.
     """
-    path, bone = [], end
-    while bone not in (top, -1):
-        path.append(bone)
-        bone = skeleton.parents[bone]
-    if bone != top or not path:
+    above = skeleton.ancestors(end)
+    if top not in above:
         raise ClipError(
             f"The {what} cannot be spliced: '{skeleton.names[end]}' does not hang on "
             f"'{skeleton.names[top]}'.",
             "Look at the bone table, or choose another part.",
         )
-    return path[::-1]
+    return [*above[: above.index(top)][::-1], end]
 
 
 def part_bones(

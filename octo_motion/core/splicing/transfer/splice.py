@@ -61,7 +61,6 @@ class Splice:
     is the shoulder."""
     seen_from: SeenFrom = ""
     """From where legs are seen: the pelvis if empty, the chest in the source."""
-    mute: bool = False
 
     def retargets(self, base: MappedClip) -> list[Retarget]:
         """How the part goes onto a base, one for each side.
@@ -90,23 +89,14 @@ def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Spl
     return result
 
 
-def spliced(base: Clip, landmarks: Landmarks | None, splice: Splice) -> Clip:
-    """One splice onto a clip; the result has the base's frames, bones and name.
-
-    Raises:
-        ClipError: a bone or landmark is missing, or the timing makes no sense.
-    """
-    return Splicer(base, landmarks, splice).at(splice.timing)
-
-
 def splicers(base: Clip, landmarks: Landmarks | None, splices: Iterable[Splice]) -> list[Splicer]:
-    """All splices of a stack that are not muted, made ready.
+    """All splices of a stack, made ready.
 
     Raises:
         ClipError: a bone or landmark is missing.
     """
     # The ground is where the base stands on it, whatever is done to its legs on the way.
-    return [Splicer(base, landmarks, each) for each in splices if not each.mute]
+    return [Splicer(base, landmarks, each) for each in splices]
 
 
 class Splicer:
@@ -142,24 +132,6 @@ class Splicer:
             ClipError: the timing makes no sense.
         """
         return splice_window(timing, self._base, self.splice.clip)
-
-    def at(self, timing: Timing, rows: Iterable[int] | None = None) -> Clip:
-        """The base with the part spliced on at this timing, all of it or some of its frames.
-
-        Args:
-            timing: when the splice acts.
-            rows: numbers of frames, from 0.
-
-        Raises:
-            ClipError: the timing makes no sense.
-        """
-        span = self.window(timing)
-        if rows is None:
-            return self.onto(self._base, span)
-        wanted = sorted(set(rows))
-        needed = self.needed(span, wanted)
-        few = self.onto(self._base.taken(needed), span.taken(np.asarray(needed, dtype=np.intp)))
-        return few.taken(np.searchsorted(needed, wanted))
 
     def needed(self, span: SpliceWindow, rows: Iterable[int]) -> list[int]:
         """Frames on which the result at these hangs, themselves included, ascending."""
@@ -267,7 +239,7 @@ class SplicePreview:
         base: the base.
         landmarks: the base's.
         splices: the stack, the first one first.
-        number: the splice that is timed, none that is muted.
+        number: the splice that is timed.
 
     Raises:
         ClipError: a bone or landmark is missing, or a timing makes no sense.
