@@ -23,7 +23,7 @@ from ..core.posing.solver import WorldSettings
 from . import messages
 from .calibration import Phase
 from .haptics import Schedule
-from .ipc import ChannelClosedError, Child, Listener, MessageChannel, Parent
+from .ipc import ChannelClosedError, Child, MessageChannel, Parent
 from .simulation import SimulatedPointer, Simulation
 
 log = logging.getLogger(__name__)
@@ -313,15 +313,10 @@ class Bridge:
 
 def run(hand_arguments: Sequence[str]) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
-    parent = Parent()
     # Nothing here has to be tidied up: the lines to both sides end with the process, and whoever
     # holds a device lets go of it when its line ends.
-    parent.end_with()
-    listener = Listener(parent.secret)
-    parent.announce(listener.port)
-    blender = listener.accept(20.0)
+    blender = Parent().line()
     if blender is None:
-        log.error("Nobody connected")
         return 2
     bridge = Bridge(blender, hand_arguments)
     # A step that begins a little late is made up for: it is not worth a whole processor's time, as

@@ -19,7 +19,7 @@ from . import messages
 from .calibration import Calibration, Phase
 from .driver import DeviceLostError, Driver
 from .haptics import Pointer, Schedule, make_real_time
-from .ipc import ChannelClosedError, Listener, MessageChannel, Parent
+from .ipc import ChannelClosedError, MessageChannel, Parent
 from .sources import Discovery, Sources
 
 log = logging.getLogger(__name__)
@@ -250,13 +250,9 @@ class HandLoop:
 
 def run(sources: Sources, rate: float = RATE) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
-    parent = Parent()
-    parent.end_with(_LET_GO_SECONDS)
-    listener = Listener(parent.secret)
-    parent.announce(listener.port)
-    channel = listener.accept(20.0)
+    parent = Parent(_LET_GO_SECONDS)
+    channel = parent.line()
     if channel is None:
-        log.error("Nobody connected")
         return 2
     try:
         discovery = Discovery(sources)

@@ -32,6 +32,11 @@ def wait_for(client: Client, what: Callable[[], object], why: str) -> None:
         time.sleep(0.002)
 
 
+def bridge_of(client: Client) -> int | None:
+    """The process that the client has started."""
+    return client._child._process.pid if client._child else None
+
+
 def holding(client: Client) -> None:
     """Start a bridge whose simulated hand holds the tip of a puppet."""
     client.start(OPTIONS)
@@ -80,7 +85,7 @@ def kill_bridge_and_start_again() -> tuple[float, float]:
     client = Client()
     try:
         holding(client)
-        bridge = client.process_id
+        bridge = bridge_of(client)
         assert bridge
         hands = children_of(bridge)
         assert len(hands) == 1
@@ -108,10 +113,10 @@ def kill_bridge_and_start_again() -> tuple[float, float]:
 BLENDER = """
 import os, sys, time
 from octo_motion.device.ipc.client import Client
-from tests.device.bridges import children_of, holding
+from tests.device.bridges import bridge_of, children_of, holding
 client = Client()
 holding(client)
-print(client.process_id, *children_of(client.process_id), flush=True)
+print(bridge_of(client), *children_of(bridge_of(client)), flush=True)
 while True:
     client.poll()
     time.sleep(0.01)
@@ -141,8 +146,9 @@ def kill_hands() -> float:
     client = Client()
     try:
         holding(client)
-        assert client.process_id
-        (hands,) = children_of(client.process_id)
+        bridge = bridge_of(client)
+        assert bridge
+        (hands,) = children_of(bridge)
         start = time.monotonic()
         os.kill(hands, signal.SIGKILL)
         wait_for(client, lambda: client.lost_devices, "the hand is gone")

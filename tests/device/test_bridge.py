@@ -26,6 +26,7 @@ from tests.device.bridges import (
     FIGURE,
     OPTIONS,
     POSE,
+    bridge_of,
     holding,
     kill_blender,
     kill_bridge_and_start_again,
@@ -50,7 +51,7 @@ def test_hand_grabs_the_nearest_limb_and_bends_the_puppet(client: Client) -> Non
     holding(client)
     hello = client.hello
     assert hello
-    assert hello.process == client.process_id
+    assert hello.process == bridge_of(client)
 
     def bent() -> bool:
         assert client.pose
@@ -129,11 +130,11 @@ def test_meshes_of_a_whole_scene_wait_for_a_bridge_that_is_still_starting(client
 
 def test_bridge_that_is_stopped_ends_at_once_and_is_not_lost(client: Client) -> None:
     holding(client)
-    process_id = client.process_id
+    process_id = bridge_of(client)
     assert process_id
     client.stop()
     assert client.state is ClientState.OFF
-    assert client.process_id is None
+    assert bridge_of(client) is None
     with pytest.raises(ProcessLookupError):
         os.kill(process_id, 0)
     client.stop()

@@ -2,14 +2,13 @@
 """Processes of ours that exchange messages."""
 
 from .client import Client, ClientState
-from .process import ChannelClosedError, Child, Listener, MessageChannel, Parent, end_now
+from .process import ChannelClosedError, Child, MessageChannel, Parent, end_now
 
 __all__ = [
     "ChannelClosedError",
     "Child",
     "Client",
     "ClientState",
-    "Listener",
     "MessageChannel",
     "Parent",
     "end_now",

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import IO, Final
+from typing import Final
 
 from ...core.errors import DeviceError
 from ...core.posing.puppet import Figure, Pose
@@ -25,8 +25,6 @@ from .process import ChannelClosedError, Child
 
 _MOST_WAITING: Final = 100_000_000
 """Bytes: a scene's meshes are sent at one go, two dozen of the largest."""
-
-
 _SILENT: Final = 5.0
 """s; it speaks once a second at least."""
 
@@ -74,18 +72,12 @@ class Client:
     _figure: tuple[Figure, Pose] | None = None
     _pins: dict[int, bool] = field(default_factory=dict[int, bool])
 
-    def start(
-        self,
-        arguments: Sequence[str] = (),
-        python: Path | None = None,
-        log_to: IO[bytes] | None = None,
-    ) -> None:
+    def start(self, arguments: Sequence[str] = (), python: Path | None = None) -> None:
         """Start the bridge; one that runs is stopped first.
 
         Args:
             arguments: Options of ``python -m octo_motion.device bridge``.
             python: Executable; None finds Blender's own.
-            log_to: Open file for the bridge's messages; None: Blender's console.
 
         Raises:
             DeviceError: it cannot be started.
@@ -95,7 +87,7 @@ class Client:
         self._forget_devices()
         self.times = self.hello = None
         self.lost_devices = self._placed = 0
-        self._child = Child.start(("bridge", *arguments), python, log_to)
+        self._child = Child.start(("bridge", *arguments), python)
         self._child.channel.most_waiting = _MOST_WAITING
         self.state = ClientState.RUNNING
         self.heard = time.monotonic()
@@ -244,8 +236,3 @@ class Client:
     def silent(self) -> bool:
         """Whether a bridge that runs has sent nothing for long: it hangs, or gave up."""
         return self.state is ClientState.RUNNING and time.monotonic() - self.heard > _SILENT
-
-    @property
-    def process_id(self) -> int | None:
-        """Of the bridge, for tests and the curious."""
-        return self._child.process_id if self._child else None

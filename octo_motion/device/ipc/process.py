@@ -24,7 +24,7 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, Final, NoReturn
+from typing import Final, NoReturn
 
 from ...core.errors import DeviceError
 from ..messages import HEADER, MAGIC, VERSION, Message, MessageError, pack, read_body, read_header
@@ -157,41 +157,32 @@ class Listener:
     def accept(self, seconds: float) -> MessageChannel | None:
         """Take the right peer and stop listening; None when nobody right came in time."""
         deadline = time.monotonic() + seconds
-        try:
+        with self._socket:
             while (left := deadline - time.monotonic()) > 0.0:
                 self._socket.settimeout(left)
                 try:
                     connection, address = self._socket.accept()
                 except OSError:
                     return None
-                if self._proves_itself(connection):
+                try:
+                    self._examine(connection)
                     return MessageChannel(connection)
-                log.warning("Connection from port %d refused", address[1])
-                connection.close()
+                except (OSError, ChannelClosedError) as error:
+                    log.warning("Connection from port %d refused: %s", address[1], error)
+                    connection.close()
             return None
-        finally:
-            self._socket.close()
 
-    def _proves_itself(self, connection: socket.socket) -> bool:
+    def _examine(self, connection: socket.socket) -> None:
         ours = secrets.token_bytes(_NONCE)
-        try:
-            connection.sendall(_CHALLENGE.pack(MAGIC, VERSION, ours))
-            answer = _receive(connection, _ANSWER.size)
-            magic, version, theirs, proof = _ANSWER.unpack(answer)
-            if magic != MAGIC:
-                log.warning("A connection speaks another language")
-                return False
-            if version != VERSION:
-                log.warning("A connection speaks version %d, not %d", version, VERSION)
-                return False
-            if not hmac.compare_digest(proof, _proof(self._secret, b"client", ours, theirs)):
-                log.warning("A connection does not know the secret")
-                return False
-            connection.sendall(_proof(self._secret, b"server", ours, theirs))
-        except (OSError, EOFError):
-            log.warning("A connection did not prove itself in time")
-            return False
-        return True
+        connection.sendall(_CHALLENGE.pack(MAGIC, VERSION, ours))
+        magic, version, theirs, proof = _ANSWER.unpack(_receive(connection, _ANSWER.size))
+        if magic != MAGIC:
+            raise ChannelClosedError("it speaks another language")
+        if version != VERSION:
+            raise ChannelClosedError(f"it speaks version {version}, not {VERSION}")
+        if not hmac.compare_digest(proof, _proof(self._secret, b"client", ours, theirs)):
+            raise ChannelClosedError("it does not know the secret")
+        connection.sendall(_proof(self._secret, b"server", ours, theirs))
 
 
 def connect(port: int, secret: bytes) -> MessageChannel:
@@ -207,12 +198,9 @@ def connect(port: int, secret: bytes) -> MessageChannel:
         raise ChannelClosedError("nobody listens") from error
     try:
         _introduce(connection, secret)
-    except (OSError, EOFError) as error:
+    except (OSError, ChannelClosedError) as error:
         connection.close()
-        raise ChannelClosedError("the secret was refused") from error
-    except ChannelClosedError:
-        connection.close()
-        raise
+        raise ChannelClosedError(str(error)) from error
     return MessageChannel(connection)
 
 
@@ -232,13 +220,10 @@ def _receive(connection: socket.socket, count: int) -> bytes:
     deadline = time.monotonic() + _PATIENCE
     data = b""
     while len(data) < count:
-        left = deadline - time.monotonic()
-        if left <= 0.0:
-            raise EOFError
-        connection.settimeout(left)
+        connection.settimeout(max(1e-3, deadline - time.monotonic()))  # 0 would not wait at all
         got = connection.recv(count - len(data))
         if not got:
-            raise EOFError
+            raise ChannelClosedError("the other side did not prove itself")
         data += got
     return data
 
@@ -302,28 +287,19 @@ class Child:
         self.channel = channel
 
     @classmethod
-    def start(
-        cls, arguments: Sequence[str], python: Path | None = None, log_to: IO[bytes] | None = None
-    ) -> Child:
+    def start(cls, arguments: Sequence[str], python: Path | None = None) -> Child:
         """Start ``python -m octo_motion.device`` with arguments, and connect to it.
 
         Args:
             arguments: Subcommand and options.
             python: Executable; None finds it.
-            log_to: Open file for what the process says; None: where this one says it.
 
         Raises:
             DeviceError: it does not start, or does not answer.
         """
         secret = new_secret()
-        command = [
-            str(python or python_executable()),
-            "-I",
-            "-X",
-            "utf8",
-            str(LAUNCHER),
-            *arguments,
-        ]
+        options = ("-I", "-X", "utf8", str(LAUNCHER), *arguments)
+        command = [str(python or python_executable()), *options]
         for folder in library_folders():
             command += ["--library", folder]
         try:
@@ -331,7 +307,6 @@ class Child:
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=log_to,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
         except OSError as error:
@@ -357,11 +332,6 @@ class Child:
     def running(self) -> bool:
         """Whether the process is there and the line holds."""
         return self._process.poll() is None and not self.channel.closed
-
-    @property
-    def process_id(self) -> int:
-        """Of the process."""
-        return self._process.pid
 
     def stop(self, seconds: float = 1.0) -> None:
         """End it: by closing its line and standard input and, if that does not help, by force."""
@@ -397,9 +367,18 @@ def _end(process: subprocess.Popen[bytes], seconds: float = 0.0) -> None:
 
 
 class Parent:
-    """Whoever started this process; when it is gone, so are we."""
+    """Whoever started this process; when it is gone, so are we.
 
-    def __init__(self) -> None:
+    Nobody has to ask for it: the end of standard input wakes a thread that waits for nothing else.
+    No step of a simulation, no system call that never returns and nothing that Python would tidy
+    up keeps the process.
+
+    Args:
+        seconds: That the process may take for what must be done before its end, once ``gone`` is
+            set.
+    """
+
+    def __init__(self, seconds: float = 0.0) -> None:
         # Not through sys.stdin: Python cannot end while a thread waits within its buffer.
         self._input = sys.stdin.fileno()
         line = b""
@@ -409,41 +388,34 @@ class Parent:
                 break
             line += byte
         try:
-            self.secret = bytes.fromhex(line.decode("ascii", "replace").strip())
+            self._secret = bytes.fromhex(line.decode("ascii", "replace").strip())
         except ValueError:
-            self.secret = b""
-        if len(self.secret) != 32:
+            self._secret = b""
+        if len(self._secret) != 32:
             # Whoever started us is gone already, or is a person who tries it out.
             sys.exit("This is started by Blender. Try: list, watch or descriptor." if line else 2)
         self.gone = False
-
-    def end_with(self, seconds: float = 0.0) -> None:
-        """From now on, end this process when whoever started it is gone, whatever it is doing then.
-
-        Nobody has to ask for it: the end of standard input wakes a thread that waits for nothing
-        else. No step of a simulation, no system call that never returns and nothing that Python
-        would tidy up keeps the process.
-
-        Args:
-            seconds: That the process may take for what must be done before, once ``gone`` is set.
-        """
+        self._seconds = seconds
         # Waiting for the end of standard input holds no lock; on Windows nothing else can.
-        threading.Thread(target=self._watch, args=(seconds,), daemon=True).start()
+        threading.Thread(target=self._watch, daemon=True).start()
 
-    def _watch(self, seconds: float) -> None:
+    def _watch(self) -> None:
         with contextlib.suppress(OSError):
             while os.read(self._input, 4096):
                 pass
         self.gone = True
-        if seconds > 0.0:
-            time.sleep(seconds)
+        time.sleep(self._seconds)
         os._exit(0)
 
-    @staticmethod
-    def announce(port: int) -> None:
-        """Say where we listen."""
+    def line(self) -> MessageChannel | None:
+        """Say where we listen, and take the line; None where nobody connects."""
+        listener = Listener(self._secret)
         with contextlib.suppress(OSError):  # gone meanwhile: that is seen elsewhere
-            os.write(sys.stdout.fileno(), f"{PORT_LINE}{port}\n".encode())
+            os.write(sys.stdout.fileno(), f"{PORT_LINE}{listener.port}\n".encode())
+        channel = listener.accept(_START_SECONDS)
+        if channel is None:
+            log.error("Nobody connected")
+        return channel
 
 
 def end_now(status: int) -> NoReturn:

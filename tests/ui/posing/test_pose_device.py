@@ -30,6 +30,7 @@ from octo_motion.ui.posing.device_ndof import NdofHands
 from octo_motion.ui.posing.device_overlay import device_lines
 from octo_motion.ui.posing.device_settings import device_settings, message
 from octo_motion.ui.posing.puppet_session import PuppetSession
+from tests.device.bridges import bridge_of
 
 PATIENCE = 30.0
 TOLD = say.Settings(reach=0.2)
@@ -320,7 +321,7 @@ def test_bridge_that_cannot_be_started_again_leaves_the_session(
 def test_bridge_that_hangs_is_told_and_can_be_started_again(hands: DeviceHands) -> None:
     wait(hands, lambda: hands.client.times, "it goes well")
     assert "does not answer" not in device_pose.line(hands)
-    process = hands.client.process_id
+    process = bridge_of(hands.client)
     assert process
     os.kill(process, signal.SIGSTOP)
     hands.tick(TOLD, room())
@@ -330,7 +331,7 @@ def test_bridge_that_hangs_is_told_and_can_be_started_again(hands: DeviceHands) 
     press(hands, Key("B"))
     assert "does not answer" not in device_pose.line(hands)
     wait(hands, hands.shown, "the hand is back")
-    assert hands.client.process_id != process
+    assert bridge_of(hands.client) != process
 
 
 def test_obstacle_that_stays_where_it_is_is_told_once(
