@@ -24,7 +24,7 @@ import stage
 from stage import Colour, Pixels
 
 import octo_motion
-from octo_motion.blender.animation.cycles import lasting
+from octo_motion.blender.animation.fcurves import lasting
 
 CLIPS: Final = Path(__file__).resolve().parent.parent / "examples" / "clips"
 VARIABLE: Final = "OCTO_MOTION_CLIPS"

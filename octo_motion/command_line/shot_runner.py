@@ -12,8 +12,7 @@ import bpy
 from mathutils import Matrix
 
 from ..blender.animation import writable_armature
-from ..blender.overrides import linked_names
-from ..blender.rig import read_skeleton, world_matrix
+from ..blender.rig import linked_names, read_skeleton, world_matrix
 from ..blender.scene import add_octopus, add_route_curve, remove_markers
 from ..core.errors import OctoMotionError, RigError, SettingsError, WriteError
 from ..core.locomotion.gait import gait_from_json

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import bpy
 from bpy.props import EnumProperty
 
-from ..blender.overrides import linked_names
-from ..blender.rig import active_armature
+from ..blender.rig import active_armature, linked_names
 from ..core.errors import OctoMotionError, RigError
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import pytest
 from octo_motion.blender.animation import actions
 from octo_motion.core import rotations
 from octo_motion.core.errors import RigError
-from octo_motion.core.keyframes.channel import Channel
+from octo_motion.core.keyframes.channels import Channel
 from octo_motion.core.locomotion.rig.poses import Poses, halfway_automatic
 from octo_motion.core.rotations import EULER_ORDERS, Floats
 

@@ -12,7 +12,7 @@ import pytest
 
 from octo_motion.blender.animation import actions
 from octo_motion.core.keyframes import Limb, Track, reduce_keys
-from octo_motion.core.keyframes.channel import Channel
+from octo_motion.core.keyframes.channels import Channel
 from octo_motion.core.rotations import Floats, angle_between, from_matrix, from_rotation_vector
 from tests.blender.test_actions import basis_rotations, channelbag, make_armature, pose_bones
 

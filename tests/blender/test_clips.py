@@ -13,7 +13,7 @@ import pytest
 
 from octo_motion.blender.animation.actions import MARK
 from octo_motion.blender.animation.clips import further_channels, read_clip, write_clip
-from octo_motion.blender.animation.unkeyed import AT_REST
+from octo_motion.blender.animation.poses import AT_REST
 from octo_motion.core.errors import ClipError, RigError
 from octo_motion.core.rotations import angle_between, from_rotation_vector, multiply
 from octo_motion.core.splicing.clip.clip import Clip

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.animation.clips import read_clip
-from octo_motion.blender.animation.cycles import lasting
+from octo_motion.blender.animation.fcurves import lasting
 from octo_motion.core.errors import ClipError
 from octo_motion.core.rotations import angle_between
 

@@ -9,8 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.rig.armature import read_skeleton
-from octo_motion.blender.rig.arms import world_directions
+from octo_motion.blender.rig.armature import read_skeleton, world_directions
 from octo_motion.core.errors import RigError
 from octo_motion.core.locomotion.rig.arm_chains import ArmChain
 from octo_motion.core.locomotion.rig.detection import Detection, detect_arms

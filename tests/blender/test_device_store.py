@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from octo_motion.blender.files import device_store
-from octo_motion.blender.files.device_store import load_calibrations, save_calibrations
+from octo_motion.blender.files import user_files as device_store
+from octo_motion.blender.files.user_files import load_calibrations, save_calibrations
 from octo_motion.core.errors import WriteError
 from octo_motion.device.calibration import Calibration
 

@@ -8,8 +8,10 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.animation import may_stretch, read_channels
+from octo_motion.blender.animation import read_channels
+from octo_motion.blender.rig import may_stretch
 from octo_motion.blender.rig.armature import read_skeleton
+from octo_motion.blender.rig.skin import arm_skins
 from octo_motion.blender.scene.contact_markers import (
     Contact,
     markers,
@@ -17,7 +19,7 @@ from octo_motion.blender.scene.contact_markers import (
     remove_markers,
     write_markers,
 )
-from octo_motion.blender.scene.ground import arm_skins, read_triangles
+from octo_motion.blender.scene.surfaces import read_triangles
 from octo_motion.core.errors import GroundError
 from tests.ui.rig import click, make_octopus
 

@@ -11,7 +11,7 @@ import pytest
 
 from octo_motion.blender.animation import actions
 from octo_motion.core.errors import RigError, WriteError
-from octo_motion.core.keyframes.channel import Channel
+from octo_motion.core.keyframes.channels import Channel
 
 BONES = ("Arm", "Tip", "Eye")
 

@@ -8,8 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.animation.scene_playback import time_kept
-from octo_motion.blender.animation.scene_poses import shown_poses
+from octo_motion.blender.animation.scene_playback import shown_poses, time_kept
 from octo_motion.blender.scene.grasp_target import read_places
 from tests.ui.rig import make_octopus
 

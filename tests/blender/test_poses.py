@@ -5,7 +5,7 @@ from typing import Any
 
 import bpy
 
-from octo_motion.blender.animation.leftover_poses import animated_bones, rest_bones
+from octo_motion.blender.animation.poses import animated_bones, rest_bones
 
 
 def make_armature() -> Any:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.animation.key_arrays import read_keys, write_keys
+from octo_motion.blender.animation.fcurves import read_keys, write_keys
 from octo_motion.blender.animation.pose_keys import Keyed, PoseKeys
 from octo_motion.core.errors import WriteError
 from octo_motion.core.rotations import from_axis_angle

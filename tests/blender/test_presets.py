@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.blender.files import presets
+from octo_motion.blender.files import user_files as presets
 from octo_motion.core.errors import GaitError, WriteError
 from octo_motion.core.locomotion.gait import table as gait
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.animation.scene_poses import assigned, shown_poses
+from octo_motion.blender.animation.scene_playback import assigned, shown_poses
 
 
 def test_pose_that_is_not_keyed_survives_a_look_at_another_action() -> None:

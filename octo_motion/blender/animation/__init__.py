@@ -19,23 +19,24 @@ from .actions import (
     write_action,
 )
 from .clips import further_channels, read_clip, scaled_channels, write_clip
-from .cycles import lasting
-from .leftover_poses import (
+from .fcurves import lasting
+from .pose_keys import Keyed, PoseKeys
+from .poses import (
     SCALE,
+    PoseValues,
     animated_bones,
     as_posed,
     displaced_bones,
+    pose_values,
     rest_bones,
+    restore_pose,
+    show_pose,
     standing_of,
     unscale_bones,
 )
-from .pose_keys import Keyed, PoseKeys
-from .preview_pose import PoseValues, pose_values, restore_pose, show_pose
 from .scene_playback import time_kept
-from .stretching import ALIGNED, may_stretch
 
 __all__ = [
-    "ALIGNED",
     "SCALE",
     "Channel",
     "Keyed",
@@ -53,7 +54,6 @@ __all__ = [
     "lasting",
     "location_channel",
     "may_replace",
-    "may_stretch",
     "note_of",
     "object_channels",
     "pose_values",

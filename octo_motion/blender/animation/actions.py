@@ -25,8 +25,7 @@ from ...core.rotations import (
     from_matrix,
     normalized,
 )
-from ..rig import armature_data
-from .stretching import ALIGNED
+from ..rig import ALIGNED, armature_data
 
 MARK: Final = "octo_motion_generated"
 """Custom property of an action made here: a group with the fields of ``_mark``."""
@@ -508,11 +507,11 @@ def _handles_moved(action: bpy.types.Action) -> bool:
 
 def _filled(count: int, name: str, item: str) -> np.ndarray:
     """A keyframe's enumeration value, as many times as there are keys."""
-    return np.full(count, _value(name, item), dtype=_ENUMERATION)
+    return np.full(count, enum_value(name, item), dtype=_ENUMERATION)
 
 
 @cache
-def _value(name: str, item: str) -> int:
+def enum_value(name: str, item: str) -> int:
     """What Blender keeps a keyframe's enumeration as."""
     definition = bpy.types.Keyframe.bl_rna.properties[name]
     assert isinstance(definition, bpy.types.EnumProperty)
@@ -610,10 +609,10 @@ def _kinds(keys: bpy.types.FCurveKeyframePoints) -> np.ndarray:
     kinds = np.empty((4, len(keys)), dtype=_ENUMERATION)
     keys.foreach_get("interpolation", kinds[0])
     keys.foreach_get("type", kinds[1])
-    if not len(keys) or kinds[0, 0] != _value("interpolation", "BEZIER"):
+    if not len(keys) or kinds[0, 0] != enum_value("interpolation", "BEZIER"):
         return kinds[:2]
     keys.foreach_get("handle_left_type", kinds[2])
-    if kinds[2, 0] != _value("handle_left_type", "AUTO"):
+    if kinds[2, 0] != enum_value("handle_left_type", "AUTO"):
         return kinds[:2]
     keys.foreach_get("handle_right_type", kinds[3])
     if kinds[2].tobytes() != kinds[3].tobytes():

@@ -38,8 +38,8 @@ from .actions import (
     write_action,
 )
 from .fcurves import evaluate_fcurve, is_shown, key_range
-from .scene_poses import assigned, shown_poses
-from .unkeyed import AT_REST, UnkeyedPose, keep_unkeyed_pose, rotation_channel, unkeyed_pose
+from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, rotation_channel, unkeyed_pose
+from .scene_playback import assigned, shown_poses
 
 _LEAST_SCALING: Final = 1e-6
 """Factors by which a bone's scale may be off one, and be taken for one."""

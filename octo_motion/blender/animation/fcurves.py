@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""F-curves to arrays: the values that Blender would show, many frames at once."""
+"""F-curves and their keys as arrays: the values that Blender would show, and what the keys are."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import bpy
 import numpy as np
 
+from ...core.errors import ClipError
+from ...core.keyframes import BezierKeys
 from ...core.rotations import Floats
+from .actions import curves_of, enum_value
 
-_SAME_FRAME: Final = 1e-4
+_ON_KEY: Final = 1e-4
 """Frames by which Blender lets a time miss a key and still takes the key's value."""
 
 
@@ -30,7 +34,7 @@ def evaluate_fcurve(curve: bpy.types.FCurve, frames: Floats) -> Floats:
     times, values, steps = keys
     result = np.interp(frames, times, values)
     if steps.any():
-        at = np.searchsorted(times, frames + _SAME_FRAME, side="right") - 1
+        at = np.searchsorted(times, frames + _ON_KEY, side="right") - 1
         held = (at >= 0) & steps[np.maximum(at, 0)]
         result[held] = values[at[held]]
     if curve.extrapolation == "LINEAR" and len(times) > 1:
@@ -60,14 +64,14 @@ def _plain_keys(curve: bpy.types.FCurve) -> tuple[Floats, Floats, np.ndarray] | 
         return None
     kinds = np.empty(count, dtype=np.uint8)
     curve.keyframe_points.foreach_get("interpolation", kinds)
-    steps = kinds == _CONSTANT
+    steps = kinds == enum_value("interpolation", "CONSTANT")
     # The last key's own interpolation matters to extrapolation only.
-    if not (steps | (kinds == _LINEAR)).all():
+    if not (steps | (kinds == enum_value("interpolation", "LINEAR"))).all():
         return None
     points = np.empty(2 * count, dtype=np.float32)
     curve.keyframe_points.foreach_get("co", points)
     times, values = points.reshape(-1, 2).T.astype(np.float64)
-    if (np.diff(times) <= _SAME_FRAME).any():
+    if (np.diff(times) <= _ON_KEY).any():
         return None
     return times, values, steps
 
@@ -80,17 +84,176 @@ def _at_keys(curve: bpy.types.FCurve, frames: Floats) -> Floats | None:
     points = np.empty(2 * count, dtype=np.float32)
     curve.keyframe_points.foreach_get("co", points)
     times, values = points.reshape(-1, 2).T.astype(np.float64)
-    if (np.diff(times) <= 2.0 * _SAME_FRAME).any():
+    if (np.diff(times) <= 2.0 * _ON_KEY).any():
         return None
     nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), frames)
     return values[nearest] if np.all(np.abs(times[nearest] - frames) <= 1e-6) else None
 
 
-def _kind(name: str) -> int:
-    definition = bpy.types.Keyframe.bl_rna.properties["interpolation"]
-    assert isinstance(definition, bpy.types.EnumProperty)
-    return definition.enum_items[name].value
+# --- All that an F-curve's keys are, as arrays: to keep, to put back, and to replace a stretch of
 
 
-_CONSTANT: Final = _kind("CONSTANT")
-_LINEAR: Final = _kind("LINEAR")
+_VECTORS: Final = ("co", "handle_left", "handle_right")
+_NUMBERS: Final = ("back", "amplitude", "period")
+_KINDS: Final = (
+    *("interpolation", "easing", "type"),
+    *("handle_left_type", "handle_right_type"),
+)
+_FLAGS: Final = ("select_control_point", "select_left_handle", "select_right_handle")
+
+_SAME_FRAME: Final = 0.01
+"""Frames by which keys must be apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeyArrays:
+    """The keys of one curve: by property an array with a row for each key."""
+
+    values: dict[str, np.ndarray]
+
+    def __len__(self) -> int:
+        """Number of keys."""
+        return len(self.values["co"])
+
+    @property
+    def frames(self) -> np.ndarray:
+        """Frames (keys,) of the keys."""
+        return self.values["co"][:, 0]
+
+    def chosen(self, rows: np.ndarray) -> KeyArrays:
+        """Some of the keys."""
+        return KeyArrays({name: values[rows] for name, values in self.values.items()})
+
+
+def read_keys(curve: bpy.types.FCurve) -> KeyArrays:
+    """All keys of a curve."""
+    points = curve.keyframe_points
+    count = len(points)
+    values: dict[str, np.ndarray] = {}
+    for name in _VECTORS:
+        values[name] = np.empty((count, 2), dtype=np.float32)
+    for name in _NUMBERS:
+        values[name] = np.empty(count, dtype=np.float32)
+    for name in _KINDS:
+        values[name] = np.empty(count, dtype=np.uint8)
+    for name in _FLAGS:
+        values[name] = np.empty(count, dtype=bool)
+    for name, each in values.items():
+        points.foreach_get(name, each.ravel())
+    return KeyArrays(values)
+
+
+def write_keys(curve: bpy.types.FCurve, keys: KeyArrays) -> None:
+    """Make a curve's keys these and no others."""
+    points = curve.keyframe_points
+    points.clear()
+    if len(keys):
+        points.add(len(keys))
+    for name, each in keys.values.items():
+        points.foreach_set(name, np.ascontiguousarray(each).ravel())
+    curve.update()
+
+
+def bezier_arrays(keys: BezierKeys, component: int) -> KeyArrays:
+    """Reduced keys of one component, as a tool's own."""
+    count = len(keys)
+    aligned, free = (enum_value("handle_left_type", item) for item in ("ALIGNED", "FREE"))
+    kinds = np.where(keys.smooth, aligned, free).astype(np.uint8)
+    return KeyArrays(
+        {
+            "co": np.column_stack([keys.frames, keys.values[:, component]]).astype(np.float32),
+            "handle_left": np.ascontiguousarray(keys.left[:, component], dtype=np.float32),
+            "handle_right": np.ascontiguousarray(keys.right[:, component], dtype=np.float32),
+            "back": np.zeros(count, dtype=np.float32),
+            "amplitude": np.zeros(count, dtype=np.float32),
+            "period": np.zeros(count, dtype=np.float32),
+            "interpolation": np.full(count, enum_value("interpolation", "BEZIER"), dtype=np.uint8),
+            "easing": np.full(count, enum_value("easing", "AUTO"), dtype=np.uint8),
+            "type": np.full(count, enum_value("type", "GENERATED"), dtype=np.uint8),
+            "handle_left_type": kinds,
+            "handle_right_type": kinds.copy(),
+            "select_control_point": np.zeros(count, dtype=bool),
+            "select_left_handle": np.zeros(count, dtype=bool),
+            "select_right_handle": np.zeros(count, dtype=bool),
+        }
+    )
+
+
+def replace_stretch(curve: bpy.types.FCurve, keys: KeyArrays) -> None:
+    """Put keys into a curve in place of those that it has between the first and last of them."""
+    before = read_keys(curve)
+    start, end = float(keys.frames[0]), float(keys.frames[-1])
+    early = before.chosen(before.frames < start - _SAME_FRAME)
+    late = before.chosen(before.frames > end + _SAME_FRAME)
+    write_keys(
+        curve,
+        KeyArrays(
+            {
+                name: np.concatenate([early.values[name], keys.values[name], late.values[name]])
+                for name in keys.values
+            }
+        ),
+    )
+
+
+# --- Actions that go on: a walk of one cycle as long as it is wanted ------------------------------
+
+
+_SAME: Final = 0.01
+"""Frames by which keys may miss the first and last frame of an action."""
+
+
+def lasting(action: bpy.types.Action, frames: int) -> bpy.types.Action:
+    """A copy of an action that lasts so many frames, from where the action begins.
+
+    A shorter action is repeated by Cycles modifiers, as artists do it: each cycle goes on from
+    where the one before has led to. A longer one is cut by its manual frame range. Keys stay, but
+    for curves to be repeated that do not last as long as the action: they get one on each frame.
+
+    Raises:
+        ClipError: it has no keys at two frames.
+    """
+    start, end = action.frame_range
+    if end - start < 0.5:
+        raise ClipError(
+            f"Action '{action.name}' has only one frame: it cannot be repeated.",
+            "Choose an action with keys at two frames or more.",
+        )
+    copy = action.copy()
+    assert copy is not None
+    copy.name = f"{action.name} {frames}"
+    if start + frames - 1 > end:
+        for curve in curves_of(copy):
+            _repeat(curve, start, end)
+    copy.use_frame_range = True
+    copy.frame_start, copy.frame_end = start, start + frames - 1
+    copy.use_fake_user = True
+    return copy
+
+
+def _repeat(curve: bpy.types.FCurve, start: float, end: float) -> None:
+    if any(modifier.type == "CYCLES" for modifier in curve.modifiers):
+        return
+    # Each curve repeats what lies between its own first and last key.
+    own = key_range(curve)
+    lasts = max(abs(own[0] - start), abs(own[1] - end)) < _SAME
+    if not (lasts or len(curve.modifiers) or len(curve.keyframe_points) < 2):
+        _set_anew(curve, np.unique([*np.arange(start, end), end]))
+    cycles = curve.modifiers.new("CYCLES")
+    assert isinstance(cycles, bpy.types.FModifierCycles)
+    # What travels goes on; what does not is back where it was, so this does nothing to it.
+    travels = curve.data_path.endswith("location")
+    cycles.mode_before = "NONE"
+    cycles.mode_after = "REPEAT_OFFSET" if travels else "REPEAT"
+
+
+def _set_anew(curve: bpy.types.FCurve, frames: Floats) -> None:
+    """Give a curve keys at these frames in place of its own."""
+    points = np.column_stack([frames, evaluate_fcurve(curve, frames)]).astype(np.float32)
+    keys = curve.keyframe_points
+    keys.clear()
+    keys.add(len(frames))
+    keys.foreach_set("co", points.ravel())
+    for key in keys:
+        key.interpolation = "LINEAR"
+    curve.update()

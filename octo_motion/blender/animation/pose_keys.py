@@ -20,9 +20,9 @@ from ...core.errors import WriteError
 from ...core.keyframes import LOCATION, Channel, Limb, Track, reduce_keys
 from ...core.rotations import Floats
 from ..rig import carrying_axes
-from . import keying_settings as keying
 from .actions import location_channel, rotation_channels, writable_armature
-from .key_arrays import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
+from .fcurves import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
+from .poses import rotation_channel
 
 Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
 
@@ -126,13 +126,13 @@ class PoseKeys:
         assert scene is not None
         known = len(self._noted)
         self._prepare(armature)
-        options, kind = keying.options(scene, auto=auto), keying.key_type(scene)
+        options, kind = keying_options(scene, auto=auto), key_type(scene)
         active = scene.keying_sets_all.active
         assert scene.tool_settings is not None
         if auto and not scene.tool_settings.use_keyframe_insert_keyingset:
             active = None
         if active is not None and active.is_path_absolute:
-            how = keying.with_set(options, active), kind
+            how = with_keying_set(options, active), kind
             done = self._insert_paths(armature, active, frame, how)
         else:
             done = []
@@ -140,10 +140,10 @@ class PoseKeys:
                 bone = armature.pose.bones[each.bone] if armature.pose is not None else None
                 if bone is None:
                     continue
-                how = keying.with_set(options, active), kind
+                how = with_keying_set(options, active), kind
                 results = [
                     self._insert(armature, bone.path_from_id(channel), frame, each.bone, how)
-                    for channel in keying.channels(bone, active, placed=each.placed)
+                    for channel in keyed_properties(bone, active, placed=each.placed)
                 ]
                 if any(results):
                     done.append(each.bone)
@@ -575,3 +575,71 @@ def _channelbag(
             if isinstance(strip, bpy.types.ActionKeyframeStrip):
                 return strip.channelbag(slot, ensure=ensure)
     return None
+
+
+# --- The artist's own settings of keying: which channels get a key, and under which conditions ----
+
+
+_SETS: Final[tuple[tuple[str, str], ...]] = (
+    ("Loc", "location"),
+    ("Rot", "rotation"),
+    ("Scal", "scale"),
+)
+"""Parts of the names of Blender's own keying sets, and what they key."""
+
+
+def keying_options(scene: bpy.types.Scene, *, auto: bool) -> set[str]:
+    """The artist's settings of keying, those of Insert Keyframe or of auto keying."""
+    preferences = bpy.context.preferences
+    assert preferences is not None
+    assert scene.tool_settings is not None
+    found: set[str] = set()
+    edit = preferences.edit
+    if edit.use_auto_keyframe_insert_needed if auto else edit.use_keyframe_insert_needed:
+        found.add("INSERTKEY_NEEDED")
+    if auto and edit.use_keyframe_insert_available:
+        found.add("INSERTKEY_AVAILABLE")
+    if auto and scene.tool_settings.auto_keying_mode == "REPLACE_KEYS":
+        found.add("INSERTKEY_REPLACE")
+    if edit.use_visual_keying:
+        found.add("INSERTKEY_VISUAL")
+    if scene.tool_settings.use_keyframe_cycle_aware:
+        found.add("INSERTKEY_CYCLE_AWARE")
+    return found
+
+
+def key_type(scene: bpy.types.Scene) -> str:
+    """The kind of keys that the timeline is set to."""
+    assert scene.tool_settings is not None
+    return scene.tool_settings.keyframe_type
+
+
+def with_keying_set(options: set[str], active: bpy.types.KeyingSet | None) -> set[str]:
+    """The options, with what a keying set says of them."""
+    if active is None:
+        return options
+    result = set(options)
+    for own, option in (("needed", "INSERTKEY_NEEDED"), ("visual", "INSERTKEY_VISUAL")):
+        if getattr(active, f"use_insertkey_override_{own}"):
+            result.discard(option)
+            result |= {option} if getattr(active, f"use_insertkey_{own}") else set()
+    if active.bl_idname == "Available":
+        result.add("INSERTKEY_AVAILABLE")
+    elif active.type_info is not None and "Visual" in active.bl_idname:
+        result.add("INSERTKEY_VISUAL")
+    return result
+
+
+def keyed_properties(
+    bone: bpy.types.PoseBone, active: bpy.types.KeyingSet | None, *, placed: bool
+) -> list[str]:
+    """Properties of a bone that get a key."""
+    rotation = rotation_channel(bone.rotation_mode)
+    if active is not None:
+        name = active.bl_idname
+        if name.startswith(("Available", "WholeCharacter")):
+            return ["location", rotation, "scale"]
+        found = [channel for part, channel in _SETS if part in name and "Delta" not in name]
+        if found:
+            return [rotation if each == "rotation" else each for each in found]
+    return ["location", rotation] if placed else [rotation]

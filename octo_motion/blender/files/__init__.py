@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Presets and what the user's folder keeps."""
 
-from .device_store import load_calibrations, save_calibrations
-from .presets import (
+from .user_files import (
     SUFFIX,
     gait_names,
     has_gait,
+    load_calibrations,
     load_gait,
     read_gait_file,
     remove_gait,
+    save_calibrations,
     save_gait,
     user_gait_names,
     write_gait,

@@ -1,16 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of the user's own, in the folder that Blender keeps for the extension."""
+"""The user's own files, in the folder that Blender keeps for the extension: gaits and devices."""
 
 from __future__ import annotations
 
 import contextlib
+import json
+import logging
 import os
+import re
 import secrets
 from pathlib import Path
+from typing import Any, Final
 
 import bpy
 
-from ...core.errors import WriteError
+from ...core.errors import DeviceError, GaitError, WriteError
+from ...core.locomotion.gait import (
+    GaitTable,
+    gait_from_json,
+    gait_presets,
+    gait_to_json,
+    renamed_gait,
+)
+from ...device.calibration import Calibration
+from ...device.driver import Axes
 
 
 def own_folder(name: str = "", *, create: bool = False) -> Path:
@@ -53,3 +66,187 @@ def unwritable(what: str, error: OSError) -> WriteError:
     """The error that says so."""
     reason = error.strerror or type(error).__name__
     return WriteError(f"Octo Motion cannot write {what}: {reason}.", "Choose another place.")
+
+
+# --- The user's own gaits: JSON files in the folder that Blender keeps for the extension ----------
+
+
+SUFFIX: Final = ".json"
+LONGEST_NAME: Final = 60
+
+# What some file system refuses, and the escape itself.
+_UNSAFE: Final = re.compile(r'[\x00-\x1f<>:"/\\|?*%\x7f]|^[. ]|[. ]$')
+_ESCAPE: Final = re.compile("%([0-9a-f]{2})")
+_DEVICES: Final = re.compile(r"(?i)^(con|prn|aux|nul|com\d|lpt\d)(?=$|\.)")
+
+
+def user_folder(*, create: bool = False) -> Path:
+    """Where the user's gaits are; of the extension its own folder, else the scripts' presets.
+
+    Raises:
+        WriteError: it is to be made and cannot be.
+    """
+    return own_folder("gaits", create=create)
+
+
+def gait_names() -> list[str]:
+    """Names of all gaits: those that come with the extension, then the user's."""
+    return [*gait_presets(), *user_gait_names()]
+
+
+def has_gait(name: str) -> bool:
+    """Whether there is a gait of that name; quick enough to be asked while a panel is drawn."""
+    return name in gait_presets() or (bool(name) and _path_of(name).is_file())
+
+
+def user_gait_names() -> list[str]:
+    """Names of the user's own gaits, sorted."""
+    built_in = gait_presets()
+    names = (_name_of(path) for path in user_folder().glob(f"*{SUFFIX}"))
+    return sorted((name for name in names if name not in built_in), key=str.casefold)
+
+
+def load_gait(name: str) -> GaitTable:
+    """A gait by name, with that name.
+
+    Raises:
+        GaitError: there is none, or its file is damaged.
+    """
+    built_in = gait_presets()
+    if not name:
+        raise GaitError("No gait is chosen.", f"Choose one of {', '.join(gait_names())}.")
+    if name in built_in:
+        return built_in[name]
+    path = _path_of(name)
+    if not path.is_file():
+        raise GaitError(f"There is no gait '{name}'.", f"Choose one of {', '.join(gait_names())}.")
+    return renamed_gait(read_gait_file(path), name)
+
+
+def save_gait(table: GaitTable, *, overwrite: bool = False) -> Path:
+    """Keep a table as one of the user's gaits, under its own name.
+
+    Raises:
+        GaitError: the name is empty, too long, that of a gait of the extension, or taken.
+        WriteError: the file cannot be written.
+    """
+    name = table.name
+    if not name.strip():
+        raise GaitError("The gait has no name.", "Give it one.")
+    if len(name) > LONGEST_NAME:
+        raise GaitError(f"The gait's name has {len(name)} letters.", f"Use {LONGEST_NAME} at most.")
+    if name in gait_presets():
+        raise GaitError(f"The gait '{name}' comes with Octo Motion.", "Choose another name.")
+    path = _path_of(name)
+    if path.exists() and not overwrite:
+        raise GaitError(f"There is a gait '{name}' already.", "Choose another name, or overwrite.")
+    user_folder(create=True)
+    write_gait(table, path)
+    return path
+
+
+def remove_gait(name: str) -> None:
+    """Delete one of the user's gaits.
+
+    Raises:
+        GaitError: there is none of that name, or it comes with the extension.
+        WriteError: the file cannot be deleted.
+    """
+    if name in gait_presets():
+        raise GaitError(f"The gait '{name}' comes with Octo Motion.", "It cannot be removed.")
+    path = _path_of(name)
+    if not name or not path.is_file():
+        raise GaitError(f"There is no saved gait '{name}'.", "Choose one that you have saved.")
+    try:
+        path.unlink()
+    except OSError as error:
+        raise unwritable(f"'{path}'", error) from error
+
+
+def read_gait_file(path: Path) -> GaitTable:
+    """The gait in a file.
+
+    Raises:
+        GaitError: it cannot be read, or is no gait.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = (isinstance(error, OSError) and error.strerror) or "it is not text"
+        raise GaitError(
+            f"'{path.name}' cannot be read: {reason}.", "Choose a gait file."
+        ) from error
+    return gait_from_json(text, f"'{path.name}'")
+
+
+def write_gait(table: GaitTable, path: Path) -> None:
+    """Write a gait to a file, whole or not at all.
+
+    Raises:
+        WriteError: it cannot be written.
+    """
+    write_whole(path, gait_to_json(table))
+
+
+def _path_of(name: str) -> Path:
+    """The file of a gait's name: any name has one, and no two names share one."""
+    safe = _UNSAFE.sub(lambda found: f"%{ord(found.group()):02x}", name)
+    safe = _DEVICES.sub(lambda found: f"%{ord(found.group()[0]):02x}{found.group()[1:]}", safe)
+    return user_folder() / f"{safe}{SUFFIX}"
+
+
+def _name_of(path: Path) -> str:
+    return _ESCAPE.sub(lambda found: chr(int(found.group(1), 16)), path.stem)
+
+
+# --- What was learned of the user's devices: one file for this computer, whatever is opened -------
+
+
+log = logging.getLogger(__name__)
+
+_FORMAT: Final = "octo_motion.devices"
+_VERSION: Final = 1
+_AXES: Final = ("rest", "least", "most")
+
+
+def _path(*, create: bool = False) -> Path:
+    return own_folder("devices", create=create) / "calibrations.json"
+
+
+def load_calibrations() -> dict[str, Calibration]:
+    """By a device's identity. What is damaged counts as never learned, and is said in the log."""
+    path = _path()
+    try:
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+        entries: Any = data["devices"] if data["format"] == _FORMAT else {}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        log.warning("Calibrations of devices cannot be read: %s", error)
+        return {}
+    found: dict[str, Calibration] = {}
+    for identity, entry in entries.items() if isinstance(entries, dict) else ():
+        try:
+            found[identity] = Calibration(*(_six(entry[name]) for name in _AXES))
+        except (ValueError, KeyError, TypeError, DeviceError) as error:
+            log.warning("The calibration of %s cannot be read: %s", identity, error)
+    return found
+
+
+def _six(values: Any) -> Axes:
+    a, b, c, d, e, f = map(float, values)
+    return (a, b, c, d, e, f)
+
+
+def save_calibrations(calibrations: dict[str, Calibration]) -> None:
+    """Keep these, and no others.
+
+    Raises:
+        WriteError: the file cannot be written.
+    """
+    devices = {
+        identity: {name: getattr(each, name) for name in _AXES}
+        for identity, each in sorted(calibrations.items())
+    }
+    text = json.dumps({"format": _FORMAT, "version": _VERSION, "devices": devices}, indent=1)
+    write_whole(_path(create=True), text + "\n")

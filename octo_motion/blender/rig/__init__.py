@@ -2,25 +2,33 @@
 """Armatures, arms, skins and puppets."""
 
 from .armature import (
+    ALIGNED,
     SUCKER_PROPERTY,
     active_armature,
     armature_data,
     carrying_axes,
     deformed_meshes,
+    hidden_bones,
     is_driven_object,
+    linked_names,
+    may_stretch,
     read_skeleton,
+    require_editable,
+    select_pose_bones,
     selected_bones,
+    world_directions,
     world_matrix,
 )
-from .arms import hidden_bones, require_editable, select_pose_bones, world_directions
 from .puppet import Puppet
 from .puppet_reading import bone_materials, is_part_of, mark_bones, read_rig, set_bone_material
-from .skin_radii import radii_of_skin, skin_key, skin_parts
+from .skin import arm_skins, radii_of_skin, skin_key, skin_parts, vertex_positions
 
 __all__ = [
+    "ALIGNED",
     "SUCKER_PROPERTY",
     "Puppet",
     "active_armature",
+    "arm_skins",
     "armature_data",
     "bone_materials",
     "carrying_axes",
@@ -28,7 +36,9 @@ __all__ = [
     "hidden_bones",
     "is_driven_object",
     "is_part_of",
+    "linked_names",
     "mark_bones",
+    "may_stretch",
     "radii_of_skin",
     "read_rig",
     "read_skeleton",
@@ -38,6 +48,7 @@ __all__ = [
     "set_bone_material",
     "skin_key",
     "skin_parts",
+    "vertex_positions",
     "world_directions",
     "world_matrix",
 ]

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Armatures to plain arrays."""
+"""Armatures: their rest skeleton as plain arrays, their bones, and what may be done to them."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import Any, Final
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from ...core.content_cache import ContentCache
-from ...core.errors import RigError
+from ...core.errors import RigError, WriteError
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
 from .. import versions
@@ -175,3 +177,128 @@ def carrying_axes(bone: bpy.types.Bone) -> Matrix:
     """A bone's axes, seen along those in which its location is given when it is not local."""
     axes = bone.matrix_local.to_3x3()
     return axes if bone.parent is None else bone.parent.matrix_local.to_3x3().inverted() @ axes
+
+
+# --- What the list of arms needs of an armature object --------------------------------------------
+
+
+def world_directions(armature: bpy.types.Object) -> tuple[Floats, Floats]:
+    """The world's up (+Z), and where a character faces (−Y), in armature space, (3,) each."""
+    inverse = armature.matrix_world.to_3x3().inverted_safe()
+    up, front = (inverse @ Vector(axis) for axis in ((0, 0, 1), (0, -1, 0)))
+    return np.array(up, dtype=np.float64), np.array(front, dtype=np.float64)
+
+
+def require_editable(armature: bpy.types.Object) -> None:
+    """Make sure that settings written on this armature are saved with the file.
+
+    Raises:
+        RigError: the object is no armature.
+        WriteError: it is linked, or a library override that is not editable.
+    """
+    armature_data(armature)
+    if armature.library is not None:
+        raise WriteError(
+            f"'{armature.name}' is linked from '{armature.library.name}': its settings are "
+            "read-only here.",
+            "Make a library override (Object > Library Override > Make).",
+        )
+    override = armature.override_library
+    if override is not None and override.is_system_override:
+        raise WriteError(
+            f"'{armature.name}' is a library override that is not editable.",
+            "Make it editable: select it and choose Object > Library Override > Make.",
+        )
+
+
+def hidden_bones(armature: bpy.types.Object, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of the bones that pose mode does not show.
+
+    Raises:
+        RigError: a bone does not exist.
+    """
+    bones = _pose_bones(armature, names)
+    return tuple(bone.name for bone in bones if not _is_shown(bone))
+
+
+def select_pose_bones(
+    armature: bpy.types.Object, names: Iterable[str], *, extend: bool = False
+) -> None:
+    """Select bones in pose mode, the first of them active.
+
+    Hidden bones stay unselected: they could be keyed by mistake.
+
+    Raises:
+        RigError: a bone does not exist.
+    """
+    chosen = [bone for bone in _pose_bones(armature, names) if _is_shown(bone)]
+    if not extend and armature.pose is not None:
+        for bone in armature.pose.bones:
+            versions.select(bone, state=False)
+    for bone in chosen:
+        versions.select(bone, state=True)
+    if chosen:
+        bones = armature_data(armature).bones
+        bones.active = bones[chosen[0].name]
+
+
+def _pose_bones(armature: bpy.types.Object, names: Iterable[str]) -> list[bpy.types.PoseBone]:
+    bones = armature.pose.bones if armature.pose is not None else {}
+    found: list[bpy.types.PoseBone] = []
+    for name in names:
+        bone = bones.get(name)
+        if bone is None:
+            raise RigError(f"The armature has no bone '{name}'.", "Detect the arms again.")
+        found.append(bone)
+    return found
+
+
+def _is_shown(bone: bpy.types.PoseBone) -> bool:
+    collections = bone.bone.collections
+    in_view = not collections or any(each.is_visible_effectively for each in collections)
+    return in_view and not versions.is_hidden(bone)
+
+
+# --- Which bones may get longer and thinner -------------------------------------------------------
+#
+# A bone's scale reaches its children. Where they inherit it along their own axes (Blender's
+# *Aligned*) or not at all, each bone can be as long as it likes; where they inherit it in full,
+# stretched bones shear those that bend away from them.
+
+
+ALIGNED: Final = "ALIGNED"
+_APART: Final = {"NONE", "NONE_LEGACY"}
+_CLOSE: Final = 1e-4
+"""Bone lengths that a bone's head may be off its parent's tail."""
+
+
+def may_stretch(armature: bpy.types.Object, bones: Sequence[str]) -> bool:
+    """Whether the bones of an arm, root to tip, can be made longer without harm."""
+    data = armature_data(armature).bones
+    chain = [data[name] for name in bones]
+    for upper, lower in pairwise(chain):
+        if lower.parent != upper or lower.inherit_scale not in {ALIGNED, *_APART}:
+            return False
+        if (lower.head_local - upper.tail_local).length > _CLOSE * upper.length:
+            return False
+    return True
+
+
+# --- Lists of settings in library overrides -------------------------------------------------------
+
+
+def linked_names(settings: bpy.types.PropertyGroup, collection: str) -> frozenset[str]:
+    """Names of a list's items that a library override has from its linked file.
+
+    Blender allows to change their settings, but neither to rename, remove nor reorder them; items
+    added in this file are free.
+
+    Args:
+        settings: a group of an object's settings.
+        collection: which of its lists.
+    """
+    override = settings.id_data.override_library if settings.id_data else None
+    if override is None or override.reference is None:
+        return frozenset()
+    original: Any = override.reference.path_resolve(settings.path_from_id())
+    return frozenset(item.name for item in getattr(original, collection))

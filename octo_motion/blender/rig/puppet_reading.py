@@ -32,6 +32,7 @@ from ...core.posing.puppet import (
 from ...core.rotations import Floats, from_matrix
 from ...core.skeleton import Skeleton
 from .armature import armature_data, read_skeleton
+from .skin import vertex_positions
 
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
@@ -392,10 +393,9 @@ def _vertices(shown: bpy.types.Object) -> Floats:
     """Positions (vertices, 3) of an evaluated mesh object in the world."""
     mesh = shown.data
     assert isinstance(mesh, bpy.types.Mesh)
-    place = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", place)
     matrix = np.array(shown.matrix_world, dtype=np.float64)
-    return place.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    place = vertex_positions(mesh).astype(np.float64)
+    return place @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _owners(mesh: bpy.types.Mesh, bone_of_group: list[int], sums: Floats) -> dict[int, int]:

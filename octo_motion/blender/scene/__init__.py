@@ -15,11 +15,9 @@ from .grasp_target import (
     read_form,
     read_places,
 )
-from .ground import arm_skins, read_triangles
 from .imports import NOTE, ImportedClip, Up, import_clip, remove_clips
-from .obstacles import read_obstacle
 from .octopus import add_octopus
-from .world import is_enabled
+from .surfaces import is_enabled, read_obstacle, read_triangles
 
 __all__ = [
     "NOTE",
@@ -29,7 +27,6 @@ __all__ = [
     "Up",
     "add_octopus",
     "add_route_curve",
-    "arm_skins",
     "can_be_carried",
     "carrying_note",
     "hangs_on",

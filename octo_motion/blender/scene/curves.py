@@ -22,7 +22,7 @@ from ...core.errors import RouteError
 from ...core.locomotion.path import Route, s_bend
 from ...core.rotations import Floats, normalized
 from ..rig import armature_data
-from .world import world_of
+from .surfaces import world_of
 
 LONGEST: Final = -1
 """Index that stands for the longest spline of a curve."""

@@ -12,7 +12,8 @@ import numpy as np
 from ...core.errors import RigError
 from ...core.rotations import Floats, continuous, from_matrix
 from ..animation import curves_of, is_generated, may_replace, note_of, time_kept
-from .world import world_of
+from ..rig import vertex_positions
+from .surfaces import world_of
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that can have faces."""
@@ -39,8 +40,7 @@ def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
             f"'{target.name}' has no faces to grasp.", "Choose an object with a surface."
         )
     try:
-        vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-        mesh.vertices.foreach_get("co", vertices.ravel())
+        vertices = vertex_positions(mesh)
         mesh.calc_loop_triangles()
         triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
         mesh.loop_triangles.foreach_get("vertices", triangles.ravel())

@@ -23,8 +23,7 @@ from ...core.locomotion.octopus import (
     build_bones,
     build_mesh,
 )
-from ..animation import ALIGNED
-from ..rig import SUCKER_PROPERTY
+from ..rig import ALIGNED, SUCKER_PROPERTY
 
 _NAME: Final = "Octopus"
 _Colour = tuple[float, float, float]

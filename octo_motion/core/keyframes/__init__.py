@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keys of Bézier curves: how they are fitted to a motion, few or many, and what they play."""
 
-from .channel import Channel
-from .playback import values_at
+from .channels import (
+    BezierKeys,
+    Channel,
+    ObjectChannels,
+    RigChannels,
+    halfway_values,
+    rotation_property,
+    values_at,
+)
 from .reduction import check_bounds, reduce_keys, reducing
 from .residuals import Residuals
-from .subframes import halfway_values
-from .tracks import LOCATION, SCALE, BezierKeys, Limb, LimbChain, Track, chain_to_tip
-from .transform_channels import ObjectChannels, RigChannels, rotation_property
+from .tracks import LOCATION, SCALE, Limb, LimbChain, Track, chain_to_tip
 
 __all__ = [
     "LOCATION",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rotations import Floats
-from .tracks import Booleans
+from .channels import Booleans
 
 Singles = NDArray[np.float32]
 _Array = TypeVar("_Array", Floats, Singles)

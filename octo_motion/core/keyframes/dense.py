@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
-from .linear_model import LinearModel
-from .residuals import Residuals
-from .tracks import BezierKeys, Integers, Limb, bezier_keys
+from .channels import BezierKeys, bezier_keys
+from .residuals import LinearModel, Residuals
+from .tracks import Integers, Limb
 
 _PULL: Final = 0.01
 """Weight, against that of a moment, of the wish that slopes are those of the motion: with less, a

@@ -17,7 +17,8 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats, from_axis_angle, from_euler, normalized
-from .tracks import LOCATION, Booleans, Integers, Limb
+from .channels import Booleans
+from .tracks import LOCATION, Integers, Limb
 
 _STRETCH: Final = 1024
 """Frames that are worked on at once; stretches meet where a key is needed anyway."""

@@ -6,11 +6,10 @@ a key. Between two keys every channel is a cubic whose handles stand at thirds o
 Blender's curve is then a cubic in time itself, and its values depend on those of keys and handles
 linearly.
 
-First the frames are chosen (:mod:`.key_frames`), for bounds somewhat wider than those that are
-asked for. Then all keys of a limb are fitted together (:mod:`.key_fit`: :mod:`.key_curves` against
-:mod:`.key_model`), handles are brought into line, and keys are added where bounds are still broken
-(:mod:`.key_search`), between frames, too (:mod:`.key_halves`). Keys on every frame have handles of
-their own (:mod:`.key_dense`).
+First the frames are chosen (:mod:`.key_times`), for bounds somewhat wider than those that are asked
+for. Then all keys of a limb are fitted together (:mod:`.search`: :mod:`.curves` against
+:mod:`.residuals`), handles are brought into line, and keys are added where bounds are still broken,
+between frames, too. Keys on every frame have handles of their own (:mod:`.dense`).
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ import numpy as np
 
 from ..errors import SettingsError
 from ..rotations import Floats
+from .channels import BezierKeys, Booleans
 from .dense import dense_keys
 from .key_times import Choice
 from .search import Search
-from .subframes import looked_at
-from .tracks import LOCATION, SCALE, BezierKeys, Booleans, Limb, Track
+from .tracks import LOCATION, SCALE, Limb, Track, looked_at
 
 _SLACK: Final = 1.15
 """Bounds within which key frames are chosen: what fitting makes up for afterwards."""

@@ -1,23 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far values are off what they should be, as rotations, as places and along a chain of bones.
+"""How far values are off what they should be: as they are, and to first order of what is changed.
 
-All errors are shares of the bounds: 1 is what is allowed.
+Errors are those of rotations, of places and along a chain of bones, and shares of the bounds: 1 is
+what is allowed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..rotations import (
-    Floats,
-    from_mode_values,
-    multiply,
-    rotate,
-    to_matrix,
-)
-from .tracks import LOCATION, SCALE, Limb, LimbChain
+from ..rotations import Floats, conjugate, from_mode_values, multiply, rotate, to_matrix
+from .channels import Booleans
+from .tracks import LOCATION, SCALE, Integers, Limb, LimbChain
 
 
 def turns(kind: str) -> bool:
@@ -114,3 +112,210 @@ class Residuals:
         if self._limb.chain is None:
             return np.zeros((0, len(decoded[0]), 3))
         return np.cumsum(walked(self._limb.chain, decoded)[1], axis=0)
+
+
+# --- What changes of values change, to first order: each track's own error, and where bones end ---
+#
+# A bone that turns by a small angle carries along all that follows it [the geometric Jacobian of a
+# chain, e.g. Murray, Li & Sastry, *A Mathematical Introduction to Robotic Manipulation*, 1994,
+# §3.4]: turns of bones add up from the root on, and so do the moves of their ends. Worked out in
+# that order, the ends of all bones cost hardly more than that of the tip.
+
+
+Singles = NDArray[np.float32]
+
+_STEP: Final = 1e-6
+"""Change of a value from which slopes of rotations are taken."""
+_RIDGE: Final = 1.0
+"""Weight, against what is seen of them, of changes that are not seen: of a quaternion's length.
+The more alike both weigh, the fewer steps it takes to fit them."""
+_KINK: Final = 0.1
+"""Bounds by which the motion must turn aside at the seam of a loop to be let have a corner."""
+_FEW: Final = 5
+"""Frames of a loop in which corners cannot be told from bends."""
+_APART: Final = 1e-5
+"""Values that differ by less meet at the seam."""
+
+
+class LinearModel:
+    """A limb near its motion.
+
+    Args:
+        limb: at all frames that are fitted.
+    """
+
+    def __init__(self, limb: Limb) -> None:
+        values = [track.values for track in limb.tracks]
+        kinds = [track.kind for track in limb.tracks]
+        frames = len(values[0])
+        self.targets = np.zeros((4, len(values), frames))
+        """(4, tracks, frames) values; components that a track does not have are 0."""
+        for place, each in enumerate(values):
+            self.targets[: each.shape[1], place] = each.T
+        self._own = np.zeros((3, 4, len(values), frames), dtype=np.float32)
+        decoded = [
+            from_mode_values(each, kind) if turns(kind) else each
+            for each, kind in zip(values, kinds, strict=True)
+        ]
+        world: dict[int, Floats] = {}
+        # What a chain moves is looked at by itself.
+        lever = limb.lever if limb.chain is None else 0.0
+        self._ends: _Ends | None = None
+        if limb.chain is not None:
+            turn, steps = walked(limb.chain, decoded)
+            axes = to_matrix(limb.chain.rest_rotations)
+            for bone, track in enumerate(limb.chain.turned):
+                if track >= 0:
+                    world[track] = to_matrix(turn[bone]) @ axes[bone]
+            self._ends = _Ends(limb, limb.chain, steps)
+        for place, (kind, each) in enumerate(zip(kinds, values, strict=True)):
+            if not turns(kind):
+                bound = limb.angle if kind == SCALE else limb.distance
+                self._own[range(3), range(3), place] = 1.0 / bound
+                continue
+            slopes = _turned(kind, each)
+            if place in world:
+                slopes = world[place] @ slopes
+            reach = np.maximum(1.0 / limb.angle, lever / np.broadcast_to(limb.distance, frames))
+            self._own[:, :, place] = np.moveaxis(slopes * reach[:, None, None], 0, -1)
+        self._size: Singles = (self._own**2).sum(axis=(0, 1)) / np.float32(3.0)
+        turning = np.array([turns(kind) for kind in kinds], dtype=np.float32)
+        self._ridge: Singles = (_RIDGE * self._size * turning[:, None]).astype(np.float32)
+
+    def errors(self, off: Singles) -> list[Singles]:
+        """Errors of each track (3, tracks, frames), and of ends of bones (3, ends, frames) where
+        there is a chain.
+
+        Args:
+            off: (4, tracks, frames) changes of values.
+        """
+        own = np.einsum("dctf,ctf->dtf", self._own, off)
+        return [own] if self._ends is None else [own, self._ends.errors(own)]
+
+    def pull(self, off: Singles, pulls: Sequence[Singles], weight: Singles) -> Singles:
+        """Transpose of :meth:`errors`, and what keeps changes small that are not seen.
+
+        Args:
+            off: (4, tracks, frames) changes of values.
+            pulls: like the errors.
+            weight: (tracks, frames) of each track's own error.
+        """
+        own = pulls[0] if self._ends is None else pulls[0] + self._ends.pull(pulls[1])
+        result = np.einsum("dctf,dtf->ctf", self._own, own)
+        result += (weight * self._ridge) * off
+        return result
+
+    def weights(self, own: Singles) -> Singles:
+        """Curvature of weighted squares of tracks' own errors, for a value: (tracks, frames)."""
+        return (own * (self._size + self._ridge)).astype(np.float32, copy=False)
+
+    def culprits(self, off: Singles, frames: Integers) -> Singles:
+        """How much each track has to do with the worst end's being off: (tracks, frames).
+
+        Args:
+            off: (4, tracks, frames) changes of values.
+            frames: which of the frames.
+        """
+        own, *rest = self.errors(off)
+        if self._ends is None:
+            return np.zeros((own.shape[1], len(frames)), dtype=np.float32)
+        (ends,) = rest
+        sizes = (ends[..., frames] ** 2).sum(axis=0)
+        only = np.zeros_like(ends)
+        only[..., frames] = np.where(sizes == sizes.max(axis=0), ends[..., frames], 0.0)
+        return (own * self._ends.pull(only)).sum(axis=0)[:, frames]
+
+    def turns_at_the_seam(self, frames: Integers) -> Booleans:
+        """Whether tracks (tracks,) have a corner where a loop goes on from its start.
+
+        Args:
+            frames: those of the motion's frames between which nothing is left out.
+        """
+        if len(frames) < _FEW:
+            return np.ones(self.targets.shape[1], dtype=bool)
+        bends = np.diff(self.targets[..., frames[[-3, -2, 0, 1, 2]]], 2, axis=2)
+        bends = np.einsum("dct,ctf->dtf", self._own[..., 0], bends)
+        before, at, after = np.linalg.norm(bends, axis=0).T
+        # A tight bend is one on both sides, too.
+        aside = (at > _KINK) & (at > 2.0 * np.maximum(before, after))
+        apart = np.abs(self.targets[..., 0] - self.targets[..., -1]).max(axis=0) > _APART
+        return apart | aside
+
+
+class _Ends:
+    """Where bones of a chain end, as shares of their bounds.
+
+    Rows are those ends that have room of their own, the first of all the tip with its distance.
+    """
+
+    def __init__(self, limb: Limb, chain: LimbChain, steps: Floats) -> None:
+        tracks, bones, frames = len(limb.tracks), len(steps), steps.shape[1]
+        room = np.full((bones, frames), np.inf) if limb.room is None else limb.room.T
+        (held,) = np.nonzero(np.isfinite(room).any(axis=1))
+        tip = np.broadcast_to(1.0 / np.asarray(limb.distance), (1, frames))
+        self._share = np.concatenate([tip, 1.0 / room[held]]).astype(np.float32)
+        ends = np.concatenate([[bones - 1], held])
+        self._upto: Singles = np.tri(bones, dtype=np.float32)[ends]
+        self._steps = np.ascontiguousarray(np.moveaxis(steps, 2, 0).astype(np.float32))
+        # A track's own error is what it turns or stretches as a share of the angle.
+        self._angle = np.float32(limb.angle)
+        self._turns: Singles = _carried(chain.turned, chain.follows, tracks) * self._angle
+        self._scaled = np.array(chain.scaled, dtype=np.intp)
+        self._scales = _carried(chain.scaled, chain.handed, tracks)
+        self._along = np.zeros((tracks, frames), dtype=np.float32)
+        for track in self._scaled[self._scaled >= 0]:
+            self._along[track] = self._angle / limb.tracks[track].values[:, 1]
+
+    def errors(self, own: Singles) -> Singles:
+        """How tracks' own errors (3, tracks, frames) move ends: (3, ends, frames)."""
+        moved = _cross(self._turns @ own, self._steps)
+        if len(self._scaled):
+            moved += (self._scales @ (self._along * own[1])) * self._steps
+        return (self._upto @ moved) * self._share
+
+    def pull(self, ends: Singles) -> Singles:
+        """Transpose of :meth:`errors`."""
+        moved: Singles = self._upto.T @ (self._share * ends).astype(np.float32, copy=False)
+        result = self._turns.T @ _cross(self._steps, moved)
+        if len(self._scaled):
+            along = (self._steps * moved).sum(axis=0)
+            result[1] += self._along * (self._scales.T @ along)
+        return result
+
+
+def _cross(one: Singles, two: Singles) -> Singles:
+    """Cross products of vectors (3, …)."""
+    result = np.empty_like(two)
+    for axis in range(3):
+        ahead, behind = (axis + 1) % 3, (axis + 2) % 3
+        np.multiply(one[ahead], two[behind], out=result[axis])
+        result[axis] -= one[behind] * two[ahead]
+    return result
+
+
+def _carried(moved: Sequence[int], on: Sequence[bool], tracks: int) -> Singles:
+    """Which tracks move each bone, by itself and by those before: (bones, tracks)."""
+    result = np.zeros((len(moved), tracks), dtype=np.float32)
+    for bone, track in enumerate(moved):
+        if bone and on[bone]:
+            result[bone] = result[bone - 1]
+        if track >= 0:
+            result[bone, track] += 1.0
+    return result
+
+
+def _turned(kind: str, values: Floats) -> Floats:
+    """How values (frames, components) turn a bone in its own axes: (frames, 3, 4)."""
+    exact = from_mode_values(values, kind)
+    if kind == "QUATERNION":
+        w, x, y, z = exact.T
+        rows = ((-x, w, z, -y), (-y, -z, w, x), (-z, y, -x, w))
+        return 2.0 * np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    result = np.zeros((len(exact), 3, 4))
+    for component in range(values.shape[1]):
+        moved = values.copy()
+        moved[:, component] += _STEP
+        turned = multiply(conjugate(exact), from_mode_values(moved, kind))
+        turned *= np.where(turned[:, :1] < 0.0, -1.0, 1.0)
+        result[..., component] = 2.0 * turned[:, 1:] / _STEP
+    return result

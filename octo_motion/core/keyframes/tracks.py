@@ -5,19 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..rotations import Floats
 from ..skeleton import Skeleton
+from .channels import Booleans, halfway_values
 
 LOCATION: Final = "LOCATION"
 SCALE: Final = "SCALE"
 
 Integers = NDArray[np.intp]
-Booleans = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,58 +87,6 @@ class Limb:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class BezierKeys:
-    """Keys of one track in single precision, as Blender keeps them."""
-
-    frames: NDArray[np.float32]
-    """(keys,)"""
-    values: NDArray[np.float32]
-    """(keys, components)"""
-    left: NDArray[np.float32]
-    """(keys, components, 2) frame and value of the handles before the keys."""
-    right: NDArray[np.float32]
-    """(keys, components, 2) likewise after them."""
-    smooth: Booleans
-    """(keys,) whether both handles lie on one line, as Blender's aligned ones do."""
-
-    def __len__(self) -> int:
-        """Number of keys of each component."""
-        return len(self.frames)
-
-
-def bezier_keys(
-    frames: Floats, values: Floats, out: Floats, into: Floats, smooth: Booleans
-) -> BezierKeys:
-    """Keys with handles at thirds of the time between two of them.
-
-    Args:
-        frames: (keys,) at least two.
-        values: (keys, components)
-        out: (keys − 1, components) values of the handles after all keys but the last one.
-        into: (keys − 1, components) values of the handles before all but the first one.
-        smooth: (keys,) whether both handles lie on one line.
-    """
-    third = np.diff(frames)[:, None] / 3.0
-    own = np.stack(np.broadcast_arrays(frames[:, None], values), axis=-1)
-    left, right = own.copy(), own.copy()
-    left[1:, :, 0] -= third
-    left[1:, :, 1] = into
-    right[:-1, :, 0] += third
-    right[:-1, :, 1] = out
-    # Nothing lies before the first key and after the last: their handles go straight on.
-    left[0], right[-1] = 2.0 * own[0] - right[0], 2.0 * own[-1] - left[-1]
-    inner = smooth.copy()
-    inner[[0, -1]] = False
-    return BezierKeys(
-        frames=frames.astype(np.float32),
-        values=values.astype(np.float32),
-        left=left.astype(np.float32),
-        right=right.astype(np.float32),
-        smooth=inner,
-    )
-
-
 def chain_to_tip(skeleton: Skeleton, bones: Sequence[str]) -> LimbChain:
     """The chain of an arm whose tracks are the rotations of its bones, root to tip.
 
@@ -156,3 +104,81 @@ def chain_to_tip(skeleton: Skeleton, bones: Sequence[str]) -> LimbChain:
         rest_rotations=skeleton.rest_rotations[path],
         steps=np.diff(points, axis=0),
     )
+
+
+# --- Moments between frames, as frames alone do not say how curves have to go ---------------------
+#
+# A curve from one key to another a few frames later has handles that no frame has much to say
+# about: it may be right at every frame and swing out in between, where a foot would slide. So the
+# motion is looked at half way between frames, too: as it would go with a key on each of them and
+# automatic handles.
+
+
+@dataclass(frozen=True, eq=False)
+class Fine:
+    """A limb at all moments at which it is looked at."""
+
+    times: Floats
+    """(moments,)"""
+    limb: Limb
+    allowed: Booleans
+    """(moments,) where there may be a key."""
+
+    def marked(self, marks: Booleans) -> Booleans:
+        """Marks (rows, moments) that are given at frames (rows, frames), or at all moments."""
+        if marks.shape[1] == len(self.times):
+            return marks
+        result = np.zeros((len(marks), len(self.times)), dtype=bool)
+        result[:, self.allowed] = marks
+        return result
+
+
+def with_halves(times: Floats, limb: Limb) -> Fine:
+    """A limb on frames and half way between them.
+
+    Args:
+        times: (frames,) at least two.
+        limb: at the frames.
+    """
+
+    def closer(bound: Floats) -> Floats:
+        """Bounds half way, which are those of both frames."""
+        looser = np.isinf(bound[:-1]) | np.isinf(bound[1:])
+        return joined(bound, np.where(looser, np.inf, np.minimum(bound[:-1], bound[1:])))
+
+    tracks = [Track(joined(each.values, _halves(each.values)), each.kind) for each in limb.tracks]
+    finer = replace(
+        limb,
+        tracks=tracks,
+        distance=closer(np.broadcast_to(limb.distance, len(times))),
+        room=None if limb.room is None else closer(limb.room),
+    )
+    moments = joined(times, 0.5 * (times[:-1] + times[1:]))
+    return Fine(moments, finer, np.arange(len(moments)) % 2 == 0)
+
+
+def looked_at(times: Floats, limb: Limb, every: int) -> Fine:
+    """A limb at all moments that matter: between frames, too, where something hangs on it.
+
+    Args:
+        times: (moments,) at least two.
+        limb: at those moments.
+        every: at every how many of them there is a frame, from the first to the last.
+    """
+    if every == 1 and (limb.chain is not None or limb.lever > 0.0):
+        return with_halves(times, limb)
+    return Fine(times, limb, np.arange(len(times)) % every == 0)
+
+
+def joined(frames: NDArray[Any], halves: NDArray[Any]) -> NDArray[Any]:
+    """What is on frames (frames, …) and half way between them (frames − 1, …), in turn."""
+    result = np.empty((len(frames) + len(halves), *frames.shape[1:]), dtype=frames.dtype)
+    result[::2], result[1::2] = frames, halves
+    return result
+
+
+def _halves(values: Floats) -> Floats:
+    """Half way from each frame's values (frames, components) to the next one's."""
+    slopes = np.gradient(values, axis=0)
+    slopes[[0, -1]] = 0.0
+    return halfway_values(values, slopes)

@@ -16,15 +16,20 @@ layout: ``multiply``, ``conjugate``, ``rotate``, ``cross``, ``dot``, ``normalize
 """
 
 from .arrays import (
+    EULER_ORDERS,
     IDENTITY,
     Floats,
     angle_between,
     conjugate,
     continuous,
+    continuous_axis_angle,
+    continuous_euler,
     cross,
     dot,
     from_axis_angle,
+    from_euler,
     from_matrix,
+    from_mode_values,
     from_rotation_vector,
     lerp_rotation_vectors,
     less_whole_turns,
@@ -36,16 +41,9 @@ from .arrays import (
     shortest_arc,
     slerp,
     slerp_in_sense,
+    to_euler,
     to_matrix,
     to_rotation_vector,
-)
-from .modes import (
-    EULER_ORDERS,
-    continuous_axis_angle,
-    continuous_euler,
-    from_euler,
-    from_mode_values,
-    to_euler,
 )
 
 __all__ = [

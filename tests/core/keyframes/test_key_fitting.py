@@ -8,13 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.keyframes import reduce_keys
+from octo_motion.core.keyframes.channels import values_at
 from octo_motion.core.keyframes.curves import Curves
-from octo_motion.core.keyframes.linear_model import LinearModel
-from octo_motion.core.keyframes.playback import values_at
-from octo_motion.core.keyframes.residuals import Residuals
+from octo_motion.core.keyframes.residuals import LinearModel, Residuals
 from octo_motion.core.keyframes.search import Search
-from octo_motion.core.keyframes.subframes import Fine, looked_at, with_halves
-from octo_motion.core.keyframes.tracks import SCALE, Limb, Track
+from octo_motion.core.keyframes.tracks import SCALE, Fine, Limb, Track, looked_at, with_halves
 from octo_motion.core.rotations import (
     Floats,
     angle_between,

@@ -4,7 +4,7 @@
 import numpy as np
 
 from octo_motion.core.keyframes import LOCATION, Limb, Track, reduce_keys
-from octo_motion.core.keyframes.playback import values_at
+from octo_motion.core.keyframes.channels import values_at
 
 FRAMES = np.arange(1.0, 61.0)
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.files import presets
+from octo_motion.blender.files import user_files as presets
 from octo_motion.core.errors import GaitError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.ui.locomotion.settings import locomotion_settings, read_gait, set_gait

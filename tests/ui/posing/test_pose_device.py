@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from octo_motion.blender.files import device_store
-from octo_motion.blender.files.device_store import load_calibrations
+from octo_motion.blender.files import user_files as device_store
+from octo_motion.blender.files.user_files import load_calibrations
 from octo_motion.device import messages as say
 from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.driver import Kind

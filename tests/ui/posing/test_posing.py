@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from octo_motion.blender.animation.preview_pose import pose_values
+from octo_motion.blender.animation.poses import pose_values
 from octo_motion.core.errors import OctoMotionError, RigError, WriteError
 from octo_motion.core.rotations import Floats
 from octo_motion.ui.posing.controls import Outcome, PoseControls

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.animation.preview_pose import pose_values
+from octo_motion.blender.animation.poses import pose_values
 from octo_motion.core.errors import OctoMotionError, RigError
 from octo_motion.ui.posing import session_operator
 from octo_motion.ui.posing.controls import Outcome, PoseControls

@@ -13,7 +13,7 @@ import pytest
 
 from octo_motion.blender.rig.puppet import Puppet
 from octo_motion.blender.rig.puppet_reading import MATERIAL, bone_materials, moved_bones
-from octo_motion.blender.scene.obstacles import read_obstacle
+from octo_motion.blender.scene.surfaces import read_obstacle
 from octo_motion.core.errors import OctoMotionError, RigError
 from octo_motion.core.posing.puppet.figure import Pose
 from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.animation.preview_pose import pose_values
+from octo_motion.blender.animation.poses import pose_values
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.ui.posing.puppet_session import PuppetSession, active_session
 

@@ -17,9 +17,9 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import Floats
 from ...rotations.components_first import dot
+from ...smoothing import smooth_step
 
 _NO_LENGTH: Final = 1e-30
 """Squares of lengths that are none, however small a rig's unit makes its bones."""

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import (
     Floats,
     components_first,
@@ -21,7 +20,7 @@ from ...rotations import (
     rotate,
     shortest_arc,
 )
-from ...temporal_filter import covered
+from ...smoothing import covered, smooth_step
 from ..ground import Ground, raise_over_ground
 from ..rig import (
     TOLERATED,

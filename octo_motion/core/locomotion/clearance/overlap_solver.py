@@ -17,10 +17,9 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import Floats
 from ...rotations.components_first import dot
-from ...temporal_filter import blur_reach, blurred, covered, widened
+from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed
 from .capsule_overlap import Capsules, Crowd, Touches, Touching, aside

@@ -17,9 +17,9 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import Floats, from_axis_angle, less_whole_turns, to_matrix
 from ...skeleton import Skeleton
+from ...smoothing import smooth_step
 from ..rig import BodyFrame, arm_azimuths
 from .ccd import HEAD
 

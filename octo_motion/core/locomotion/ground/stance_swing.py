@@ -23,9 +23,9 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import least_jerk, smooth_step
 from ...rotations import Floats, components_first
 from ...rotations.components_first import dot
+from ...smoothing import least_jerk, smooth_step
 from ..rig import MARGIN, JointRoom, loose_from_root, room_needed
 from .arm_curves import bent, curve, drawn, evened, lerp_bends, raise_over_ground, spread_chain
 from .footholds import PEELING, UNROLLING, Footholds

@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import least_jerk
 from ...rotations import Floats, rotate
+from ...smoothing import least_jerk
 from ..clearance import afloat
 from ..gait import CYCLE, GaitPoser, GaitTable
 from ..ground import GroundedPoses, GroundedWalk, Raise, SwingSmoothing, frames_around

@@ -11,8 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import Floats
+from ...smoothing import smooth_step
 from .body import HEAD_MIDDLE, MANTLE_EDGE, NECK
 from .rig import BODY, FIRST_ARM_BONE, HEAD, MANTLE
 from .shape import OctopusShape

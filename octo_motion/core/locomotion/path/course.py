@@ -16,9 +16,9 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...easing import least_jerk
 from ...errors import SettingsError
 from ...rotations import Floats, rotation_vector_between, slerp_in_sense
+from ...smoothing import least_jerk
 from ..gait import CYCLE
 from ..rig import lift_to_floor
 from .gait_changes import GaitTransition

@@ -17,7 +17,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...easing import least_jerk
 from ...errors import SettingsError
 from ...rotations import (
     Floats,
@@ -26,6 +25,7 @@ from ...rotations import (
     from_rotation_vector,
     multiply,
 )
+from ...smoothing import least_jerk
 
 _HELD: Final = 0.3
 """Share of a change, from either end, in which arms may still hold on, or hold on again: in between

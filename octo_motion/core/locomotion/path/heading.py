@@ -23,7 +23,6 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import (
     IDENTITY,
     Floats,
@@ -37,6 +36,7 @@ from ...rotations import (
     rotate_in_plane,
     shortest_arc,
 )
+from ...smoothing import smooth_step
 from .route import Route
 
 _FEWEST: Final = 1024

@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import least_jerk
 from ...rotations import Floats, lerp_rotation_vectors
+from ...smoothing import least_jerk
 from ..rig import ArmFrames
 from .timeline import Timeline, folded
 

@@ -17,7 +17,6 @@ from typing import Final, Literal
 
 import numpy as np
 
-from ...easing import least_jerk, smooth_step
 from ...errors import RigError, SettingsError
 from ...rotations import (
     Floats,
@@ -30,6 +29,7 @@ from ...rotations import (
     rotate,
     shortest_arc,
 )
+from ...smoothing import least_jerk, smooth_step
 from ..gait import close_group
 from ..rig import ArmFrames, frame_of, transport_frames
 from .timeline import Timeline, first_place, folded, front_width, passed

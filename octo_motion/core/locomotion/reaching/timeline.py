@@ -21,9 +21,9 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import least_jerk
 from ...errors import SettingsError
 from ...rotations import Floats
+from ...smoothing import least_jerk
 from ..rig import bend_rotations
 
 FOLD: Final = np.radians(100.0)

@@ -16,8 +16,8 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import Floats, conjugate, rotate, shortest_arc
+from ...smoothing import smooth_step
 
 MARGIN: Final = 0.03
 """Arm lengths that joints which do not lie keep between their skin and the ground: between two of

@@ -9,9 +9,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...easing import smooth_step
 from ...errors import ClipError
 from ...rotations import Floats
+from ...smoothing import smooth_step
 from .clip import Clip
 
 Integers = NDArray[np.intp]

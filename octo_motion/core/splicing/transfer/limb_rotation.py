@@ -14,7 +14,6 @@ from typing import Final
 
 import numpy as np
 
-from ...easing import smooth_step
 from ...rotations import (
     Floats,
     conjugate,
@@ -25,6 +24,7 @@ from ...rotations import (
     rotate,
     shortest_arc,
 )
+from ...smoothing import smooth_step
 
 _STRAIGHT: Final = np.radians(5.0)
 """Bend below which a triangle says nothing of how a limb is turned about itself."""

@@ -9,11 +9,10 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ....blender.animation import may_stretch, standing_of, writable_object
+from ....blender.animation import standing_of, writable_object
 from ....blender.files import load_gait, sample_weight_curve
-from ....blender.rig import radii_of_skin
+from ....blender.rig import arm_skins, may_stretch, radii_of_skin
 from ....blender.scene import (
-    arm_skins,
     can_be_carried,
     hangs_on,
     home_of,

@@ -19,10 +19,10 @@ from ....blender.animation import (
     is_generated,
     read_channels,
 )
-from ....blender.overrides import linked_names
 from ....blender.rig import (
     armature_data,
     is_driven_object,
+    linked_names,
     radii_of_skin,
     read_skeleton,
     skin_key,

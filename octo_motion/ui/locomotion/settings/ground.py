@@ -11,7 +11,7 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ....blender.overrides import linked_names
+from ....blender.rig import linked_names
 from ....blender.scene import Contact, markers, read_markers
 from ....core.locomotion.gait import Arm
 from ....core.locomotion.ground import ContactOverride, StanceSettings

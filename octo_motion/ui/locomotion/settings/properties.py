@@ -14,8 +14,7 @@ import bpy
 import numpy as np
 
 from ....blender.files import curve_node, ensure_weight_curve, gait_names, load_gait
-from ....blender.overrides import linked_names
-from ....blender.rig import armature_data
+from ....blender.rig import armature_data, linked_names
 from ....core.errors import GaitError
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.metrics import Figure

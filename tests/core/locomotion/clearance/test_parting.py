@@ -21,7 +21,7 @@ from octo_motion.core.locomotion.clearance.capsule_overlap import (
 )
 from octo_motion.core.locomotion.clearance.overlap_solver import joints_of, parted, turned_towards
 from octo_motion.core.rotations import Floats
-from octo_motion.core.temporal_filter import blur_reach, blurred, covered
+from octo_motion.core.smoothing import blur_reach, blurred, covered
 
 SEEDS = st.integers(0, 2**31)
 UP = np.array([0.0, 0.0, 1.0])

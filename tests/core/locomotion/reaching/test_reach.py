@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from octo_motion.core.easing import least_jerk
 from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
@@ -16,6 +15,7 @@ from octo_motion.core.locomotion.reaching.timeline import Timeline, first_place,
 from octo_motion.core.locomotion.reaching.winding import profile_of
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle, rotate
+from octo_motion.core.smoothing import least_jerk
 from tests.core import objects
 from tests.core.rigs import body_with_arms, posed_joints
 

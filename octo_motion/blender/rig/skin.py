@@ -4,14 +4,41 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
-from ...core.content_cache import content_key
+from ...core.content_cache import ContentCache, content_key
+from ...core.locomotion.rig import ArmSkin, arm_skin, joint_positions, nearest_bones
 from ...core.rotations import Floats
+from ...core.skeleton import Skeleton
 from .armature import deformed_meshes
+
+_MOST_POINTS: Final = 6000
+"""Points of a skin that are looked at; an arm's thickness needs no more."""
+
+_THICKEST: Final = 0.2
+"""Arm lengths from an arm's middle line: what is further away is not its skin."""
+
+_SLENDER: Final = (0.03, 0.008)
+"""Radius of an arm without a skin at its root and at its tip, in arm lengths."""
+
+_PLACED_TO: Final = 1e-5
+"""Share of an armature's size, and of 1, to which it is known where its skin is."""
+
+_SHARE: Final = 0.9
+"""Of the points round a joint, the share that lies nearer to it than its radius: an arm lies on its
+suckers, and on what comes out at bends …"""
+
+_STANDS_OUT: Final = 1.25
+"""… unless they are so many times as far away as half of them: webs and fins are no thickness …"""
+
+_AT_LEAST: Final = 0.7
+"""… but then this share lies nearer."""
+
+_skins_known: Final[ContentCache[list[ArmSkin]]] = ContentCache(4)
 
 _MOST_VERTICES: Final = 3_000
 """Of more, only every second, third … is looked at."""
@@ -27,6 +54,16 @@ _ROUNDED: Final = 1e-6
 """To which a skin's place on its armature is known."""
 _BONE_ROOT, _BONE_TIP = 0.06, 0.012
 """Radius in arm lengths at root and tip of an arm without skin."""
+
+
+def vertex_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
+    """(vertices, 3) in the mesh's own space."""
+    points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
+    if len(points):
+        # The attribute is much quicker to read than the property that shows the same.
+        attribute: Any = mesh.attributes["position"]
+        attribute.data.foreach_get("vector", points.ravel())
+    return points
 
 
 def radii_of_skin(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> list[Floats]:
@@ -153,8 +190,7 @@ def _meshes(
         mesh = item.data
         assert isinstance(mesh, bpy.types.Mesh)
         step = max(1, -(-len(mesh.vertices) // _MOST_VERTICES))
-        points = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-        mesh.vertices.foreach_get("co", points.ravel())
+        points = vertex_positions(mesh)
         matrix = inverse @ np.array(item.matrix_world, dtype=np.float64)
         # Wherever the armature has walked to, its skin is as thick.
         matrix = np.round(matrix / _ROUNDED) * _ROUNDED
@@ -179,3 +215,81 @@ def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
                 owner[number] = max(groups, key=lambda each: each.weight).group
         for group in np.unique(owner[owner >= 0]).tolist():
             yield names[group], moved[owner == group]
+
+
+def arm_skins(
+    armature: bpy.types.Object, skeleton: Skeleton, arms: Sequence[Sequence[str]]
+) -> list[ArmSkin]:
+    """How far the skin of each arm is from its bones at rest.
+
+    Where no mesh hangs on the armature, arms are taken to be slender.
+    """
+    joints = [joint_positions(skeleton, bones) for bones in arms]
+    frames = [skeleton.rest_rotations[[skeleton.index[name] for name in bones]] for bones in arms]
+    points = _skin(armature, float(np.ptp(np.concatenate(joints), axis=0).max()))
+    return _skins_known.get(
+        content_key(points, joints, frames), lambda: _arm_skins(points, joints, frames)
+    )
+
+
+def _arm_skins(points: Floats, joints: Sequence[Floats], frames: Sequence[Floats]) -> list[ArmSkin]:
+    """The same from points of the skin.
+
+    Args:
+        points: (n, 3).
+        joints: for each arm (bones + 1, 3).
+        frames: for each arm (bones, 4) its bones' rest orientations.
+    """
+    lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
+    found = [nearest_bones(points, each) for each in joints]
+    distances = np.stack([np.linalg.norm(off, axis=1) for _, _, off in found])
+    nearest = distances.argmin(axis=0)
+    skins = []
+    for arm, (bone, share, _) in enumerate(found):
+        own = (nearest == arm) & (distances[arm] < _THICKEST * lengths[arm])
+        slender = lengths[arm] * np.linspace(*_SLENDER, len(joints[arm]))
+        radii = _radii(distances[arm][own], (bone + share)[own], slender)
+        skins.append(arm_skin(points[own], joints[arm], frames[arm], radii))
+    return skins
+
+
+def _skin(armature: bpy.types.Object, size: float) -> Floats:
+    """Some points (n, 3) of the meshes that the armature moves, at rest, armature space.
+
+    Args:
+        armature: the armature object.
+        size: how large it is, armature units.
+    """
+    inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
+    found: list[tuple[np.ndarray, Floats]] = []
+    for item in deformed_meshes(armature):
+        mesh = item.data
+        assert isinstance(mesh, bpy.types.Mesh)
+        points = vertex_positions(mesh)
+        place = inverse @ np.array(item.matrix_world, dtype=np.float64)
+        # Wherever the armature has walked to, its skin is as thick.
+        place[:3, :3] = np.round(place[:3, :3] / _PLACED_TO) * _PLACED_TO
+        place[:3, 3] = np.round(place[:3, 3] / (_PLACED_TO * size)) * (_PLACED_TO * size)
+        found.append((points, place))
+    step = max(1, sum(len(points) for points, _ in found) // _MOST_POINTS)
+    parts, passed = [np.empty((0, 3))], 0
+    for points, place in found:
+        some = points[-passed % step :: step].astype(np.float64)
+        parts.append(some @ place[:3, :3].T + place[:3, 3])
+        passed += len(points)
+    return np.concatenate(parts)
+
+
+def _radii(distance: Floats, along: Floats, otherwise: Floats) -> Floats:
+    """The radius at each joint (joints,), where there are points round it, else its neighbours'."""
+    places = np.arange(len(otherwise))
+    radii = np.full(len(otherwise), np.nan)
+    for joint in places:
+        near = distance[np.abs(along - joint) <= 0.5]
+        if len(near):
+            half, many, most = np.quantile(near, [0.5, _AT_LEAST, _SHARE])
+            radii[joint] = max(many, min(most, _STANDS_OUT * half))
+    known = np.isfinite(radii)
+    if not np.any(known):
+        return otherwise
+    return np.interp(places, places[known], radii[known])

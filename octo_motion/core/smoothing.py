@@ -1,16 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What happens at some frames, spread over those before and after it.
-
-A value at one frame hangs on the frames round it, the same number to either side, and on nothing
-else: it is the same in whatever portions a motion is made. A loop has no ends; elsewhere the first
-and the last frame go on.
-"""
+"""Gentle ways from one value to another, and values spread over the frames about them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from .rotations import Floats
+
+# --- Ways from 0 to 1 that begin and end gently, of shares (…); they are held beyond both ends ----
+
+
+def smooth_step(share: Floats) -> Floats:
+    """``3t² − 2t³``: level at both ends."""
+    t = np.clip(share, 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def least_jerk(share: Floats) -> Floats:
+    """``10t³ − 15t⁴ + 6t⁵``: no acceleration at its ends either.
+
+    Of all movements from rest to rest in a time it has the least jerk (Flash and Hogan, "The
+    coordination of arm movements", Journal of Neuroscience 5, 1985). Next to a hold nothing moves
+    at first.
+    """
+    t = np.clip(share, 0.0, 1.0)
+    return t * t * t * (10.0 + t * (6.0 * t - 15.0))
+
+
+# --- What happens at some frames, spread over those before and after it ---------------------------
+#
+# A value at one frame hangs on the frames round it, the same number to either side, and on nothing
+# else: it is the same in whatever portions a motion is made. A loop has no ends; elsewhere the
+# first and the last frame go on.
+
 
 _PASSES = 3
 """Means in a row: what comes of them has neither corner nor jump."""

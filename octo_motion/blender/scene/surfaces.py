@@ -1,18 +1,116 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that the artist has marked as solid, as obstacles for a puppet."""
+"""Objects of the scene as surfaces: where they are, what a creature walks on, what is solid."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import bmesh
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
-from ...core.errors import RigError
+from ...core.content_cache import ContentCache, content_key
+from ...core.errors import GroundError, RigError
 from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from ...core.rotations import Floats, from_matrix
+from ..rig import vertex_positions
+
+_SAME = 1e-5
+"""Share of its largest number by which a matrix may be off another, in single precision."""
+
+
+def world_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
+    """World matrix of an object, which may be disabled in viewports, or excluded.
+
+    Blender leaves such an object's own world matrix as it was long ago, of a file that was opened
+    even at the origin, and does not always tell so: what a setting points at counts as evaluated.
+    So its transform and its parents' are put together here. Where something else moves it,
+    Blender's matrix is all there is.
+    """
+    evaluated = obj.evaluated_get(depsgraph)
+    if len(obj.constraints) > 0 or obj.rigid_body is not None or obj.parent_type != "OBJECT":
+        return evaluated.matrix_world
+    own = obj.matrix_basis
+    if obj.parent is not None:
+        own = world_of(obj.parent, depsgraph) @ obj.matrix_parent_inverse @ own
+    away = np.abs(np.array(evaluated.matrix_world) - np.array(own)).max()
+    # The same but for rounding: what others compute from it must not change in the last digit.
+    return evaluated.matrix_world if away <= _SAME * np.abs(np.array(own)).max() else own
+
+
+def is_enabled(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether Blender works an object out, hidden by its eye or not: its modifiers count."""
+    layer = depsgraph.view_layer
+    return not obj.hide_viewport and layer is not None and obj.name in layer.objects
+
+
+# --- Mesh objects to what a creature walks on, and meshes to how thick its arms are ---------------
+
+
+_faces_known: Final[ContentCache[Floats]] = ContentCache(2)
+_corners_known: Final[ContentCache[np.ndarray]] = ContentCache(2)
+
+
+def read_triangles(
+    ground: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats, bytes]:
+    """The faces of a mesh object as it is seen, modifiers and all, (faces, 3, 3) world.
+
+    With them comes a key of their content, for what is made from them.
+
+    Raises:
+        GroundError: the object is no mesh, or has no faces.
+    """
+    if ground.type != "MESH":
+        raise GroundError(f"'{ground.name}' is not a mesh.", "Choose a mesh as the ground.")
+    if ground.mode == "EDIT":
+        ground.update_from_editmode()
+    evaluated = ground.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        if mesh is None or len(mesh.loop_triangles) == 0:
+            raise GroundError(f"The ground '{ground.name}' has no faces.", "Choose another mesh.")
+        points = vertex_positions(mesh)
+        corners, content = _corners(mesh, points)
+    finally:
+        evaluated.to_mesh_clear()
+    world = np.array(world_of(ground, depsgraph), dtype=np.float64)
+    key = content_key(content, world)
+
+    def placed() -> Floats:
+        moved = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+        return moved[corners]
+
+    return _faces_known.get(key, placed), key
+
+
+def _corners(mesh: bpy.types.Mesh, points: np.ndarray) -> tuple[np.ndarray, bytes]:
+    """Vertices (faces, 3) of a mesh's triangles, and a key of its content.
+
+    Args:
+        mesh: the mesh.
+        points: (vertices, 3) its vertices.
+    """
+
+    def read() -> np.ndarray:
+        corners = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners.ravel())
+        return corners
+
+    # How faces are cut into triangles hangs on nothing else, and takes much longer to read.
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    vertices = np.empty(len(mesh.loops), dtype=np.int32)
+    # The attribute is much quicker to read than the property that shows the same.
+    attribute: Any = mesh.attributes[".corner_vert"]
+    attribute.data.foreach_get("value", vertices)
+    content = content_key(points, starts, vertices)
+    return _corners_known.get(content, read), content
+
+
+# --- Objects that the artist has marked as solid, as obstacles for a puppet -----------------------
+
 
 MOST_TRIANGLES: Final = 50_000
 """More would keep a session from running in real time."""
@@ -92,9 +190,7 @@ def _triangles(shown: bpy.types.Object, *, convex: bool) -> Floats:
         raise RigError(
             f"The obstacle '{shown.name}' has no faces.", "Choose another shape for it: a box."
         )
-    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", places)
-    _check_corners(shown, places)
+    _check_corners(shown, vertex_positions(mesh))
     editable = bmesh.new()
     try:
         editable.from_mesh(mesh)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Channels of bones and of an object: motion in space, as values of Blender's own properties.
+"""Channels: motion in space, as values of Blender's own properties, and what their keys play.
 
 What Blender knows of a rig's channels (what they are called, in which rotation modes, which bones
 hand their scale on, what frame an object's own channels stand in) is read once; from then on it is
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..rotations import (
     Floats,
@@ -24,7 +25,24 @@ from ..rotations import (
     normalized,
     to_euler,
 )
-from .channel import Channel
+
+Booleans = NDArray[np.bool_]
+
+_HANDLE: Final = 1.0 / 2.5614
+"""Length of an automatic handle, as a share of the time between two keys."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One animated property: as many F-curves as it has components."""
+
+    data_path: str
+    values: Floats
+    """(frames, components)"""
+    group: str
+    keys: BezierKeys | None = None
+    """What is written in place of one linear key per frame."""
+
 
 OBJECT_GROUP: Final = "Object Transforms"
 """Where Blender's own keying puts an object's channels."""
@@ -200,3 +218,92 @@ class RigChannels:
                 longer = longer * own if handed else np.ones(count) * own
                 strains.append(longer - 1.0)
         return np.stack(strains, axis=1)
+
+
+# --- What keys play: values of Bézier curves ------------------------------------------------------
+
+
+def values_at(keys: BezierKeys, times: Floats) -> Floats:
+    """Values (times, components) of curves; before the first key and after the last as there.
+
+    Args:
+        keys: with handles at thirds of the time between two keys, as :func:`keys.reduce_keys` has
+            them: a curve is then a cubic in time itself.
+        times: (times,) frames, which need not be whole.
+    """
+    frames, values = keys.frames.astype(np.float64), keys.values.astype(np.float64)
+    if len(frames) == 1:
+        return np.tile(values, (len(times), 1))
+    span = np.clip(np.searchsorted(frames, times, side="right") - 1, 0, len(frames) - 2)
+    start, end = frames[span], frames[span + 1]
+    share = np.clip((times - start) / (end - start), 0.0, 1.0)[:, None]
+    rest = 1.0 - share
+    out, into = keys.right[span, :, 1], keys.left[span + 1, :, 1]
+    return (
+        rest**3 * values[span]
+        + 3.0 * share * rest**2 * out
+        + 3.0 * share**2 * rest * into
+        + share**3 * values[span + 1]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class BezierKeys:
+    """Keys of one track in single precision, as Blender keeps them."""
+
+    frames: NDArray[np.float32]
+    """(keys,)"""
+    values: NDArray[np.float32]
+    """(keys, components)"""
+    left: NDArray[np.float32]
+    """(keys, components, 2) frame and value of the handles before the keys."""
+    right: NDArray[np.float32]
+    """(keys, components, 2) likewise after them."""
+    smooth: Booleans
+    """(keys,) whether both handles lie on one line, as Blender's aligned ones do."""
+
+    def __len__(self) -> int:
+        """Number of keys of each component."""
+        return len(self.frames)
+
+
+def bezier_keys(
+    frames: Floats, values: Floats, out: Floats, into: Floats, smooth: Booleans
+) -> BezierKeys:
+    """Keys with handles at thirds of the time between two of them.
+
+    Args:
+        frames: (keys,) at least two.
+        values: (keys, components)
+        out: (keys − 1, components) values of the handles after all keys but the last one.
+        into: (keys − 1, components) values of the handles before all but the first one.
+        smooth: (keys,) whether both handles lie on one line.
+    """
+    third = np.diff(frames)[:, None] / 3.0
+    own = np.stack(np.broadcast_arrays(frames[:, None], values), axis=-1)
+    left, right = own.copy(), own.copy()
+    left[1:, :, 0] -= third
+    left[1:, :, 1] = into
+    right[:-1, :, 0] += third
+    right[:-1, :, 1] = out
+    # Nothing lies before the first key and after the last: their handles go straight on.
+    left[0], right[-1] = 2.0 * own[0] - right[0], 2.0 * own[-1] - left[-1]
+    inner = smooth.copy()
+    inner[[0, -1]] = False
+    return BezierKeys(
+        frames=frames.astype(np.float32),
+        values=values.astype(np.float32),
+        left=left.astype(np.float32),
+        right=right.astype(np.float32),
+        smooth=inner,
+    )
+
+
+def halfway_values(values: Floats, slopes: Floats) -> Floats:
+    """What is played half way from each frame to the next (frames − 1, …).
+
+    Args:
+        values: (frames, …) of keys with automatic handles.
+        slopes: (frames, …) of these, per frame.
+    """
+    return 0.5 * (values[:-1] + values[1:]) + 0.375 * _HANDLE * (slopes[:-1] - slopes[1:])

@@ -1,0 +1,421 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bones' own poses: those that stay behind, that are only shown, and that no action moves."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final, cast
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Quaternion, Vector
+
+from ...core.rotations import Floats
+from ...core.skeleton import Skeleton
+from ..rig import carrying_axes
+from .actions import curves_of, flattened, is_generated
+from .fcurves import is_shown
+
+SCALE: Final = ("scale",)
+"""Channels of a bone that stretches."""
+_UNSCALED: Final = 1e-3
+_UNSHEARED: Final = 1e-3
+"""Factors that are no scale, and cosines that are no shear."""
+_TINY: Final = 1e-6
+_STILL: Final = 0.01
+"""Bone lengths, radians and factors by which a bone may be off its rest pose unnoticed."""
+
+
+def animated_bones(
+    action: bpy.types.Action, channels: tuple[str, ...] = ("location", "rotation_")
+) -> set[str]:
+    """Names of the bones whose channels of these kinds the action keys."""
+    # The components of a property have the same path.
+    paths = {
+        curve.data_path
+        for layer in action.layers
+        for strip in layer.strips
+        if isinstance(strip, bpy.types.ActionKeyframeStrip)
+        for channelbag in strip.channelbags
+        for curve in channelbag.fcurves
+    }
+    names: set[str] = set()
+    for path in paths:
+        start, _, rest = path.partition('pose.bones["')
+        name, _, channel = rest.partition('"].')
+        if not start and channel.startswith(channels):
+            names.add(bpy.utils.unescape_identifier(name))
+    return names
+
+
+def rest_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
+    """Put bones back to their rest location and rotation; names that are no bone's are passed."""
+    if armature.pose is None:
+        return
+    for name in names:
+        bone = armature.pose.bones.get(name)
+        if bone is None:
+            continue
+        bone.location = (0.0, 0.0, 0.0)
+        if bone.rotation_mode == "QUATERNION":
+            bone.rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
+        elif bone.rotation_mode == "AXIS_ANGLE":
+            bone.rotation_axis_angle = (0.0, 0.0, 1.0, 0.0)
+        else:
+            bone.rotation_euler = (0.0, 0.0, 0.0)
+
+
+def unscale_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
+    """Put bones back to their rest scale; names that are no bone's are passed."""
+    bones = armature.pose.bones if armature.pose is not None else {}
+    for name in names:
+        if name in bones:
+            bones[name].scale = (1.0, 1.0, 1.0)
+
+
+def standing_of(
+    armature: bpy.types.Object, bone: str, *, left_out: Collection[str] = ()
+) -> tuple[Floats, Floats]:
+    """Where the poses of a bone's ancestors have brought what it hangs on.
+
+    Args:
+        armature: the armature object.
+        bone: name of a bone.
+        left_out: ancestors whose pose does not count.
+
+    Returns:
+        A shift (3,) and a turn (4,) of armature space; scale is left out.
+    """
+    assert armature.pose is not None
+    ancestors = list(reversed(armature.pose.bones[bone].parent_recursive))
+    moved = Matrix.Identity(4)
+    for each in ancestors:
+        rest = each.bone.matrix_local
+        if each.name not in left_out:
+            # What it does to its own rest, in armature space, carried by those above it.
+            moved = moved @ rest @ each.matrix_basis @ rest.inverted_safe()
+    shift, turn, _ = moved.decompose()
+    return np.array(shift, dtype=np.float64), np.array(turn, dtype=np.float64)
+
+
+def as_posed(
+    armature: bpy.types.Object, skeleton: Skeleton, posed: Iterable[str], kept: Iterable[str]
+) -> Skeleton | None:
+    """The skeleton as if some bones' poses were part of the rest pose.
+
+    Args:
+        armature: the armature object.
+        skeleton: its rest skeleton.
+        posed: bones that stay as they are posed now; all others are at rest.
+        kept: bones that must keep their shape.
+
+    Returns:
+        The skeleton, or none where its numbers cannot tell it: something else than its pose moves
+        a bone, some of ``kept`` would be sheared or scaled unequally, or a rotation or a scale is
+        not handed on as a whole.
+    """
+    assert armature.pose is not None
+    bones, posed = armature.pose.bones, set(posed)
+    if any(skeleton.constrained[skeleton.index[name]] for name in posed):
+        return None
+    basis = {name: np.array(bones[name].matrix_basis, dtype=np.float64) for name in posed}
+    sizes = [np.linalg.norm(each[:3, :3], axis=0) for each in basis.values()]
+    scaled = any(np.abs(size - 1.0).max() > _UNSCALED for size in sizes)
+    moved: list[Floats] = []
+    for number, parent in enumerate(skeleton.parents):
+        bone = bones[skeleton.names[number]].bone
+        if not skeleton.inherits_rotation[number] or (scaled and bone.inherit_scale != "FULL"):
+            return None
+        rest = skeleton.rest_matrices[number]
+        matrix = rest
+        if parent >= 0:
+            matrix = moved[parent] @ np.linalg.inv(skeleton.rest_matrices[parent]) @ rest
+        moved.append(matrix @ basis.get(skeleton.names[number], np.eye(4)))
+    matrices = np.stack(moved)
+    axes = matrices[:, :3, :3]
+    sizes = np.cbrt(np.abs(np.linalg.det(axes)))
+    if sizes.min() < _TINY:
+        return None
+    sheared = np.abs(np.swapaxes(axes, 1, 2) @ axes / sizes[:, None, None] ** 2 - np.eye(3))
+    order = [skeleton.index[name] for name in kept]
+    if sheared[order].max(initial=0.0) > _UNSHEARED:
+        return None
+    # The turns of what is sheared, as near as can be.
+    before, _, after = np.linalg.svd(axes)
+    matrices[:, :3, :3] = before @ after
+    return replace(skeleton, rest_matrices=matrices, lengths=skeleton.lengths * sizes)
+
+
+def displaced_bones(
+    armature: bpy.types.Object, turned: Iterable[str], carrying: Iterable[str]
+) -> list[str]:
+    """Those of the bones that are posed by more than what is going to be keyed.
+
+    Args:
+        armature: the armature object.
+        turned: bones whose rotation is going to be keyed: location and scale count.
+        carrying: bones that get no keys: rotation counts as well.
+    """
+    if armature.pose is None:
+        return []
+    bones = armature.pose.bones
+    found: list[str] = []
+    for name in turned:
+        bone = bones[name]
+        moved = np.abs(np.array(bone.location)).max() / bone.length
+        if max(moved, np.abs(np.array(bone.scale) - 1.0).max()) > _STILL:
+            found.append(name)
+    for name in carrying:
+        basis = np.array(bones[name].matrix_basis)
+        basis[:3, 3] /= bones[name].length
+        if np.abs(basis - np.eye(4)).max() > _STILL:
+            found.append(name)
+    return found
+
+
+# --- A pose that is only shown: put on an armature for a while, without keys, and taken off again
+
+
+_CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
+
+PoseValues = dict[str, tuple[tuple[float, ...], ...]]
+"""A bone's own values by its name."""
+
+
+def pose_values(armature: bpy.types.Object) -> PoseValues:
+    """The pose that an armature has now."""
+    if armature.pose is None:
+        return {}
+    return {
+        bone.name: tuple(tuple(getattr(bone, channel)) for channel in _CHANNELS)
+        for bone in armature.pose.bones
+    }
+
+
+def restore_pose(armature: bpy.types.Object, values: PoseValues) -> None:
+    """Put bones back to values of :func:`pose_values`; bones that are gone are passed."""
+    if armature.pose is None:
+        return
+    for bone in armature.pose.bones:
+        for channel, value in zip(_CHANNELS, values.get(bone.name, ()), strict=False):
+            setattr(bone, channel, value)
+
+
+def show_pose(
+    armature: bpy.types.Object,
+    names: Sequence[str],
+    rotations: Floats,
+    locations: Floats,
+    scales: Floats | None = None,
+) -> None:
+    """Pose bones, without keys: the next change of frame brings back what the action says.
+
+    Args:
+        armature: the armature object.
+        names: bones; those that are gone are passed.
+        rotations: (bones, 4), from rest.
+        locations: (bones, 3), in each bone's rest frame.
+        scales: (bones, 3), if any bone has one.
+    """
+    if armature.pose is None:
+        return
+    bones = armature.pose.bones
+    sizes = [None] * len(names) if scales is None else scales.tolist()
+    for name, rotation, location, size in zip(
+        names, rotations.tolist(), locations.tolist(), sizes, strict=True
+    ):
+        bone = bones.get(name)
+        if bone is not None:
+            place = Vector(location)
+            if not bone.bone.use_local_location:
+                place = carrying_axes(bone.bone) @ place
+            bone.matrix_basis = Matrix.LocRotScale(place[:], Quaternion(rotation), size)
+
+
+# --- Poses without keys: what a bone keeps of its own where an action says nothing ----------------
+#
+# Most bones are then at rest. But glTF files pose bones once and leave them out of their actions,
+# and rigs come with hands that are set half closed. Blender shows such a pose under any action;
+# once an action that keys all bones has been on the armature, it is gone. So it is kept beforehand,
+# and taken anew when an artist has changed it meanwhile.
+
+
+AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
+    "location": (0.0, 0.0, 0.0),
+    "scale": (1.0, 1.0, 1.0),
+    "rotation_quaternion": (1.0, 0.0, 0.0, 0.0),
+    "rotation_euler": (0.0, 0.0, 0.0),
+    "rotation_axis_angle": (0.0, 0.0, 1.0, 0.0),
+}
+"""Values of a bone's properties at rest."""
+
+UnkeyedPose = dict[tuple[str, str], tuple[float, ...]]
+"""Values by bone and property, where they are not those at rest."""
+
+_SAME: Final = 1e-5
+"""How far values may be off a curve, single precision, and be taken from it."""
+
+KEPT: Final = "octo_motion_unkeyed_pose"
+"""Custom property of an armature object: its unkeyed pose before we last gave it an action."""
+
+
+def rotation_channel(mode: str) -> str:
+    """The property that holds a bone's rotation in this mode."""
+    return f"rotation_{mode.lower()}" if mode in ("QUATERNION", "AXIS_ANGLE") else "rotation_euler"
+
+
+def unkeyed_pose(armature: bpy.types.Object) -> UnkeyedPose:
+    """What bones keep where an action has no curve for them.
+
+    That is the present pose where no action moves it now. Where one does, or where one that we made
+    has left its own pose behind, it is what was kept.
+    """
+    pose = _kept(armature)
+    if armature.pose is None:
+        return pose
+    # An artist may change the rotation mode of a bone that is moved: then no mode of it is free.
+    moved = {(name, _plain(channel)) for name, channel in _moved(armature)}
+    ours = _Generated(armature)
+    for bone in armature.pose.bones:
+        for channel in ("location", "scale", rotation_channel(bone.rotation_mode)):
+            place = bone.name, channel
+            values = tuple(getattr(bone, channel))
+            if (bone.name, _plain(channel)) in moved or ours.left_behind(bone, channel, values):
+                continue
+            pose.pop(place, None)
+            if values != AT_REST[channel]:
+                pose[place] = values
+    return pose
+
+
+def _plain(channel: str) -> str:
+    return "rotation" if channel.startswith("rotation") else channel
+
+
+def keep_unkeyed_pose(armature: bpy.types.Object) -> None:
+    """Note the unkeyed pose on the armature, before an action is given to it that keys all."""
+    kept: dict[str, dict[str, list[float]]] = {}
+    for (name, channel), values in unkeyed_pose(armature).items():
+        kept.setdefault(name, {})[channel] = list(values)
+    armature[KEPT] = kept
+
+
+def _kept(armature: bpy.types.Object) -> UnkeyedPose:
+    kept = armature.get(KEPT)
+    if kept is None or armature.pose is None:
+        return {}
+    pose: UnkeyedPose = {}
+    bones = armature.pose.bones
+    for name, channels in kept.items():
+        bone = bones.get(name)
+        for channel, values in channels.items():
+            if bone is not None and channel.startswith("rotation"):
+                # The bone may have another rotation mode by now.
+                wanted = rotation_channel(bone.rotation_mode)
+                pose[name, wanted] = _converted(channel, tuple(values), bone.rotation_mode)
+            else:
+                pose[name, channel] = tuple(values)
+    return pose
+
+
+def _converted(channel: str, values: tuple[float, ...], mode: str) -> tuple[float, ...]:
+    """Values of a rotation in a bone's mode; Euler angles are taken to be of its order."""
+    if channel == rotation_channel(mode):
+        return values
+    if channel == "rotation_quaternion":
+        turn = Quaternion(values)
+    elif channel == "rotation_axis_angle":
+        turn = Quaternion(values[1:], values[0])
+    else:
+        turn = Euler(values).to_quaternion()
+    if mode == "QUATERNION":
+        return (turn.w, turn.x, turn.y, turn.z)
+    if mode == "AXIS_ANGLE":
+        axis, angle = turn.to_axis_angle()
+        return (angle, *axis)
+    angles = turn.to_euler(cast("Any", mode))
+    return (angles.x, angles.y, angles.z)
+
+
+class _Generated:
+    """The actions that were made here for an armature: what they leave is nobody's pose."""
+
+    def __init__(self, armature: bpy.types.Object) -> None:
+        self._armature = armature
+        self._curves: dict[str, list[dict[int, bpy.types.FCurve]]] | None = None
+
+    def left_behind(
+        self, bone: bpy.types.PoseBone, channel: str, values: tuple[float, ...]
+    ) -> bool:
+        """Whether one of them shows these values at some time."""
+        if self._armature.get(KEPT) is None:
+            # None was made before.
+            return False
+        if self._curves is None:
+            self._curves = self._read()
+        path = bone.path_from_id(channel)
+        return any(_shows(curves, values) for curves in self._curves.get(path, ()))
+
+    def _read(self) -> dict[str, list[dict[int, bpy.types.FCurve]]]:
+        found: dict[str, list[dict[int, bpy.types.FCurve]]] = {}
+        for action in bpy.data.actions:
+            if not is_generated(action):
+                continue
+            own: dict[str, dict[int, bpy.types.FCurve]] = {}
+            for curve in curves_of(action):
+                own.setdefault(curve.data_path, {})[curve.array_index] = curve
+            for path, components in own.items():
+                found.setdefault(path, []).append(components)
+        return found
+
+
+def _shows(curves: Mapping[int, bpy.types.FCurve], values: tuple[float, ...]) -> bool:
+    """Whether F-curves of a property have these values at a frame, or between two."""
+    count = min(len(curve.keyframe_points) for curve in curves.values())
+    if count == 0 or set(curves) != set(range(len(values))):
+        return False
+    rows = np.empty((count, len(values)))
+    for component, curve in curves.items():
+        points = np.empty((len(curve.keyframe_points), 2), dtype=np.float32)
+        curve.keyframe_points.foreach_get("co", points.ravel())
+        rows[:, component] = points[:count, 1]
+    start = rows[:-1] if count > 1 else rows
+    along = rows[1:] - start if count > 1 else np.zeros_like(rows)
+    away = np.array(values) - start
+    share = np.sum(away * along, axis=1) / np.maximum(np.sum(along**2, axis=1), 1e-30)
+    nearest = away - np.clip(share, 0.0, 1.0)[:, None] * along
+    return bool(np.linalg.norm(nearest, axis=1).min() < _SAME * max(1.0, np.abs(rows).max()))
+
+
+def _moved(armature: bpy.types.Object) -> Iterator[tuple[str, str]]:
+    """Bones and properties that some action moves at present."""
+    data = armature.animation_data
+    if data is None:
+        return
+    acting = [(data.action, data.action_slot)]
+    if data.use_nla:
+        tracks = (track for track in data.nla_tracks if not track.mute)
+        acting += [
+            (strip.action, strip.action_slot)
+            for track in tracks
+            for strip in flattened(track.strips)
+            if not strip.mute
+        ]
+    for action, slot in acting:
+        if action is None or slot is None:
+            continue
+        for path in _paths(action, slot):
+            start, _, rest = path.partition('pose.bones["')
+            name, _, channel = rest.rpartition('"].')
+            if not start:
+                yield bpy.utils.unescape_identifier(name), channel
+
+
+def _paths(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> Iterable[str]:
+    for layer in action.layers:
+        for strip in layer.strips:
+            if isinstance(strip, bpy.types.ActionKeyframeStrip):
+                channelbag = strip.channelbag(slot)
+                if channelbag is not None:
+                    yield from (curve.data_path for curve in channelbag.fcurves if is_shown(curve))
