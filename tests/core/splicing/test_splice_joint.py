@@ -35,24 +35,15 @@ def bent_limb(random: np.random.Generator, bend: Floats) -> LimbTriangle:
     return LimbTriangle(joint, elbow, elbow + 0.25 * rotate(from_axis_angle(axis, bend), along))
 
 
-def turned(limb: LimbTriangle, turn: Floats) -> LimbTriangle:
-    return LimbTriangle(
-        limb.joint,
-        limb.joint + rotate(turn, limb.elbow - limb.joint),
-        limb.joint + rotate(turn, limb.hand - limb.joint),
-    )
-
-
 @given(seed=seeds)
 def test_a_limb_of_the_same_shape_is_laid_exactly_onto_the_wanted_one(seed: int):
     random = np.random.default_rng(seed)
     # The triangle of a limb that is flatter is believed in part only.
     limb = bent_limb(random, random.uniform(1.05, 2.25, 20))
     # Further than 45° about the hand's direction the normals are not trusted.
-    wanted = turned(
-        limb, from_axis_angle(normalized(random.normal(size=(20, 3))), np.full(20, 0.6))
-    )
-    result = turned(limb, joint_turn(limb, wanted))
+    axes = normalized(random.normal(size=(20, 3)))
+    wanted = limb.turned(from_axis_angle(axes, np.full(20, 0.6)))
+    result = limb.turned(joint_turn(limb, wanted))
     assert np.allclose(result.elbow, wanted.elbow, atol=1e-9)
     assert np.allclose(result.hand, wanted.hand, atol=1e-9)
 
@@ -62,7 +53,7 @@ def test_the_hand_always_points_where_it_should(seed: int):
     random = np.random.default_rng(seed)
     limb = bent_limb(random, random.uniform(0.0, 3.0, 20))
     wanted = replace(bent_limb(random, random.uniform(0.0, 3.0, 20)), joint=limb.joint)
-    result = turned(limb, joint_turn(limb, wanted))
+    result = limb.turned(joint_turn(limb, wanted))
     assert np.allclose(
         normalized(result.hand - limb.joint), normalized(wanted.hand - limb.joint), atol=1e-9
     )
@@ -91,7 +82,7 @@ def test_nothing_pops_while_an_elbow_goes_through_straight(seed: int):
         limb = LimbTriangle(
             zeros, elbow, elbow + 0.25 * rotate(from_axis_angle(across, bend), elbow / 0.3)
         )
-        wanted = turned(limb, from_axis_angle(normalized(fixed.normal(size=3)), 0.7))
+        wanted = limb.turned(from_axis_angle(normalized(fixed.normal(size=3)), 0.7))
         shifted = replace(wanted, hand=wanted.hand + 0.03 * fixed.normal(size=3))
         turns = joint_turn(limb, shifted)
         steps.append(angle_between(turns[1:], turns[:-1]).max())

@@ -85,10 +85,8 @@ def matched_bones(
     ours, others = landmarks
     if ours is not None and others is not None:
         for name in LANDMARKS:
-            mine, other = ours.get(name), others.get(name)
-            if mine is None or other is None:
-                continue
-            bone, answer = base.index.get(mine, -1), splice.index.get(other, -1)
+            bone = base.index.get(ours.get(name) or "", -1)
+            answer = splice.index.get(others.get(name) or "", -1)
             if bone in inside and answer in theirs:
                 pairs[bone] = answer
     taken = set(pairs.values())
@@ -194,12 +192,10 @@ def _follower(
     kind, _, side = landmark.partition(".")
     if landmarks is not None and kind in _NEXT:
         following = f"{_NEXT[kind]}.{side}" if side else _NEXT[kind]
-        name = landmarks.get(following)
-        number = base.index.get(name, -1) if name is not None else -1
+        number = base.index.get(landmarks.get(following) or "", -1)
         if number in pairs:
             return number
-    children = [child for child in base.children[bone] if child in pairs]
-    return children[0] if children else None
+    return next((child for child in base.children[bone] if child in pairs), None)
 
 
 def _same_body(base: Skeleton, splice: Skeleton, pairs: Mapping[int, int]) -> bool:

@@ -76,25 +76,14 @@ def chest_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
     Raises:
         ClipError: a landmark is missing, or they lie in one line.
     """
-    chest, left, right, top, low = (
-        landmark_bone(skeleton, landmarks, *choices)
-        for choices in (
-            ("chest",),
-            ("upper_arm.L",),
-            ("upper_arm.R",),
-            ("neck", "head"),
-            ("spine", "hips"),
-        )
+    chest = landmark_bone(skeleton, landmarks, "chest")
+    left, right, top, low = (
+        skeleton.heads[landmark_bone(skeleton, landmarks, *choices)]
+        for choices in (("upper_arm.L",), ("upper_arm.R",), ("neck", "head"), ("spine", "hips"))
     )
-    heads = skeleton.heads
-    return _frame(
-        skeleton,
-        landmarks,
-        chest,
-        axes=(heads[left] - heads[right], heads[top] - heads[low]),
-        origin=0.5 * (heads[left] + heads[right]),
-        joints=_CHEST_JOINTS,
-    )
+    joints = _joints(skeleton, landmarks, chest, _CHEST_JOINTS)
+    middle = 0.5 * (left + right)
+    return _frame(skeleton, chest, left - right, top - low, origin=middle, joints=joints)
 
 
 def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
@@ -103,20 +92,14 @@ def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
     Raises:
         ClipError: a landmark is missing, or they lie in one line.
     """
-    hips, left, right, top = (
-        landmark_bone(skeleton, landmarks, *choices)
-        for choices in (("hips",), ("thigh.L",), ("thigh.R",), ("neck", "head"))
+    hips = landmark_bone(skeleton, landmarks, "hips")
+    left, right, top = (
+        skeleton.heads[landmark_bone(skeleton, landmarks, *choices)]
+        for choices in (("thigh.L",), ("thigh.R",), ("neck", "head"))
     )
-    heads = skeleton.heads
-    middle = 0.5 * (heads[left] + heads[right])
-    return _frame(
-        skeleton,
-        landmarks,
-        hips,
-        axes=(heads[left] - heads[right], heads[top] - middle),
-        origin=middle,
-        joints=_PELVIS_JOINTS,
-    )
+    joints = _joints(skeleton, landmarks, hips, _PELVIS_JOINTS)
+    middle = 0.5 * (left + right)
+    return _frame(skeleton, hips, left - right, top - middle, origin=middle, joints=joints)
 
 
 def chain_frame(skeleton: Skeleton, bones: Sequence[int]) -> AnatomicalFrame:
@@ -166,14 +149,15 @@ def laid_over(splice: AnatomicalFrame, base: AnatomicalFrame) -> AnatomicalFrame
 
 def _frame(
     skeleton: Skeleton,
-    landmarks: Landmarks,
     bone: int,
+    left: Floats,
+    up: Floats,
     *,
-    axes: tuple[Floats, Floats],
     origin: Floats,
-    joints: Sequence[str],
+    joints: dict[str, Floats],
 ) -> AnatomicalFrame:
-    left, up = (normalized(axis) for axis in axes)
+    """A frame with X along ``left`` and Z as near to ``up`` as that allows, armature space."""
+    left, up = normalized(left), normalized(up)
     up = up - np.dot(left, up) * left
     if np.linalg.norm(left) < 0.5 or np.linalg.norm(up) < 1e-3:
         raise ClipError(
@@ -182,25 +166,22 @@ def _frame(
             "Look at the bone table.",
         )
     up = normalized(up)
-    axes_matrix = np.stack([left, np.cross(up, left), up], axis=-1)
+    axes = from_matrix(np.stack([left, np.cross(up, left), up], axis=-1))
     back = conjugate(skeleton.rest_rotations[bone])
-    head = skeleton.heads[bone]
-    places = {
-        name: rotate(back, skeleton.heads[child] - head)
-        for name in joints
-        if (child := _child_towards(skeleton, landmarks, bone, name)) is not None
-    }
-    return AnatomicalFrame(
-        bone, multiply(back, from_matrix(axes_matrix)), rotate(back, origin - head), places
-    )
+    offset = rotate(back, origin - skeleton.heads[bone])
+    return AnatomicalFrame(bone, multiply(back, axes), offset, joints)
 
 
-def _child_towards(
-    skeleton: Skeleton, landmarks: Landmarks, bone: int, landmark: str
-) -> int | None:
-    """The child of a bone on the way to a landmark: its head is fixed to the bone."""
-    end = skeleton.index.get(landmarks.get(landmark) or "")
-    if end is None:
-        return None
-    path = (end, *skeleton.ancestors(end))
-    return next((child for child in path if skeleton.parents[child] == bone), None)
+def _joints(
+    skeleton: Skeleton, landmarks: Landmarks, bone: int, names: Sequence[str]
+) -> dict[str, Floats]:
+    """Where the bone's children on the way to landmarks begin: these places are fixed to it."""
+    back = conjugate(skeleton.rest_rotations[bone])
+    places = {}
+    for name in names:
+        end = skeleton.index.get(landmarks.get(name) or "")
+        path = [] if end is None else [end, *skeleton.ancestors(end)]
+        for child in path:
+            if skeleton.parents[child] == bone:
+                places[name] = rotate(back, skeleton.heads[child] - skeleton.heads[bone])
+    return places

@@ -28,7 +28,7 @@ from ...rotations import (
 from ..clip import Clip, Posture, SpliceWindow, sample_clip, sample_world
 from ..humanoid import chain_length
 from .body_frames import AnatomicalFrame
-from .parts import LEG, landmark_bone
+from .parts import LEG
 from .retarget import MappedClip, Retarget
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
@@ -103,9 +103,8 @@ class LegTravel:
         leaving = (span.weights < span.entering)[:, None]
         goal_turns = np.where(leaving, later.orientations[:count], own.orientations[span.frames])
         goal_places = np.where(leaving, later.places[:count], own.places[span.frames])
-        weights = span.weights
-        later.orientations[:count] = slerp(goal_turns, orientations, weights)
-        later.places[:count] = goal_places + weights[:, None] * (places - goal_places)
+        later.orientations[:count] = slerp(goal_turns, orientations, span.weights)
+        later.places[:count] = goal_places + span.weights[:, None] * (places - goal_places)
         _write_hips(clip, ours, base, later, (rotations, locations))
 
     def _path(self, span: SpliceWindow) -> _Path:
@@ -119,8 +118,7 @@ class LegTravel:
         # Each round goes on from where the one before has led, and the way it faced then.
         turn = _heading(ends.orientations[1], ends.orientations[0])
         numbers = np.arange(span.rounds.max() + 1.0)
-        angle = 2.0 * np.arctan2(turn[3], turn[0])
-        turns = from_axis_angle(_UP, angle * numbers)
+        turns = from_axis_angle(_UP, 2.0 * np.arctan2(turn[3], turn[0]) * numbers)
         step = rotate(turns, (ends.places[1] - ends.places[0]) * _LEVEL)
         shifts = np.concatenate([np.zeros((1, 3)), np.cumsum(step, axis=0)[:-1]])
         # What is left of the step at the seam: how the pelvis leans, and how high it is.
@@ -178,27 +176,16 @@ def _heading(goal: Floats, start: Floats) -> Floats:
 
 def _leg(mapped: MappedClip) -> float:
     """Length of the legs, armature units."""
-    marks = mapped.humanoid()
-    return 0.5 * sum(
-        chain_length(
-            mapped.skeleton,
-            [landmark_bone(mapped.skeleton, marks, name) for name in LEG.limb_on(side)],
-        )
-        for side in "LR"
-    )
+    joints = ([mapped.bone(name) for name in LEG.limb_on(side)] for side in "LR")
+    return 0.5 * sum(chain_length(mapped.skeleton, each) for each in joints)
 
 
 def ground_height(mapped: MappedClip) -> float:
     """Height of the lowest point that a foot reaches in a clip, world units."""
-    clip, marks = mapped.clip, mapped.humanoid()
+    clip = mapped.clip
     count = min(len(clip), _GROUND_SAMPLES)
     chosen = clip.frames[np.linspace(0, len(clip) - 1, count).astype(np.intp)]
     posture = sample_clip(clip, chosen)
     turns, shifts, scale = sample_world(clip, chosen)
-    heights = [
-        (shifts + scale * rotate(turns, posture.head(landmark_bone(clip.skeleton, marks, foot))))[
-            :, 2
-        ].min()
-        for foot in ("foot.L", "foot.R")
-    ]
-    return float(min(heights))
+    feet = (posture.head(mapped.bone(foot)) for foot in ("foot.L", "foot.R"))
+    return float(min((shifts + scale * rotate(turns, each))[:, 2].min() for each in feet))

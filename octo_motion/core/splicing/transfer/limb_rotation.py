@@ -10,6 +10,7 @@ wanted direction. The source says nothing on a limb that is straight, and has no
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -66,6 +67,32 @@ class LimbTriangle:
     elbow: Floats
     hand: Floats
 
+    def turned(self, turn: Floats) -> LimbTriangle:
+        """The limb after a rotation (frames, 4) about its joint."""
+        elbow, hand = (rotate(turn, each - self.joint) for each in (self.elbow, self.hand))
+        return LimbTriangle(self.joint, self.joint + elbow, self.joint + hand)
+
+    @cached_property
+    def upper(self) -> Floats:
+        """(frames, 3) from the joint to the elbow."""
+        return self.elbow - self.joint
+
+    @cached_property
+    def lower(self) -> Floats:
+        """(frames, 3) from the elbow to the hand."""
+        return self.hand - self.elbow
+
+    @cached_property
+    def normal(self) -> Floats:
+        """(frames, 3) about which it is bent, none of a straight one."""
+        return cross(self.upper, self.lower)
+
+    @cached_property
+    def bend(self) -> Floats:
+        """(frames,) angle at the elbow by which it is off straight, 0…π."""
+        cosine = np.sum(self.upper * self.lower, axis=-1)
+        return np.arctan2(np.linalg.norm(self.normal, axis=-1), cosine)
+
 
 def joint_turn(limb: LimbTriangle, wanted: LimbTriangle) -> Floats:
     """The rotation (frames, 4) about a limb's joint that brings it to the wanted one's shape.
@@ -81,14 +108,17 @@ def joint_turn(limb: LimbTriangle, wanted: LimbTriangle) -> Floats:
     """
     own, goal = normalized(limb.hand - limb.joint), normalized(wanted.hand - limb.joint)
     aimed = shortest_arc(own, goal)
-    normal = rotate(aimed, cross(limb.elbow - limb.joint, limb.hand - limb.elbow))
-    other = cross(wanted.elbow - limb.joint, wanted.hand - wanted.elbow)
-    sine = np.sum(cross(normal, other) * goal, axis=-1)
-    angle = np.arctan2(sine, np.sum(normal * other, axis=-1))
+    angle = _angle_about(goal, rotate(aimed, limb.normal), wanted.normal)
     # It has faded out long before half a turn, where the way round would jump.
     trust = smooth_step((_DISAGREES - np.abs(angle)) / (_DISAGREES - _AGREES))
-    share = np.minimum(_bend(limb), _bend(wanted)) * trust
+    share = np.minimum(_trust(limb.bend, _BENT), _trust(wanted.bend, _BENT)) * trust
     return multiply(from_axis_angle(goal, angle * share), aimed)
+
+
+def _angle_about(axis: Floats, start: Floats, goal: Floats) -> Floats:
+    """The angle (frames,) from one direction across an axis to another, about it."""
+    sine = np.sum(cross(start, goal) * axis, axis=-1)
+    return np.arctan2(sine, np.sum(start * goal, axis=-1))
 
 
 def bend_to_reach(
@@ -112,33 +142,28 @@ def bend_to_reach(
     Returns:
         Rotations (frames, 4) of the upper and of the lower limb.
     """
-    first, second = limb.elbow - limb.joint, limb.hand - limb.elbow
-    upper, lower = np.linalg.norm(first, axis=-1), np.linalg.norm(second, axis=-1)
-    normal = cross(first, second)
-    now = np.arctan2(np.linalg.norm(normal, axis=-1), np.sum(first * second, axis=-1))
-    wanted = _wanted_bend(upper, lower, limb, target, now)
-    bend = wanted if alike else now + _told(now, _SHAPED) * (wanted - now)
-    swung = _lift(upper, lower, bend) - _lift(upper, lower, now)
+    upper, lower = np.linalg.norm(limb.upper, axis=-1), np.linalg.norm(limb.lower, axis=-1)
+    bend = _wanted_bend(upper, lower, limb, target)
+    if not alike:
+        bend = limb.bend + _trust(limb.bend, _SHAPED) * (bend - limb.bend)
+    swung = _lift(upper, lower, bend) - _lift(upper, lower, limb.bend)
     direction = normalized(limb.hand - limb.joint)
     across = normalized(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
-    plane = normal / np.maximum(upper * lower, 1e-12)[:, None]
+    plane = limb.normal / np.maximum(upper * lower, 1e-12)[:, None]
     missing = np.maximum(np.sin(_STRAIGHT) - np.linalg.norm(plane, axis=-1), 0.0)
-    missing = missing * smooth_step(np.abs(bend - now) / _MOVED)
+    missing = missing * smooth_step(np.abs(bend - limb.bend) / _MOVED)
     axis = normalized(plane + missing[:, None] * across)
     straight = ~np.any(axis, axis=-1)
     axis[straight] = across[straight]
     # About the limb's line: from its own plane to that in which it bends.
-    sine = np.sum(cross(normal, axis) * direction, axis=-1)
-    turn = from_axis_angle(direction, np.arctan2(sine, np.sum(normal * axis, axis=-1)))
+    turn = from_axis_angle(direction, _angle_about(direction, limb.normal, axis))
     upper_turn = multiply(from_axis_angle(axis, -swung), turn)
-    lower_turn = multiply(from_axis_angle(axis, bend - now - swung), turn)
+    lower_turn = multiply(from_axis_angle(axis, bend - limb.bend - swung), turn)
     # The elbow goes round the limb's line to its new side, the bones do not twist with it.
-    return _untwisted(upper_turn, first), _untwisted(lower_turn, second)
+    return _untwisted(upper_turn, limb.upper), _untwisted(lower_turn, limb.lower)
 
 
-def _wanted_bend(
-    upper: Floats, lower: Floats, limb: LimbTriangle, target: Floats, now: Floats
-) -> Floats:
+def _wanted_bend(upper: Floats, lower: Floats, limb: LimbTriangle, target: Floats) -> Floats:
     """The bend (frames,) with which a hand is as far from the joint as its target, softened.
 
     Args:
@@ -146,7 +171,6 @@ def _wanted_bend(
         lower: (frames,) of the lower limb.
         limb: the limb.
         target: (frames, 3)
-        now: (frames,) the bend that the limb has.
     """
     product = np.maximum(upper * lower, 1e-12)
     distance = np.linalg.norm(target - limb.joint, axis=-1)
@@ -169,6 +193,7 @@ def _wanted_bend(
     bend -= eased(distance - far, far, straight, straight)
     bend += eased(near - distance, near, tight, _TIGHTEST - tight)
     # At both ends of its reach a limb that is there already stays as it is.
+    now = limb.bend
     ends = np.maximum(1.0 - now / np.maximum(straight, 1e-12), (now - _TIGHT) / (np.pi - _TIGHT))
     span = soft * np.clip(ends, 0.0, 1.0)
     off = np.abs(distance - np.linalg.norm(limb.hand - limb.joint, axis=-1))
@@ -194,23 +219,15 @@ def hinge_axis(limb: LimbTriangle, orientation: Floats) -> Floats:
         limb: the joints over the clip.
         orientation: (frames, 4) of the upper limb.
     """
-    normals = cross(limb.elbow - limb.joint, limb.hand - limb.elbow)
-    mean = rotate(conjugate(orientation), normals).mean(axis=0)
-    along = rotate(conjugate(orientation), limb.elbow - limb.joint).mean(axis=0)
+    mean = rotate(conjugate(orientation), limb.normal).mean(axis=0)
+    along = rotate(conjugate(orientation), limb.upper).mean(axis=0)
     if np.linalg.norm(mean) > 1e-3 * np.sum(along**2):
         return normalized(mean)
     # Always straight: any axis across the limb is as good.
     return normalized(np.cross(along, np.eye(3)[np.argmin(np.abs(along))]))
 
 
-def _bend(limb: LimbTriangle) -> Floats:
-    """0 … 1: how much a limb's triangle says of its turn."""
-    upper, lower = limb.elbow - limb.joint, limb.hand - limb.elbow
-    sine = np.linalg.norm(cross(upper, lower), axis=-1)
-    return _told(np.arctan2(sine, np.sum(upper * lower, axis=-1)), _BENT)
-
-
-def _told(bend: Floats, bent: float) -> Floats:
+def _trust(bend: Floats, bent: float) -> Floats:
     """0 … 1: how much a bend (frames,) says, if one as large as ``bent`` says all."""
     opened = smooth_step((bend - _STRAIGHT) / (bent - _STRAIGHT))
     shut = np.pi - _STRAIGHT

@@ -73,6 +73,14 @@ class MappedClip:
             )
         return self.landmarks
 
+    def bone(self, landmark: str) -> int:
+        """Index of a landmark's bone.
+
+        Raises:
+            ClipError: the skeleton has none.
+        """
+        return landmark_bone(self.skeleton, self.humanoid(), landmark)
+
     @contextmanager
     def named_in_errors(self) -> Iterator[None]:
         """Errors within say which of the two clips they speak of."""
@@ -221,13 +229,9 @@ def write_retargeted(
     turn = joint_turn(limb, wanted)
     lower_turn = turn
     if exact:
-        turned = LimbTriangle(
-            limb.joint,
-            limb.joint + rotate(turn, limb.elbow - limb.joint),
-            limb.joint + rotate(turn, limb.hand - limb.joint),
-        )
         hinge = rotate(multiply(turn, result.orientation(joint)), retarget.hinge)
         alike = retarget.match.same_body
+        turned = limb.turned(turn)
         upper_bend, lower_bend = bend_to_reach(turned, wanted.hand, hinge, alike=alike)
         turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
     _turn_limb(result, rotations, (joint, turn), (elbow, lower_turn))
@@ -353,8 +357,9 @@ def _side_retarget(
     if kind.spine:
         return _spine_retarget(clips, (bones, others), frames, chests)
     pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, marks)
-    rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
-    match = find_correspondence(base.skeleton, splice.skeleton, pairs, rests, marks)
+    match = find_correspondence(
+        base.skeleton, splice.skeleton, pairs, _at_rest(frames, clips), marks
+    )
     limb = None
     if kind.limb is not None:
         limb = _limb_joints(kind, side, base), _limb_joints(kind, side, splice)
@@ -380,11 +385,8 @@ def _spine_retarget(
         pairs, spread = dict(zip(ours, theirs, strict=True)), None
     else:
         pairs, spread = {ours[-1]: theirs[-1]}, (tuple(ours), tuple(theirs))
-    rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
-    bent = any(
-        angle_between(rest, chest.at_rest(each.skeleton)) > _UPRIGHT
-        for rest, chest, each in zip(rests, chests, clips, strict=True)
-    )
+    rests = _at_rest(frames, clips)
+    bent = bool((angle_between(rests, _at_rest(chests, clips)) > _UPRIGHT).any())
     marks = base.humanoid(), splice.humanoid()
     match = find_correspondence(base.skeleton, splice.skeleton, pairs, rests, marks, aim_all=bent)
     top = multiply(chests[1].turn, conjugate(chests[0].turn))
@@ -392,23 +394,28 @@ def _spine_retarget(
     return Retarget(base, splice, tuple(ours), frames, match, None, spread, bent)
 
 
+def _at_rest(
+    frames: tuple[AnatomicalFrame, AnatomicalFrame], clips: tuple[MappedClip, MappedClip]
+) -> tuple[Floats, Floats]:
+    """Orientations (4,) of base and splice's frames in their rest poses."""
+    return frames[0].at_rest(clips[0].skeleton), frames[1].at_rest(clips[1].skeleton)
+
+
 def _hangs_on_clavicle(kind: PartKind, side: str, mapped: MappedClip) -> bool:
     """Whether there is a collar bone, and the arm hangs on it."""
-    skeleton, marks = mapped.skeleton, mapped.humanoid()
-    names = sided(kind.clavicle, side), sided(kind.root, side)
-    if marks.get(names[0]) is None:
+    clavicle, root = sided(kind.clavicle, side), sided(kind.root, side)
+    if mapped.humanoid().get(clavicle) is None:
         return False
-    clavicle, root = (landmark_bone(skeleton, marks, name) for name in names)
-    return root in bones_beneath(skeleton, [clavicle])
+    return mapped.bone(clavicle) in mapped.skeleton.ancestors(mapped.bone(root))
 
 
 def _limb_joints(kind: PartKind, side: str, mapped: MappedClip) -> tuple[int, int, int]:
     """The bones that begin at joint, elbow and hand."""
-    skeleton, marks = mapped.skeleton, mapped.humanoid()
+    skeleton = mapped.skeleton
     with mapped.named_in_errors():
-        joint, elbow, hand = (landmark_bone(skeleton, marks, name) for name in kind.limb_on(side))
+        joint, elbow, hand = map(mapped.bone, kind.limb_on(side))
         for upper, lower in ((joint, elbow), (elbow, hand)):
-            if lower not in bones_beneath(skeleton, [upper]):
+            if upper not in skeleton.ancestors(lower):
                 raise ClipError(
                     f"'{skeleton.names[lower]}' does not hang on '{skeleton.names[upper]}'.",
                     "Such a limb follows controls: bake its motion onto its bones first.",
@@ -420,21 +427,16 @@ def _chain_retarget(part: Part, base: MappedClip, splice: MappedClip) -> Retarge
     with base.named_in_errors():
         bones = bones_beneath(base.skeleton, [bone_of(base.skeleton, part.root)])
     with splice.named_in_errors():
-        others = bones_beneath(
-            splice.skeleton, [bone_of(splice.skeleton, part.splice_root or part.root)]
-        )
-    names = matched_bones(base.skeleton, bones, splice.skeleton, others, (None, None))
-    pairs, spread = names, None
-    if len(names) < len(bones) or names.get(bones[0]) != others[0]:
+        root = bone_of(splice.skeleton, part.splice_root or part.root)
+        others = bones_beneath(splice.skeleton, [root])
+    pairs, spread = matched_bones(base.skeleton, bones, splice.skeleton, others, (None, None)), None
+    if len(pairs) < len(bones) or pairs.get(bones[0]) != others[0]:
         pairs = matched_chains(base.skeleton, bones, splice.skeleton, others)
-        single = all(
-            _single(each, within)
-            for each, within in ((base.skeleton, bones), (splice.skeleton, others))
-        )
+        single = _single(base.skeleton, bones) and _single(splice.skeleton, others)
         if single and len(bones) != len(others):
             pairs, spread = {}, (tuple(bones), tuple(others))
     frames = chain_frame(base.skeleton, bones), chain_frame(splice.skeleton, others)
-    rests = frames[0].at_rest(base.skeleton), frames[1].at_rest(splice.skeleton)
+    rests = _at_rest(frames, (base, splice))
     match = find_correspondence(
         base.skeleton, splice.skeleton, pairs, rests, (None, None), aim_all=True
     )

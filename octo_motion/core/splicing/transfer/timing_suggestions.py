@@ -17,7 +17,7 @@ from ...rotations import Floats, conjugate, rotate
 from ..clip import Clip, sample_clip
 from ..humanoid import Landmarks, chain_length
 from .body_frames import laid_over, pelvis_frame
-from .parts import LEG, landmark_bone
+from .parts import LEG
 from .retarget import MappedClip
 
 _RATE: Final = 20.0
@@ -106,16 +106,14 @@ def _legs(mapped: MappedClip, base: MappedClip, frames: Floats, pace: float) -> 
     """Where knees and feet are in the pelvis's frame and how they swing, (frames, 24), in leg
     lengths.
     """
-    marks = mapped.humanoid()
-    skeleton = mapped.skeleton
     reference = pelvis_frame(base.skeleton, base.humanoid())
-    frame = laid_over(pelvis_frame(skeleton, marks), reference)
+    frame = laid_over(pelvis_frame(mapped.skeleton, mapped.humanoid()), reference)
     posture = sample_clip(mapped.clip, frames)
     back, place = conjugate(frame.orientation(posture)), frame.place(posture)
     positions = []
     for side in "LR":
-        joints = [landmark_bone(skeleton, marks, name) for name in LEG.limb_on(side)]
-        length = chain_length(skeleton, joints)
+        joints = [mapped.bone(name) for name in LEG.limb_on(side)]
+        length = chain_length(mapped.skeleton, joints)
         positions += [rotate(back, posture.head(bone) - place) / length for bone in joints[1:]]
     seen = np.concatenate(positions, axis=-1)
     speeds = np.gradient(seen, axis=0) * pace if len(seen) > 1 else np.zeros_like(seen)
