@@ -56,7 +56,7 @@ class ImportSession:
         self._active = layer.objects.active.name_full if layer.objects.active else ""
 
     @property
-    def told(self) -> str:
+    def current(self) -> str:
         """The file whose turn it is, for people."""
         number = len(self.clips) + len(self.refused)
         path = self._paths[min(number, len(self._paths) - 1)]
@@ -70,11 +70,13 @@ class ImportSession:
         """
         for number, path in enumerate(self._paths):
 
-            def told(share: float, number: int = number) -> None:
+            def follow(share: float, number: int = number) -> None:
                 progress((number + share) / len(self._paths))
 
             try:
-                clip = import_clip(path, bpy.context, self._frame_start, up=self._up, progress=told)
+                clip = import_clip(
+                    path, bpy.context, self._frame_start, up=self._up, progress=follow
+                )
                 self.clips.append(clip)
             except ClipError as error:
                 self.refused.append((path, error))
@@ -212,7 +214,7 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
                 pass
         finally:
             window_manager.progress_end()
-        self._tell(session.end())
+        self._report(session.end())
 
     def _new_session(self, context: bpy.types.Context) -> ImportSession:
         folder = Path(bpy.path.abspath(self.directory))
@@ -233,22 +235,22 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
 
     def conclude(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         assert self._session is not None
-        self._tell(self._session.end())
+        self._report(self._session.end())
 
     def status(self, progress: float) -> str:  # noqa: ARG002
         assert self._session is not None
-        return f"Importing {self._session.told}    Esc: none of them"
+        return f"Importing {self._session.current}    Esc: none of them"
 
     def take_back(self) -> None:
         if self._session is not None:
             self._session.undo()
 
-    def _tell(self, session: ImportSession) -> None:
+    def _report(self, session: ImportSession) -> None:
         count = len(session.clips)
-        told = f"{count} {'clip' if count == 1 else 'clips'} imported"
+        message = f"{count} {'clip' if count == 1 else 'clips'} imported"
         if session.refused:
-            told += f", {len(session.refused)} refused"
-        self.report({"INFO"}, f"{told}.")
+            message += f", {len(session.refused)} refused"
+        self.report({"INFO"}, f"{message}.")
         # Blender's status bar keeps the last, which is to be the one that says most.
         for clip in session.clips:
             for note in clip.notes:

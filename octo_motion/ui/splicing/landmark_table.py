@@ -59,12 +59,7 @@ class OCTO_MOTION_OT_map_skeleton(_TableOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,
-        table: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:  # noqa: ARG002
         found = map_skeleton(read_skeleton(armature))
         if found.problem:
             raise RigError(
@@ -106,12 +101,7 @@ class OCTO_MOTION_OT_landmark_pick(_TableOperator, bpy.types.Operator):
             return False
         return True
 
-    def edit(
-        self,
-        context: bpy.types.Context,
-        armature: bpy.types.Object,
-        table: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:
         bone = context.active_pose_bone
         if bone is None or bone.id_data != armature:
             raise RigError(
@@ -143,12 +133,7 @@ class OCTO_MOTION_OT_landmarks_mirror(_TableOperator, bpy.types.Operator):
         other = "right" if properties.direction == "LEFT_TO_RIGHT" else "left"
         return f"Fill the {other} side with the bones that are called like those of this side"
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,
-        table: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:  # noqa: ARG002
         bones = dict(read_landmarks(table).bones)
         source, target = ("L", "R") if self.direction == "LEFT_TO_RIGHT" else ("R", "L")
         given = {part: bones[f"{part}.{source}"] for part in SIDED if f"{part}.{source}" in bones}
@@ -173,12 +158,7 @@ class OCTO_MOTION_OT_landmarks_clear(_TableOperator, bpy.types.Operator):
     bl_description = "Empty the table. Bones and their keys stay as they are"
     bl_options = {"REGISTER", "UNDO"}
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        table: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:  # noqa: ARG002
         write_landmarks(table, {})
 
 

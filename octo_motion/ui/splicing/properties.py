@@ -8,7 +8,7 @@ be overridden.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import bpy
 
@@ -127,6 +127,23 @@ def _slot(description: str) -> Any:
     return StringProperty(name="Slot", description=description)
 
 
+def _action(name: str, description: str) -> Any:
+    return PointerProperty(name=name, description=description, type=bpy.types.Action)
+
+
+def _as_shown(name: str, what: str) -> Any:
+    return BoolProperty(
+        name=name,
+        description=f"Take the {what} as the scene shows it, with constraints, drivers and NLA. "
+        "That plays the scene, so it takes longer",
+    )
+
+
+def _frame(name: str, description: str, **options: Any) -> Any:
+    """A moment, or how long something takes, in frames."""
+    return FloatProperty(name=name, description=description, step=100, precision=1, **options)
+
+
 class SpliceItem(bpy.types.PropertyGroup):
     """One part of one clip, and when."""
 
@@ -153,31 +170,11 @@ class SpliceItem(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=_is_armature,
     )
-    action: PointerProperty(
-        name="Action",
-        description="The clip. It is never changed",
-        type=bpy.types.Action,
-    )
+    action: _action("Action", "The clip. It is never changed")
     slot: _slot("Slot of the clip's action; empty takes the one that fits the source")
-    visual: BoolProperty(
-        name="As Shown",
-        description="Take the clip as the scene shows it, with constraints, drivers and NLA. "
-        "That plays the scene, so it takes longer",
-    )
-    splice_start: FloatProperty(
-        name="Clip Start",
-        description="Frame of the clip that is shown first",
-        default=1.0,
-        step=100,
-        precision=1,
-    )
-    base_start: FloatProperty(
-        name="Base Start",
-        description="Frame of the base at which the splice begins",
-        default=1.0,
-        step=100,
-        precision=1,
-    )
+    visual: _as_shown("As Shown", "clip")
+    splice_start: _frame("Clip Start", "Frame of the clip that is shown first", default=1.0)
+    base_start: _frame("Base Start", "Frame of the base at which the splice begins", default=1.0)
     rate: FloatProperty(
         name="Rate",
         description="Speed of the clip, 1 as it is",
@@ -187,29 +184,23 @@ class SpliceItem(bpy.types.PropertyGroup):
         soft_max=4.0,
         step=5,
     )
-    length: FloatProperty(
-        name="Length",
-        description="Frames of the base that the splice lasts; 0 is as long as there is motion",
+    length: _frame(
+        "Length",
+        "Frames of the base that the splice lasts; 0 is as long as there is motion",
         min=0.0,
-        step=100,
-        precision=1,
     )
-    ease_in: FloatProperty(
-        name="Ease In",
-        description="Frames over which the splice comes in, and each further round of a loop",
+    ease_in: _frame(
+        "Ease In",
+        "Frames over which the splice comes in, and each further round of a loop",
         default=6.0,
         min=0.0,
-        step=100,
-        precision=1,
     )
-    ease_out: FloatProperty(
-        name="Ease Out",
-        description="Frames over which the splice goes, if it ends before the base; over which a "
-        "round of a loop goes; and over which a clip that is held comes to rest",
+    ease_out: _frame(
+        "Ease Out",
+        "Frames over which the splice goes, if it ends before the base; over which a round of a "
+        "loop goes; and over which a clip that is held comes to rest",
         default=6.0,
         min=0.0,
-        step=100,
-        precision=1,
     )
     after: EnumProperty(
         name="After",
@@ -241,40 +232,23 @@ class SpliceItem(bpy.types.PropertyGroup):
     mute: BoolProperty(name="Mute", description="Leave this splice out")
 
 
-class SpliceStack:
-    """What ``Object.octo_motion.splicing`` has of the stack."""
+class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
+    """Settings of splicing, saved with the armature object."""
 
-    base: PointerProperty(
-        name="Base",
-        description="The action onto which parts are spliced. It is never changed",
-        type=bpy.types.Action,
-    )
+    base: _action("Base", "The action onto which parts are spliced. It is never changed")
     base_slot: _slot("Slot of the base; empty takes the one that fits the armature")
-    visual: BoolProperty(
-        name="Base As Shown",
-        description="Take the base as the scene shows it, with constraints, drivers and NLA. "
-        "That plays the scene, so it takes longer",
-    )
+    visual: _as_shown("Base As Shown", "base")
     splices: CollectionProperty(
         name="Splices",
         description="What is spliced onto the base, each onto the result of those above it",
         type=SpliceItem,
     )
     active_splice: IntProperty(name="Active Splice", options={"HIDDEN"})
-    result: PointerProperty(
-        name="Result",
-        description="The action that was built last. It is made anew in place until you edit it; "
-        "then it is yours, and the next one is a new action",
-        type=bpy.types.Action,
+    result: _action(
+        "Result",
+        "The action that was built last. It is made anew in place until you edit it; then it is "
+        "yours, and the next one is a new action",
     )
-
-
-# --- All of it ------------------------------------------------------------------------------------
-
-
-class OCTO_MOTION_PG_splicing(SpliceStack, bpy.types.PropertyGroup):
-    """Settings of splicing, saved with the armature object."""
-
     landmarks: PointerProperty(
         name="Landmarks",
         description="Which bone is which part of the body",
@@ -289,12 +263,12 @@ CLASSES: Final[tuple[type, ...]] = (
 )
 
 
-def splicing_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_splicing:
-    """The settings of an armature object.
+def splicing_settings(armature: bpy.types.Object) -> Any:
+    """The settings of an armature object, of whose properties type checkers know nothing.
 
     Raises:
         RigError: the object is no armature.
     """
     armature_data(armature)
     make_overridable(armature)
-    return cast("OCTO_MOTION_PG_splicing", armature.octo_motion.splicing)  # type: ignore[attr-defined]
+    return armature.octo_motion.splicing  # type: ignore[attr-defined]

@@ -13,7 +13,6 @@ from ...blender.animation import writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError
 from ...core.rotations import Floats
-from ...core.splicing.transfer import Suggestion
 from ..declared_settings import assign
 from ..operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ..panel_base import ItemRows
@@ -280,12 +279,6 @@ def _base(armature: bpy.types.Object, settings: Any) -> tuple[bpy.types.Action, 
 MOST_SUGGESTIONS: Final = 5
 
 
-def set_timing(item: Any, base_start: float, splice_start: float) -> None:
-    """Set where a splice begins."""
-    assign(item, "base_start", base_start)
-    assign(item, "splice_start", splice_start)
-
-
 class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
     bl_idname = "octo_motion.splice_build"
     bl_label = "Build Splices"
@@ -295,14 +288,9 @@ class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
     )
     bl_options = {"REGISTER", "UNDO"}
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,
-        settings: Any,  # noqa: ARG002
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         stack = prepare_splices(armature)
-        tell(self, write_splices(stack, stack.compute()))
+        report_built(self, write_splices(stack, stack.compute()))
 
 
 class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
@@ -322,37 +310,29 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
         max=MOST_SUGGESTIONS,
         options={"SKIP_SAVE"},
     )
-    told: str = ""
+    found: str = ""
 
     def draw(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         layout = self.layout
         assert layout is not None
         layout.prop(self, "choice")
-        for line in self.told.splitlines():
+        for line in self.found.splitlines():
             layout.label(text=line)
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,
-        settings: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         number = settings.active_splice
         stack = prepare_splices(armature)
         found = suggestions(stack, number, MOST_SUGGESTIONS)
         chosen = found[min(self.choice, len(found)) - 1]
-        stack = stack.retimed(number, chosen.base_start, chosen.splice_start)
-        clip = stack.compute()
-        set_timing(settings.splices[number], chosen.base_start, chosen.splice_start)
-        made = write_splices(stack, clip)
-        lines = [_line(rank, each) for rank, each in enumerate(found, 1)]
-        self.told = "\n".join(lines)
-        told = f"Begins at {chosen.base_start:g}. Best first: {'; '.join(lines)}."
-        tell(self, made, told)
-
-
-def _line(rank: int, found: Suggestion) -> str:
-    return f"{rank}: frame {found.base_start:g} ({found.cost:.2f} leg lengths apart)"
+        starts = chosen.base_start, chosen.splice_start
+        made = build_retimed(armature, settings, number, starts, stack)
+        lines = [
+            f"{rank}: frame {each.base_start:g} ({each.cost:.2f} leg lengths apart)"
+            for rank, each in enumerate(found, 1)
+        ]
+        self.found = "\n".join(lines)
+        message = f"Begins at {chosen.base_start:g}. Best first: {'; '.join(lines)}."
+        report_built(self, made, message)
 
 
 def build_retimed(
@@ -369,11 +349,12 @@ def build_retimed(
     """
     stack = (prepared or prepare_splices(armature)).retimed(number, *starts)
     clip = stack.compute()
-    set_timing(settings.splices[number], *starts)
+    for name, start in zip(("base_start", "splice_start"), starts, strict=True):
+        assign(settings.splices[number], name, start)
     return write_splices(stack, clip)
 
 
-def tell(operator: bpy.types.Operator, made: SpliceSummary, message: str = "") -> None:
+def report_built(operator: bpy.types.Operator, made: SpliceSummary, message: str = "") -> None:
     """Report what was made, and then, to stay on screen, what is to be looked at."""
     operator.report({"INFO"}, message or made.message)
     for each in made.warnings:

@@ -41,7 +41,7 @@ from ...core.splicing.transfer import (
     suggest_timings,
 )
 from ..declared_settings import plain
-from .properties import OCTO_MOTION_PG_splicing, read_landmarks, splicing_settings, write_landmarks
+from .properties import read_landmarks, splicing_settings, write_landmarks
 
 _FINER: Final = 4
 """Samples per frame of a clip that is slowed down, …"""
@@ -70,14 +70,18 @@ class Stack:
     splices: tuple[Splice | None, ...]
     """In the order of the list; none for one that is muted."""
 
+    @property
+    def acting(self) -> list[Splice]:
+        """Those that are not muted."""
+        return [splice for splice in self.splices if splice is not None]
+
     def compute(self) -> Clip:
         """The whole result.
 
         Raises:
             ClipError: a bone or landmark is missing, or a timing makes no sense.
         """
-        acting = [splice for splice in self.splices if splice is not None]
-        return build_splices(self.base.clip, self.base.landmarks, acting)
+        return build_splices(self.base.clip, self.base.landmarks, self.acting)
 
     def retimed(self, number: int, base_start: float, splice_start: float) -> Stack:
         """The same with another start of one splice."""
@@ -119,15 +123,14 @@ def prepare_splices(armature: bpy.types.Object) -> Stack:
         OctoMotionError: something is wrong that the user can put right.
     """
     settings = splicing_settings(armature)
-    stack = cast("Any", settings)
     writable_armature(armature)
-    if len(stack.splices) == 0:
+    if len(settings.splices) == 0:
         raise ClipError(
             f"'{armature.name}' has no splices.", "Add one in the panel Splicing (Add Splice)."
         )
     reader = ClipReader()
     base = reader.base(armature)
-    splices = [None if item.mute else _splice(reader, item, base) for item in stack.splices]
+    splices = [None if item.mute else _splice(reader, item, base) for item in settings.splices]
     return Stack(armature.name, base, tuple(splices))
 
 
@@ -143,7 +146,7 @@ class ClipReader:
         Raises:
             OctoMotionError: there is none, or it cannot be read.
         """
-        settings = cast("Any", splicing_settings(armature))
+        settings = splicing_settings(armature)
         if settings.base is None:
             raise ClipError(
                 f"'{armature.name}' has no base action, or it is gone.",
@@ -159,16 +162,12 @@ class ClipReader:
         Raises:
             OctoMotionError: it is gone, or cannot be read.
         """
-        if item.source is None:
-            raise ClipError(
-                f"The source armature of splice '{item.name}' is gone, or was never chosen.",
-                "Choose it in the panel Splicing, mute the splice or remove it.",
-            )
-        if item.action is None:
-            raise ClipError(
-                f"The action of splice '{item.name}' is gone, or was never chosen.",
-                "Choose it in the panel Splicing, mute the splice or remove it.",
-            )
+        for each, what in ((item.source, "source armature"), (item.action, "action")):
+            if each is None:
+                raise ClipError(
+                    f"The {what} of splice '{item.name}' is gone, or was never chosen.",
+                    "Choose it in the panel Splicing, mute the splice or remove it.",
+                )
         # Slowed down, what a clip does between its frames is seen. To play the scene takes longer.
         between = item.rate < 1.0 and not item.visual
         return self.source(item.source, item.action, item.slot, visual=item.visual, between=between)
@@ -215,11 +214,10 @@ class ClipReader:
 def _check_mixing(armature: bpy.types.Object) -> None:
     """As shown, a base has its NLA tracks in it; so the result must act alone."""
     data = armature.animation_data
-    if (
-        data is None
-        or not data.use_nla
-        or not any(len(track.strips) and not track.mute for track in data.nla_tracks)
-    ):
+    if data is None or not data.use_nla:
+        return
+    acting = any(len(track.strips) and not track.mute for track in data.nla_tracks)
+    if not acting:
         return
     if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
         raise ClipError(
@@ -236,7 +234,7 @@ def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, 
         The landmarks, none where the table is empty and the skeleton is no humanoid; why that is
         so; and whether the table was empty and could be filled with them.
     """
-    bones = dict(read_landmarks(cast("Any", splicing_settings(armature)).landmarks).bones)
+    bones = dict(read_landmarks(splicing_settings(armature).landmarks).bones)
     if all(each in bones for each in LANDMARKS if each not in OPTIONAL):
         return Landmarks(bones), "", False
     found = map_skeleton(read_skeleton(armature))
@@ -310,8 +308,8 @@ def _check_landmarks(splice: Splice, source: Source) -> None:
         bones = source.clip.skeleton.index
         asked = any(known.get(each) not in bones for each in LANDMARKS if each not in OPTIONAL)
         # With all landmarks there, it is the rig that does not serve.
-        told = remedy if asked else error.remedy
-        raise ClipError(f"'{source.armature}': {error.problem}", told) from None
+        remedy = remedy if asked else error.remedy
+        raise ClipError(f"'{source.armature}': {error.problem}", remedy) from None
 
 
 def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
@@ -357,13 +355,12 @@ def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
     armature = local_object(stack.armature)
     writable_armature(armature)
     settings = splicing_settings(armature)
-    group = cast("Any", settings)
-    previous = group.result
+    previous = settings.result
     if previous is not None and is_source(previous):
         # Someone splices from it: it stays as it is.
         previous = None
     besides, lost = _besides(armature, stack, clip)
-    kept, group.result = group.result, None
+    kept, settings.result = settings.result, None
     try:
         action = write_clip(
             armature,
@@ -374,18 +371,17 @@ def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
             besides=besides,
         )
     except BaseException:
-        group.result = kept
+        settings.result = kept
         raise
-    group.result = action
+    settings.result = action
     if stack.base.found and stack.base.landmarks is not None:
         # What was used is what the table shows from now on.
-        write_landmarks(group.landmarks, stack.base.landmarks.bones)
-    acting = sum(splice is not None for splice in stack.splices)
-    warnings = list(_warnings(stack, group.splices))
+        write_landmarks(settings.landmarks, stack.base.landmarks.bones)
+    warnings = list(_warnings(stack, settings.splices))
     if lost:
         verbs = "is scaled and loses its" if len(lost) == 1 else "are scaled and lose their"
         warnings.append(f"{_listed(lost)} {verbs} size: of what they carry a part is spliced.")
-    return SpliceSummary(action.name, len(clip), acting, tuple(warnings))
+    return SpliceSummary(action.name, len(clip), len(stack.acting), tuple(warnings))
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -432,18 +428,15 @@ def _besides(
     armature: bpy.types.Object, stack: Stack, clip: Clip
 ) -> tuple[list[Channel], list[str]]:
     """What the base moves besides the body, as it does; and bones that lose their size."""
-    group = cast("Any", splicing_settings(armature))
-    if group.base is None:
+    settings = splicing_settings(armature)
+    if settings.base is None:
         return [], []
-    slot = group.base.slots.get(group.base_slot) if group.base_slot else None
-    found = further_channels(armature, group.base, slot, clip.frames)
-    if group.visual:
+    slot = settings.base.slots.get(settings.base_slot) if settings.base_slot else None
+    found = further_channels(armature, settings.base, slot, clip.frames)
+    if settings.visual:
         return found, []
-    changed: set[str] = set()
-    for splice in stack.splices:
-        if splice is not None:
-            changed.update(_changed(stack.base, splice))
-    scaled, lost = scaled_channels(armature, group.base, slot, clip.frames, changed)
+    changed = {bone for each in stack.acting for bone in _changed(stack.base, each)}
+    scaled, lost = scaled_channels(armature, settings.base, slot, clip.frames, changed)
     return found + scaled, lost
 
 
@@ -479,6 +472,6 @@ def local_object(name: str) -> bpy.types.Object:
     return found
 
 
-def _note(settings: OCTO_MOTION_PG_splicing) -> str:
+def _note(settings: Any) -> str:
     """The settings as JSON, kept with the action: what it was made from."""
     return json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True)

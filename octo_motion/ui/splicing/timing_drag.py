@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import bpy
 from bpy.props import FloatProperty
@@ -20,7 +20,7 @@ from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.splicing.transfer import SplicePreview
 from .. import at_work
 from .properties import splicing_settings
-from .splice_operators import SpliceOperator, active_splice, build_retimed, tell
+from .splice_operators import SpliceOperator, active_splice, build_retimed, report_built
 from .stack import Stack, local_object, prepare_splices
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ class TimingDrag:
         self.typed = ""
         self.handle = "splice" if self.handle == "base" else "base"
 
-    def told(self) -> str:
+    def header(self) -> str:
         """The numbers, the one that moves marked."""
         shown = {name: f"{value:g}" for name, value in self._starts.items()}
         if self.typed:
@@ -120,15 +120,12 @@ class DragSession:
     def __init__(self, stack: Stack, number: int, scene: bpy.types.Scene) -> None:
         splice = stack.splices[number]
         assert splice is not None
+        beneath = sum(each is not None for each in stack.splices[:number])
         self.number = number
         self.stack = stack
         self.drag = TimingDrag(splice.timing.base_start, splice.timing.splice_start)
         self._timing = splice.timing
-        beneath = [each for each in stack.splices[:number] if each is not None]
-        above = [each for each in stack.splices[number + 1 :] if each is not None]
-        self._live = SplicePreview(
-            stack.base.clip, stack.base.landmarks, [*beneath, splice, *above], len(beneath)
-        )
+        self._live = SplicePreview(stack.base.clip, stack.base.landmarks, stack.acting, beneath)
         self._pose = pose_values(local_object(stack.armature))
         self._scene = scene.name
         self._frame = scene.frame_current_final
@@ -227,12 +224,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
     _session: DragSession | None = None
     _mouse: float = 0.0
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,
-        settings: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         """Without a drag: the starts that are given, else those that there are."""
         item = active_splice(settings)
         _check_shown(item)
@@ -241,7 +233,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
             self.base_start if given("base_start") else item.base_start,
             self.splice_start if given("splice_start") else item.splice_start,
         )
-        tell(self, build_retimed(armature, settings, settings.active_splice, starts))
+        report_built(self, build_retimed(armature, settings, settings.active_splice, starts))
 
     def invoke(
         self, context: bpy.types.Context, event: bpy.types.Event
@@ -251,7 +243,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         assert window_manager is not None
         assert scene is not None
         armature = active_armature(context)
-        settings = cast("Any", splicing_settings(armature))
+        settings = splicing_settings(armature)
         try:
             writable_armature(armature)
             _check_shown(active_splice(settings))
@@ -262,7 +254,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         self._mouse = event.mouse_x
         window_manager.modal_handler_add(self)
         at_work.begun(self, self._tear_down)
-        self._tell(context)
+        self._show_header(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
@@ -284,7 +276,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         except BaseException:
             self._tear_down(context)
             raise
-        self._tell(context)
+        self._show_header(context)
         return {"PASS_THROUGH"} if free else {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -311,10 +303,10 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         starts, stack, number = session.drag.starts, session.stack, session.number
         self._tear_down(context)
         armature = local_object(stack.armature)
-        settings = cast("Any", splicing_settings(armature))
+        settings = splicing_settings(armature)
         # For the panel of the last operation.
         self.base_start, self.splice_start = starts
-        tell(self, build_retimed(armature, settings, number, starts, stack))
+        report_built(self, build_retimed(armature, settings, number, starts, stack))
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
@@ -322,10 +314,10 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         self.report({"ERROR"}, str(error))
         return {"CANCELLED"}
 
-    def _tell(self, context: bpy.types.Context) -> None:
+    def _show_header(self, context: bpy.types.Context) -> None:
         assert self._session is not None
         if context.area is not None:
-            context.area.header_text_set(self._session.drag.told())
+            context.area.header_text_set(self._session.drag.header())
         if context.workspace is not None:
             context.workspace.status_text_set(_HELP)
 
