@@ -41,8 +41,9 @@ def _parser() -> argparse.ArgumentParser:
         each.add_argument("--no-haply", action="store_true", help="do not look for Haply's service")
         each.add_argument("--haply-port", type=int, default=10001, help="of Haply's service")
         each.add_argument("--simulate", action="store_true", help="add a hand made of numbers")
-        each.add_argument("--udp", type=int, help="port at which a program may be a device")
-        each.add_argument("--tcp", type=int, help="the same over TCP")
+        network = each.add_mutually_exclusive_group()
+        network.add_argument("--udp", type=int, help="port at which a program may be a device")
+        network.add_argument("--tcp", type=int, help="the same over TCP")
         each.add_argument(
             "--rate", type=float, default=1000.0, help="Hz of the loop; less on a slow machine"
         )
@@ -79,21 +80,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Sources:
     from .sources import KEY_BYTES, Sources  # noqa: PLC0415 - what help does without
 
-    if options.udp is not None and options.tcp is not None:
-        parser.error("--udp and --tcp exclude each other")
-    network: tuple[str, int] | None = None
-    key = b""
-    port: int | None = options.tcp if options.udp is None else options.udp
-    if port is not None:
-        network = ("tcp" if options.udp is None else "udp", port)
-        try:
-            key = bytes.fromhex(options.key)
-        except ValueError:
-            key = b""
-        if len(key) != KEY_BYTES:
-            parser.error(f"--key must be {2 * KEY_BYTES} hexadecimal digits")
-        if not 0 <= port <= 0xFFFF:
-            parser.error("a port is a number from 0 to 65535")
+    ports = ((kind, getattr(options, kind)) for kind in ("udp", "tcp"))
+    network = next((each for each in ports if each[1] is not None), None)
+    try:
+        key = bytes.fromhex(options.key)
+    except ValueError:
+        key = b""
+    if network is not None and len(key) != KEY_BYTES:
+        parser.error(f"--key must be {2 * KEY_BYTES} hexadecimal digits")
+    if network is not None and not 0 <= network[1] <= 0xFFFF:
+        parser.error("a port is a number from 0 to 65535")
     return Sources(
         hid=not options.no_hid,
         haply=not options.no_haply,

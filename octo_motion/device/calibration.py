@@ -61,33 +61,20 @@ class Response:
 
     def speeds(self, push: Axes) -> Axes:
         """m/s along and rad/s about the axes, for a push of −1…1 on each."""
-        return (
-            self._one(push, 0, self.speed),
-            self._one(push, 1, self.speed),
-            self._one(push, 2, self.speed),
-            self._one(push, 3, self.angular_speed),
-            self._one(push, 4, self.angular_speed),
-            self._one(push, 5, self.angular_speed),
-        )
-
-    def _one(self, push: Axes, axis: int, full: float) -> float:
-        zone = self.dead_zone[axis]
-        beyond = min(1.0, abs(push[axis])) - zone
-        if beyond <= 0.0:
-            return 0.0
-        size = (beyond / (1.0 - zone)) ** self.curve[axis]
-        return copysign(size, push[axis]) * self.gain[axis] * full
+        full = (self.speed,) * 3 + (self.angular_speed,) * 3
+        return _axes(map(_response, push, full, self.gain, self.dead_zone, self.curve))
 
 
-# --- A device's own zero and range, and learning them while an artist moves it --------------------
-#
-# The cap of an old space mouse does not come back quite to its middle, and does not reach as far as
-# its maker says; the middle of a force device's room is not always where its firmware counts from.
-# Both are learned: what the axes say at rest, and the least and the most that they ever say.
+def _response(push: float, full: float, gain: float, zone: float, curve: float) -> float:
+    beyond = min(1.0, abs(push)) - zone
+    if beyond <= 0.0:
+        return 0.0
+    return copysign((beyond / (1.0 - zone)) ** curve, push) * gain * full
 
+
+# --- Zero and range -------------------------------------------------------------------------------
 
 _NOTHING: Final[Axes] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_FULL: Final[Axes] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 _REST_SECONDS: Final = 1.0
 """For so long the device must be left alone."""
 _TREMBLES: Final = 0.05
@@ -127,7 +114,7 @@ class Calibration:
 
     rest: Axes = _NOTHING
     least: Axes = (-1.0, -1.0, -1.0, -1.0, -1.0, -1.0)
-    most: Axes = _FULL
+    most: Axes = _ONES
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense."""

@@ -84,59 +84,47 @@ class HandLoop:
             self._look()
 
     def _receive(self, message: messages.Message, now: float) -> None:
+        pointer = self._pointers.get(getattr(message, "pointer", -1))
         match message:
-            case messages.HeldMessage():
-                pointer = self._pointers.get(message.pointer)
-                if pointer is not None:
-                    pointer.hold(message, now)
-            case messages.Calibrate():
-                self._calibrate(message)
+            case messages.HeldMessage() if pointer is not None:
+                pointer.hold(message, now)
+            case messages.Calibrate() if pointer is not None:
+                self._calibrate(pointer, message.order)
             case messages.CalibrationMessage():
-                self._correct(message)
+                self._correct(pointer, message)
             case messages.Settings():
                 self._take_settings(message)
-            case messages.Workspace():
-                if message.scale > 0.0 and message.pointer < MOST_POINTERS:
-                    self._workspaces[message.pointer] = message
-                    if message.pointer in self._pointers:
-                        self._pointers[message.pointer].place(message)
-            case messages.Grab():
-                pointer = self._pointers.get(message.pointer)
+            case messages.Workspace() if message.scale > 0.0 and message.pointer < MOST_POINTERS:
+                self._workspaces[message.pointer] = message
                 if pointer is not None:
-                    pointer.want(grab=message.grab)
-            case messages.Buzz():
-                pointer = self._pointers.get(message.pointer)
-                if pointer is not None:
-                    pointer.test(now)
+                    pointer.place(message)
+            case messages.Grab() if pointer is not None:
+                pointer.want(grab=message.grab)
+            case messages.Buzz() if pointer is not None:
+                pointer.test(now)
             case messages.Goodbye():
                 raise ChannelClosedError("goodbye")
-            case _:
-                log.warning("A message that is not for here: %s", type(message).__name__)
+            case _:  # most likely to a device that has just gone
+                log.debug("Not taken: %s", type(message).__name__)
 
-    def _calibrate(self, order: messages.Calibrate) -> None:
-        pointer = self._pointers.get(order.pointer)
-        if pointer is None:
-            return
+    def _calibrate(self, pointer: Pointer, order: int) -> None:
         learner = pointer.calibrator
-        if order.order == messages.Order.FINISH and learner is not None:
+        phase = Phase.FAILED
+        if order == messages.Order.FINISH and learner is not None:
             try:
                 pointer.correct(learner.finish())
-                self._corrections[order.pointer] = pointer.calibration
+                self._corrections[pointer.number] = pointer.calibration
             except DeviceError as error:
                 self._channel.send(messages.Notice(error.problem, error.remedy))
-            phase, learned = learner.phase, pointer.calibration
-            pointer.calibrate(begin=False)
-            self._channel.send(messages.CalibrationMessage.of(order.pointer, learned, phase))
-        elif order.order == messages.Order.BEGIN:
-            pointer.calibrate(begin=True)
-        elif learner is not None:
-            pointer.calibrate(begin=False)
-            self._channel.send(
-                messages.CalibrationMessage.of(order.pointer, pointer.calibration, Phase.FAILED)
-            )
+            phase = learner.phase
+        begin = order == messages.Order.BEGIN
+        if begin or learner is not None:
+            pointer.calibrate(begin=begin)
+        if learner is not None and not begin:
+            done = messages.CalibrationMessage.of(pointer.number, pointer.calibration, phase)
+            self._channel.send(done)
 
-    def _correct(self, message: messages.CalibrationMessage) -> None:
-        pointer = self._pointers.get(message.pointer)
+    def _correct(self, pointer: Pointer | None, message: messages.CalibrationMessage) -> None:
         with contextlib.suppress(messages.MessageError):  # as without one, then
             calibration = message.calibration()
             if message.pointer < MOST_POINTERS:
@@ -180,9 +168,9 @@ class HandLoop:
     def _look(self) -> None:
         for driver in self._discovery.look():
             self._welcome(driver)
-        problems, self._discovery.problems = self._discovery.problems, []
-        for problem in problems:
-            self._channel.send(messages.Notice(problem.problem, problem.remedy))
+        for error in self._discovery.problems:
+            self._channel.send(messages.Notice(error.problem, error.remedy))
+        self._discovery.problems.clear()
 
     def _welcome(self, driver: Driver) -> None:
         who = driver.description
@@ -227,14 +215,10 @@ class HandLoop:
         self._send_device(pointer, present=False)
 
     def _send_device(self, pointer: Pointer, *, present: bool) -> None:
-        who = pointer.driver.description
-        force = torque = 0.0
-        if who.dynamics is not None:
-            force, torque = who.dynamics.force, who.dynamics.torque
-        gains = pointer.gains
+        who, limits, gains = pointer.driver.description, pointer.limits, pointer.gains
         self._channel.send(
             messages.DeviceMessage(
-                *(pointer.number, present, who.kind, force, torque),
+                *(pointer.number, present, who.kind, limits.force, limits.torque),
                 *(gains.stiffness, gains.angular_stiffness, who.name),
                 *(who.lasting or who.identity, who.buttons),
             )

@@ -79,38 +79,19 @@ class LocalModel:
         velocity: Vector,
         angular_velocity: Vector,
     ) -> None:
-        """Go on for one period.
-
-        Args:
-            period: s
-            position: Of the pointer, world.
-            orientation: Of the pointer, world.
-            velocity: Of the pointer.
-            angular_velocity: Of the pointer.
-        """
+        """Go on for one period (s), pulled to where the pointer is and as it moves, world."""
         pull = self._pull
         if pull.mobility > 0.0:
-            now = add_scaled(
-                scale(subtract(position, self.position), pull.stiffness),
-                *(subtract(velocity, self.velocity), pull.damping),
-            )
-            # Backward Euler in one degree of freedom: stable whatever the simulation's stiffness.
-            gives = pull.mobility * period
-            softened = gives / (1.0 + gives * (pull.damping + period * pull.stiffness))
-            self.velocity = add_scaled(self.velocity, subtract(now, self._force), softened)
+            tie = (pull.stiffness, pull.damping, pull.mobility)
+            apart = subtract(position, self.position)
+            drift = subtract(velocity, self.velocity)
+            self.velocity = add(self.velocity, _change(tie, apart, drift, self._force, period))
         if pull.angular_mobility > 0.0:
+            tie = (pull.angular_stiffness, pull.angular_damping, pull.angular_mobility)
             apart = to_rotation_vector(multiply(orientation, conjugate(self.orientation)))
-            now = add_scaled(
-                scale(apart, pull.angular_stiffness),
-                *(subtract(angular_velocity, self.angular_velocity), pull.angular_damping),
-            )
-            gives = pull.angular_mobility * period
-            softened = gives / (
-                1.0 + gives * (pull.angular_damping + period * pull.angular_stiffness)
-            )
-            self.angular_velocity = add_scaled(
-                self.angular_velocity, subtract(now, self._torque), softened
-            )
+            drift = subtract(angular_velocity, self.angular_velocity)
+            change = _change(tie, apart, drift, self._torque, period)
+            self.angular_velocity = add(self.angular_velocity, change)
         self.position = add_scaled(self.position, self.velocity, period)
         self.orientation = integrate(self.orientation, self.angular_velocity, period)
         left = exp(-period / _FADE)
@@ -123,3 +104,22 @@ class LocalModel:
             add(self.position, self._off),
             multiply(from_rotation_vector(self._twisted), self.orientation),
         )
+
+
+def _change(
+    tie: tuple[float, float, float], apart: Vector, drift: Vector, used: Vector, period: float
+) -> Vector:
+    """Of the body's velocity in a period: what the pull is now, other than what was last used.
+
+    Args:
+        tie: Stiffness and damping of the pull, mobility of the body.
+        apart: From the body to the pointer.
+        drift: Of the pointer's velocity from the body's.
+        used: What the simulation's coupling used in its last step.
+        period: s
+    """
+    stiffness, damping, mobility = tie
+    now = add_scaled(scale(apart, stiffness), drift, damping)
+    # Backward Euler in one degree of freedom: stable whatever the simulation's stiffness.
+    gives = mobility * period
+    return scale(subtract(now, used), gives / (1.0 + gives * (damping + period * stiffness)))

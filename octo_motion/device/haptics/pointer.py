@@ -27,7 +27,7 @@ from ...core.rotations.scalars import (
 from ..calibration import NONE, Calibration, Calibrator, corrected
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..messages import HandMessage, HeldMessage, Settings, Workspace
-from .force import DAMPING, STORED, ForceLimits, Gains, Observer, Shaper, gains_for, wrench
+from .force import DAMPING, STORED, ForceLimits, Observer, Shaper, gains_for, wrench
 from .local_model import LocalModel
 
 _FULL_PUSH: Final = 0.1
@@ -71,14 +71,17 @@ class Pointer:
 
     def __post_init__(self) -> None:
         """Choose the coupling for the device."""
-        device = self.driver.description.dynamics
-        self._kind = self.driver.description.kind
+        who = self.driver.description
+        self.has_force = who.dynamics is not None
+        """Whether the device has motors."""
+        device = who.dynamics or Dynamics(0.0, damping=0.0, angular_damping=0.0)
+        self._kind = who.kind
         self._response = self.settings.response()
-        self.gains = gains_for(device, self.period) if device else Gains(0.0, 0.0, 0.0, 0.0)
-        self._limits = ForceLimits(device.force, device.torque) if device else ForceLimits(0.0, 0.0)
-        self._shaper = Shaper(self._limits)
-        self._push = _observer(device, turning=False)
-        self._turn = _observer(device, turning=True)
+        self.gains = gains_for(device, self.period)
+        self.limits = ForceLimits(device.force, device.torque)
+        self._shaper = Shaper(self.limits)
+        self._push = Observer(STORED, DAMPING * device.damping)
+        self._turn = Observer(STORED, DAMPING * device.angular_damping)
         self._model = LocalModel()
         self._answered = 0
         self._last_answer = -math.inf
@@ -93,11 +96,6 @@ class Pointer:
         self._test_until = -math.inf
         self._last: tuple[Vector, Quaternion] | None = None
         self._ticked = -math.inf
-
-    @property
-    def has_force(self) -> bool:
-        """Whether the device has motors."""
-        return self.driver.description.dynamics is not None
 
     @property
     def force(self) -> Vector:
@@ -132,11 +130,10 @@ class Pointer:
         moved = not self._placed or workspace.origin != self.workspace.origin
         self.workspace = workspace
         self._placed = True
-        if self._kind is Kind.RATE:
-            if moved:
-                self.position, self.orientation = workspace.origin, workspace.orientation
-        else:
+        if self._kind is Kind.POSE:
             self._lift()
+        elif moved:
+            self.position, self.orientation = workspace.origin, workspace.orientation
 
     def want(self, *, grab: bool) -> None:
         """Grab what is near, or let go."""
@@ -242,21 +239,13 @@ class Pointer:
 
     def _press(self, buttons: int) -> None:
         changed = buttons ^ self.sample.buttons
-        index = 0
-        while changed:
-            if changed & 1:
-                pressed = bool(buttons >> index & 1)
-                self.presses.append((index, pressed))
-                if index == self.settings.grab_button:
-                    self._grab_pressed(pressed=pressed)
-            changed >>= 1
-            index += 1
-
-    def _grab_pressed(self, *, pressed: bool) -> None:
-        if not self.settings.toggle:
-            self.want(grab=pressed)
-        elif pressed:
-            self.want(grab=not self.grab)
+        for index in range(changed.bit_length()):
+            if not changed >> index & 1:
+                continue
+            pressed, toggle = bool(buttons >> index & 1), self.settings.toggle
+            self.presses.append((index, pressed))
+            if index == self.settings.grab_button and (pressed or not toggle):
+                self.want(grab=not self.grab if toggle else pressed)
 
     def _move(self, now: float) -> None:
         space, sample = self.workspace, self.sample
@@ -286,7 +275,7 @@ class Pointer:
         """Force and torque that the coupling asks for, in the device's axes, and how old it is."""
         age = now - self.sample.time
         if now < self._test_until and not self._answered:
-            size = _TEST_SHARE * self._limits.force * self.settings.force
+            size = _TEST_SHARE * self.limits.force * self.settings.force
             late = self._test_until - now
             return (size if late > 0.5 * _TEST_SECONDS else -size, 0.0, 0.0), ZERO, age
         if not self._answered:
@@ -331,10 +320,3 @@ class Pointer:
         """Take force away and let the device go."""
         self._shaper.drop()
         self.driver.close()
-
-
-def _observer(device: Dynamics | None, *, turning: bool) -> Observer:
-    if device is None:
-        return Observer(0.0, 0.0)
-    damping = device.angular_damping if turning else device.damping
-    return Observer(STORED, DAMPING * damping)

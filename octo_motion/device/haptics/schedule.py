@@ -23,71 +23,49 @@ import gc
 import os
 import sys
 import time
+from bisect import bisect, bisect_left
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from itertools import accumulate
+from typing import Final
 
 from ..messages import LoopTimesMessage
 
-_RANGES: Final = ((0.0, 1e-3, 1e-6), (1e-3, 1e-2, 1e-5), (1e-2, 5e-2, 1e-4))
-"""From, to and width of bins, in s: a hundredth of what they count, or finer. Few enough of them
-that looking through all takes no tick's time."""
-_FIRSTS: Final = (0, 1000, 1900)
-_LAST: Final = 2300
-
-
-class Percentiles(NamedTuple):
-    """Seconds that 50, 99 and 99.9 % stay below, and the longest of all."""
-
-    half: float
-    most: float
-    nearly_all: float
-    longest: float
+_EDGES: Final = (
+    *(1e-6 * each for each in range(1, 1001)),
+    *(1e-5 * each for each in range(101, 1001)),
+    *(1e-4 * each for each in range(101, 501)),
+)
+"""Upper edges of bins, in s: a hundredth of what they count, or finer. Few enough of them that
+looking through all takes no tick's time."""
+_AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015
+"""s before a deadline from which on the loop does not sleep."""
 
 
 class Histogram:
     """Counts of durations by size, up to 50 ms; adding one allocates nothing."""
 
     def __init__(self) -> None:
-        self._counts = [0] * (_LAST + 1)
+        self._counts = [0] * (len(_EDGES) + 1)
         self.count = 0
         self.longest = 0.0
 
     def add(self, seconds: float) -> None:
         """Count one."""
-        self._counts[_bin(seconds)] += 1
+        self._counts[bisect(_EDGES, seconds)] += 1
         self.count += 1
         self.longest = max(self.longest, seconds)
 
-    def percentiles(self) -> Percentiles:
-        """The upper edge of the bin within which each share of all lies; zeros where none came."""
-        wanted = [share * self.count for share in (0.5, 0.99, 0.999)]
-        found: list[float] = []
-        total = 0
-        for index, count in enumerate(self._counts):
-            total += count
-            while len(found) < 3 and count and total >= wanted[len(found)]:
-                found.append(min(self.longest, _upper_edge(index)))
-            if len(found) == 3:
-                break
-        half, most, nearly_all = (*found, 0.0, 0.0, 0.0)[:3]
-        return Percentiles(half, most, nearly_all, self.longest)
+    def percentiles(self) -> tuple[float, float, float, float]:
+        """Seconds that 50, 99 and 99.9 % stay below, and the longest of all; zeros without any.
 
-
-def _bin(seconds: float) -> int:
-    for first, (start, end, width) in zip(_FIRSTS, _RANGES, strict=True):
-        if seconds < end:
-            return first + max(0, int((seconds - start) / width))
-    return _LAST
-
-
-def _upper_edge(index: int) -> float:
-    place = 2 if index >= _FIRSTS[2] else 1 if index >= _FIRSTS[1] else 0
-    start, _, width = _RANGES[place]
-    return start + (index - _FIRSTS[place] + 1) * width
-
-
-_AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015
-"""s before a deadline from which on the loop does not sleep."""
+        The former are upper edges of bins.
+        """
+        totals = list(accumulate(self._counts))
+        bins = (bisect_left(totals, share * self.count) for share in (0.5, 0.99, 0.999))
+        half, most, nearly_all = (
+            min(self.longest, _EDGES[min(each, len(_EDGES) - 1)]) for each in bins
+        )
+        return half, most, nearly_all, self.longest
 
 
 class Schedule:

@@ -8,6 +8,7 @@ suspicion due to a device: every count is bounded, and what makes no sense raise
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Final
@@ -247,13 +248,11 @@ def item(kind: str, value: int = 0) -> bytes:
     ``kind`` is the standard's own name in lower case with underscores, for example ``usage_page``.
     """
     prefix, signed = _ITEMS[kind]
-    for code, size in ((0, 0), (1, 1), (2, 2), (3, 4)):
-        if size == 0 and (value != 0 or kind != "end_collection"):
-            continue
-        try:
+    if kind == "end_collection":
+        return bytes([prefix])
+    for code, size in ((1, 1), (2, 2), (3, 4)):
+        with suppress(OverflowError):
             return bytes([prefix | code]) + value.to_bytes(size, "little", signed=signed)
-        except OverflowError:
-            continue
     raise DescriptorError(f"{value} does not fit into an item")
 
 

@@ -47,7 +47,6 @@ class Handle(Protocol):
 
     def close(self) -> None:
         """Let the device go."""
-        ...
 
 
 @dataclass(frozen=True)

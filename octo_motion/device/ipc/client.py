@@ -162,10 +162,8 @@ class Client:
             Buttons of devices that were pressed or let go, in order.
         """
         buttons: list[messages.Button] = []
-        if self._child is None:
-            return buttons
         try:
-            came = self._child.channel.receive()
+            came = self._child.channel.receive() if self._child else []
         except ChannelClosedError:
             self._lose()
             return buttons

@@ -13,9 +13,10 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 from ...core.errors import DeviceError
@@ -155,31 +156,12 @@ class _Search:
         while self.gone:
             self._used.pop(self.gone.popleft(), None)
             self._seen = object()
-        if self._sources.haply and "haply" not in self._used:
-            self._look_for_haply(now)
+        costly = now - self._looked_for_haply >= _EVERY_COSTLY
+        if self._sources.haply and "haply" not in self._used and costly:
+            self._looked_for_haply = now
+            self._open("haply", b"", lambda: Haply.open(self._sources.haply_port), now, settles=0.0)
         if self._sources.hid:
             self._look_for_hid(now)
-
-    def _found(self, identity: str, path: bytes, driver: Driver) -> None:
-        self._used[identity] = path
-        self._refused.pop(identity, None)
-        self._reported.discard(identity)
-        self.drivers.append(driver)
-        if self._closed:  # meanwhile: whoever closed has not seen this one
-            with suppress(IndexError, DeviceLostError):
-                self.drivers.popleft().close()
-
-    def _look_for_haply(self, now: float) -> None:
-        if now - self._looked_for_haply < _EVERY_COSTLY:
-            return
-        self._looked_for_haply = now
-        try:
-            device = Haply.open(self._sources.haply_port)
-        except DeviceError as error:
-            self._refuse("haply", error, now, at_once=True)
-            return
-        if device is not None:
-            self._found("haply", b"", device)
 
     def _look_for_hid(self, now: float) -> None:
         cheap = descriptor_fingerprint()
@@ -192,7 +174,7 @@ class _Search:
         try:
             listed = list_devices()
         except DeviceError as error:
-            self._refuse("hidapi", error, now, at_once=True)
+            self._refuse("hidapi", error, now, settles=0.0)
             return
         except OSError as error:
             log.warning("Devices cannot be listed: %s", error)
@@ -209,23 +191,36 @@ class _Search:
                 if in_use not in paths:
                     continue  # the same device, plugged in again before its loss was noticed
                 found = replace(each, twin=True)
-            driver = self._open(found, now)
-            if driver is not None:
-                self._found(found.identity, found.path, driver)
+            kind = hid_driver_for(found)
+            if kind is not None:
+                self._open(found.identity, found.path, partial(kind.open, found), now)
 
-    def _open(self, found: Found, now: float) -> Driver | None:
-        kind = hid_driver_for(found)
-        try:
-            return kind.open(found) if kind else None
-        except DeviceError as error:
-            self._refuse(found.identity, error, now)
-        return None
-
-    def _refuse(
-        self, identity: str, error: DeviceError, now: float, *, at_once: bool = False
+    def _open(
+        self,
+        identity: str,
+        path: bytes,
+        opening: Callable[[], Driver | None],
+        now: float,
+        settles: float = _SETTLES,
     ) -> None:
+        try:
+            driver = opening()
+        except DeviceError as error:
+            self._refuse(identity, error, now, settles)
+            return
+        if driver is None:
+            return
+        self._used[identity] = path
+        self._refused.pop(identity, None)
+        self._reported.discard(identity)
+        self.drivers.append(driver)
+        if self._closed:  # meanwhile: whoever closed has not seen this one
+            with suppress(IndexError, DeviceLostError):
+                self.drivers.popleft().close()
+
+    def _refuse(self, identity: str, error: DeviceError, now: float, settles: float) -> None:
         since = self._refused.setdefault(identity, now)
-        if identity not in self._reported and (at_once or now - since >= _SETTLES):
+        if identity not in self._reported and now - since >= settles:
             self._reported.add(identity)
             self.problems.append(error)
             log.warning("%s", error)

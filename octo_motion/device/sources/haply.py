@@ -17,6 +17,7 @@ import http.client
 import json
 import re
 import time
+from contextlib import suppress
 from typing import Any, Final
 
 from ...core.errors import DeviceError
@@ -113,17 +114,8 @@ class Haply(Driver):
             return None
 
     def read(self) -> Sample | None:
-        """The newest state.
-
-        Raises:
-            DeviceLostError: service or device are gone.
-        """
-        if self._socket is None:
-            raise DeviceLostError(self.description.name)
-        try:
-            texts = self._socket.receive()
-        except WebSocketError as error:
-            raise DeviceLostError(self.description.name) from error
+        """The newest state."""
+        texts = self._there().receive()
         now = time.perf_counter()
         if not texts:
             if now - self._answered > _LOST_SECONDS:
@@ -144,13 +136,8 @@ class Haply(Driver):
         return sample._replace(time=now)
 
     def send(self, force: Vector, torque: Vector) -> None:  # noqa: ARG002 - it has no torque
-        """Ask for a force; sent once the service has answered the message before.
-
-        Raises:
-            DeviceLostError: the service is gone.
-        """
-        if self._socket is None:
-            raise DeviceLostError(self.description.name)
+        """Ask for a force; sent once the service has answered the message before."""
+        self._there()
         if self._asked and time.perf_counter() - self._asked < _ANSWER_SECONDS:
             return
         x, y, z = force
@@ -172,21 +159,20 @@ class Haply(Driver):
             message = {**message, "session": {"configure": configure}}
         self._greeted = True
         self._asked = time.perf_counter()
-        assert self._socket is not None
-        try:
-            self._socket.send(json.dumps(message))
-        except WebSocketError as error:
-            raise DeviceLostError(self.description.name) from error
+        self._there().send(json.dumps(message))
+
+    def _there(self) -> WebSocket:
+        if self._socket is None:
+            raise DeviceLostError(self.description.name)
+        return self._socket
 
     def close(self) -> None:
         """Take force away and leave the service."""
         if self._socket is not None:
             self._asked = 0.0
-            try:
+            with suppress(DeviceLostError):
                 if self._device:
                     self.send(ZERO, ZERO)
-            except DeviceLostError:
-                pass
             self._socket.close()
             self._socket = None
 

@@ -161,11 +161,7 @@ class NetworkDevice(Driver):
         )
 
     def read(self) -> Sample | None:
-        """The newest pose that came.
-
-        Raises:
-            DeviceLostError: the program is gone or silent.
-        """
+        """The newest pose that came; a program that is gone or silent is lost."""
         sample = self._port.newest()
         if sample is None and self._port.silent:
             raise DeviceLostError(self.description.name)
@@ -255,6 +251,9 @@ class Port:
         if not self._stream:
             self._fill_from_datagrams()
             return
+        # Who says nothing of a device keeps the port only until somebody else comes.
+        if self._peer is None or (self._known is None and self.silent):
+            self._accept()
         try:
             self._fill_from_stream()
         except PacketError as error:
@@ -274,15 +273,11 @@ class Port:
                 return
             try:
                 self._take(parse_datagram(data, self._key))
+                self._address = address
             except PacketError as error:
                 self._complain(error)
-                continue
-            self._address = address
 
     def _fill_from_stream(self) -> None:
-        # Who says nothing of a device keeps the port only until somebody else comes.
-        if self._peer is None or (self._known is None and self.silent):
-            self._accept()
         if self._peer is None:
             return
         if not self._peer.receive():
@@ -294,9 +289,8 @@ class Port:
             size = size_of(got, self._key)
             if len(got) < size:
                 return
-            packet = bytes(got[:size])
+            self._take(parse_datagram(bytes(got[:size]), self._key))
             del got[:size]
-            self._take(parse_datagram(packet, self._key))
 
     def _accept(self) -> None:
         try:

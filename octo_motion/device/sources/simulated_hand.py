@@ -110,30 +110,19 @@ class Hand:
 
     def _step(self, step: float) -> None:
         place, turn = self.wish(self.seconds)
-        place = add(place, self._tremble())
-        pull = subtract(
-            add_scaled(
-                scale(subtract(place, self.position), self.stiffness),
-                *(self.velocity, -(self.damping if self.stiffness else 0.0)),
-            ),
-            _friction(self.velocity, self.device.damping, self.device.friction),
-        )
+        device, held = self.device, 1.0 if self.stiffness else 0.0
+        apart = subtract(add(place, self._tremble()), self.position)
+        pull = add_scaled(scale(apart, self.stiffness), self.velocity, -held * self.damping)
+        pull = subtract(pull, _friction(self.velocity, device.damping, device.friction))
         self.velocity = add_scaled(self.velocity, add(pull, self._force), step / self.mass)
         self.position = add_scaled(self.position, self.velocity, step)
-        apart = to_rotation_vector(multiply(turn, conjugate(self.orientation)))
-        twist = subtract(
-            add_scaled(
-                scale(apart, self.angular_stiffness),
-                *(self.angular_velocity, -(self.angular_damping if self.stiffness else 0.0)),
-            ),
-            _friction(
-                *(self.angular_velocity, self.device.angular_damping),
-                self.device.angular_friction,
-            ),
+        spin = self.angular_velocity
+        turned = to_rotation_vector(multiply(turn, conjugate(self.orientation)))
+        twist = add_scaled(
+            scale(turned, self.angular_stiffness), spin, -held * self.angular_damping
         )
-        self.angular_velocity = add_scaled(
-            self.angular_velocity, add(twist, self._torque), step / self.inertia
-        )
+        twist = subtract(twist, _friction(spin, device.angular_damping, device.angular_friction))
+        self.angular_velocity = add_scaled(spin, add(twist, self._torque), step / self.inertia)
         self.orientation = integrate(self.orientation, self.angular_velocity, step)
         self.seconds += step
 
@@ -151,12 +140,8 @@ class Hand:
         step = self.device.resolution
         if not step:
             return self.position
-        x, y, z = self.position
-        return (
-            math.floor(x / step) * step,
-            math.floor(y / step) * step,
-            math.floor(z / step) * step,
-        )
+        x, y, z = (math.floor(each / step) * step for each in self.position)
+        return (x, y, z)
 
     def energy(self) -> float:
         """J of motion."""

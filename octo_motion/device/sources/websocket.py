@@ -10,6 +10,7 @@ import socket
 import struct
 from typing import Final
 
+from ..driver import DeviceLostError
 from ..stream import Stream
 
 _GUID: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
@@ -17,7 +18,7 @@ _MOST_BYTES: Final = 1_000_000
 _TEXT, _CLOSE, _PING, _PONG = 0x1, 0x8, 0x9, 0xA
 
 
-class WebSocketError(Exception):
+class WebSocketError(DeviceLostError):
     """The other side is no WebSocket server, broke the rules, or is gone."""
 
 
@@ -131,12 +132,9 @@ class WebSocket:
         try:
             connection.sendall(request.encode())
             return cls(connection, _read_upgrade(connection, key))
-        except OSError as error:
+        except (OSError, WebSocketError) as error:
             connection.close()
-            raise WebSocketError("no answer") from error
-        except WebSocketError:
-            connection.close()
-            raise
+            raise WebSocketError(str(error)) from error
 
     def send(self, text: str) -> None:
         """Send a text.
