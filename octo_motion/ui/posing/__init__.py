@@ -3,36 +3,29 @@
 
 from ..steps import Step, nothing
 from . import (
-    device_calibrate,
-    device_panel,
     device_pose,
     device_settings,
-    marks,
-    measure,
+    operators,
     panels,
-    pose_start,
+    pose_operator,
     properties,
     script_player,
 )
 from .properties import OCTO_MOTION_PG_posing
-from .registration import unregister
 from .script_player import play_file
 
 CLASSES = (
     *properties.CLASSES,
     *device_settings.CLASSES,
-    *pose_start.CLASSES,
+    *pose_operator.CLASSES,
     *script_player.CLASSES,
-    *marks.CLASSES,
-    *measure.CLASSES,
-    *panels.CLASSES,
+    *operators.CLASSES,
     *device_pose.CLASSES,
-    *device_calibrate.CLASSES,
-    *device_panel.CLASSES,
+    *panels.CLASSES,
 )
 STEPS = (
     Step(device_settings.register, device_settings.unregister),
-    Step(nothing, unregister),
+    Step(nothing, device_pose.unregister),
 )
 
 __all__ = ["CLASSES", "STEPS", "OCTO_MOTION_PG_posing", "play_file"]

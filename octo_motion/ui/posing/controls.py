@@ -14,7 +14,7 @@ from ...core.posing.picking import Hit
 from ...core.rotations import IDENTITY, Floats, from_axis_angle, multiply
 from .measuring_hand import MeasuringHand
 from .puppet_session import PuppetSession
-from .scrubbing import go_to
+from .viewport import go_to
 
 HELP: Final = (
     ("Drag", "pull"),
@@ -182,29 +182,25 @@ class PoseControls:
             return Outcome.PASSED
         return Outcome.TAKEN
 
-    def _measure(self) -> None:
+    def _measure(self) -> str:
         body = self._pointed_at()
         if body is None:
-            self.message = "Point at a limb to measure its joint"
-            return
+            return "Point at a limb to measure its joint"
         self._lose()
-        try:
-            self.session.measure(body)
-            self.message = ""
-        except OctoMotionError as error:
-            self.message = str(error)
+        self.session.measure(body)
+        return ""
 
     def _press(self, event: Any, view: EyeOn, x: float, y: float) -> Outcome:
         kind = event.type
-        if kind in {"ESC", "RIGHTMOUSE"}:
-            if kind == "RIGHTMOUSE" and not self.holding:
-                return Outcome.PASSED
-            if kind == "RIGHTMOUSE":
-                self._let_go(keep=False)
-                return Outcome.TAKEN
+        if kind == "ESC":
             return Outcome.CANCEL
         if kind in {"RET", "NUMPAD_ENTER"}:
             return Outcome.FINISH
+        if kind == "RIGHTMOUSE":
+            if not self.holding:
+                return Outcome.PASSED
+            self._let_go(keep=False)
+            return Outcome.TAKEN
         if kind == "LEFTMOUSE":
             if self._latched:
                 self._let_go()
@@ -227,13 +223,14 @@ class PoseControls:
             elif self._take(view, x, y) is Outcome.TAKEN:
                 self._latched = True
         elif kind == "P":
-            self._pin()
+            body = self._pointed_at()
+            self.message = "Point at a limb to pin it" if body is None else session.toggle_pin(body)
         elif kind == "K":
-            self._say_keys(lambda: session.key(all_bones=event.shift))
+            self._try(lambda: session.words_for(session.key(all_bones=event.shift)))
         elif kind == "O":
-            self._record()
+            self._try(session.toggle_record)
         elif kind == "M":
-            self._measure()
+            self._try(self._measure)
         elif kind == "R":
             if self.holding:
                 self._turning = True
@@ -272,9 +269,13 @@ class PoseControls:
             self.session.measuring.release()
             return
         if keep:
-            self._say_keys(self.session.release, quiet=True)
+            self._try(self._release)
         else:
             self.session.step_back()
+
+    def _release(self) -> str:
+        keyed = self.session.release()
+        return self.session.words_for(keyed) if keyed else self.message
 
     def _pointed_at(self) -> int | None:
         """The body that the hand holds, or else the one under the mouse."""
@@ -320,40 +321,12 @@ class PoseControls:
             self.hand = self.hand - share * DEPTH_STEP * self.session.size * towards
         return Outcome.TAKEN
 
-    def _pin(self) -> None:
-        body = self._pointed_at()
-        if body is None:
-            self.message = "Point at a limb to pin it"
-            return
-        self.message = self.session.toggle_pin(body)
-
-    def _record(self) -> None:
+    def _try(self, do: Callable[[], str]) -> None:
+        """Do what may fail, and tell what came of it: nothing else is lost by that."""
         try:
-            if self.session.recording:
-                bones, count = map(_counted, self.session.stop_record(), ("bone", "key frame"))
-                self.message = f"Recorded {bones} on {count}"
-            else:
-                self.session.record()
-                self.message = "Recording while the frames go by: play, and drag"
+            self.message = do()
         except OctoMotionError as error:
             self.message = str(error)
-
-    def _say_keys(self, key: Callable[[], list[str]], *, quiet: bool = False) -> None:
-        try:
-            names = key()
-        except OctoMotionError as error:
-            # Nothing was keyed, and nothing else is lost.
-            self.message = str(error)
-            return
-        if names:
-            frame = self.session.scene().frame_current
-            self.message = f"Keyed {_counted(len(names), 'bone')} at frame {frame}"
-        elif quiet:
-            return
-        elif self.session.core.touched():
-            self.message = "Nothing keyed: by the settings of keying, no bone needs or takes a key"
-        else:
-            self.message = "Nothing to key: no bone was moved"
 
     def status(self) -> str:
         """One line about the session, for the header."""
@@ -383,10 +356,6 @@ class PoseControls:
 
 def _modified(event: Any) -> bool:
     return event.ctrl or event.alt or getattr(event, "oskey", False)
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 SLOW: Final = 0.9

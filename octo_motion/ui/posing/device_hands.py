@@ -12,14 +12,17 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...blender.files import load_calibrations, save_calibrations
+from ...core.errors import SettingsError, WriteError
 from ...core.posing.puppet import Pose
 from ...core.posing.solver import Obstacle
 from ...core.rotations import Floats, from_matrix
+from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
 from ...device.ipc import Client
 from ...device.messages import (
     Button,
-    Buzz,
+    CalibrationMessage,
     DeviceMessage,
     Grab,
     Notice,
@@ -29,7 +32,6 @@ from ...device.messages import (
     WorldMessage,
 )
 from ...device.messages import Settings as DeviceSettings
-from .device_calibrations import Calibrations
 from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25
@@ -41,7 +43,6 @@ RATE_WIDTH: Final = 1.0
 _ANSWER: Final = 0.4
 """s after which a grab that holds nothing has found nothing."""
 NOTHING_NEAR: Final = "No limb is near enough to grab"
-HOLD_TO_PIN: Final = "Hold a limb to pin it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,22 +72,126 @@ class Shown:
     name: str
 
 
-class DeviceHands:
-    """Hands at devices that hold a session's puppet.
+class HandsBase:
+    """What devices and Blender's own space mouse share as hands of a session.
 
     Args:
-        session: of posing; it steps no more by itself.
+        session: of posing.
+        client: to the bridge; off where there is none.
+    """
+
+    hand: Floats | None = None
+    """No mouse draws an arrow."""
+
+    def __init__(self, session: PuppetSession, client: Client) -> None:
+        self.session = session
+        self.client = client
+        self.message = ""
+        """The last thing worth telling."""
+
+    @property
+    def hover(self) -> int | None:
+        """The limb that is held, or the first of several."""
+        raise NotImplementedError
+
+    @property
+    def holding(self) -> bool:
+        """Whether any hand holds a limb."""
+        return self.hover is not None
+
+    def pin(self) -> None:
+        """Pin what is held, or take the pin out."""
+        held = self.hover
+        self.message = "Hold a limb to pin it" if held is None else self.session.toggle_pin(held)
+
+    def restore(self) -> None:
+        """Back to the pose at the start; hands let go."""
+        self.session.restore()
+
+    def step_back(self) -> bool:
+        """Back to before the last grab or restoring, hands let go; whether there was one."""
+        return self.session.step_back()
+
+    def notices(self) -> list[Notice]:
+        """What is to be shown to the user, each once."""
+        notices, self.client.notices = self.client.notices, []
+        return notices
+
+
+class Calibrations:
+    """The zero and range that devices have learned here: kept in a file, and handed to them.
+
+    Args:
+        client: to the bridge.
+    """
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self.learned = load_calibrations()
+        """By a device's identity."""
+        self.sent: dict[int, str] = {}
+        """Identities of devices whose calibration the bridge was told."""
+
+    def reset(self, number: int) -> None:
+        """Forget what was learned of a device.
+
+        Raises:
+            SettingsError: nothing was.
+            WriteError: the file of calibrations cannot be written.
+        """
+        identity = self._client.devices[number].identity
+        if identity not in self.learned:
+            raise SettingsError("This device was not calibrated.", "It is as its maker says.")
+        left = {name: each for name, each in self._all().items() if name != identity}
+        save_calibrations(left)
+        self.learned = left
+        self._client.send(CalibrationMessage.of(number, NONE))
+
+    def keep_learned(self) -> list[tuple[int, DeviceMessage]]:
+        """Keep what devices have learned since the last time; which did."""
+        client = self._client
+        calibrated, client.calibrated = client.calibrated, {}
+        present = [number for number in calibrated if number in client.devices]
+        for number in present:
+            self.keep(client.devices[number], calibrated[number].calibration())
+        return [(number, client.devices[number]) for number in present]
+
+    def keep(self, device: DeviceMessage, calibration: Calibration) -> None:
+        """Keep what was learned of one device."""
+        self.learned = {**self._all(), device.identity: calibration}
+        try:
+            save_calibrations(self.learned)
+        except WriteError as error:
+            # It holds for now all the same.
+            self._client.notices.append(Notice(error.problem, error.remedy))
+
+    def send(self) -> None:
+        """Tell devices that came what was learned of them."""
+        client = self._client
+        present = {number: device.identity for number, device in client.devices.items()}
+        for number, identity in present.items():
+            if self.sent.get(number) != identity:
+                # Also where none was learned: another device may have had its number.
+                wanted = self.learned.get(identity, NONE)
+                client.send(CalibrationMessage.of(number, wanted))
+        self.sent = present
+
+    def _all(self) -> dict[str, Calibration]:
+        """Those known here, and what another Blender may have learned since they were read."""
+        return {**self.learned, **load_calibrations()}
+
+
+class DeviceHands(HandsBase):
+    """Hands at devices: the bridge simulates, and the session steps no more by itself.
+
+    Args:
+        session: of posing.
         client: to the bridge, started.
         settings: how devices behave.
     """
 
     def __init__(self, session: PuppetSession, client: Client, settings: DeviceSettings) -> None:
-        self.session = session
-        self.client = client
-        self.hover: int | None = None
-        """The limb that is held, for the overlay."""
-        self.hand: Floats | None = None
-        self.message = ""
+        super().__init__(session, client)
         self._asked: float | None = None
         self._figure: Any = None
         self._world: Any = None
@@ -108,7 +213,7 @@ class DeviceHands:
         self.client.restart()
         settings, self._settings = self._settings, None
         self._world, self._obstacles = None, ()
-        self.calibrations.forget_sent()
+        self.calibrations.sent = {}
         self._held.clear()
         self._asked = None
         self.recentre()
@@ -118,9 +223,9 @@ class DeviceHands:
     # --- What is there --------------------------------------------------------------------------
 
     @property
-    def holding(self) -> bool:
-        """Whether any hand holds a limb."""
-        return any(each.body >= 0 for each in self.client.pointers.values())
+    def hover(self) -> int | None:
+        held = (each.body for each in self.client.pointers.values() if each.body >= 0)
+        return next(held, None)
 
     def shown(self) -> list[Shown]:
         """The pointers."""
@@ -152,19 +257,12 @@ class DeviceHands:
         if not held:
             self._asked = time.monotonic()
 
-    def pin(self) -> None:
-        """Pin what is held, or take the pin out."""
-        held = self.hover
-        self.message = HOLD_TO_PIN if held is None else self.session.toggle_pin(held)
-
     def restore(self) -> None:
-        """Back to the pose at the start; hands let go."""
-        self.session.restore()
+        super().restore()
         self._let_go()
 
     def step_back(self) -> bool:
-        """Back to before the last grab or restoring, hands let go; whether there was one."""
-        done = self.session.step_back()
+        done = super().step_back()
         if done:
             self._let_go()
         return done
@@ -174,10 +272,6 @@ class DeviceHands:
         self._give(self.session.core.pose)
         # A hand that still holds will let go: that is no grab of its own.
         self._held = set(self.client.pointers)
-
-    def test(self, number: int) -> None:
-        """Let a device push gently each way."""
-        self.client.send(Buzz(number))
 
     def recentre(self) -> None:
         """Bring all pointers to the middle of the view."""
@@ -230,10 +324,12 @@ class DeviceHands:
             self._ours = core.pose
         self.session.tick(0.0)
         self._send_changes(settings)
-        self._correct()
+        for number, device in self.calibrations.keep_learned():
+            self.message = f"Calibrated: {device.name}"
+            self._fit(number, device)
+        self.calibrations.send()
         if room is not None:
             self._place(room)
-        self._look_at_held()
         if any(each.pressed and each.button == settings.grab_button for each in buttons):
             self._asked = time.monotonic()
         if self.holding:
@@ -244,11 +340,6 @@ class DeviceHands:
             self.message = NOTHING_NEAR
         return buttons
 
-    def notices(self) -> list[Notice]:
-        """What is to be shown to the user, each once."""
-        notices, self.client.notices = self.client.notices, []
-        return notices
-
     def _note_grabs(self) -> None:
         """Before the first pose that follows from a grab: that is what a step back leads to."""
         held = {number for number, each in self.client.pointers.items() if each.body >= 0}
@@ -256,21 +347,10 @@ class DeviceHands:
             self.session.core.remember()
         self._held = held
 
-    def _correct(self) -> None:
-        """Tell devices their own zero and range, and keep what was learned."""
-        for number, device in self.calibrations.keep_learned():
-            self.message = f"Calibrated: {device.name}"
-            self._fit(number, device)
-        self.calibrations.send()
-
     def _fit(self, number: int, device: DeviceMessage) -> None:
         """Lay the room of a device anew, whose own is another one now."""
         if device.kind == Kind.POSE:
             self._spaces.pop(number, None)
-
-    def _look_at_held(self) -> None:
-        held = [each.body for each in self.client.pointers.values() if each.body >= 0]
-        self.hover = held[0] if held else None
 
     def _give(self, pose: Pose) -> None:
         self._ours = pose
@@ -296,10 +376,11 @@ class DeviceHands:
             self._figure = session.figure
             self.client.send_figure(session.figure, session.core.pose)
             self._pins = {}
-        firm = self._pins_now()
-        if firm != self._pins:
-            self._pins = firm
-            self.client.send_pins(firm)
+        held = session.root_is_held
+        pins = {body: held or session.figure.parents[body] >= 0 for body in session.core.pins}
+        if pins != self._pins:
+            self._pins = pins
+            self.client.send_pins(pins)
         if settings != self._settings:
             self._settings = settings
             self.client.send(settings)
@@ -312,13 +393,6 @@ class DeviceHands:
         for number in range(len(obstacles), len(self._obstacles)):
             self.client.send_obstacle(number, None)
         self._obstacles = obstacles
-
-    def _pins_now(self) -> dict[int, bool]:
-        session = self.session
-        held = session.root_is_held
-        return {
-            body: held if session.figure.parents[body] < 0 else True for body in session.core.pins
-        }
 
     def _place(self, room: Room) -> None:
         """Tell devices where the view is; a hand that holds something stays where it is."""

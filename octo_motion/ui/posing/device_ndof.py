@@ -16,9 +16,9 @@ from ...blender.versions import ndof_sensitivities
 from ...core.posing.picking import nearest_body
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
 from ...device.ipc import Client
-from ...device.messages import Button, Notice
+from ...device.messages import Button
 from ...device.messages import Settings as DeviceSettings
-from .device_hands import HOLD_TO_PIN, NOTHING_NEAR, RATE_WIDTH, Room, Shown
+from .device_hands import NOTHING_NEAR, RATE_WIDTH, HandsBase, Room, Shown
 from .puppet_session import PuppetSession
 
 NAME: Final = "Space mouse, through Blender"
@@ -28,8 +28,8 @@ _LONGEST: Final = 0.1
 """s: a longer time between two events is a pause, not a long push."""
 
 
-class NdofHands:
-    """One pointer on a session's puppet, moved by Blender's events; as ``DeviceHands``.
+class NdofHands(HandsBase):
+    """One pointer on a session's puppet, moved by Blender's events.
 
     Args:
         session: of posing.
@@ -39,12 +39,7 @@ class NdofHands:
     def __init__(
         self, session: PuppetSession, clock: Callable[[], float] = time.perf_counter
     ) -> None:
-        self.session = session
-        self.client = Client()
-        """Off: there is no bridge."""
-        self.hover: int | None = None
-        self.hand: Floats | None = None
-        self.message = ""
+        super().__init__(session, Client())
         self.position: Floats | None = None
         """(3,) of the pointer, world; none before the first push."""
         self._turn = IDENTITY.copy()
@@ -53,16 +48,16 @@ class NdofHands:
         self._last = clock()
 
     @property
-    def holding(self) -> bool:
-        """Whether the pointer holds a limb."""
-        return self.session.held is not None
+    def hover(self) -> int | None:
+        held = self.session.held
+        return None if held is None else held.body
 
     def shown(self) -> list[Shown]:
         """The pointer."""
         if self.position is None:
             return []
-        held, point = self.session.held, self.session.held_point()
-        body = -1 if held is None else held.body
+        held, point = self.hover, self.session.held_point()
+        body = -1 if held is None else held
         place = self.position if point is None else point
         return [Shown(0, self.position, place, body, min(1.0, self.session.pull()), NAME)]
 
@@ -114,22 +109,6 @@ class NdofHands:
         self._turn = IDENTITY.copy()
         self.session.grab(body, point)
 
-    def pin(self) -> None:
-        """Pin what is held, or take the pin out."""
-        held = self.session.held
-        self.message = HOLD_TO_PIN if held is None else self.session.toggle_pin(held.body)
-
-    def restore(self) -> None:
-        """Back to the pose at the start; the pointer lets go."""
-        self.session.restore()
-
-    def step_back(self) -> bool:
-        """Back to before the last grab or restoring, and let go; whether there was one."""
-        return self.session.step_back()
-
-    def test(self, number: int) -> None:
-        """Nothing: a space mouse has no motors."""
-
     def recentre(self) -> None:
         """Bring the pointer to the middle of the view, with the next push."""
         self.position = None
@@ -144,11 +123,6 @@ class NdofHands:
             self.session.tick(seconds)
         else:
             self.session.tick(seconds, self.position, self._turn)
-        self.hover = None if held is None else held.body
-        return []
-
-    def notices(self) -> list[Notice]:
-        """None: there is no bridge to complain."""
         return []
 
     def stop(self) -> None:

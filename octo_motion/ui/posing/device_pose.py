@@ -3,26 +3,26 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, Final
 
 import bpy
 import numpy as np
-from bpy.props import IntProperty
+from bpy.props import EnumProperty, IntProperty
 
-from ...core.errors import DeviceError, SettingsError
+from ...core.errors import DeviceError, OctoMotionError, SettingsError
 from ...core.rotations import Floats
 from ...device.driver import Kind
 from ...device.ipc import Client, ClientState
-from ...device.messages import Notice
+from ...device.messages import Buzz, Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import DeviceHands, Room
 from .device_ndof import GRAB_BUTTONS, KEY_BUTTONS, NAME, NdofHands
-from .device_overlay import device_lines
 from .device_settings import device_settings, message
-from .overlay import Overlay
-from .puppet_session import PuppetSession
-from .session_operator import SessionOperator, tell
+from .overlay import Overlay, device_lines, take_down_all
+from .pose_operator import SessionOperator, tell
+from .puppet_session import PuppetSession, active_session
 
 HELP: Final = (
     ("First button or G", "grab"),
@@ -183,9 +183,8 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
 
     @staticmethod
     def _key(hands: Hands, *, all_bones: bool) -> None:
-        names = hands.session.key(all_bones=all_bones)
-        frame = hands.session.scene().frame_current
-        hands.message = f"Keyed {len(names)} bones at frame {frame}" if names else "Nothing to key"
+        session = hands.session
+        hands.message = session.words_for(session.key(all_bones=all_bones))
 
     def _push(self, context: bpy.types.Context, hands: Hands, event: Any) -> Outcome:
         """Blender has a space mouse itself: without a force device, that one poses."""
@@ -240,7 +239,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             case "P":
                 hands.pin()
             case "O":
-                self._record(hands)
+                hands.message = hands.session.toggle_record()
             case "R":
                 hands.restore()
                 hands.message = "As at the start"
@@ -263,15 +262,6 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             hands.client.notices.append(Notice(error.problem, error.remedy))
             return
         hands.message = "Started again"
-
-    @staticmethod
-    def _record(hands: Hands) -> None:
-        if hands.session.recording:
-            bones, count = hands.session.stop_record()
-            hands.message = f"Recorded {bones} bones on {count} key frames"
-        else:
-            hands.session.record()
-            hands.message = "Recording while the frames go by: play, and drag"
 
 
 def _is_undo(event: Any) -> bool:
@@ -302,10 +292,9 @@ def line(hands: Hands) -> str:
     return "    ".join(parts)
 
 
-class OCTO_MOTION_OT_device_test(OctoOperator, bpy.types.Operator):
-    bl_idname = "octo_motion.device_test"
-    bl_label = "Test Device"
-    bl_description = "Let the device push gently to the right, then to the left"
+class DeviceOperator(OctoOperator):
+    """An operator on one of the devices that pose now."""
+
     bl_options = {"INTERNAL"}  # nothing in the file changes
 
     number: IntProperty(
@@ -315,9 +304,15 @@ class OCTO_MOTION_OT_device_test(OctoOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:  # noqa: ARG003
         if active_hands() is None:
-            cls.poll_message_set("Start Pose with Device first")
+            cls.poll_message_set("Start Pose with Device first")  # type: ignore[attr-defined]
             return False
         return True
+
+
+class OCTO_MOTION_OT_device_test(DeviceOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.device_test"
+    bl_label = "Test Device"
+    bl_description = "Let the device push gently to the right, then to the left"
 
     def run(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         hands = active_hands()
@@ -325,7 +320,71 @@ class OCTO_MOTION_OT_device_test(OctoOperator, bpy.types.Operator):
         device = hands.client.devices.get(self.number)
         if device is None or device.force <= 0.0:
             raise SettingsError("This device has no force.", "Choose a force device.")
-        hands.test(self.number)
+        hands.client.send(Buzz(self.number))
 
 
-CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_OT_pose_device, OCTO_MOTION_OT_device_test)
+class OCTO_MOTION_OT_device_calibrate(DeviceOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.device_calibrate"
+    bl_label = "Calibrate Device"
+    bl_description = (
+        "Learn where the device is at rest and how far it goes: leave it alone for a second, then "
+        "move it as far as it goes, each way. It is kept for this device on this computer"
+    )
+
+    step: EnumProperty(
+        name="Step",
+        description="What to do about the device's zero and range",
+        items=(
+            ("BEGIN", "Begin", "Begin to learn what the device says"),
+            ("FINISH", "Done", "Use and keep what was learned"),
+            ("CANCEL", "Cancel", "Stop, and go on as before"),
+            ("RESET", "Reset", "Forget what was learned: go on as the maker says"),
+        ),
+        default="BEGIN",
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if isinstance(active_hands(), NdofHands):
+            cls.poll_message_set("Blender has the space mouse: calibrate it with its own driver")
+            return False
+        return super().poll(context)
+
+    def run(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+        hands = active_hands()
+        assert isinstance(hands, DeviceHands)
+        number = self.number
+        if number not in hands.client.devices:
+            raise SettingsError(
+                f"No device has the number {number}.", "Plug it in, or choose another one."
+            )
+        match self.step:
+            case "BEGIN":
+                hands.begin_calibration(number)
+            case "RESET":
+                hands.reset_calibration(number)
+            case _:
+                if number not in hands.client.calibrating:
+                    raise SettingsError(
+                        "This device is not being calibrated.", "Click Calibrate first."
+                    )
+                hands.end_calibration(number, keep=self.step == "FINISH")
+
+
+def unregister() -> None:
+    """End the session that is going on, if one is, and draw no more."""
+    hands = active_hands()
+    if hands is not None:
+        hands.stop()
+    session = active_session()
+    if session is not None:
+        with suppress(OctoMotionError):
+            session.finish()
+    take_down_all()
+
+
+CLASSES: Final[tuple[type, ...]] = (
+    OCTO_MOTION_OT_pose_device,
+    OCTO_MOTION_OT_device_test,
+    OCTO_MOTION_OT_device_calibrate,
+)

@@ -8,7 +8,17 @@ from typing import Final
 import numpy as np
 
 from ...core.errors import RigError
-from ...core.posing.puppet import Bend, Figure, Pose, measure_shown
+from ...core.posing.puppet import (
+    Bend,
+    Figure,
+    Material,
+    MeasuredBend,
+    Pose,
+    joint_loads,
+    material_of,
+    measure_bend,
+    measure_shown,
+)
 from ...core.rotations import (
     IDENTITY,
     Floats,
@@ -36,11 +46,7 @@ class MeasuringHand:
     """
 
     def __init__(self, figure: Figure, pose: Pose, body: int) -> None:
-        if figure.parents[body] < 0:
-            raise RigError(
-                f"'{figure.names[body]}' hangs on no other limb, so it has no joint to bend.",
-                "Choose a limb further out.",
-            )
+        check_joint(figure, body)
         self.body = body
         self.pull = 2.0
         """How hard the joint is pulled, in its loads."""
@@ -120,3 +126,46 @@ class MeasuringHand:
         size = float(np.linalg.norm(axis))
         angles = turns @ (axis / size) if size > 0.0 else np.zeros(len(turns))
         return measure_shown(times, angles, released, self.pull, BEARS)
+
+
+def check_joint(figure: Figure, body: int) -> None:
+    """See whether a body has a joint that can be bent.
+
+    Raises:
+        RigError: it hangs on nothing.
+    """
+    if figure.parents[body] < 0:
+        raise RigError(
+            f"'{figure.names[body]}' hangs on no other limb, so it has no joint to bend.",
+            "Choose a limb further out.",
+        )
+
+
+def measured_joint(
+    figure: Figure, body: int, strength: float, bend: Bend
+) -> tuple[MeasuredBend, Material]:
+    """Coefficients of a joint that does what a bend says, and the material that has them.
+
+    Args:
+        figure: the puppet.
+        body: whose joint it is.
+        strength: of the settings.
+        bend: its torques in loads of the joint.
+
+    Raises:
+        RigError: the body hangs on nothing.
+        SettingsError: the bend makes no sense.
+    """
+    check_joint(figure, body)
+    load = strength * float(joint_loads(figure)[body])
+    torques = {"torque": bend.torque * load, "bears": bend.bears * load}
+    measured = measure_bend(Bend(**{**vars(bend), **torques}))
+    return measured, material_of(measured, load)
+
+
+def coefficients(bone: str, measured: MeasuredBend) -> str:
+    """The coefficients, for people."""
+    text = f"{bone}: K_f {measured.stiffness:.3g} N·m/rad, D_f {measured.damping:.3g} N·m·s/rad"
+    if not np.isfinite(measured.yield_torque):
+        return text + ", never gives way"
+    return text + f", D_d {measured.flow:.3g} N·m·s/rad, yields at {measured.yield_torque:.3g} N·m"

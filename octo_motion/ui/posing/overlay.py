@@ -14,6 +14,8 @@ from gpu_extras.batch import batch_for_shader
 from ...core.posing.wireframe import arrow_lines, capsule_lines, load_colours, pin_lines
 from ...core.rotations import Floats
 from .controls import PoseControls
+from .device_hands import DeviceHands
+from .device_ndof import NdofHands
 from .properties import posing_settings
 
 _HOVERED: Final = (1.0, 1.0, 1.0, 0.9)
@@ -21,12 +23,19 @@ _HELD: Final = (1.0, 0.6, 0.1, 1.0)
 _PIN: Final = (0.2, 0.9, 0.9, 1.0)
 _ARROW: Final = (1.0, 0.45, 0.05, 1.0)
 _ALPHA: Final = 0.55
+_FREE: Final = (0.6, 0.9, 1.0, 1.0)
+_HOLDING: Final = (1.0, 0.6, 0.1, 1.0)
+_STRONG: Final = (1.0, 0.1, 0.1, 1.0)
+_POINTER: Final = 0.03
+"""Of the figure."""
 
 Lines = list[tuple[Floats, Floats, float]]
 """Points (2 · lines, 3), colours (2 · lines, 4) and width in pixels."""
 
 
-def overlay_lines(controls: PoseControls, eye: Floats, *, loads: bool = True) -> Lines:
+def overlay_lines(
+    controls: PoseControls | DeviceHands | NdofHands, eye: Floats, *, loads: bool = True
+) -> Lines:
     """All lines of a session, in the world.
 
     Args:
@@ -126,3 +135,18 @@ class Overlay:
         finally:
             gpu.state.blend_set("NONE")
             gpu.state.depth_test_set("NONE")
+
+
+def device_lines(hands: DeviceHands | NdofHands, eye: Floats, *, loads: bool = True) -> Lines:
+    """All lines of a session with devices, in the world; as ``overlay_lines``."""
+    found = overlay_lines(hands, eye, loads=loads)
+    size = _POINTER * hands.session.size
+    for each in hands.shown():
+        cross = np.stack([each.position - size * np.eye(3), each.position + size * np.eye(3)], 1)
+        colour = _FREE if each.body < 0 else _HOLDING
+        found.append(_one_colour(cross, colour, 2.0))
+        if each.body >= 0:
+            spring = np.stack([each.coupled, each.position])
+            mixed = np.array(_HOLDING) + min(1.0, each.force) * np.subtract(_STRONG, _HOLDING)
+            found.append(_one_colour(spring, tuple(mixed), 3.0))
+    return found

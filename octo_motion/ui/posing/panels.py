@@ -7,14 +7,32 @@ from typing import Any, Final
 
 import bpy
 
+from ...device.calibration import Phase, reached
+from ...device.driver import Kind
+from ...device.ipc import ClientState
+from ...device.messages import DeviceMessage
 from ..panel_base import ArmaturePanel
-from .custom_material import CUSTOM
-from .marks import OCTO_MOTION_OT_pose_mark_bones, OCTO_MOTION_OT_pose_obstacle
-from .measure import OCTO_MOTION_OT_pose_forget_measured, OCTO_MOTION_OT_pose_measure
-from .pose_start import OCTO_MOTION_OT_pose_start
+from .device_hands import DeviceHands
+from .device_ndof import NAME, NdofHands
+from .device_pose import (
+    Hands,
+    OCTO_MOTION_OT_device_calibrate,
+    OCTO_MOTION_OT_device_test,
+    OCTO_MOTION_OT_pose_device,
+    active_hands,
+)
+from .device_settings import device_settings
+from .operators import (
+    OCTO_MOTION_OT_pose_forget_measured,
+    OCTO_MOTION_OT_pose_mark_bones,
+    OCTO_MOTION_OT_pose_measure,
+    OCTO_MOTION_OT_pose_obstacle,
+)
+from .pose_operator import OCTO_MOTION_OT_pose_start
 from .properties import posing_settings
 from .puppet_session import active_session
 from .script_player import OCTO_MOTION_OT_pose_script
+from .session_settings import CUSTOM
 
 
 class PosePanel(ArmaturePanel):
@@ -110,9 +128,123 @@ class OCTO_MOTION_PT_posing_keys(PosePanel, bpy.types.Panel):
         layout.operator(OCTO_MOTION_OT_pose_script.bl_idname, icon="FILE_SCRIPT")
 
 
+# --- The panel Device: what is plugged in, how well it goes, and how strong it is -----------------
+
+
+_LATE: Final = 0.002
+"""s: a loop that is off its period by more, in one of a hundred ticks, is felt."""
+_SLOW: Final = 0.9
+"""Simulated against real time, below which the panel says so."""
+_LAGS: Final = 0.05
+"""s: a puppet that follows later is felt to lag."""
+
+
+class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
+    bl_idname = "OCTO_MOTION_PT_posing_device"
+    bl_label = "Device"
+    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+
+    def show(self, layout: Any, settings: Any) -> None:  # noqa: ARG002
+        assert bpy.context.window_manager is not None
+        own = device_settings(bpy.context.window_manager)
+        row = layout.row()
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(OCTO_MOTION_OT_pose_device.bl_idname, icon="ORIENTATION_GIMBAL")
+        hands = active_hands()
+        if hands is not None:
+            self._devices(layout, hands)
+        layout.prop(own, "force")
+        layout.prop(own, "toggle")
+        layout.prop(own, "speed")
+        layout.prop(own, "scale")
+        layout.prop(own, "reach")
+        row = layout.row()
+        row.active = hands is None
+        row.prop(own, "simulate")
+
+    @staticmethod
+    def _devices(layout: Any, hands: Hands) -> None:
+        box = layout.box()
+        client = hands.client
+        if client.state is ClientState.LOST:
+            box.alert = True
+            box.label(text="The program has ended", icon="ERROR")
+            box.label(text="B over the viewport starts it again")
+            return
+        if isinstance(hands, NdofHands):
+            box.label(text=NAME, icon="ORIENTATION_GIMBAL")
+            return
+        if client.silent:
+            box.alert = True
+            box.label(text="The program does not answer", icon="ERROR")
+            box.label(text="B over the viewport starts it again")
+            return
+        if not client.devices:
+            box.label(text="No device is plugged in", icon="INFO")
+        forces = {each.number: each for each in hands.shown()}
+        for number, device in client.devices.items():
+            column = box.column(align=True)
+            row = column.split(factor=0.7)
+            row.label(text=device.name, icon="ORIENTATION_GIMBAL")
+            shown = forces.get(number)
+            if device.force > 0.0:
+                row.operator(OCTO_MOTION_OT_device_test.bl_idname, text="Test").number = number
+                share = shown.force if shown else 0.0
+                column.progress(factor=share, text=f"{share * device.force:.1f} N")
+            else:
+                column.label(text="Leads, without force")
+            draw_calibration(column, hands, number, device)
+        times = client.times
+        if times is not None:
+            column = box.column(align=True)
+            row = column.row()
+            row.alert = times.late[1] > _LATE
+            row.label(text=f"{times.rate:.0f} Hz, {1e3 * times.late[1]:.2f} ms off at most")
+            row = column.row()
+            # Before its first step the simulation has no pace.
+            row.alert = 0.0 < times.pace < _SLOW
+            slow = f", {100.0 * times.pace:.0f} % of real time" if row.alert else ""
+            row.label(text=f"A step takes {1e3 * times.step:.1f} ms{slow}")
+            if times.lag > 0.0:
+                row = column.row()
+                row.alert = times.lag > _LAGS
+                row.label(text=f"{1e3 * times.lag:.0f} ms from hand to pose")
+
+
+def draw_calibration(layout: Any, hands: DeviceHands, number: int, device: DeviceMessage) -> None:
+    """The part of a device's box that calibrates it."""
+    name = OCTO_MOTION_OT_device_calibrate.bl_idname
+
+    def button(row: Any, step: str, **shown: Any) -> None:
+        operator = row.operator(name, **shown)
+        operator.number, operator.step = number, step
+
+    learning = hands.client.calibrating.get(number)
+    if learning is None:
+        row = layout.row(align=True)
+        button(row, "BEGIN", text="Calibrate")
+        if device.identity in hands.calibrations.learned:
+            button(row, "RESET", text="", icon="LOOP_BACK")
+        return
+    column = layout.column(align=True)
+    if learning.phase == Phase.REST:
+        column.label(text="Take your hand off it …", icon="TIME")
+    else:
+        there, ends = reached(learning.calibration(), Kind(device.kind))
+        way = "Push and turn" if device.kind == Kind.RATE else "Move"
+        column.label(text=f"{way} it as far as it goes, each way", icon="ORIENTATION_GIMBAL")
+        column.progress(factor=there / ends, text=f"{there} of {ends}")
+    row = column.row(align=True)
+    done = row.row(align=True)
+    done.enabled = learning.phase == Phase.REACH
+    button(done, "FINISH", text="Done")
+    button(row, "CANCEL", text="Cancel")
+
+
 CLASSES: Final[tuple[type, ...]] = (
     OCTO_MOTION_PT_posing,
     OCTO_MOTION_PT_posing_world,
     OCTO_MOTION_PT_posing_bones,
     OCTO_MOTION_PT_posing_keys,
+    OCTO_MOTION_PT_posing_device,
 )

@@ -38,6 +38,8 @@ class Player:
         self._script = script
         self._hand: Floats | None = None
         self._turn = IDENTITY.copy()
+        self._played = 0.0
+        """Seconds since the frame that is shown while recording."""
         self.keys = 0
         """How many bones were keyed, all in all."""
 
@@ -89,14 +91,14 @@ class Player:
         self._session.core.pin(self._session.body(step.bone), state=False)
 
     def _frame(self, step: Step) -> None:
-        if not self._session.recording:
-            self._session.scene().frame_set(step.frame)
-            self._held()
-            return
-        # While recording, time goes by from frame to frame, and the hand waits.
         scene = self._session.scene()
-        for frame in range(scene.frame_current + 1, step.frame + 1):
-            self._one_frame(frame)
+        if not self._session.recording:
+            scene.frame_set(step.frame)
+            if self._session.held is None:
+                self._hand = None
+        # While recording, time goes by from frame to frame, and the hand waits.
+        while scene.frame_current < step.frame:
+            self._tick()
 
     def _key(self, step: Step) -> None:
         bones = None if isinstance(step.bones, str) else step.bones
@@ -115,31 +117,16 @@ class Player:
 
     def _tick(self) -> None:
         self._session.tick(TICK, self._hand, self._turn)
-        if self._session.recording:
-            self._played += TICK
-            self._go_on()
-
-    # --- Frames while recording -------------------------------------------------------------------
-
-    _played: float = 0.0
-
-    def _go_on(self) -> None:
-        """The scene plays at its own rate."""
+        if not self._session.recording:
+            return
+        # The scene plays at its own rate.
+        self._played += TICK
         scene = self._session.scene()
         assert scene.render is not None
         length = scene.render.fps_base / scene.render.fps
         while self._played >= length - 1e-9:
             self._played -= length
             scene.frame_set(scene.frame_current + 1)
-
-    def _one_frame(self, frame: int) -> None:
-        scene = self._session.scene()
-        while scene.frame_current < frame:
-            self._tick()
-
-    def _held(self) -> None:
-        if self._session.held is None:
-            self._hand = None
 
 
 def apply_settings(armature: bpy.types.Object, values: Any) -> None:

@@ -10,13 +10,20 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ...blender.rig import Puppet, bone_materials, is_part_of
+from ...blender.rig import Puppet, armature_data, bone_materials, is_part_of, set_bone_material
 from ...blender.scene import read_obstacle
 from ...core.posing.puppet import Elements, Figure, Material, elements_for
 from ...core.posing.session import Session
-from ...core.posing.solver import Obstacle, Plane, WorldSettings
-from .custom_material import chosen_material, keep_material, kept_before
+from ...core.posing.solver import Obstacle, Plane
 from .properties import marked_obstacles, posing_settings
+
+CUSTOM: Final = "CUSTOM"
+
+NAMES: Final = (
+    *("material", "custom_yields", "custom_bears", "custom_springs"),
+    *("custom_settles", "custom_gives"),
+)
+"""The settings that hold it."""
 
 GRAVITY: Final = (0.0, 0.0, -9.81)
 _CALMING: Final = 3.0
@@ -68,10 +75,6 @@ class SessionSettings:
             "friction": self.friction,
             "drag": _CALMING if calm else 0.0,
         }
-
-    def world_settings(self) -> WorldSettings:
-        """Of a session that begins."""
-        return WorldSettings(**self.world)
 
     def elements(self, figure: Figure, own: Mapping[int, Material]) -> Elements:
         """Of the joints; some bodies may have a material of their own."""
@@ -140,3 +143,63 @@ class BoneMaterials:
         """As they were at the start."""
         for put_back in reversed(self._before):
             put_back(armature)
+
+
+def chosen_material(settings: Any) -> str | Material:
+    """What a figure is made of, for ``elements_for``.
+
+    Args:
+        settings: the armature's, or anything with the same names.
+    """
+    if settings.material != CUSTOM:
+        return settings.material.lower()
+    yields = settings.custom_yields
+    return Material(
+        bears=settings.custom_bears if yields else float(np.inf),
+        springs=settings.custom_springs,
+        settles=settings.custom_settles,
+        gives=settings.custom_gives if yields else 0.0,
+    )
+
+
+def keep_material(armature: bpy.types.Object, settings: Any, material: Material, bone: str) -> None:
+    """Make the figure of a material, or one bone's joint.
+
+    Args:
+        armature: the armature object.
+        settings: its own of posing.
+        material: the new one.
+        bone: the one that it is for; empty for all.
+
+    Raises:
+        WriteError: the bones are linked.
+    """
+    if bone:
+        set_bone_material(armature, bone, material)
+        return
+    settings.material = CUSTOM
+    settings.custom_yields = bool(np.isfinite(material.bears))
+    if settings.custom_yields:
+        settings.custom_bears = material.bears
+        settings.custom_gives = material.gives
+    settings.custom_springs = material.springs
+    settings.custom_settles = material.settles
+
+
+def kept_before(
+    armature: bpy.types.Object, settings: Any, bone: str
+) -> Callable[[bpy.types.Object], None]:
+    """What puts back the armature's material of now; asked for before ``keep_material``."""
+    values = {each: getattr(settings, each) for each in NAMES}
+    own = bone_materials(armature).get(bone)
+
+    def put_back(armature: bpy.types.Object) -> None:
+        if bone:
+            if bone in armature_data(armature).bones:
+                set_bone_material(armature, bone, own)
+            return
+        now = posing_settings(armature)
+        for each, value in values.items():
+            setattr(now, each, value)
+
+    return put_back

@@ -27,8 +27,8 @@ from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.controls import Outcome
 from octo_motion.ui.posing.device_hands import NOTHING_NEAR, DeviceHands, Room
 from octo_motion.ui.posing.device_ndof import NdofHands
-from octo_motion.ui.posing.device_overlay import device_lines
 from octo_motion.ui.posing.device_settings import device_settings, message
+from octo_motion.ui.posing.overlay import device_lines
 from octo_motion.ui.posing.puppet_session import PuppetSession
 from tests.device.bridges import bridge_of
 
@@ -280,7 +280,7 @@ def test_bridge_that_is_started_again_knows_force_floor_and_calibration(
     hands.client.send = lambda each: (sent.append(each), send(each))
     press(hands, Key("B"))
     wait_gently(lambda: 0 in hands._spaces and hands.shown(), "the hand is back")
-    hands.test(0)
+    hands.client.send(say.Buzz(0))
     forces: list[float] = []
 
     def pushes() -> bool:

@@ -16,9 +16,9 @@ from octo_motion.blender.animation.poses import pose_values
 from octo_motion.core.errors import OctoMotionError, RigError, WriteError
 from octo_motion.core.rotations import Floats
 from octo_motion.ui.posing.controls import Outcome, PoseControls
+from octo_motion.ui.posing.device_pose import unregister
 from octo_motion.ui.posing.overlay import overlay_lines
 from octo_motion.ui.posing.puppet_session import PuppetSession, active_session
-from octo_motion.ui.posing.registration import unregister
 
 TICK = 1.0 / 60.0
 PIXELS = 500.0

@@ -15,11 +15,11 @@ import pytest
 
 from octo_motion.blender.animation.poses import pose_values
 from octo_motion.core.errors import OctoMotionError, RigError
-from octo_motion.ui.posing import session_operator
+from octo_motion.ui.posing import pose_operator as session_operator
 from octo_motion.ui.posing.controls import Outcome, PoseControls
+from octo_motion.ui.posing.pose_operator import tell
 from octo_motion.ui.posing.puppet_session import PuppetSession, active_session
-from octo_motion.ui.posing.session_operator import tell
-from octo_motion.ui.posing.view import view_under
+from octo_motion.ui.posing.viewport import view_under
 from tests.ui.posing.test_posing import MOVE, TICK, VIEW, Event, drag, keyed, over
 
 ARM, OTHER = "arm1.04.L", "arm2.04.L"

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import pytest
 
-from octo_motion.ui.posing.scrubbing import frame_under, go_to, strip_under
+from octo_motion.ui.posing.viewport import frame_under, go_to, strip_under
 
 
 def area(kind: str, y: int, *, ui_type: str = "") -> Any:

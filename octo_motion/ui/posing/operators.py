@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saying how a joint is to give way, and getting the material that does so."""
+"""Buttons about a puppet: which bones are limbs, what is solid, how a joint gives way."""
 
 from __future__ import annotations
 
@@ -7,26 +7,100 @@ from typing import TYPE_CHECKING, Any, Final
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...blender.animation import writable_armature
 from ...blender.rig import (
     active_armature,
     bone_materials,
+    mark_bones,
     read_rig,
     selected_bones,
     set_bone_material,
 )
-from ...core.errors import RigError
+from ...core.errors import RigError, WriteError
 from ...core.posing.puppet import Bend, Figure
-from ..operator_base import ArmatureOperator
-from .custom_material import coefficients, keep_material, measured_joint
-from .measuring_hand import BEARS
-from .properties import posing_settings
+from ..operator_base import ArmatureOperator, OctoOperator
+from .measuring_hand import BEARS, coefficients, measured_joint
+from .properties import OBSTACLES, posing_settings
 from .puppet_session import PuppetSession, active_session
+from .session_settings import keep_material
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+
+class OCTO_MOTION_OT_pose_mark_bones(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_mark_bones"
+    bl_label = "Mark Bones"
+    bl_description = (
+        "Decide for the selected bones whether they are limbs of the puppet or only follow the "
+        "bone they hang on, where it was told wrongly by itself"
+    )
+    bl_options = {"REGISTER", "UNDO"}
+
+    mark: EnumProperty(
+        name="Mark",
+        description="What the selected bones are",
+        items=(
+            ("BODY", "Limb", "They can be grabbed and bent", 0),
+            ("FOLLOW", "Follows", "They keep their pose and follow their parent", 1),
+            ("AUTO", "Automatic", "Names, skin and constraints decide", 2),
+        ),
+        default="BODY",
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        writable_armature(armature)
+        names = selected_bones(armature)
+        if not names:
+            raise RigError("No bones are selected.", "Select bones in pose mode.")
+        data = armature.data
+        if data is None or not data.is_editable:
+            raise WriteError(
+                f"The bones of '{armature.name}' are linked and read-only.",
+                "Mark them in the linked file.",
+            )
+        mark_bones(armature, list(names), "" if self.mark == "AUTO" else self.mark)
+        self.report({"INFO"}, f"Marked {len(names)} bones.")
+
+
+class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_obstacle"
+    bl_label = "Mark Obstacle"
+    bl_description = "Let the selected objects stop puppets, as a shape of your choice"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(
+        name="Shape", description="What puppets take them for", items=OBSTACLES, default="BOX"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if context.mode not in {"OBJECT", "POSE"}:
+            cls.poll_message_set("Go to object mode or pose mode first")
+            return False
+        return True
+
+    def run(self, context: bpy.types.Context) -> None:
+        chosen = [each for each in context.selected_objects if each.type != "ARMATURE"]
+        if not chosen:
+            raise RigError(
+                "No object that could be an obstacle is selected.", "Select a mesh or an empty."
+            )
+        for each in chosen:
+            if not each.is_editable:
+                raise WriteError(
+                    f"'{each.name}' is linked and read-only here.", "Make a library override."
+                )
+        for item in chosen:
+            own: Any = item
+            own.octo_motion.posing.obstacle = self.kind
+        self.report({"INFO"}, f"Marked {len(chosen)} objects.")
+
+
+# --- Saying how a joint is to give way, and getting the material that does so ---------------------
 
 
 class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
@@ -166,6 +240,8 @@ def _session_of(armature: bpy.types.Object) -> PuppetSession | None:
 
 
 CLASSES: Final[tuple[type, ...]] = (
+    OCTO_MOTION_OT_pose_mark_bones,
+    OCTO_MOTION_OT_pose_obstacle,
     OCTO_MOTION_OT_pose_measure,
     OCTO_MOTION_OT_pose_forget_measured,
 )
