@@ -17,10 +17,9 @@ from .command_line import parse
 from .job_report import figures_in_words
 from .job_runner import STOPPED, BakeOptions, bake
 from .outputs import commit, staged
-from .schema import Reading
 from .shot_runner import perform
-from .shot_schema import KINDS, ShotRequest, is_motion, read_shot
-from .vocabulary import known, with_gait
+from .shot_schema import KINDS, ShotRequest, is_motion
+from .vocabulary import make_request
 from .worker import RUN_SHOT, run_shot, stoppable
 
 _WRONG: Final = 2
@@ -98,12 +97,9 @@ def _requested(options: argparse.Namespace) -> ShotRequest:
         )
     if options.command == "splice" and is_motion(read) and not options.splices:
         raise SettingsError("There is nothing to splice: give --splice PART FILE.")
-    reading = Reading(known(), _resolved, has_open_file=True)
-    shot = read_shot(table, reading)
-    if reading.faults:
-        raise SettingsError("\n".join(reading.faults))
+    shot = make_request(table, _resolved, has_open_file=True)
     _check_outputs(shot, read, overwrite=options.overwrite)
-    return with_gait(shot)
+    return shot
 
 
 def _check_outputs(shot: ShotRequest, read: Path, *, overwrite: bool) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -76,12 +76,8 @@ def read_job(path: Path, known: Known, report: Path) -> JobFile:
         name = table.get("name")
         name = name if isinstance(name, str) and name.strip() else ""
         label = f"shot '{name}'" if name else f"shot number {place}"
-
-        def resolve(text: str, name: str = name) -> Path:
-            # An output that is a link is written where the link leads.
-            return (path.parent / Path(text.replace("{name}", name)).expanduser()).resolve()
-
-        shots.append(read_shot(table, Reading(known, resolve, faults).within(label)))
+        reading = Reading(known, resolver(path, name), faults)
+        shots.append(read_shot(table, reading.within(label)))
     counts = Counter(shot.name for shot in shots if shot.name)
     faults += [
         f"shot '{name}': {count} shots have this name."
@@ -92,6 +88,16 @@ def read_job(path: Path, known: Known, report: Path) -> JobFile:
     if faults:
         raise JobError(f"'{path}'", faults)
     return JobFile(path, tuple(shots), {table["name"]: table for table in asked})
+
+
+def resolver(job: Path, name: str) -> Callable[[str], Path]:
+    """The paths that the texts of a shot mean, by the job's path and the shot's name."""
+
+    def resolve(text: str) -> Path:
+        # An output that is a link is written where the link leads.
+        return (job.parent / Path(text.replace("{name}", name)).expanduser()).resolve()
+
+    return resolve
 
 
 def _content(path: Path) -> dict[str, Any]:

@@ -210,6 +210,11 @@ class Verdict:
     kept: tuple[str, ...] = ()
     """Outputs of a shot to skip that somebody has changed since."""
 
+    @property
+    def must_bake(self) -> bool:
+        """Whether it is new or has changed, and nothing stands in the way."""
+        return not (self.skip or self.reason)
+
 
 def judge(
     record: ShotRecord | None,

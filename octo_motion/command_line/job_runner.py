@@ -13,7 +13,16 @@ from typing import Any
 
 from ..core.errors import OctoMotionError
 from .job_file import JobError, JobFile, read_job
-from .job_report import ShotRecord, count, digest, fingerprint, judge, read_report, write_report
+from .job_report import (
+    ShotRecord,
+    Verdict,
+    count,
+    digest,
+    fingerprint,
+    judge,
+    read_report,
+    write_report,
+)
 from .outputs import commit, staged
 from .schema import unknown
 from .shot_schema import ShotRequest
@@ -52,10 +61,7 @@ class _Plan:
 
     shot: ShotRequest
     fingerprint: str
-    inputs: tuple[Path, ...]
-    problem: str = ""
-    skip: bool = False
-    kept: tuple[str, ...] = ()
+    verdict: Verdict
 
 
 def bake(options: BakeOptions) -> int:
@@ -75,12 +81,12 @@ def bake(options: BakeOptions) -> int:
     run = _Run(job, records, report, len(chosen))
     problems = _problems(chosen)
     plans = [_plan(shot, run, problems, force=options.force) for shot in chosen]
-    jobs = check_jobs(options.jobs, sum(not (plan.problem or plan.skip) for plan in plans))
+    jobs = check_jobs(options.jobs, sum(plan.verdict.must_bake for plan in plans))
     if options.check:
         for plan in plans:
-            state = plan.problem or ("unchanged" if plan.skip else "ready")
+            state = plan.verdict.reason or ("unchanged" if plan.verdict.skip else "ready")
             _say(f"{plan.shot.name}: {state}")
-        return 1 if any(plan.problem for plan in plans) else 0
+        return 1 if any(plan.verdict.reason for plan in plans) else 0
     return run.all(plans, jobs)
 
 
@@ -102,25 +108,19 @@ def _problems(shots: Sequence[ShotRequest]) -> dict[Path, str]:
     return problems
 
 
-def _plan(asked: ShotRequest, run: _Run, problems: Mapping[Path, str], *, force: bool) -> _Plan:
+def _plan(shot: ShotRequest, run: _Run, problems: Mapping[Path, str], *, force: bool) -> _Plan:
     """Look at a shot, without changing anything."""
     try:
-        shot = with_gait(asked)
-        gait = str(shot.gait)
+        gait = str(with_gait(shot).gait)
         problem = next((problems[path] for path in shot.opened if path in problems), "")
     except OctoMotionError as error:
-        shot, gait, problem = asked, "", str(error)
-    plan = _Plan(shot, fingerprint(run.job.asked[shot.name], gait), asked.inputs, problem)
+        gait, problem = "", str(error)
+    mark = fingerprint(run.job.asked[shot.name], gait)
     if problem or force:
-        return plan
-    verdict = judge(
-        run.records.get(shot.name),
-        plan.fingerprint,
-        [run.relative(path) for path in asked.inputs],
-        [run.relative(path) for path in shot.outputs],
-        run.digest,
-    )
-    return replace(plan, skip=verdict.skip, problem=verdict.reason, kept=verdict.kept)
+        return _Plan(shot, mark, Verdict(skip=False, reason=problem))
+    inputs, outputs = (map(run.relative, paths) for paths in (shot.inputs, shot.outputs))
+    verdict = judge(run.records.get(shot.name), mark, inputs, outputs, run.digest)
+    return _Plan(shot, mark, verdict)
 
 
 def _say(line: str) -> None:
@@ -142,13 +142,15 @@ class _Run:
     def all(self, plans: Sequence[_Plan], jobs: int) -> int:
         """Bake what is to be baked."""
         for plan in plans:
-            if plan.problem:
-                self._fail(plan, plan.problem)
-            elif plan.skip:
+            if plan.verdict.reason:
+                self._fail(plan, plan.verdict.reason)
+            elif plan.verdict.skip:
                 self._skip(plan)
         # Now, so that a report that cannot be written is known before hours of work.
         self._write_report()
-        waiting = {plan.shot.name: plan for plan in plans if not (plan.problem or plan.skip)}
+        waiting = {
+            plan.shot.name: plan for plan in plans if not (plan.verdict.reason or plan.verdict.skip)
+        }
         order = list(waiting.values())
         try:
             self._bake(order, waiting, jobs)
@@ -177,7 +179,7 @@ class _Run:
     ) -> Iterator[Task]:
         for number, plan in enumerate(order):
             try:
-                yield scratch.task(number, plan.shot)
+                yield scratch.task(number, plan.shot, self.job)
             except OctoMotionError as error:
                 self._fail(plan, str(error))
                 del waiting[plan.shot.name]
@@ -197,7 +199,7 @@ class _Run:
         if error:
             self._fail(plan, error, log=last_lines(scratch.log(name)), **said)
         else:
-            read = [*plan.inputs, *map(Path, libraries)]
+            read = [*plan.shot.inputs, *map(Path, libraries)]
             self.records[name] = ShotRecord(
                 name=name,
                 status="done",
@@ -220,7 +222,10 @@ class _Run:
     def _skip(self, plan: _Plan) -> None:
         name = plan.shot.name
         self.records[name] = replace(self.records[name], status="skipped")
-        kept = [f"'{path}' has been changed since it was baked, and is kept." for path in plan.kept]
+        kept = [
+            f"'{path}' has been changed since it was baked, and is kept."
+            for path in plan.verdict.kept
+        ]
         self._tell(name, "skipped, unchanged", kept)
 
     def _tell(self, name: str, what: str, warnings: Sequence[str] = ()) -> None:
@@ -275,7 +280,7 @@ class _Scratch(ExitStack):
         self._numbers: dict[str, int] = {}
         self._open: dict[str, ExitStack] = {}
 
-    def task(self, number: int, shot: ShotRequest) -> Task:
+    def task(self, number: int, shot: ShotRequest, job: JobFile) -> Task:
         """Everything ready for one shot.
 
         Raises:
@@ -286,7 +291,7 @@ class _Scratch(ExitStack):
         self._open[shot.name] = own
         self.places[shot.name] = own.enter_context(staged(shot.outputs))
         request = self._path(shot.name, "request.json")
-        write_request(request, shot, self.places[shot.name])
+        write_request(request, job.path, job.asked[shot.name], self.places[shot.name])
         command = child_command(request, self.answer(shot.name))
         return Task(shot.name, command, child_environment(self._folder), self.log(shot.name))
 

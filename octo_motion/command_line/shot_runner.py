@@ -30,7 +30,7 @@ from .job_report import ShotSummary, check_limits
 from .outputs import blender_said, check_export, export
 from .schema import set_values
 from .shot_schema import NewRoute, ShotRequest, frame_rate, is_motion
-from .splice_runner import Clips, has_splices, import_base, splice
+from .splice_runner import Clips, has_splices, import_base, named, splice
 
 _ROUTE_NAME: Final = "Octopus Route"
 _COMPRESSED: Final = (b"\x28\xb5\x2f\xfd", b"\x1f\x8b")
@@ -151,11 +151,9 @@ def find_armature(
         RigError: there is none, or it is not clear which.
     """
     if name:
-        found = [each for each in bpy.data.objects if each.name == name]
-        if not found:
+        armature = named(bpy.data.objects, name)
+        if armature is None:
             raise RigError(f"There is no object '{name}'.", _choose(bpy.data.objects))
-        local = [each for each in found if each.library is None]
-        armature = (local or found)[0]
         if armature.type != "ARMATURE":
             raise RigError(f"'{name}' is not an armature.", _choose(bpy.data.objects))
         return armature
@@ -287,13 +285,13 @@ def _object(
     Raises:
         SettingsError: there is none, or it is of another kind.
     """
-    found = [each for each in bpy.data.objects if each.name == name]
     fitting = [each for each in bpy.data.objects if kind in {"", each.type}]
-    named = next((each for each in found if each in fitting), None)
-    if named is not None:
-        return named
+    found = named(fitting, name)
+    if found is not None:
+        return found
     noun = kind.lower() or "object"
-    problem = f"'{name}' is not a {noun}." if found else f"There is no {noun} '{name}'."
+    other = named(bpy.data.objects, name)
+    problem = f"'{name}' is not a {noun}." if other else f"There is no {noun} '{name}'."
     names = ", ".join(sorted({each.name for each in fitting}))
     raise SettingsError(problem, f"Name one of {names}." if names else instead)
 

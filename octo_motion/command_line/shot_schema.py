@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a shot may say: each key declared once, for job files and for the command line.
 
-A :class:`ShotRequest` is what came of it: plain data that can be handed to another process.
+A :class:`ShotRequest` is what came of it: plain data that can be checked.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final, get_args, get_origin, get_type_hints
+from typing import Any, Final
 
 from ..core.errors import SettingsError
 from ..core.locomotion.gait import gait_to_json
@@ -80,9 +79,7 @@ class NewSplice:
 
 @dataclass(frozen=True)
 class ShotRequest:
-    """What one shot is made from, and what is made of it: its keys in a job file, see
-    ``shot_schema``.
-    """
+    """What one shot is made from, and what is made of it: its keys in a job file."""
 
     name: str = ""
     kind: str = "generate"
@@ -132,40 +129,6 @@ class ShotRequest:
     def outputs(self) -> tuple[Path, ...]:
         """All files that are to be written."""
         return (*((self.output,) if self.output else ()), *self.export)
-
-    def to_plain(self) -> dict[str, Any]:
-        """For JSON; ``from_plain`` reads it."""
-        return _plain(self)
-
-    @classmethod
-    def from_plain(cls, plain: Mapping[str, Any]) -> ShotRequest:
-        """The request that ``to_plain`` made plain."""
-        return _restored(cls, plain)
-
-
-def _plain(value: Any) -> Any:
-    if is_dataclass(value):
-        return {each.name: _plain(getattr(value, each.name)) for each in fields(value)}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return str(value) if isinstance(value, Path) else value
-
-
-def _restored(hint: Any, plain: Any) -> Any:
-    """The value of a type that was made plain; of several types, the first that it could be of."""
-    origin, arguments = get_origin(hint), get_args(hint)
-    if plain is None:
-        return None
-    if origin is types.UnionType:
-        fits = (each for each in arguments if is_dataclass(each) == isinstance(plain, dict))
-        return _restored(next(fits), plain)
-    if origin in {list, tuple} and isinstance(plain, list):
-        values = [_restored(arguments[0], each) for each in plain]
-        return values if origin is list else tuple(values)
-    if isinstance(hint, type) and is_dataclass(hint):
-        hints = get_type_hints(hint)
-        return hint(**{name: _restored(hints[name], value) for name, value in plain.items()})
-    return Path(plain) if hint is Path else plain
 
 
 def frame_rate(fps: float) -> tuple[int, float]:
@@ -406,90 +369,91 @@ def _settings(known: str, help_: str) -> Key:
     return Key(Table(known=known), option)
 
 
-def _exported(what: str) -> Key:
-    help_ = f"export {what} as well ({', '.join(_EXPORT_SUFFIXES)}); may be repeated"
-    return Key(_exports, Option(help_, "FILE", collect=list))
+def _kind(own: dict[str, Key], exported: str) -> dict[str, Key]:
+    """The keys of a kind of shot: its own, and those that all have."""
+    suffixes = ", ".join(_EXPORT_SUFFIXES)
+    export = Option(
+        f"export {exported} as well ({suffixes}); may be repeated", "FILE", collect=list
+    )
+    output = Option("the .blend file to write", "FILE", ("-o", "--output"))
+    return {
+        "name": Key(Text()),
+        "kind": Key(Choice(("generate", "splice", "pose"), "kind")),
+        **own,
+        "fps": Key(Number(1.0, HIGHEST_FPS), Option("frames per second of the scene", "FPS")),
+        "output": Key(File("format to save to", (".blend",)), output),
+        "export": Key(_exports, export),
+    }
 
-
-_NAME: Final = Key(Text())
-_KIND: Final = Key(Choice(("generate", "splice", "pose"), "kind"))
-_OUTPUT: Final = Key(
-    File("format to save to", (".blend",)),
-    Option("the .blend file to write", "FILE", ("-o", "--output")),
-)
-_FPS: Final = Key(Number(1.0, HIGHEST_FPS), Option("frames per second of the scene", "FPS"))
 
 KINDS: Final[dict[str, dict[str, Key]]] = {
-    "generate": {
-        "name": _NAME,
-        "kind": _KIND,
-        "file": _file("the .blend file to read"),
-        "octopus": Key(OCTOPUS),
-        "armature": _named("default: the one that has arms"),
-        "route": Key(_route, Option("the curve; default: the armature's own")),
-        "ground": _named("the mesh to walk on; default: its own"),
-        "gait": Key(_gait, Option("a gait by name, or a gait file (.json)")),
-        "changes": _items("changes", '{ gait = "swim", position = 0.5 }', "gait", "position"),
-        "reaches": _items("reaches", '{ target = "Ball", arm = "Arm 1 L", frame_contact = 40 }'),
-        "contacts": _items(
-            "contacts", '{ arm = "Arm 1 L", cycle = 2, shift = 0.1 }', "arm", "cycle"
-        ),
-        "settings": _settings(
-            "generate", "a setting, such as speed=0.4, sway=12° or table.stride=1.2"
-        ),
-        "limits": Key(
-            LIMITS,
-            Option(
-                f"write nothing if a figure of the motion ({', '.join(NAMES)}) is above; "
-                "may be repeated",
-                "NAME=VALUE",
-                ("--limit",),
-                partial(parse_assignments, option="--limit"),
+    "generate": _kind(
+        {
+            "file": _file("the .blend file to read"),
+            "octopus": Key(OCTOPUS),
+            "armature": _named("default: the one that has arms"),
+            "route": Key(_route, Option("the curve; default: the armature's own")),
+            "ground": _named("the mesh to walk on; default: its own"),
+            "gait": Key(_gait, Option("a gait by name, or a gait file (.json)")),
+            "changes": _items("changes", '{ gait = "swim", position = 0.5 }', "gait", "position"),
+            "reaches": _items(
+                "reaches", '{ target = "Ball", arm = "Arm 1 L", frame_contact = 40 }'
             ),
-        ),
-        "fps": _FPS,
-        "output": _OUTPUT,
-        "export": _exported("the creature"),
-    },
-    "splice": {
-        "name": _NAME,
-        "kind": _KIND,
-        "file": _file("the motion or .blend file to splice onto, before any --splice"),
-        "armature": _named("default: the one that has splices"),
-        "base": _named("default: the list's, or the armature's own", "ACTION"),
-        "frames": Key(
-            Number(2, _MOST_FRAMES, whole=True),
-            Option(
-                "how long the base lasts: a walk of one cycle is repeated, a longer one is cut", "N"
+            "contacts": _items(
+                "contacts", '{ arm = "Arm 1 L", cycle = 2, shift = 0.1 }', "arm", "cycle"
             ),
-        ),
-        "splices": Key(
-            SPLICES,
-            Option(
-                "a part, the motion file that it is from, and settings; may be repeated",
-                ("PART", "FILE NAME=VALUE"),
-                ("--splice",),
-                parse_splices,
+            "settings": _settings(
+                "generate", "a setting, such as speed=0.4, sway=12° or table.stride=1.2"
             ),
-        ),
-        "settings": _settings(
-            "splice", "a setting of the base, such as visual=true or landmarks.chest=Spine2"
-        ),
-        "fps": _FPS,
-        "output": _OUTPUT,
-        "export": _exported("the armature and what hangs on it"),
-    },
-    "pose": {
-        "name": _NAME,
-        "kind": _KIND,
-        "file": _file("the .blend file to read"),
-        "octopus": Key(OCTOPUS),
-        "armature": _named("default: the only one, or the active one"),
-        "script": Key(_script, Option("the pose script (.json)", "FILE", required=True)),
-        "fps": _FPS,
-        "output": _OUTPUT,
-        "export": _exported("the figure"),
-    },
+            "limits": Key(
+                LIMITS,
+                Option(
+                    f"write nothing if a figure of the motion ({', '.join(NAMES)}) is above; "
+                    "may be repeated",
+                    "NAME=VALUE",
+                    ("--limit",),
+                    partial(parse_assignments, option="--limit"),
+                ),
+            ),
+        },
+        "the creature",
+    ),
+    "splice": _kind(
+        {
+            "file": _file("the motion or .blend file to splice onto, before any --splice"),
+            "armature": _named("default: the one that has splices"),
+            "base": _named("default: the list's, or the armature's own", "ACTION"),
+            "frames": Key(
+                Number(2, _MOST_FRAMES, whole=True),
+                Option(
+                    "how long the base lasts: a walk of one cycle is repeated, a longer one is cut",
+                    "N",
+                ),
+            ),
+            "splices": Key(
+                SPLICES,
+                Option(
+                    "a part, the motion file that it is from, and settings; may be repeated",
+                    ("PART", "FILE NAME=VALUE"),
+                    ("--splice",),
+                    parse_splices,
+                ),
+            ),
+            "settings": _settings(
+                "splice", "a setting of the base, such as visual=true or landmarks.chest=Spine2"
+            ),
+        },
+        "the armature and what hangs on it",
+    ),
+    "pose": _kind(
+        {
+            "file": _file("the .blend file to read"),
+            "octopus": Key(OCTOPUS),
+            "armature": _named("default: the only one, or the active one"),
+            "script": Key(_script, Option("the pose script (.json)", "FILE", required=True)),
+        },
+        "the figure",
+    ),
 }
 """The keys of each kind of shot."""
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -155,16 +156,26 @@ def splice(
             f"'{armature.name}' has no splices in its list.",
             "Say what to splice, a part and a motion file at least.",
         )
-    if shot.base or base_file is not None:
-        named = clips.action(base_file, shot.base) if base_file is not None else _action(shot.base)
-        stack.base, stack.base_slot = named, ""
+    if base_file is not None:
+        stack.base, stack.base_slot = clips.action(base_file, shot.base), ""
+    elif shot.base:
+        stack.base, stack.base_slot = _action(shot.base), ""
     set_values(stack, shot.settings)
     if shot.frames is not None or shot.splices is not None:
-        _choose_base(armature, stack)
+        # Where none is set, the armature's own action is the base.
+        own = own_action(armature)
+        if stack.base is None and own is not None:
+            stack.base, stack.base_slot = own
     if shot.frames is not None and stack.base is not None:
         stack.base = lasting(stack.base, shot.frames)
     if shot.splices is not None:
-        _clear(stack)
+        stack.splices.clear()
+        if len(stack.splices):
+            raise ClipError(
+                "The list of splices is in a linked file and cannot be replaced.",
+                "Leave splices out to build it as it is.",
+            )
+        stack.active_splice = 0
         for number, each in enumerate(shot.splices, 1):
             try:
                 _add(armature, each, clips, base_file)
@@ -177,29 +188,17 @@ def splice(
     return ShotSummary(made.message, made.frames, first, last, warnings)
 
 
-def _choose_base(armature: bpy.types.Object, stack: Any) -> None:
-    """Take the armature's own action as the base, where none is set."""
-    own = own_action(armature)
-    if stack.base is None and own is not None:
-        stack.base, stack.base_slot = own
+def named(blocks: Iterable[Any], name: str) -> Any:
+    """The data-block of that name, that of a linked file only where there is no other."""
+    found = [each for each in blocks if each.name == name]
+    return next((each for each in found if each.library is None), found[0] if found else None)
 
 
 def _action(name: str) -> bpy.types.Action:
-    found = [each for each in bpy.data.actions if each.name == name]
-    local = [each for each in found if each.library is None]
-    if not found:
+    action = named(bpy.data.actions, name)
+    if action is None:
         raise ClipError(unknown("action", name, sorted(each.name for each in bpy.data.actions)))
-    return (local or found)[0]
-
-
-def _clear(stack: Any) -> None:
-    stack.splices.clear()
-    if len(stack.splices):
-        raise ClipError(
-            "The list of splices is in a linked file and cannot be replaced.",
-            "Leave splices out to build it as it is.",
-        )
-    stack.active_splice = 0
+    return action
 
 
 def _add(
@@ -207,8 +206,9 @@ def _add(
 ) -> None:
     """Add a splice with what the panel's button gives it, and what is asked for."""
     source, action = _source(armature, asked, clips, base_file)
-    values = {name: each for name, each in asked.settings.items() if not _is_landmark(name)}
-    landmarks = {name: each for name, each in asked.settings.items() if _is_landmark(name)}
+    values, landmarks = dict[str, Any](), dict[str, Any]()
+    for name, each in asked.settings.items():
+        (landmarks if name.startswith("landmarks.") else values)[name] = each
     set_values(splicing_settings(source), landmarks)
     reader = ClipReader()
     stack: Any = splicing_settings(armature)
@@ -219,10 +219,6 @@ def _add(
     set_values(item, values)
     if not item.name:
         name_splice(stack, item)
-
-
-def _is_landmark(name: str) -> bool:
-    return name.startswith("landmarks.")
 
 
 def _source(
@@ -245,11 +241,11 @@ def _source(
 
 
 def _armature(name: str) -> bpy.types.Object:
-    found = [each for each in bpy.data.objects if each.type == "ARMATURE"]
-    named = [each for each in found if each.name == name]
-    if not named:
-        raise ClipError(unknown("armature", name, sorted(each.name for each in found)))
-    return named[0]
+    armatures = [each for each in bpy.data.objects if each.type == "ARMATURE"]
+    armature = named(armatures, name)
+    if armature is None:
+        raise ClipError(unknown("armature", name, sorted(each.name for each in armatures)))
+    return armature
 
 
 def _own_action(source: bpy.types.Object, armature: bpy.types.Object) -> bpy.types.Action:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,13 @@ from typing import Any
 import bpy
 
 from ..blender.files import load_gait, read_gait_file
-from ..core.errors import ClipError, OctoMotionError
+from ..core.errors import ClipError, OctoMotionError, SettingsError
 from ..core.locomotion.gait import gait_to_json
 from ..core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ..ui.locomotion import ChangeItem, ContactItem, OCTO_MOTION_PG_locomotion, ReachItem
 from ..ui.splicing import PARTS, OCTO_MOTION_PG_landmarks, OCTO_MOTION_PG_splicing, SpliceItem
-from .schema import Choice, Kind, Known, Number, Text, flag, point
-from .shot_schema import ShotRequest, gait_name, is_motion
+from .schema import Choice, Kind, Known, Number, Reading, Text, flag, point
+from .shot_schema import ShotRequest, gait_name, is_motion, read_shot
 
 _OWN_KEYS = {"name", "gait"}
 """No settings: Blender's own name of a group, and the gait, which a shot names itself."""
@@ -80,6 +80,21 @@ def _settings(group: Any, before: str = "") -> Iterator[tuple[str, Kind]]:
 def _number(each: Any) -> Number:
     whole, is_angle = each.type == "INT", each.unit == "ROTATION"
     return Number(each.hard_min, each.hard_max, whole=whole, is_angle=is_angle)
+
+
+def make_request(
+    table: Mapping[str, Any], resolve: Callable[[str], Path], *, has_open_file: bool = False
+) -> ShotRequest:
+    """The shot that a single table asks for, with the content of its gait file.
+
+    Raises:
+        OctoMotionError: the table is wrong, with everything that is wrong with it.
+    """
+    reading = Reading(known(), resolve, has_open_file=has_open_file)
+    shot = read_shot(table, reading)
+    if reading.faults:
+        raise SettingsError("\n".join(reading.faults))
+    return with_gait(shot)
 
 
 def with_gait(shot: ShotRequest) -> ShotRequest:

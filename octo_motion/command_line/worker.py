@@ -23,10 +23,11 @@ import bpy
 from ..core.errors import OctoMotionError
 from ..ui.locomotion import Summary
 from .command_line import COMMAND
+from .job_file import resolver
 from .job_report import LimitError, quality
 from .outputs import remove_staged, write_json
 from .shot_runner import AnySummary, perform
-from .shot_schema import ShotRequest
+from .vocabulary import make_request
 
 _GRACE: Final = 5.0
 """Seconds that a process has to end before it is ended."""
@@ -66,12 +67,6 @@ class Ended:
         return f"Blender crashed or was ended ({name})."
 
 
-@dataclass
-class _Running:
-    process: subprocess.Popen[bytes]
-    started: float
-
-
 def run_processes(
     tasks: Iterable[Task], most: int, clock: Callable[[], float] = time.monotonic
 ) -> Generator[Ended]:
@@ -81,26 +76,26 @@ def run_processes(
     an error or Ctrl-C, ends all processes.
     """
     waiting = iter(tasks)
-    running: dict[str, _Running] = {}
+    running: dict[str, tuple[subprocess.Popen[bytes], float]] = {}
     try:
         while True:
             while len(running) < most and (task := next(waiting, None)) is not None:
                 try:
-                    running[task.name] = _Running(_start(task), clock())
+                    running[task.name] = _start(task), clock()
                 except OSError as error:
                     task.log.write_text(f"{task.command[0]}: {error}", encoding="utf-8")
                     yield Ended(task.name, 127, 0.0)
             if not running:
                 return
-            ended = [name for name, each in running.items() if each.process.poll() is not None]
+            ended = [name for name, (each, _) in running.items() if each.poll() is not None]
             for name in ended:
-                each = running.pop(name)
-                _close(each.process)
-                yield Ended(name, each.process.returncode, clock() - each.started)
+                process, started = running.pop(name)
+                _close(process)
+                yield Ended(name, process.returncode, clock() - started)
             if not ended:
                 time.sleep(_GLANCE)
     finally:
-        _end([each.process for each in running.values()])
+        _end([process for process, _ in running.values()])
 
 
 def _start(task: Task) -> subprocess.Popen[bytes]:
@@ -259,10 +254,20 @@ def child_environment(scratch: Path) -> dict[str, str]:
     return {**os.environ, **temporary, **python}
 
 
-def write_request(path: Path, shot: ShotRequest, places: Mapping[Path, Path]) -> None:
-    """Write down what a process is to do; ``run_shot`` does it."""
+def write_request(
+    path: Path, job: Path, table: Mapping[str, Any], places: Mapping[Path, Path]
+) -> None:
+    """Write down what a process is to do; ``run_shot`` does it.
+
+    Args:
+        path: of the request.
+        job: path of the job file.
+        table: of the shot, as it stands there.
+        places: where each of its outputs is to be written.
+    """
     plain = {str(output): str(place) for output, place in places.items()}
-    write_json(path, {"shot": shot.to_plain(), "places": plain})
+    text = json.dumps({"job": str(job), "table": table, "places": plain})
+    path.write_text(text, encoding="utf-8")
 
 
 def read_answer(path: Path) -> dict[str, Any]:
@@ -279,7 +284,6 @@ def read_answer(path: Path) -> dict[str, Any]:
 def run_shot(request: Path, answer: Path) -> int:
     """Make the shot that is asked for, in the process of its own; the exit status."""
     asked = json.loads(request.read_text(encoding="utf-8"))
-    shot = ShotRequest.from_plain(asked["shot"])
     places = {Path(output): Path(place) for output, place in asked["places"].items()}
 
     def clean_up() -> None:
@@ -291,7 +295,8 @@ def run_shot(request: Path, answer: Path) -> int:
     said: dict[str, Any]
     try:
         with dying_with_parent(clean_up):
-            performed = perform(shot, places)
+            resolve = resolver(Path(asked["job"]), asked["table"]["name"])
+            performed = perform(make_request(asked["table"], resolve), places)
         said = {**_said(performed.summary), "libraries": performed.libraries}
     except LimitError as error:
         said = {"error": str(error), **_said(error.summary)}

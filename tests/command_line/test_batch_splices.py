@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from octo_motion.command_line.job_file import JobError, JobFile, read_job
+from octo_motion.command_line.job_file import JobError, JobFile, read_job, resolver
 from octo_motion.command_line.schema import Reading
-from octo_motion.command_line.shot_schema import SPLICES, NewSplice, ShotRequest, parse_splices
+from octo_motion.command_line.shot_schema import SPLICES, NewSplice, parse_splices
 from octo_motion.command_line.splice_runner import files_within, import_base
-from octo_motion.command_line.vocabulary import check_file, known
+from octo_motion.command_line.vocabulary import check_file, known, make_request
 from octo_motion.core.errors import ClipError, SettingsError
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
@@ -147,9 +147,10 @@ def test_output_must_not_be_a_clip_that_is_read(tmp_path: Path) -> None:
 def test_splices_survive_their_way_to_another_process(tmp_path: Path) -> None:
     asked = WALK + ARM + 'frames = 50\nbase = "Stroll"\nsettings = { visual = true }\n'
     listed = WALK.replace("walk", "b").replace(".bvh", ".blend").replace("out.", "b2.")
-    for shot in read(tmp_path, asked + listed).shots:
-        text = json.dumps(shot.to_plain())
-        assert ShotRequest.from_plain(json.loads(text)) == shot
+    job = read(tmp_path, asked + listed)
+    for shot in job.shots:
+        table = json.loads(json.dumps(job.asked[shot.name]))
+        assert make_request(table, resolver(job.path, shot.name)) == shot
         assert shot.kind == "splice"
 
 
