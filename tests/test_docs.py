@@ -203,13 +203,10 @@ def described(group: str) -> dict[str, list[str]]:
 
 
 def group_class(group: str) -> Any:
-    from octo_motion.ui.locomotion.settings import arms as arm_properties
-    from octo_motion.ui.locomotion.settings import changes as change_properties
     from octo_motion.ui.locomotion.settings import gait as gait_properties
     from octo_motion.ui.locomotion.settings import ground as ground_properties
-    from octo_motion.ui.locomotion.settings import properties
+    from octo_motion.ui.locomotion.settings import lists, properties
     from octo_motion.ui.locomotion.settings import properties as quality_report
-    from octo_motion.ui.locomotion.settings import reaches as reach_properties
     from octo_motion.ui.posing.properties import OCTO_MOTION_PG_posing
     from octo_motion.ui.splicing.properties import (
         OCTO_MOTION_PG_landmarks,
@@ -219,14 +216,14 @@ def group_class(group: str) -> Any:
 
     own = {
         "locomotion": properties.OCTO_MOTION_PG_locomotion,
-        "arm": arm_properties.ArmItem,
-        "bone": arm_properties.ArmBoneItem,
+        "arm": lists.ArmItem,
+        "bone": lists.ArmBoneItem,
         "figure": quality_report.FigureItem,
-        "reach": reach_properties.ReachItem,
+        "reach": lists.ReachItem,
         "ground": ground_properties.OCTO_MOTION_PG_ground,
         "contact": ground_properties.ContactItem,
-        "change": change_properties.OCTO_MOTION_PG_change,
-        "place": change_properties.ChangeItem,
+        "change": lists.OCTO_MOTION_PG_change,
+        "place": lists.ChangeItem,
         "landmarks": OCTO_MOTION_PG_landmarks,
         "posing": OCTO_MOTION_PG_posing,
         "splicing": OCTO_MOTION_PG_splicing,

@@ -17,6 +17,8 @@ BoolProperty: Final = partial(props.BoolProperty, override={"LIBRARY_OVERRIDABLE
 EnumProperty: Final = partial(props.EnumProperty, override={"LIBRARY_OVERRIDABLE"})
 FloatProperty: Final = partial(props.FloatProperty, override={"LIBRARY_OVERRIDABLE"})
 FloatVectorProperty: Final = partial(props.FloatVectorProperty, override={"LIBRARY_OVERRIDABLE"})
+AngleProperty: Final = partial(FloatProperty, subtype="ANGLE", step=500, precision=1)
+FactorProperty: Final = partial(FloatProperty, subtype="FACTOR", min=0.0, max=1.0)
 IntProperty: Final = partial(props.IntProperty, override={"LIBRARY_OVERRIDABLE"})
 PointerProperty: Final = partial(props.PointerProperty, override={"LIBRARY_OVERRIDABLE"})
 StringProperty: Final = partial(props.StringProperty, override={"LIBRARY_OVERRIDABLE"})
@@ -56,7 +58,7 @@ def _look_at(group: bpy.types.PropertyGroup) -> None:
                 _look_at(value)
 
 
-# --- Properties made from the settings that core declares, and core's dataclasses from properties
+# --- Properties made from the settings that core declares, and core's dataclasses from properties -
 
 
 Settings = TypeVar("Settings")

@@ -1,19 +1,48 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators that work in short turns: with progress, and Esc stops them cleanly."""
+"""Long work in short turns: Blender's window stays alive, and Esc stops it cleanly."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, cast
 
 from ..core.errors import OctoMotionError
 from . import at_work
-from .job import Job
 from .operator_base import OctoOperator
 
 if TYPE_CHECKING:
     import bpy
     from bpy.stub_internal.rna_enums import OperatorReturnItems
+
+
+class Job:
+    """Work that yields the share of it that is done, 0…1.
+
+    Args:
+        steps: the work.
+        clock: seconds.
+    """
+
+    def __init__(self, steps: Iterator[float], clock: Callable[[], float] = time.monotonic) -> None:
+        self.progress = 0.0
+        self.finished = False
+        self._steps = steps
+        self._clock = clock
+
+    def work(self, seconds: float) -> bool:
+        """Go on for about so long, at least one step; whether all is done."""
+        until = self._clock() + seconds
+        while not self.finished:
+            done = next(self._steps, None)
+            if done is None:
+                self.finished = True
+                self.progress = 1.0
+                break
+            self.progress = done
+            if self._clock() >= until:
+                break
+        return self.finished
 
 
 class ModalJob(OctoOperator):

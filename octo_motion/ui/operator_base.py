@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import bpy
+from bl_operators.presets import AddPresetBase
 from bpy.props import EnumProperty
 
 from ..blender.rig import active_armature, linked_names
 from ..core.errors import OctoMotionError, RigError
 
 if TYPE_CHECKING:
-    import bpy
     from bpy.stub_internal.rna_enums import OperatorReturnItems
 
 
@@ -175,3 +175,50 @@ class MoveOperator(ItemOperator):
 
     def _target(self, settings: Any) -> int:
         return getattr(settings, self.KIND.active) + (-1 if self.direction == "UP" else 1)
+
+
+# --- What operators share that keep settings of an armature as a preset, Blender's own kind -------
+
+
+ARMATURE = (
+    "active = bpy.context.object",
+    "armature = active if active.type == 'ARMATURE' else active.find_armature()",
+)
+"""First lines of a file: whose settings they are."""
+
+
+class ArmaturePresetAdd(AddPresetBase):
+    """Mix-in: name ``preset_menu``, ``preset_subdir`` and the ``preset_values`` of ``settings``.
+
+    Files say whose settings they are about by the active object, as files of Blender's own do.
+    What the user has at hand may as well be the armature's mesh, its route or a marker of a
+    contact: while a file is written, the armature stands for it.
+    """
+
+    # A file stays when something else is undone.
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        try:
+            active_armature(context)
+        except RigError as error:
+            cast("Any", cls).poll_message_set(str(error).rstrip("."))
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> Any:
+        """Write the file, or remove it."""
+        with context.temp_override(object=active_armature(context)):
+            return super().execute(context)
+
+
+# --- Views that show a few objects alone ----------------------------------------------------------
+
+
+def show_in_local_view(context: bpy.types.Context, *added: bpy.types.Object) -> None:
+    """Let what is added join the objects that the view shows, where it shows a few alone."""
+    space = context.space_data
+    if isinstance(space, bpy.types.SpaceView3D) and space.local_view:
+        for each in added:
+            each.local_view_set(space, state=True)

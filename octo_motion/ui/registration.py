@@ -8,9 +8,63 @@ from functools import partial
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
-from . import at_work, locomotion, posing, settings, splicing
+from . import at_work, locomotion, posing, splicing
+from .declared_settings import PointerProperty, make_overridable
+from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion
+from .posing import OCTO_MOTION_PG_posing
+from .splicing import OCTO_MOTION_PG_splicing
 from .steps import Step, do_all, nothing, undo_all
+
+
+class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
+    """All settings of an object, by feature."""
+
+    locomotion: PointerProperty(
+        name="Locomotion",
+        description="How the armature walks or swims",
+        type=OCTO_MOTION_PG_locomotion,
+    )
+    contact: PointerProperty(
+        name="Contact",
+        description="What a marker of a contact with the ground stands for",
+        type=OCTO_MOTION_PG_contact,
+    )
+    splicing: PointerProperty(
+        name="Splicing",
+        description="What splicing knows of the armature",
+        type=OCTO_MOTION_PG_splicing,
+    )
+    posing: PointerProperty(
+        name="Posing",
+        description="How the armature is posed by hand, and what stops it",
+        type=OCTO_MOTION_PG_posing,
+    )
+
+
+@persistent
+def _before_saving(*_: object) -> None:
+    for each in bpy.data.objects:
+        if each.override_library is not None:
+            make_overridable(each)
+
+
+def _give_settings() -> None:
+    """Give objects their settings."""
+    bpy.types.Object.octo_motion = PointerProperty(  # type: ignore[attr-defined]
+        name="Octo Motion",
+        description="Settings of Octo Motion",
+        type=OCTO_MOTION_PG_object,
+    )
+    bpy.app.handlers.save_pre.append(_before_saving)
+
+
+def _take_settings() -> None:
+    """Take the settings away."""
+    bpy.app.handlers.save_pre.remove(_before_saving)
+    del bpy.types.Object.octo_motion  # type: ignore[attr-defined]
+
 
 Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
 
@@ -24,7 +78,7 @@ CLASSES: tuple[type, ...] = (
     *splicing.SETTINGS,
     *splicing.CLASSES,
     *posing.CLASSES,
-    *settings.CLASSES,
+    OCTO_MOTION_PG_object,
 )
 
 
@@ -33,7 +87,7 @@ def _steps() -> list[Step]:
     register, unregister = bpy.utils.register_class, bpy.utils.unregister_class
     return [
         *(Step(partial(register, each), partial(unregister, each)) for each in CLASSES),
-        Step(settings.register, settings.unregister),
+        Step(_give_settings, _take_settings),
         *locomotion.STEPS,
         *(_entry(getattr(bpy.types, menu), draw) for menu, draw in MENUS),
         *posing.STEPS,

@@ -101,7 +101,7 @@ def _timed(what: str, change: Callable[[int], None]) -> Measured:
 def _run() -> list[Measured]:
     import bpy
 
-    from octo_motion.ui.locomotion.operators import live
+    from octo_motion.ui.locomotion.operators import generate as live
 
     operators: Any = bpy.ops.octo_motion
 

@@ -17,8 +17,7 @@ from ...blender.animation import writable_armature
 from ...blender.rig import active_armature, armature_data, read_skeleton
 from ...core.errors import RigError
 from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
-from ..armature_preset import ARMATURE, ArmaturePresetAdd
-from ..operator_base import ArmatureOperator
+from ..operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd
 from ..panel_base import armature_in
 from .properties import PROPERTIES, read_landmarks, splicing_settings, title, write_landmarks
 

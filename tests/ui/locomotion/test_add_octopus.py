@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.octopus.shape import OctopusShape
-from octo_motion.ui.locomotion.operators.add_octopus import OCTO_MOTION_OT_add_octopus
+from octo_motion.ui.locomotion.operators.adding import OCTO_MOTION_OT_add_octopus
 
 
 @pytest.fixture(autouse=True)

@@ -9,7 +9,7 @@ import pytest
 
 from octo_motion.core.locomotion.clearance import corrections as body_volume
 from octo_motion.core.locomotion.clearance.corrections import DEEP
-from octo_motion.ui.locomotion.operators import live
+from octo_motion.ui.locomotion.operators import generate as live
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.bench.apart import add_bumps
 from tests.ui.made import Made, prepare

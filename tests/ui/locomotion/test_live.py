@@ -19,7 +19,7 @@ import octo_motion
 from octo_motion.blender.animation import actions
 from octo_motion.blender.scene.contact_markers import markers
 from octo_motion.ui.locomotion import panels
-from octo_motion.ui.locomotion.operators import live
+from octo_motion.ui.locomotion.operators import generate as live
 from tests.blender.test_ground import make_mesh, make_square
 from tests.ui.made import prepare
 from tests.ui.rig import ROUTE, Octopus, click, generate, give_route, keys, make_octopus
@@ -528,7 +528,7 @@ def test_nothing_is_left_of_it_when_the_add_on_is_switched_off() -> None:
         "if isinstance(each := getattr(bpy.app.handlers, name), list)]\n"
         "before = [len(each) for each in known]\n"
         "octo_motion.register()\n"
-        "from octo_motion.ui.locomotion.operators import live\n"
+        "from octo_motion.ui.locomotion.operators import generate as live\n"
         "assert [len(each) for each in known] != before\n"
         "live._soon('nobody', certain=True)\n"
         "assert live.pending()\n"

@@ -15,11 +15,11 @@ from octo_motion.core.locomotion.path.travel import TravelSettings
 from octo_motion.core.settings import declared_settings
 from octo_motion.ui import registration
 from octo_motion.ui.declared_settings import plain, read_settings
-from octo_motion.ui.job import Job
 from octo_motion.ui.locomotion.settings.properties import (
     OCTO_MOTION_PG_locomotion,
     locomotion_settings,
 )
+from octo_motion.ui.modal_job import Job
 from tests.ui.rig import give_route, make_octopus
 
 # What scripts rely on: a name is never changed or removed.

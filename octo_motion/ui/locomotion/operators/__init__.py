@@ -2,23 +2,14 @@
 """The buttons, and what of the panel belongs to each."""
 
 from ...steps import Step
-from . import (
-    add_octopus,
-    add_route,
-    arms,
-    changes,
-    contacts,
-    gait_table,
-    generate,
-    live,
-    quality,
-    reaches,
-    setups,
+from . import arms, contacts, gait_table, generate, quality, reaches, setups
+from .adding import (
+    OCTO_MOTION_OT_add_octopus,
+    OCTO_MOTION_OT_add_route,
+    draw_octopus_entry,
+    draw_route_entry,
 )
-from .add_octopus import OCTO_MOTION_OT_add_octopus
-from .add_route import OCTO_MOTION_OT_add_route
 from .arms import draw_arms
-from .changes import draw_changes
 from .contacts import draw_ground, draw_rest
 from .gait_table import (
     OCTO_MOTION_MT_gait,
@@ -32,28 +23,27 @@ from .gait_table import (
 )
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .quality import draw_figures
-from .reaches import draw_reaches
+from .reaches import draw_changes, draw_reaches
 from .setups import OCTO_MOTION_PT_setups
 
 CLASSES = (
     *arms.CLASSES,
-    add_octopus.OCTO_MOTION_OT_add_octopus,
-    add_route.OCTO_MOTION_OT_add_route,
+    OCTO_MOTION_OT_add_octopus,
+    OCTO_MOTION_OT_add_route,
     *gait_table.CLASSES,
-    generate.OCTO_MOTION_OT_generate_locomotion,
+    OCTO_MOTION_OT_generate_locomotion,
     *contacts.CLASSES,
     *setups.CLASSES,
-    *changes.CLASSES,
     *quality.CLASSES,
     *reaches.CLASSES,
 )
 STEPS = (
-    Step(live.register, live.unregister),
+    Step(generate.listen, generate.listen_no_more),
     Step(setups.register, setups.unregister),
 )
 MENUS = (
-    ("VIEW3D_MT_armature_add", add_octopus.draw_in_add_menu),
-    ("VIEW3D_MT_curve_add", add_route.draw_in_add_menu),
+    ("VIEW3D_MT_armature_add", draw_octopus_entry),
+    ("VIEW3D_MT_curve_add", draw_route_entry),
 )
 
 __all__ = [

@@ -11,8 +11,7 @@ from bpy.props import FloatProperty
 from ....blender.rig import active_armature, require_editable
 from ....blender.scene import markers, remove_markers
 from ....core.errors import OctoMotionError, SettingsError
-from ...local_view import show_in_local_view
-from ...operator_base import ArmatureOperator, OctoOperator
+from ...operator_base import ArmatureOperator, OctoOperator, show_in_local_view
 from ..reading import resting
 from ..settings import (
     OCTO_MOTION_PG_locomotion,

@@ -1,18 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The button that makes the armature walk: read → plain arrays → compute → write."""
+"""The motion made: by the button, or live, by itself.
+
+Live, whoever drags a point of the route or a slider sees the motion follow. Blender tells after
+each update what has changed. If that is something that a motion was made from, a timer makes the
+motion anew a moment later, in place, outside the update; what changes in the meantime waits for the
+same turn. Only an action that was generated and that nobody has edited is touched. What our own
+writing changes is let through Blender's update before we listen again. Where nothing is live,
+Blender is not kept waiting: thousands of objects may move with each frame.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
+import numpy as np
+from bpy.app.handlers import persistent
 
-from ....blender.rig import active_armature
-from ....core.errors import OctoMotionError
+from ....blender.animation import is_edited, may_replace
+from ....blender.rig import active_armature, deformed_meshes, read_skeleton
+from ....core.content_cache import clear_caches, content_key
+from ....core.errors import OctoMotionError, RigError
+from ...declared_settings import plain
 from ...modal_job import ModalJob
 from ...operator_base import ArmatureOperator
-from ..writing import Shot, Summary, generate_locomotion, prepare
-from . import live
+from ..reading import playing_action, previous_action
+from ..settings import (
+    SWITCHED,
+    OCTO_MOTION_PG_locomotion,
+    locomotion_settings,
+    once_called,
+    read_overrides,
+)
+from ..writing import RESULTS, Shot, Summary, generate_locomotion, prepare
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -35,7 +58,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
         self._tell(generate_locomotion(armature, context))
-        live.made(armature)
+        made(armature)
 
     def invoke(
         self,
@@ -53,7 +76,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
     def conclude(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         assert self._shot is not None
         self._tell(self._shot.write())
-        live.made(bpy.data.objects[self._shot.armature, None])  # type: ignore[index]
+        made(bpy.data.objects[self._shot.armature, None])  # type: ignore[index]
 
     def status(self, progress: float) -> str:
         return f"Generating locomotion: {100.0 * progress:.0f} %    Esc: stop"
@@ -63,3 +86,445 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         # Blender's status bar keeps the last, which is to be the one that says most.
         for warning in reversed(summary.warnings):
             self.report({"WARNING"}, warning)
+
+
+# --- What is known while a motion is live ---------------------------------------------------------
+
+
+_SOON: Final = 0.01
+"""Seconds from a change to the new motion at least: what changes together is made together."""
+_LATER: Final = 0.3
+"""Seconds until it is tried again, while Blender renders or a tool of ours runs."""
+_NO_MATTER: Final = RESULTS | {
+    *("contacts", "active_arm", "active_reach", "active_curve", "active_change", "shown_angle"),
+    *("keys", "key_angle", "key_distance", "key_columns", "tell_overlaps"),
+}
+"""Settings that the motion does not depend on while it is live; contacts are looked at otherwise.
+"""
+
+
+class _State:
+    """What is known between two updates."""
+
+    def __init__(self) -> None:
+        self.seen: dict[str, str | None] = {}
+        """What each live armature's motion was made from, by the object's name."""
+        self.changed: dict[str, bool] = {}
+        """Armatures to look at, and whether it is known already that they changed."""
+        self.rates: dict[str, float] = {}
+        """Frames per second of each scene."""
+        self.complete = False
+        """Whether all live armatures of the file are among those seen."""
+        self.busy = False
+
+    def clear(self) -> None:
+        self.seen.clear()
+        self.changed.clear()
+        self.rates.clear()
+        self.complete = False
+        self.busy = False
+
+
+_state: Final = _State()
+
+
+def listen() -> None:
+    """Listen to Blender."""
+    for handlers, function in _handlers():
+        handlers.append(function)
+
+
+def listen_no_more() -> None:
+    """Listen no more, and drop what was about to be made."""
+    _drop()
+    _state.clear()
+    clear_caches()
+    for handlers, function in _handlers():
+        if function in handlers:
+            handlers.remove(function)
+
+
+def _handlers() -> list[tuple[Any, Any]]:
+    known = bpy.app.handlers
+    return [
+        (known.depsgraph_update_post, _after_update),
+        (known.frame_change_post, _after_frame),
+        (known.undo_pre, _before_undo),
+        (known.redo_pre, _before_undo),
+        (known.undo_post, _after_undo),
+        (known.redo_post, _after_undo),
+        (known.load_pre, _before_loading),
+        (known.load_post, _after_loading),
+        (known.blend_import_post, _after_import),
+    ]
+
+
+def made(armature: bpy.types.Object) -> None:
+    """Tell that an armature's motion has just been made from its settings as they are."""
+    settings = locomotion_settings(armature)
+    if settings.live:
+        _state.seen[armature.name] = _made_from(armature, settings)
+    if settings.live_error:
+        settings.live_error = ""
+
+
+def pending() -> bool:
+    """Whether a motion is about to be made."""
+    return bpy.app.timers.is_registered(run_pending)
+
+
+def run_pending() -> float | None:
+    """What the timer does: make the motions anew whose sources have changed.
+
+    Returns:
+        Seconds until it has to be called again, none if all is done.
+    """
+    if _state.busy or _others_at_work():
+        return _LATER
+    changed = dict(_state.changed)
+    _state.changed.clear()
+    for name, certain in changed.items():
+        _follow(name, certain=certain)
+    return None
+
+
+# --- What Blender tells --------------------------------------------------------------------------
+
+
+@persistent
+def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    if _state.busy or depsgraph.mode != "VIEWPORT" or not _listens():
+        return
+    touched = _touched(depsgraph)
+    for each in touched:
+        if isinstance(each, bpy.types.Object) and each.type == "ARMATURE":
+            _look_at(each)
+    rate = _rate(scene)
+    another_rate = rate != _state.rates.get(scene.name, rate)
+    _state.rates[scene.name] = rate
+    marked = {_marked(each) for each in touched if isinstance(each, bpy.types.Object)}
+    meshes = {each for each in touched if isinstance(each, bpy.types.Mesh)}
+    for name in list(_state.seen):
+        armature = _armature(name)
+        if armature is None:
+            del _state.seen[name]
+        elif (
+            (another_rate and name in scene.objects)
+            or not touched.isdisjoint(_sources(armature))
+            or _is_skin(armature, meshes)
+        ):
+            _soon(name, certain=True)
+        elif marked & {name, once_called(locomotion_settings(armature).ground)} - {""}:
+            _soon(name, certain=False)
+
+
+@persistent
+def _after_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """A change that comes together with another frame, as while it plays, is told here alone."""
+    if _state.busy or depsgraph.mode != "VIEWPORT" or not _listens():
+        return
+    followed = [each for name in _state.seen if (each := _armature(name)) is not None]
+    sources = [_sources(each) for each in followed]
+    touched = _touched(depsgraph, set(followed).union(*sources))
+    still = {each for each in touched if not _is_animated(each)}
+    for armature, its in zip(followed, sources, strict=True):
+        if armature in touched and not pending():
+            # It moves with every frame: now and then is enough to see whether it is set anew.
+            _soon(armature.name, certain=False, wait=_LATER)
+        if not still.isdisjoint(its):
+            _soon(armature.name, certain=True)
+
+
+def _listens() -> bool:
+    """Whether any armature is live; all that are so are known then."""
+    if not _state.complete or not all(map(_armature, _state.seen)):
+        # The add-on was switched on, a file was appended, an armature was renamed.
+        for each in _live_armatures():
+            if each.name not in _state.seen:
+                _state.seen[each.name] = _made_from(each, locomotion_settings(each))
+        _state.rates = {each.name: _rate(each) for each in bpy.data.scenes}
+        _state.complete = True
+    while SWITCHED:
+        armature = _armature(SWITCHED.pop())
+        if armature is not None:
+            _look_at(armature)
+    return bool(_state.seen)
+
+
+def _rate(scene: bpy.types.Scene) -> float:
+    return scene.render.fps / scene.render.fps_base
+
+
+def _touched(
+    depsgraph: bpy.types.Depsgraph, among: set[bpy.types.ID] | None = None
+) -> set[bpy.types.ID]:
+    """What has changed so that something may move; a selection, for one, moves nothing.
+
+    Args:
+        depsgraph: what tells it.
+        among: what is asked for, all if none.
+    """
+    found: set[bpy.types.ID] = set()
+    for update in depsgraph.updates:
+        each = cast("bpy.types.ID", update.id.original)  # type: ignore[union-attr]
+        if among is not None and each not in among:
+            continue
+        if (
+            not isinstance(each, bpy.types.Object)
+            or update.is_updated_geometry
+            or update.is_updated_transform
+        ):
+            found.add(each)
+    return found
+
+
+def _is_animated(each: bpy.types.ID) -> bool:
+    """Whether another frame may move it by itself."""
+    item: Any = each
+    while item is not None:
+        data = getattr(item, "data", item)
+        parts = (item, data, getattr(data, "shape_keys", None))
+        if any(getattr(part, "animation_data", None) is not None for part in parts):
+            return True
+        if isinstance(item, bpy.types.Object) and (item.constraints or item.modifiers):
+            return True
+        item = getattr(item, "parent", None)
+    return False
+
+
+def _look_at(armature: bpy.types.Object) -> None:
+    """Begin or cease to follow an armature, or see whether its settings have changed."""
+    name = armature.name
+    if not _is_live(armature):
+        for known in (_state.seen, _state.changed):
+            known.pop(name, None)
+    elif name in _state.seen:
+        _soon(name, certain=False)
+    else:
+        _state.seen[name] = None
+        _soon(name, certain=True)
+
+
+def _is_live(armature: bpy.types.Object) -> bool:
+    # Settings come into being when they are looked at: what has none is left without.
+    return (
+        armature.library is None
+        and armature.is_property_set("octo_motion")
+        and locomotion_settings(armature).live
+    )
+
+
+def _marked(item: bpy.types.Object) -> str:
+    """Name of the armature whose contact an object marks."""
+    if item.type != "EMPTY" or not item.is_property_set("octo_motion"):
+        return ""
+    return item.octo_motion.contact.armature  # type: ignore[attr-defined]
+
+
+def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
+    """Data-blocks that a motion is made from, but for its armature object."""
+    settings = locomotion_settings(armature)
+    roots: list[bpy.types.Object | None] = [
+        *(settings.route, settings.ground.object, armature.parent),
+        # What is carried gets keys from us.
+        *(each.target for each in settings.reaches if not each.carry),
+    ]
+    found: set[bpy.types.ID] = set()
+    for root in roots:
+        each = root
+        while each is not None and each != armature:
+            found.add(each)
+            if each.data is not None:
+                found.add(each.data)
+            each = each.parent
+    # Blender tags the armature's data with every pose: its bones are looked at themselves.
+    return found | ({settings.weight_curve} - {None})
+
+
+def _is_skin(armature: bpy.types.Object, meshes: set[bpy.types.Mesh]) -> bool:
+    """Whether the armature deforms any of these."""
+    return bool(meshes) and any(each.data in meshes for each in deformed_meshes(armature))
+
+
+@persistent
+def _before_undo(*_: object) -> None:
+    _drop()
+
+
+@persistent
+def _after_undo(*_: object) -> None:
+    """A step may have been made between a change and the motion that follows from it."""
+    _state.clear()
+    for armature in _live_armatures():
+        _state.seen[armature.name] = None
+        _soon(armature.name, certain=True)
+    _state.complete = True
+
+
+@persistent
+def _before_loading(*_: object) -> None:
+    _drop()
+    _state.clear()
+    clear_caches()
+
+
+@persistent
+def _after_loading(*_: object) -> None:
+    _listens()
+
+
+@persistent
+def _after_import(*_: object) -> None:
+    _state.complete = False
+
+
+def _live_armatures() -> list[bpy.types.Object]:
+    return [each for each in bpy.data.objects if each.type == "ARMATURE" and _is_live(each)]
+
+
+# --- The motion ----------------------------------------------------------------------------------
+
+
+def _soon(name: str, *, certain: bool, wait: float = _SOON) -> None:
+    _state.changed[name] = certain or _state.changed.get(name, False)
+    if not pending():
+        bpy.app.timers.register(run_pending, first_interval=wait)
+
+
+def _drop() -> None:
+    _state.changed.clear()
+    if pending():
+        bpy.app.timers.unregister(run_pending)
+
+
+def _others_at_work() -> bool:
+    """Whether Blender renders, or a modal tool of ours has the screen."""
+    if bpy.app.is_job_running("RENDER"):
+        return True
+    manager = bpy.context.window_manager
+    return manager is not None and any(
+        operator.bl_idname.startswith("OCTO_MOTION_OT_")
+        for window in manager.windows
+        for operator in window.modal_operators
+        # Of one whose add-on was switched off meanwhile nothing is left.
+        if operator is not None
+    )
+
+
+def _armature(name: str) -> bpy.types.Object | None:
+    found = bpy.data.objects.get((name, None))
+    return found if found is not None and found.type == "ARMATURE" else None
+
+
+def _follow(name: str, *, certain: bool) -> None:
+    """Make an armature's motion anew, if it is not what it is made from says already."""
+    armature = _armature(name)
+    settings = locomotion_settings(armature) if armature is not None else None
+    if armature is None or settings is None or not settings.live:
+        _state.seen.pop(name, None)
+        return
+    if armature.mode == "EDIT" or not _within_scene(armature):
+        # Leaving edit mode is a change of its own.
+        return
+    if not certain and _state.seen.get(name) == _made_from(armature, settings):
+        return
+    with _deaf(), _window_of(armature):
+        try:
+            _make(armature, settings)
+        except OctoMotionError as error:
+            settings.live_error = str(error)
+        except BaseException:
+            settings.live = False
+            settings.live_error = "Live has stopped at a fault: the console tells which."
+            raise
+    if settings.live:
+        _state.seen[name] = _made_from(armature, settings)
+
+
+def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
+    kept = _whose(armature, settings)
+    if kept:
+        settings.live = False
+        settings.live_error = kept
+        _state.seen.pop(armature.name, None)
+        return
+    shot = prepare(armature, bpy.context, live=True)
+    for _ in shot.compute():
+        pass
+    shot.write(unedited=True)
+    if settings.live_error:
+        settings.live_error = ""
+
+
+def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
+    """Why the armature's action must be left alone, "" if it is ours."""
+    previous, playing = previous_action(armature, settings), playing_action(armature)
+    if playing is not None and playing != previous:
+        return f"Live is off: '{playing.name}' is not what was generated."
+    if previous is None or may_replace(previous, armature):
+        return ""
+    if is_edited(previous):
+        return f"Live is off: '{previous.name}' was edited and is yours."
+    return f"Live is off: '{previous.name}' has other users too."
+
+
+def _made_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
+    """All that a motion is made from and that belongs to the armature object itself, as text."""
+    wishes = [
+        (place, each.removed, each.shift, each.heading, np.asarray(each.position).tolist())
+        for place, each in sorted(read_overrides(settings.ground, armature).items())
+    ]
+    bones = armature.pose.bones if armature.pose is not None else ()
+    try:
+        rest = content_key(read_skeleton(armature)).hex()
+    except RigError:
+        # Generating says what is wrong with it.
+        rest = ""
+    # Where it travels itself, its place is what the motion makes of it.
+    travels = settings.travel_on == "OBJECT"
+    place = armature.scale if travels else [value for row in armature.matrix_world for value in row]
+    return json.dumps(
+        [
+            *(plain(settings, without=_NO_MATTER), wishes, [*place], armature.rotation_mode),
+            *(rest, [bone.rotation_mode for bone in bones]),
+        ],
+        sort_keys=True,
+    )
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Let nothing that happens within be a change to follow."""
+    _state.busy = True
+    try:
+        yield
+    finally:
+        try:
+            # What was written is told now, while nobody listens.
+            if bpy.context.view_layer is not None:
+                bpy.context.view_layer.update()
+        finally:
+            _state.busy = False
+
+
+def _within_scene(armature: bpy.types.Object) -> bool:
+    return _windows(armature) != [] or armature.name in bpy.context.view_layer.objects
+
+
+def _windows(armature: bpy.types.Object) -> list[bpy.types.Window]:
+    """Windows that show a view layer with the armature."""
+    manager = bpy.context.window_manager
+    if manager is None:
+        return []
+    return [each for each in manager.windows if armature.name in each.view_layer.objects]
+
+
+@contextmanager
+def _window_of(armature: bpy.types.Object) -> Iterator[None]:
+    """A context in which the armature's scene is the one that is worked on."""
+    windows = _windows(armature)
+    if not windows:
+        yield
+        return
+    with bpy.context.temp_override(window=windows[0]):
+        yield

@@ -20,9 +20,8 @@ from ....blender.animation import writable_armature
 from ....blender.files import load_gait
 from ....blender.rig import active_armature
 from ....core.errors import SettingsError
-from ...armature_preset import ARMATURE, ArmaturePresetAdd
 from ...declared_settings import assign, plain
-from ...operator_base import ArmatureOperator
+from ...operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd
 from ..settings import (
     DEFAULT_GAIT,
     OCTO_MOTION_PG_locomotion,

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist sets, kept with the armature object."""
 
-from . import arms, changes, gait, ground, properties, reaches
-from .arms import AXES
-from .changes import ChangeItem, OCTO_MOTION_PG_change
+from . import gait, ground, lists, properties
 from .gait import (
     DEFAULT_GAIT,
     SIDES,
@@ -28,6 +26,7 @@ from .ground import (
     read_overrides,
     store,
 )
+from .lists import AXES, MODES, ChangeItem, OCTO_MOTION_PG_change, ReachItem
 from .properties import (
     KIND_NAMES,
     KINDS,
@@ -40,14 +39,11 @@ from .properties import (
     set_gait,
     write_figures,
 )
-from .reaches import MODES, ReachItem
 
 CLASSES = (
     *gait.CLASSES,
-    *arms.CLASSES,
-    *reaches.CLASSES,
     *ground.CLASSES,
-    *changes.CLASSES,
+    *lists.CLASSES,
     *properties.CLASSES,
 )
 

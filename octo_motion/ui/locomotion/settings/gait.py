@@ -11,11 +11,13 @@ first. So whatever an artist does with them, the table closes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any, Final
 
 import bpy
 import numpy as np
 
+from ....blender.files import gait_names
 from ....core.errors import GaitError
 from ....core.locomotion.gait import (
     ANGLES,
@@ -30,6 +32,7 @@ from ....core.locomotion.gait import (
 )
 from ....core.rotations import Floats
 from ...declared_settings import (
+    AngleProperty,
     BoolProperty,
     CollectionProperty,
     EnumProperty,
@@ -53,6 +56,14 @@ SIDES: Final = (
 # what they meant, so that a table is the same before and after its way through properties.
 _DEGREE_DIGITS: Final = 4
 _NUMBER_DIGITS: Final = 6
+
+
+def _gait_names(_owner: Any, _context: Any, _text: str) -> list[str]:
+    return gait_names()
+
+
+GaitName: Final = partial(StringProperty, search=_gait_names, search_options=set())
+"""A property that names a gait, and offers those that there are."""
 
 
 def _unused() -> Any:
@@ -97,14 +108,11 @@ def _link_angles(name: str, description: str) -> Any:
 class OCTO_MOTION_PG_gait_knot(bpy.types.PropertyGroup):
     """Angles of the three links at one phase."""
 
-    phase: FloatProperty(
+    phase: AngleProperty(
         name="Phase",
         description="Where in the cycle these angles are reached; between them they run evenly",
-        subtype="ANGLE",
         min=0.0,
         max=2.0 * np.pi,
-        step=500,
-        precision=1,
     )
     head: _link_angles("Head", "Up and down; above zero raises")
     pitch: _link_angles("Pitch", "Left and right; above zero turns to the body's front")
@@ -145,14 +153,11 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
         default=1,
     )
     side: EnumProperty(name="Side", description="Side of the arm", items=SIDES)
-    phase: FloatProperty(
+    phase: AngleProperty(
         name="Ahead",
         description="How far this arm is ahead of the body's cycle, whatever the spread says",
-        subtype="ANGLE",
         soft_min=-2.0 * np.pi,
         soft_max=2.0 * np.pi,
-        step=500,
-        precision=1,
     )
     unused: _unused()
 
@@ -225,15 +230,12 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         type=OCTO_MOTION_PG_gait_offset,
     )
     active_offset: IntProperty(name="Active Offset", options={"HIDDEN"})
-    power_phase: FloatProperty(
+    power_phase: AngleProperty(
         name="Power Stroke",
         description="Phase at the middle of the power stroke: a swimming body shoots ahead there",
-        subtype="ANGLE",
         default=_DEFAULT.power_phase,
         min=0.0,
         max=2.0 * np.pi,
-        step=500,
-        precision=1,
     )
     curves: CollectionProperty(
         name="Curves",
@@ -279,10 +281,9 @@ def fill_table(group: OCTO_MOTION_PG_gait_table, table: GaitTable) -> None:
     """Make the properties say what the table says."""
     for name in (
         *("name", "description", "manner", "stride"),
-        *("spread_pairs", "spread_sides", "spread_halves"),
+        *("spread_pairs", "spread_sides", "spread_halves", "power_phase"),
     ):
         assign(group, name, getattr(table, name))
-    assign(group, "power_phase", table.power_phase)
     assign(group, "active_curve", 0)
     for curve, (pair, values) in matched(group, "curves", sorted(table.curves.items())):
         assign(curve, "pair", pair)

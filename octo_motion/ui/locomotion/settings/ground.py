@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import bpy
@@ -33,21 +34,24 @@ def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
     return candidate.type == "MESH" and candidate.find_armature() != settings.id_data
 
 
+def _shift() -> Any:
+    return FloatProperty(
+        name="Shift",
+        description="Share of a cycle by which the contact is later, negative if it is earlier",
+        min=-0.3,
+        max=0.3,
+        step=1,
+        precision=3,
+    )
+
+
 class ContactItem(bpy.types.PropertyGroup):
     """What an artist wants of one contact: it stays when the motion is generated again."""
 
     arm: StringProperty(name="Arm", description="Name of the arm in the list")
     cycle: IntProperty(name="Cycle", description="Number of the arm's cycle along the route")
     removed: BoolProperty(name="Removed", description="The arm does not touch the ground here")
-    shift: FloatProperty(
-        name="Shift",
-        description="Share of a cycle by which the contact is later, negative if it is earlier",
-        default=0.0,
-        min=-0.3,
-        max=0.3,
-        step=1,
-        precision=3,
-    )
+    shift: _shift()
     locked: BoolProperty(
         name="Locked",
         description="The contact stays where it is in the world, however the route or the gait "
@@ -123,15 +127,15 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
     )
 
 
+_HiddenFloat: Final = partial(FloatProperty, options={"HIDDEN"})
+_HiddenText: Final = partial(StringProperty, options={"HIDDEN"})
+
+
 class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
     """What a marker stands for: ``Object.octo_motion.contact``."""
 
-    armature: StringProperty(
-        name="Armature",
-        description="Object whose arm touches here",
-        options={"HIDDEN"},
-    )
-    arm: StringProperty(name="Arm", description="Name of the arm", options={"HIDDEN"})
+    armature: _HiddenText(name="Armature", description="Object whose arm touches here")
+    arm: _HiddenText(name="Arm", description="Name of the arm")
     cycle: IntProperty(
         name="Cycle",
         description="Number of the arm's cycle along the route",
@@ -142,40 +146,18 @@ class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
         description="The contact stays here, however the route or the gait are changed. One that "
         "was dragged or turned is locked; free it to have it where the gait wants it",
     )
-    shift: FloatProperty(
-        name="Shift",
-        description="Share of a cycle by which the contact is later, negative if it is earlier",
-        min=-0.3,
-        max=0.3,
-        step=1,
-        precision=3,
-    )
+    shift: _shift()
     position: FloatVectorProperty(
         name="Position",
         description="Where the marker was put",
         size=3,
         options={"HIDDEN"},
     )
-    heading: FloatProperty(
-        name="Heading",
-        description="How the marker was turned",
-        options={"HIDDEN"},
-    )
-    frame_on: FloatProperty(
-        name="From",
-        description="Frame at which the arm takes hold",
-        options={"HIDDEN"},
-    )
-    frame_off: FloatProperty(
-        name="To",
-        description="Frame at which the arm lets go",
-        options={"HIDDEN"},
-    )
-    cycle_frames: FloatProperty(
-        name="Cycle Frames",
-        description="Frames that a cycle takes there",
-        default=1.0,
-        options={"HIDDEN"},
+    heading: _HiddenFloat(name="Heading", description="How the marker was turned")
+    frame_on: _HiddenFloat(name="From", description="Frame at which the arm takes hold")
+    frame_off: _HiddenFloat(name="To", description="Frame at which the arm lets go")
+    cycle_frames: _HiddenFloat(
+        name="Cycle Frames", description="Frames that a cycle takes there", default=1.0
     )
 
 

@@ -8,21 +8,24 @@ core/settings.py.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, Final, cast
 
 import bpy
 import numpy as np
 
-from ....blender.files import curve_node, ensure_weight_curve, gait_names, load_gait
+from ....blender.files import curve_node, ensure_weight_curve, load_gait
 from ....blender.rig import armature_data, linked_names
 from ....core.errors import GaitError
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.metrics import Figure
 from ....core.locomotion.path import TravelSettings
 from ...declared_settings import (
+    AngleProperty,
     BoolProperty,
     CollectionProperty,
     EnumProperty,
+    FactorProperty,
     FloatProperty,
     IntProperty,
     PointerProperty,
@@ -30,11 +33,9 @@ from ...declared_settings import (
     declared,
     make_overridable,
 )
-from .arms import ArmList
-from .changes import OCTO_MOTION_PG_change
-from .gait import DEFAULT_GAIT, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
+from .gait import DEFAULT_GAIT, GaitName, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
 from .ground import OCTO_MOTION_PG_ground
-from .reaches import Reaches
+from .lists import ArmList, OCTO_MOTION_PG_change, Reaches
 
 KINDS: Final = (
     ("SLIP", "Slip", "How far an arm slides over the ground that it holds, in arm lengths", 0),
@@ -71,16 +72,6 @@ class FigureItem(bpy.types.PropertyGroup):
     )
 
 
-class QualityReport:
-    """What ``Object.octo_motion.locomotion`` has of it."""
-
-    figures: CollectionProperty(
-        name="Quality",
-        description="The worst of each kind in the motion that was generated last",
-        type=FigureItem,
-    )
-
-
 def known_figures(settings: Any) -> list[Any]:
     """Items of the figures that were measured, in the order of ``KINDS``."""
     items = settings.figures
@@ -113,10 +104,6 @@ def _is_weight_curve(_settings: Any, candidate: bpy.types.NodeTree) -> bool:
     return curve_node(candidate) is not None
 
 
-def _gait_names(_settings: Any, _context: Any, _text: str) -> list[str]:
-    return gait_names()
-
-
 def _load_gait(settings: Any, _context: bpy.types.Context) -> None:
     if used(settings.table.curves) and settings.table.name == settings.gait:
         return
@@ -137,12 +124,10 @@ def _make_weight_curve(settings: Any, _context: bpy.types.Context) -> None:
 class Movement:
     """What ``Object.octo_motion.locomotion`` has of the gait."""
 
-    gait: StringProperty(
+    gait: GaitName(
         name="Gait",
         description="The gait that is loaded. Choosing one loads its table, which can be edited",
         default=DEFAULT_GAIT,
-        search=_gait_names,
-        search_options=set(),
         update=_load_gait,
     )
     table: PointerProperty(
@@ -158,48 +143,40 @@ class Movement:
     stand: declared(GaitSettings, "raise_to_floor")
     phase_spread: declared(GaitSettings, "phase_spread")
     turning: declared(GaitSettings, "turning")
-    variation_min: FloatProperty(
+    variation_min: AngleProperty(
         name="Variation Min",
         description="Least random addition to the gait's angles, drawn anew for each cycle",
-        subtype="ANGLE",
         default=GaitSettings.variation[0],
         soft_min=-0.5 * np.pi,
         soft_max=0.0,
         min=-np.pi,
         max=np.pi,
         step=100,
-        precision=1,
     )
-    variation_max: FloatProperty(
+    variation_max: AngleProperty(
         name="Max",
         description="Greatest random addition to the gait's angles, drawn anew for each cycle",
-        subtype="ANGLE",
         default=GaitSettings.variation[1],
         soft_min=0.0,
         soft_max=0.5 * np.pi,
         min=-np.pi,
         max=np.pi,
         step=100,
-        precision=1,
     )
     seed: declared(GaitSettings, "seed")
-    weight_root: FloatProperty(
+    weight_root: FactorProperty(
         name="Weight Root",
         description="How readily joints at the arm's root bend. Lower weights spread a bend over "
         "more joints",
-        subtype="FACTOR",
         default=GaitSettings.weights[0],
         min=0.01,
-        max=1.0,
     )
-    weight_tip: FloatProperty(
+    weight_tip: FactorProperty(
         name="Tip",
         description="How readily joints at the arm's tip bend. Lower than at the root, the bend "
         "moves to the root",
-        subtype="FACTOR",
         default=GaitSettings.weights[-1],
         min=0.01,
-        max=1.0,
     )
     use_weight_curve: BoolProperty(
         name="Curve",
@@ -279,14 +256,11 @@ class RouteSettings:
     corner: declared(TravelSettings, "corner")
     burst: declared(TravelSettings, "burst")
     bank_in_turns: declared(TravelSettings, "bank")
-    streamline: FloatProperty(
+    streamline: FactorProperty(
         name="Streamline",
         description="Swimming: how far head and mantle stretch out along the way. At 0 they lean "
         "back as they do at rest. A body whose mantle lies flat behind it swims as it lies instead",
-        subtype="FACTOR",
         default=1.0,
-        min=0.0,
-        max=1.0,
     )
     height_mode: EnumProperty(
         name="Height",
@@ -310,62 +284,21 @@ class RouteSettings:
     )
 
 
-# --- Settings of motion in place, and of breath ---------------------------------------------------
+# --- When the motion is, what it moves, and which keys it gets ------------------------------------
 
 
+_Seconds: Final = partial(
+    FloatProperty, subtype="TIME_ABSOLUTE", unit="TIME_ABSOLUTE", soft_max=20.0, step=10
+)
 _IN_PLACE: Final = (
     "Nothing travels: whole cycles on the spot, whose last frame meets the first, for games and "
     "for a creature that stays. No route is needed; a root bone lifts the body to its height over "
     "the armature's origin"
 )
-TRAVEL_IN_PLACE: Final = ("NONE", "In Place", _IN_PLACE, 2)
-
-
-class InPlace:
-    """What ``Object.octo_motion.locomotion`` has of motion in place, and of breath."""
-
-    cycles: IntProperty(
-        name="Cycles",
-        description="In place: how many cycles of the gait the loop has. Random additions repeat "
-        "with the loop, so more cycles look less even",
-        default=1,
-        min=1,
-        soft_max=12,
-        max=10_000,
-    )
-    repeat: BoolProperty(
-        name="Repeat",
-        description="In place: curves repeat before and after the loop, by Cycles modifiers. "
-        "Exporters take the loop alone",
-        default=True,
-    )
-    breathing: FloatProperty(
-        name="Breathing",
-        description="How much wider the mantle gets with each breath; 0 gives it no keys",
-        subtype="FACTOR",
-        default=0.0,
-        min=0.0,
-        soft_max=0.3,
-        max=1.0,
-        step=1,
-    )
-    breath_time: FloatProperty(
-        name="Breath",
-        description="Time that one breath takes. A loop takes a whole number of breaths",
-        subtype="TIME_ABSOLUTE",
-        unit="TIME_ABSOLUTE",
-        default=3.0,
-        min=0.05,
-        soft_max=20.0,
-        step=10,
-    )
-
-
-# --- When the motion is, what it moves, and which keys it gets ------------------------------------
 
 
 class Timing:
-    """What ``Object.octo_motion.locomotion`` has of the time and of what carries the body."""
+    """What ``Object.octo_motion.locomotion`` has of time, of the body's travel and breath."""
 
     timing: EnumProperty(
         name="Timing",
@@ -376,16 +309,12 @@ class Timing:
             ("RANGE", "Frames", "The first and the last frame", 2),
         ),
     )
-    cycle_time: FloatProperty(
+    cycle_time: _Seconds(
         name="Cycle",
         description="Time that one cycle of the gait takes at full speed",
-        subtype="TIME_ABSOLUTE",
-        unit="TIME_ABSOLUTE",
         default=2.0,
         min=0.01,
         soft_min=0.2,
-        soft_max=20.0,
-        step=10,
     )
     speed: FloatProperty(
         name="Speed",
@@ -404,7 +333,7 @@ class Timing:
         items=(
             ("OBJECT", "Object", "The armature object moves", 0),
             ("BONE", "Root Bone", "The object stays; its root bone moves, as game engines like", 1),
-            TRAVEL_IN_PLACE,
+            ("NONE", "In Place", _IN_PLACE, 2),
         ),
     )
     extend_scene_range: BoolProperty(
@@ -414,10 +343,47 @@ class Timing:
         "is extended. Switch it off where a shot has its length",
         default=True,
     )
+    cycles: IntProperty(
+        name="Cycles",
+        description="In place: how many cycles of the gait the loop has. Random additions repeat "
+        "with the loop, so more cycles look less even",
+        default=1,
+        min=1,
+        soft_max=12,
+        max=10_000,
+    )
+    repeat: BoolProperty(
+        name="Repeat",
+        description="In place: curves repeat before and after the loop, by Cycles modifiers. "
+        "Exporters take the loop alone",
+        default=True,
+    )
+    breathing: FactorProperty(
+        name="Breathing",
+        description="How much wider the mantle gets with each breath; 0 gives it no keys",
+        soft_max=0.3,
+        step=1,
+    )
+    breath_time: _Seconds(
+        name="Breath",
+        description="Time that one breath takes. A loop takes a whole number of breaths",
+        default=3.0,
+        min=0.05,
+    )
 
 
-class Keys:
-    """What ``Object.octo_motion.locomotion`` has of the keys."""
+SWITCHED: Final[set[str]] = set()
+"""Names of the armatures whose Live was switched, until somebody has looked."""
+
+
+def _tell(settings: Any, _context: bpy.types.Context) -> None:
+    """A change in the panel is told to everyone by Blender, one by a script only like this."""
+    SWITCHED.add(settings.id_data.name)
+    settings.id_data.update_tag(refresh={"OBJECT"})
+
+
+class Outcome:
+    """What ``Object.octo_motion.locomotion`` has of what is made: keys, quality, live."""
 
     keys: EnumProperty(
         name="Keys",
@@ -478,14 +444,6 @@ class Keys:
         "it; then it is yours, and the next one is a new action",
         type=bpy.types.Action,
     )
-
-
-# --- Settings of how arms keep apart --------------------------------------------------------------
-
-
-class KeepingApart:
-    """What ``Object.octo_motion.locomotion`` has of it."""
-
     keep_apart: BoolProperty(
         name="Keep Apart",
         description="Arms that would pass through each other or through the body make way: those "
@@ -498,24 +456,11 @@ class KeepingApart:
         "or through the body, if by more than a tenth of its thickness",
         default=True,
     )
-
-
-# --- What ``Object.octo_motion.locomotion`` has of live motion ------------------------------------
-
-
-SWITCHED: Final[set[str]] = set()
-"""Names of the armatures whose Live was switched, until somebody has looked."""
-
-
-def _tell(settings: Any, _context: bpy.types.Context) -> None:
-    """A change in the panel is told to everyone by Blender, one by a script only like this."""
-    SWITCHED.add(settings.id_data.name)
-    settings.id_data.update_tag(refresh={"OBJECT"})
-
-
-class LiveSettings:
-    """Whether the motion follows its route and its settings by itself."""
-
+    figures: CollectionProperty(
+        name="Quality",
+        description="The worst of each kind in the motion that was generated last",
+        type=FigureItem,
+    )
     live: BoolProperty(
         name="Live",
         description="Make the motion anew by itself whenever its route, its ground or a setting "
@@ -532,17 +477,7 @@ class LiveSettings:
 
 
 class OCTO_MOTION_PG_locomotion(
-    ArmList,
-    RouteSettings,
-    Movement,
-    Reaches,
-    Timing,
-    InPlace,
-    Keys,
-    KeepingApart,
-    QualityReport,
-    LiveSettings,
-    bpy.types.PropertyGroup,
+    ArmList, RouteSettings, Movement, Reaches, Timing, Outcome, bpy.types.PropertyGroup
 ):
     """How an armature walks or swims along a route."""
 
