@@ -120,7 +120,7 @@ def test_gait_file_that_is_shown_can_be_imported(block: str, clean_blender: Path
 
 @pytest.mark.parametrize("block", code_blocks(BATCH, "toml"))
 def test_job_that_is_shown_has_no_faults(block: str, clean_blender: Path) -> None:
-    from octo_motion.command_line.job_file import read_job
+    from octo_motion.command_line.job import read_job
     from octo_motion.command_line.vocabulary import known
 
     file = clean_blender / "job.toml"

@@ -14,8 +14,8 @@ import bpy
 from ..core.errors import OctoMotionError, SettingsError, WriteError
 from ..ui.locomotion import Summary
 from .command_line import parse
+from .job import STOPPED, BakeOptions, bake
 from .job_report import figures_in_words
-from .job_runner import STOPPED, BakeOptions, bake
 from .outputs import commit, staged
 from .shot_runner import perform
 from .shot_schema import KINDS, ShotRequest, is_motion

@@ -82,6 +82,16 @@ def _number(each: Any) -> Number:
     return Number(each.hard_min, each.hard_max, whole=whole, is_angle=is_angle)
 
 
+def resolver(job: Path, name: str) -> Callable[[str], Path]:
+    """The paths that the texts of a shot mean, by the job's path and the shot's name."""
+
+    def resolve(text: str) -> Path:
+        # An output that is a link is written where the link leads.
+        return (job.parent / Path(text.replace("{name}", name)).expanduser()).resolve()
+
+    return resolve
+
+
 def make_request(
     table: Mapping[str, Any], resolve: Callable[[str], Path], *, has_open_file: bool = False
 ) -> ShotRequest:

@@ -23,11 +23,10 @@ import bpy
 from ..core.errors import OctoMotionError
 from ..ui.locomotion import Summary
 from .command_line import COMMAND
-from .job_file import resolver
 from .job_report import LimitError, quality
 from .outputs import remove_staged, write_json
 from .shot_runner import AnySummary, perform
-from .vocabulary import make_request
+from .vocabulary import make_request, resolver
 
 _GRACE: Final = 5.0
 """Seconds that a process has to end before it is ended."""
@@ -197,13 +196,13 @@ def processors() -> int:
     return os.cpu_count() or 1
 
 
-def last_lines(log: Path, most: int = 20) -> str:
-    """The end of a log."""
+def last_lines(log: Path) -> str:
+    """The last 20 lines of a log."""
     try:
         lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return ""
-    return "\n".join([line for line in lines if line.strip()][-most:])
+    return "\n".join([line for line in lines if line.strip()][-20:])
 
 
 def check_jobs(jobs: int | None, shots: int) -> int:

@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from octo_motion.core.rotations import conjugate, multiply, slerp
-from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.posture import sample_clip
+from octo_motion.core.splicing.clip.clip import Clip, sample_clip
 from octo_motion.core.splicing.clip.splice_timing import splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.transfer.parts import part_bones

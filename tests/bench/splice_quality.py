@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from octo_motion.core.rotations import Floats, angle_between, conjugate, multiply, rotate
 from octo_motion.core.skeleton import Skeleton
-from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.posture import Posture, posture_of, sample_clip, sample_world
+from octo_motion.core.splicing.clip.clip import Clip, Posture, posture_of, sample_clip, sample_world
 from octo_motion.core.splicing.clip.splice_timing import SpliceWindow, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.transfer.body_frames import (

@@ -20,8 +20,7 @@ from octo_motion.core.rotations import (
     normalized,
     rotate,
 )
-from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.posture import posture_of, sample_clip, unposed
+from octo_motion.core.splicing.clip.clip import Clip, posture_of, sample_clip, unposed
 from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton

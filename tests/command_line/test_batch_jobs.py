@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from octo_motion.command_line.job_file import JobError, JobFile, read_job, resolver
+from octo_motion.command_line.job import JobError, JobFile, read_job
 from octo_motion.command_line.job_report import fingerprint, version
 from octo_motion.command_line.schema import (
     Choice,
@@ -22,7 +22,7 @@ from octo_motion.command_line.schema import (
     parse_assignments,
 )
 from octo_motion.command_line.shot_schema import NewRoute, ShotRequest, frame_rate
-from octo_motion.command_line.vocabulary import known, make_request, with_gait
+from octo_motion.command_line.vocabulary import known, make_request, resolver, with_gait
 from octo_motion.core.errors import GaitError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.octopus.shape import OctopusShape

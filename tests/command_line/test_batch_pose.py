@@ -11,7 +11,7 @@ import bpy
 import pytest
 
 from octo_motion.command_line.commands import main
-from octo_motion.command_line.job_file import JobError, read_job
+from octo_motion.command_line.job import JobError, read_job
 from octo_motion.command_line.shot_runner import perform
 from octo_motion.command_line.shot_schema import ShotRequest
 from octo_motion.command_line.vocabulary import known

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from octo_motion.command_line.job_file import JobError, JobFile, read_job, resolver
+from octo_motion.command_line.job import JobError, JobFile, read_job
 from octo_motion.command_line.schema import Reading
 from octo_motion.command_line.shot_schema import SPLICES, NewSplice, parse_splices
 from octo_motion.command_line.splice_runner import files_within, import_base
-from octo_motion.command_line.vocabulary import check_file, known, make_request
+from octo_motion.command_line.vocabulary import check_file, known, make_request, resolver
 from octo_motion.core.errors import ClipError, SettingsError
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent

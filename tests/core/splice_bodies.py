@@ -15,8 +15,7 @@ from octo_motion.core.rotations import (
     to_matrix,
 )
 from octo_motion.core.skeleton import Skeleton
-from octo_motion.core.splicing.clip.clip import Clip
-from octo_motion.core.splicing.clip.posture import unposed
+from octo_motion.core.splicing.clip.clip import Clip, unposed
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.transfer.splice import Splice, build_splices
 from tests.core.rigs import skeleton_of

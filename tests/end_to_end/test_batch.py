@@ -17,7 +17,7 @@ import pytest
 
 from octo_motion import command_line
 from octo_motion.command_line import commands
-from octo_motion.command_line import job_runner as bake
+from octo_motion.command_line import job as bake
 from octo_motion.core.errors import WriteError
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent

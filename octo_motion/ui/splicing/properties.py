@@ -31,30 +31,33 @@ def _bone(name: str, description: str) -> Any:
     return StringProperty(name=name, description=description)
 
 
+_MIDDLE: Final = {
+    "hips": _bone("Hips", "Bone of the pelvis, which carries legs and trunk"),
+    "spine": _bone("Spine", "Lowest bone above the pelvis that bends the trunk, if there is one"),
+    "chest": _bone("Chest", "Bone that carries neck and shoulders"),
+    "neck": _bone("Neck", "Lowest bone of the neck, if there is one"),
+    "head": _bone("Head", "Bone of the head"),
+}
+_SIDED: Final = {
+    "clavicle": ("Collar Bone", "Bone from the chest to the {} shoulder, if any"),
+    "upper_arm": ("Upper Arm", "Bone that begins at the {} shoulder"),
+    "forearm": ("Forearm", "Bone that begins at the {} elbow"),
+    "hand": ("Hand", "Bone that begins at the {} wrist"),
+    "thigh": ("Thigh", "Bone that begins at the {} hip"),
+    "shin": ("Shin", "Bone that begins at the {} knee"),
+    "foot": ("Foot", "Bone that begins at the {} ankle"),
+    "toe": ("Toes", "Bone that begins at the ball of the {} foot, if there is one"),
+}
+
+
 class OCTO_MOTION_PG_landmarks(bpy.types.PropertyGroup):
     """One bone name for each landmark; empty where the rig has none."""
 
-    hips: _bone("Hips", "Bone of the pelvis, which carries legs and trunk")
-    spine: _bone("Spine", "Lowest bone above the pelvis that bends the trunk, if there is one")
-    chest: _bone("Chest", "Bone that carries neck and shoulders")
-    neck: _bone("Neck", "Lowest bone of the neck, if there is one")
-    head: _bone("Head", "Bone of the head")
-    clavicle_l: _bone("Left Collar Bone", "Bone from the chest to the left shoulder, if any")
-    upper_arm_l: _bone("Left Upper Arm", "Bone that begins at the left shoulder")
-    forearm_l: _bone("Left Forearm", "Bone that begins at the left elbow")
-    hand_l: _bone("Left Hand", "Bone that begins at the left wrist")
-    thigh_l: _bone("Left Thigh", "Bone that begins at the left hip")
-    shin_l: _bone("Left Shin", "Bone that begins at the left knee")
-    foot_l: _bone("Left Foot", "Bone that begins at the left ankle")
-    toe_l: _bone("Left Toes", "Bone that begins at the ball of the left foot, if there is one")
-    clavicle_r: _bone("Right Collar Bone", "Bone from the chest to the right shoulder, if any")
-    upper_arm_r: _bone("Right Upper Arm", "Bone that begins at the right shoulder")
-    forearm_r: _bone("Right Forearm", "Bone that begins at the right elbow")
-    hand_r: _bone("Right Hand", "Bone that begins at the right wrist")
-    thigh_r: _bone("Right Thigh", "Bone that begins at the right hip")
-    shin_r: _bone("Right Shin", "Bone that begins at the right knee")
-    foot_r: _bone("Right Foot", "Bone that begins at the right ankle")
-    toe_r: _bone("Right Toes", "Bone that begins at the ball of the right foot, if there is one")
+    __annotations__ = _MIDDLE | {
+        f"{part}_{side[0]}": _bone(f"{side.capitalize()} {name}", description.format(side))
+        for side in ("left", "right")
+        for part, (name, description) in _SIDED.items()
+    }
 
 
 PROPERTIES: Final = {each: each.replace(".", "_").lower() for each in LANDMARKS}

@@ -66,12 +66,8 @@ class TimingDrag:
         self._dragged[self.handle] = value
         self._starts[self.handle] = round(value, 2 if fine else 0)
 
-    def type(self, character: str) -> bool:
-        """A key for the number: digit, point, minus, or "" to take the last back.
-
-        Returns:
-            Whether it is one.
-        """
+    def type(self, character: str) -> None:
+        """A key for the number: digit, point, minus, or "" to take the last back."""
         if character == "":
             self.typed = self.typed[:-1]
         elif character == "-":
@@ -82,13 +78,12 @@ class TimingDrag:
         elif character in tuple("0123456789"):
             self.typed += character
         else:
-            return False
+            return
         try:
             value = float(self.typed)
         except ValueError:
             value = round(self._dragged[self.handle])
         self._starts[self.handle] = value
-        return True
 
     def switch(self) -> None:
         """Move the other start from now on."""

@@ -11,7 +11,6 @@ from octo_motion.core.rotations import angle_between
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.clip.splice_timing import After, Timing
 from octo_motion.core.splicing.transfer import splice
-from octo_motion.core.splicing.transfer import splice as live
 from octo_motion.core.splicing.transfer.parts import PARTS, Part
 from octo_motion.core.splicing.transfer.splice import Splice, SplicePreview, build_splices
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
@@ -90,7 +89,7 @@ def test_a_look_matches_no_bones_and_takes_few_frames(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(splice, "write_retargeted", watched)
     monkeypatch.setattr(splice, "find_retargets", refuse)
-    monkeypatch.setattr(live, "splicers", refuse)
+    monkeypatch.setattr(splice, "Splicer", refuse)
     for start in (100.0, 250.0, 598.0):
         looked_at.at(600.0, replace(timing, base_start=start))
     # The frame itself, where each of the two begins and ends, half an easing.

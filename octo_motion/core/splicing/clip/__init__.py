@@ -2,8 +2,9 @@
 """Clips as arrays: poses over time, and how they are read and timed."""
 
 from .bvh_check import check_bvh
-from .clip import MOTION_SUFFIXES, Clip
-from .posture import (
+from .clip import (
+    MOTION_SUFFIXES,
+    Clip,
     Posture,
     orientations_of,
     posture_of,

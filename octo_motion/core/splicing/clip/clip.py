@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A motion clip as plain arrays: what splicing takes and gives."""
+"""Motion clips as plain arrays, and where their bones are at any time."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -10,7 +11,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...rotations import Floats, from_matrix, multiply, rotate
+from ...rotations import (
+    Floats,
+    conjugate,
+    from_matrix,
+    from_rotation_vector,
+    multiply,
+    normalized,
+    rotate,
+    slerp,
+    to_matrix,
+    to_rotation_vector,
+)
 from ...skeleton import Skeleton
 
 MOTION_SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
@@ -68,3 +80,229 @@ class Clip:
             scales=None if self.scales is None else self.scales[chosen],
             own=None if self.own is None else self.own[chosen],
         )
+
+
+# --- Forward kinematics of just those bones that are asked for, and backwards, for all frames -----
+
+
+class Posture:
+    """Where bones are, in armature space, bone by bone as needed.
+
+    What was computed is kept: a bone's rotation must not change after it, or one beneath it, has
+    been asked for.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        rotations: Callable[[Sequence[int]], Floats],
+        location: Callable[[int], Floats],
+    ) -> None:
+        self.skeleton = skeleton
+        self.rotations = rotations
+        """(frames, bones, 4) of some bones, each in its rest frame."""
+        self.location = location
+        """(frames, 3) of a bone, in its rest frame."""
+        self._orientations: dict[int, Floats] = {}
+        self._heads: dict[int, Floats] = {}
+        self._turns: dict[int, Floats] = {}
+
+    def rotation(self, bone: int) -> Floats:
+        """(frames, 4) of a bone, in its rest frame."""
+        return self.rotations([bone])[:, 0]
+
+    def turn(self, bone: int) -> Floats:
+        """How a bone has turned from its rest pose, (frames, 4)."""
+        if bone not in self._turns:
+            back = conjugate(self.skeleton.rest_rotations[bone])
+            self._turns[bone] = multiply(self.orientation(bone), back)
+        return self._turns[bone]
+
+    def carried(self, bone: int) -> Floats:
+        """A bone's orientation before its own rotation, (frames, 4) or (4,)."""
+        rest, parent = self.skeleton.rest_rotations[bone], self.skeleton.parents[bone]
+        if parent < 0 or not self.skeleton.inherits_rotation[bone]:
+            return rest
+        return multiply(self.turn(parent), rest)
+
+    def location_axes(self, bone: int) -> Floats:
+        """The axes in which a bone's location is given, (frames, 4) or (4,)."""
+        rest, parent = self.skeleton.rest_rotations[bone], self.skeleton.parents[bone]
+        return rest if parent < 0 else multiply(self.turn(parent), rest)
+
+    def unmoved_head(self, bone: int) -> Floats:
+        """Where a bone's head is before its own location, (frames, 3) or (3,)."""
+        parent = self.skeleton.parents[bone]
+        if parent < 0:
+            return self.skeleton.heads[bone]
+        offset = self.skeleton.heads[bone] - self.skeleton.heads[parent]
+        return self.head(parent) + rotate(self.turn(parent), offset)
+
+    def orientation(self, bone: int) -> Floats:
+        """(frames, 4), armature space."""
+        if bone not in self._orientations:
+            self._orientations[bone] = multiply(self.carried(bone), self.rotation(bone))
+        return self._orientations[bone]
+
+    def head(self, bone: int) -> Floats:
+        """(frames, 3), armature space."""
+        if bone not in self._heads:
+            moved = self.location(bone)
+            position = self.unmoved_head(bone)
+            if np.any(moved):
+                position = position + rotate(self.location_axes(bone), moved)
+            self._heads[bone] = np.broadcast_to(position, moved.shape)
+        return self._heads[bone]
+
+
+def posture_of(skeleton: Skeleton, rotations: Floats, locations: Floats) -> Posture:
+    """The posture of arrays (frames, bones, 4) and (frames, bones, 3)."""
+    return Posture(skeleton, lambda bones: rotations[:, bones], lambda bone: locations[:, bone])
+
+
+def sample_clip(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
+    """A clip at any times, in its own frame numbers; beyond its ends it stands still.
+
+    Args:
+        clip: the clip.
+        frames: (frames,)
+        seams: (frames,) how much of the step from the clip's last pose to its first is added.
+    """
+    before, after, share = _between(clip, frames)
+    between = share.any()
+    looped = seams is not None and seams.any()
+
+    def rotations(bones: Sequence[int]) -> Floats:
+        own = np.asarray(bones, dtype=np.intp)
+        values = clip.rotations[before[:, None], own]
+        if between:
+            values = slerp(values, clip.rotations[after[:, None], own], share[:, None])
+        if looped:
+            assert seams is not None
+            step = multiply(conjugate(clip.rotations[-1, own]), clip.rotations[0, own])
+            added = seams[:, None, None] * to_rotation_vector(step)
+            values = multiply(values, from_rotation_vector(added))
+        return values
+
+    def location(bone: int) -> Floats:
+        values = clip.locations[before, bone]
+        if between:
+            values = values + share[:, None] * (clip.locations[after, bone] - values)
+        if looped:
+            assert seams is not None
+            step = clip.locations[0, bone] - clip.locations[-1, bone]
+            values = values + seams[:, None] * step
+        return values
+
+    return Posture(clip.skeleton, rotations, location)
+
+
+def sample_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[int]) -> Floats:
+    """Scales (frames, bones, 3) of some bones of a clip at any times, like :func:`sample_clip`."""
+    if clip.scales is None:
+        return np.ones((len(frames), len(bones), 3))
+    before, after, share = _between(clip, frames)
+    own = np.asarray(bones, dtype=np.intp)
+    values = clip.scales[before[:, None], own]
+    values += share[:, None, None] * (clip.scales[after[:, None], own] - values)
+    return values + seams[:, None, None] * (clip.scales[0, own] - clip.scales[-1, own])
+
+
+def sample_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
+    """The armature object at any times: rotations (frames, 4), places (frames, 3), and scale."""
+    before, after, share = _between(clip, frames)
+    first, second = clip.world[before], clip.world[after]
+    turns = from_matrix(first[:, :3, :3] / clip.scale)
+    if share.any():
+        turns = slerp(turns, from_matrix(second[:, :3, :3] / clip.scale), share)
+    places = first[:, :3, 3] + share[:, None] * (second[:, :3, 3] - first[:, :3, 3])
+    return turns, places, clip.scale
+
+
+def _between(clip: Clip, frames: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:
+    """Indices of the clip's frames on either side of each time, and how far it is between."""
+    place: Floats = np.interp(frames, clip.frames, np.arange(len(clip), dtype=np.float64))
+    # A time that misses a frame by rounding alone is that frame.
+    whole = np.round(place)
+    place = np.where(np.abs(place - whole) < 1e-6, whole, place)
+    before = np.floor(place).astype(np.intp)
+    after = np.minimum(before + 1, len(clip) - 1)
+    return before, after, np.asarray(place - before)
+
+
+# --- Forward kinematics backwards: from where the bones are to how each is turned and moved -------
+
+
+def unposed(skeleton: Skeleton, orientations: Floats, heads: Floats) -> tuple[Floats, Floats]:
+    """Rotations (…, bones, 4) and locations (…, bones, 3) in each bone's rest frame.
+
+    The inverse of ``Skeleton.pose``.
+
+    Args:
+        skeleton: the bones.
+        orientations: (…, bones, 4) quaternions, armature space.
+        heads: (…, bones, 3), armature space.
+    """
+    rotations, locations = np.empty(orientations.shape), np.empty(heads.shape)
+    for bone, parent in enumerate(skeleton.parents):
+        rest, position = skeleton.rest_rotations[bone], skeleton.heads[bone]
+        carried = rest
+        if parent >= 0:
+            turn = multiply(
+                orientations[..., parent, :], conjugate(skeleton.rest_rotations[parent])
+            )
+            position = heads[..., parent, :] + rotate(turn, position - skeleton.heads[parent])
+            carried = multiply(turn, rest)
+        moved = heads[..., bone, :] - position
+        locations[..., bone, :] = rotate(conjugate(carried), moved)
+        if not skeleton.inherits_rotation[bone]:
+            carried = rest
+        rotations[..., bone, :] = multiply(conjugate(carried), orientations[..., bone, :])
+    return rotations, locations
+
+
+def orientations_of(matrices: Floats) -> Floats:
+    """Orthonormal axes (…, 3, 3) of matrices that may scale and shear.
+
+    Y, along which a bone points, keeps its direction, and X its side.
+    """
+    y = normalized(matrices[..., :, 1])
+    x = matrices[..., :, 0]
+    x = normalized(x - np.sum(x * y, axis=-1, keepdims=True) * y)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+# --- Bones that are scaled: where they and those they carry come to lie ---------------------------
+
+
+_LEAST: Final = 1e-4
+"""Scale of what is scaled to nothing, to hide it: which way it points is still to be seen."""
+
+
+def without_scale(
+    skeleton: Skeleton, rotations: Floats, locations: Floats, scales: Floats
+) -> tuple[Floats, Floats]:
+    """Rotations and locations that put all bones where they are when each scales its children.
+
+    For bones that inherit all of their parent's scale and rotation, which is the usual.
+
+    Args:
+        skeleton: the bones.
+        rotations: (frames, bones, 4) in each bone's rest frame.
+        locations: (frames, bones, 3) in each bone's rest frame.
+        scales: (frames, bones, 3) in each bone's rest frame.
+    """
+    scales = np.where(np.abs(scales) < _LEAST, _LEAST, scales)
+    basis = np.zeros((*rotations.shape[:2], 4, 4))
+    basis[..., :3, :3] = to_matrix(rotations) * scales[..., None, :]
+    basis[..., :3, 3] = locations
+    basis[..., 3, 3] = 1.0
+    posed = np.empty_like(basis)
+    for bone, parent in enumerate(skeleton.parents):
+        rest = skeleton.rest_matrices[bone]
+        if parent < 0:
+            posed[:, bone] = rest @ basis[:, bone]
+        else:
+            offset = np.linalg.inv(skeleton.rest_matrices[parent]) @ rest
+            posed[:, bone] = posed[:, parent] @ offset @ basis[:, bone]
+    return unposed(skeleton, from_matrix(orientations_of(posed[..., :3, :3])), posed[..., :3, 3])

@@ -84,19 +84,10 @@ def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Spl
         ClipError: a bone or landmark is missing, or a timing makes no sense.
     """
     result = base
-    for each in splicers(base, landmarks, splices):
+    # All on the same base: the ground is where it stands, whatever is done to its legs on the way.
+    for each in [Splicer(base, landmarks, splice) for splice in splices]:
         result = each.onto(result, each.window(each.splice.timing))
     return result
-
-
-def splicers(base: Clip, landmarks: Landmarks | None, splices: Iterable[Splice]) -> list[Splicer]:
-    """All splices of a stack, made ready.
-
-    Raises:
-        ClipError: a bone or landmark is missing.
-    """
-    # The ground is where the base stands on it, whatever is done to its legs on the way.
-    return [Splicer(base, landmarks, each) for each in splices]
 
 
 class Splicer:
@@ -250,7 +241,7 @@ class SplicePreview:
     ) -> None:
         self._base = build_splices(base, landmarks, splices[:number])
         # Made ready on the stack's own base: it tells the ground.
-        self._levels = splicers(base, landmarks, splices[number:])
+        self._levels = [Splicer(base, landmarks, each) for each in splices[number:]]
         self._above = [each.window(each.splice.timing) for each in self._levels[1:]]
 
     def at(self, frame: float, timing: Timing) -> Clip:
