@@ -76,13 +76,9 @@ class SimulatedPointer:
 
 
 class Simulation:
-    """A session of posing whose hands are at devices, kept in time with the clock of those.
+    """A session of posing whose hands are at devices, kept in time with the clock (s) of those.
 
-    Args:
-        figure: the puppet.
-        pose: where it starts.
-        settings: of the world; their step is the nominal one.
-        clock: seconds.
+    The step in the settings is the nominal one.
     """
 
     def __init__(
@@ -127,11 +123,7 @@ class Simulation:
         self.session.show(pose)
 
     def pin(self, pins: dict[int, bool]) -> None:
-        """Pin these bodies where they are, and no others.
-
-        Args:
-            pins: By body, whether its orientation is held as well.
-        """
+        """Pin these bodies and no others where they are; those that say so do not turn either."""
         before = self.session.pins
         for body in before.keys() - pins.keys():
             self.session.pin(body, state=False)
@@ -155,12 +147,9 @@ class Simulation:
     def hear(
         self, message: HandMessage, device: DeviceMessage | None = None, scale: float = 1.0
     ) -> None:
-        """Take over where a hand is, what it wants, and grab or let go.
+        """Take over where a hand is and what it wants, and grab or let go.
 
-        Args:
-            message: The hand's newest.
-            device: What it holds in reality.
-            scale: m of the scene for a metre of the hand.
+        The device is what it holds in reality; a metre of its way is ``scale`` m of the scene.
         """
         hand = self.hands.setdefault(message.pointer, SimulatedPointer(message))
         if message.time != hand.message.time:
@@ -300,11 +289,7 @@ class Simulation:
         return _LATE * self._turn if self._turn > _PROMPT else 0.0
 
     def worked(self, seconds: float) -> None:
-        """Lengthen steps if turns take too long, shorten them when there is time again.
-
-        Args:
-            seconds: that a whole turn took to compute: the step, and all messages.
-        """
+        """Lengthen steps if whole turns, messages and all, take too long, or shorten them again."""
         if not self.session.resting:
             step = self.step_seconds
             self.session.change(step=self._length.after(seconds, step, step))
@@ -354,13 +339,7 @@ def coupling_for(
     The hand feels its own spring over the way by which the body lags behind. A world's spring r
     times as stiff then means that r newtons on the puppet are one on the hand. But the softest
     device must still move the puppet: the world's spring lifts it all when it is drawn out by a
-    tenth of the puppet's size.
-
-    Args:
-        figure: the puppet.
-        pose: where it is.
-        device: what the hand holds in reality.
-        scale: m of the scene for a metre of the hand.
+    tenth of the puppet's size. A metre of the hand is ``scale`` m of the scene.
     """
     firm = Coupling.for_figure(figure)
     if device is None or device.force <= 0.0 or device.stiffness <= 0.0:

@@ -151,7 +151,7 @@ def kill_hands() -> float:
         (hands,) = children_of(bridge)
         start = time.monotonic()
         os.kill(hands, signal.SIGKILL)
-        wait_for(client, lambda: client.lost_devices, "the hand is gone")
+        wait_for(client, lambda: not client.devices, "the hand is gone")
         wait_for(client, lambda: client.devices, "the hand is back")
         assert client.state is ClientState.RUNNING
         return time.monotonic() - start

@@ -73,31 +73,20 @@ class Gains:
 
 
 def stiffest(damping: float, late: float, damper: float = 0.0) -> float:
-    """The largest passive stiffness: ``(b − |B|) / late``, after Colgate and Brown.
+    """The largest passive stiffness, after Colgate and Brown: ``(b − |B|) / late``.
 
-    Args:
-        damping: b of the device.
-        late: s from a pose to the force that answers it, on average: T / 2 + d.
-        damper: B of the coupling.
+    b damps the device and B is the coupling's damper; T / 2 + d is how late (s) a force answers.
     """
     return max(0.0, damping - abs(damper)) / late
 
 
 def gains_for(device: Dynamics, period: float, share: float = SHARE) -> Gains:
-    """The coupling for a device and a loop.
-
-    Args:
-        device: What the device says of its mechanics.
-        period: s of the loop.
-        share: Of the bound; above 1 the coupling may become active.
-    """
-    half = 0.5 * period + device.delay
+    """The coupling for a device and a loop (s); by a share above 1 it may become active."""
+    late = 0.5 * period + device.delay
+    angular = (device.angular_damping, device.angular_friction, device.angular_resolution)
     return Gains(
-        *_gains(device.damping, device.friction, device.resolution, half, share),
-        *_gains(
-            *(device.angular_damping, device.angular_friction, device.angular_resolution),
-            *(half, share),
-        ),
+        *_gains(device.damping, device.friction, device.resolution, late, share),
+        *_gains(*angular, late, share),
     )
 
 
@@ -116,12 +105,8 @@ def wrench(
 ) -> tuple[Vector, Vector]:
     """Force and torque on the hand.
 
-    Args:
-        gains: Of the coupling.
-        apart: m from the hand to where the body is.
-        turned: rad, rotation vector from the hand's orientation to the body's.
-        drift: m/s of the body less the hand's.
-        spin: rad/s of the body less the hand's.
+    ``apart`` (m) and ``turned`` (rad, rotation vector) lead from the hand to the body; ``drift``
+    (m/s) and ``spin`` (rad/s) are the body's less the hand's.
     """
     return (
         add_scaled(scale(apart, gains.stiffness), drift, gains.damping),
@@ -158,22 +143,14 @@ class Observer:
     """J that the loop gave beyond what it had got: stays near 0 unless damping was capped."""
 
     def observe(self, force: Vector, moved: Vector) -> None:
-        """Account for one period.
-
-        Args:
-            force: What acted on the hand throughout it.
-            moved: How the hand moved (turned) in it.
-        """
+        """Account for one period: what acted on the hand, and how that moved (turned) in it."""
         self.energy = min(self.most, self.energy - dot(force, moved))
         self.given = max(self.given, -self.energy)
 
     def damping(self, force: Vector, velocity: Vector, period: float) -> Vector:
-        """Force to add so that the coming period does not give what is not there.
+        """To add to what the coupling asks for, so that no period gives what is not there.
 
-        Args:
-            force: What the coupling asks for.
-            velocity: The hand's, expected to go on for this period.
-            period: s
+        The hand's velocity is expected to go on for the coming period (s).
         """
         speed_squared = dot(velocity, velocity)
         if speed_squared <= 0.0:
@@ -185,18 +162,11 @@ class Observer:
         return scale(velocity, -amount)
 
     def allowed(self, force: Vector, velocity: Vector, period: float) -> Vector:
-        """What is left of a force that drives the hand while the store runs out.
-
-        Args:
-            force: What the coupling asks for.
-            velocity: The hand's.
-            period: s
-        """
+        """What is left of a force that drives the hand while the store runs out; period in s."""
         drives = dot(force, velocity) > 0.0
         wanted = max(0.0, min(1.0, self.energy / (_EMPTYING * self.most))) if drives else 1.0
-        self._share += min(1.0, period / (_FADE_OUT if wanted < self._share else _FADE_IN)) * (
-            wanted - self._share
-        )
+        takes = _FADE_OUT if wanted < self._share else _FADE_IN
+        self._share += min(1.0, period / takes) * (wanted - self._share)
         return scale(force, self._share)
 
     def forget(self) -> None:
@@ -248,20 +218,16 @@ class Shaper:
     def shape(
         self, force: Vector, torque: Vector, period: float, *, holding: bool, age: float
     ) -> None:
-        """Set ``force`` and ``torque`` for the coming period.
+        """Set ``force`` (N) and ``torque`` (N·m) for the coming period (s), from those asked for.
 
-        Args:
-            force: What is asked for, N.
-            torque: What is asked for, N·m.
-            period: s since the last call.
-            holding: Whether something is held; else the force fades.
-            age: s of the older of the two, the device's sample and the simulation's state.
+        They fade where nothing is held. ``age`` (s) is that of the older of the two, the device's
+        sample and the simulation's state.
         """
         fresh = freshness(age)
         if fresh <= 0.0 or not isfinite(dot(force, force) + dot(torque, torque)):
             # Not a fade but the end of one: it began when half of the time was over. And what is
             # no number, or beyond all of them, must not reach a motor.
-            self.share, self.force, self.torque = 0.0, ZERO, ZERO
+            self.drop()
             return
         step = period / RISE if holding else -period / FALL
         self.share = max(0.0, min(1.0, self.share + step))

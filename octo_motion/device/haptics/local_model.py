@@ -109,14 +109,10 @@ class LocalModel:
 def _change(
     tie: tuple[float, float, float], apart: Vector, drift: Vector, used: Vector, period: float
 ) -> Vector:
-    """Of the body's velocity in a period: what the pull is now, other than what was last used.
+    """Of the body's velocity in a period (s), by what the pull is other than what was last used.
 
-    Args:
-        tie: Stiffness and damping of the pull, mobility of the body.
-        apart: From the body to the pointer.
-        drift: Of the pointer's velocity from the body's.
-        used: What the simulation's coupling used in its last step.
-        period: s
+    ``tie`` is stiffness and damping of the pull and mobility of the body; ``apart`` and ``drift``
+    lead from the body to the pointer.
     """
     stiffness, damping, mobility = tie
     now = add_scaled(scale(apart, stiffness), drift, damping)

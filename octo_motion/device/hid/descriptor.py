@@ -7,7 +7,6 @@ suspicion due to a device: every count is bounded, and what makes no sense raise
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
@@ -47,7 +46,6 @@ class Field:
     least: int
     """Logical minimum; below 0 makes the number a signed one."""
     most: int
-    relative: bool
 
     def value(self, payload: bytes) -> int | None:
         """The number in a report without its report number; None where the report is too short."""
@@ -66,15 +64,14 @@ class Field:
 class ReportLayout:
     """All that a descriptor says of a device's reports."""
 
-    collections: tuple[tuple[int, int], ...]
-    """Usage page and usage of each application collection."""
     fields: tuple[Field, ...]
     numbered: bool
     """Whether each report starts with its number."""
 
-    def of(self, way: ReportField) -> Iterator[Field]:
-        """The fields of the reports that go one way."""
-        return (each for each in self.fields if each.way == way)
+
+_GLOBAL: Final = {0x0: "page", 0x1: "least", 0x2: "most", 0x7: "bits", 0x8: "report", 0x9: "count"}
+_WITHOUT_EFFECT: Final = (0x3, 0x4, 0x5, 0x6)
+"""Physical range and unit: known for the devices that matter here."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +106,6 @@ class _Parser:
     stack: list[_Global] = field(default_factory=list[_Global])
     depth: int = 0
     fields: list[Field] = field(default_factory=list[Field])
-    collections: list[tuple[int, int]] = field(default_factory=list[tuple[int, int]])
     lengths: dict[tuple[ReportField, int], int] = field(
         default_factory=dict[tuple[ReportField, int], int]
     )
@@ -122,8 +118,6 @@ class _Parser:
             self.depth += 1
             if self.depth > _MOST_DEPTH:
                 raise DescriptorError("collections are nested too deep")
-            if value == 1:
-                self.collections.append(_full_usage(self.state.page, self.local.usage(0)))
         elif tag == 0xC:
             self.depth -= 1
             if self.depth < 0:
@@ -150,40 +144,33 @@ class _Parser:
             self.fields.append(
                 Field(
                     *(way, state.report, page, usage, start + index * state.bits, state.bits),
-                    *(state.least, state.most, bool(flags & 4)),
+                    *(state.least, state.most),
                 )
             )
 
     def global_item(self, tag: int, value: int, signed: int) -> None:
-        match tag:
-            case 0x0:
-                self.state = replace(self.state, page=value & 0xFFFF)
-            case 0x1:
-                self.state = replace(self.state, least=signed)
-            case 0x2:
-                # Many write 255 in one byte: a maximum is below 0 only if its minimum is.
-                self.state = replace(self.state, most=signed if self.state.least < 0 else value)
-            case 0x7:
-                self.state = replace(self.state, bits=value)
-            case 0x8:
+        if tag == 0xA:
+            if len(self.stack) >= _MOST_DEPTH:
+                raise DescriptorError("too much is pushed")
+            self.stack.append(self.state)
+        elif tag == 0xB:
+            if not self.stack:
+                raise DescriptorError("popped without a push")
+            self.state = self.stack.pop()
+        elif tag in _GLOBAL:
+            name = _GLOBAL[tag]
+            if name == "page":
+                value &= 0xFFFF
+            # Many write 255 in one byte: a maximum is below 0 only if its minimum is.
+            if name == "least" or (name == "most" and self.state.least < 0):
+                value = signed
+            if name == "report":
                 if not 0 < value <= 0xFF:
                     raise DescriptorError(f"report number {value}")
                 self.numbered = True
-                self.state = replace(self.state, report=value)
-            case 0x9:
-                self.state = replace(self.state, count=value)
-            case 0xA:
-                if len(self.stack) >= _MOST_DEPTH:
-                    raise DescriptorError("too much is pushed")
-                self.stack.append(self.state)
-            case 0xB:
-                if not self.stack:
-                    raise DescriptorError("popped without a push")
-                self.state = self.stack.pop()
-            case 0x3 | 0x4 | 0x5 | 0x6:
-                pass  # physical range and unit: known for the devices that matter here
-            case _:
-                raise DescriptorError(f"global item {tag:#x} is unknown")
+            self.state = replace(self.state, **{name: value})
+        elif tag not in _WITHOUT_EFFECT:
+            raise DescriptorError(f"global item {tag:#x} is unknown")
 
     def local_item(self, tag: int, value: int, size: int) -> None:
         usage = value if size == 4 else (self.state.page << 16) | value
@@ -202,7 +189,7 @@ def _full_usage(page: int, usage: int) -> tuple[int, int]:
 
 
 def parse_descriptor(descriptor: bytes) -> ReportLayout:
-    """Fields and application collections of a report descriptor.
+    """The fields of a report descriptor.
 
     Raises:
         DescriptorError: it is cut off, out of bounds or contradicts itself.
@@ -236,7 +223,7 @@ def parse_descriptor(descriptor: bytes) -> ReportLayout:
                 raise DescriptorError("an item of the reserved type")
     if parser.depth:
         raise DescriptorError("a collection never ends")
-    return ReportLayout(tuple(parser.collections), tuple(parser.fields), parser.numbered)
+    return ReportLayout(tuple(parser.fields), parser.numbered)
 
 
 # --- Writing one ---------------------------------------------------------------------------------

@@ -121,15 +121,12 @@ def classic_layout(*, combined: bool) -> ReportLayout:
     axes = [
         Field(
             *(ReportField.INPUT, 1 if combined or axis < 3 else 2, _DESKTOP, _FIRST_AXIS + axis),
-            *(16 * (axis if combined else axis % 3), 16, -RANGE, RANGE, True),
+            *(16 * (axis if combined else axis % 3), 16, -RANGE, RANGE),
         )
         for axis in range(6)
     ]
-    buttons = [
-        Field(ReportField.INPUT, 3, _BUTTONS, bit + 1, bit, 1, 0, 1, relative=False)
-        for bit in range(32)
-    ]
-    return ReportLayout((MULTI_AXIS,), (*axes, *buttons), numbered=True)
+    buttons = [Field(ReportField.INPUT, 3, _BUTTONS, bit + 1, bit, 1, 0, 1) for bit in range(32)]
+    return ReportLayout((*axes, *buttons), numbered=True)
 
 
 class MultiAxis:
@@ -139,7 +136,9 @@ class MultiAxis:
         self._numbered = layout.numbered
         self._axes: dict[int, list[tuple[int, Field, int, float]]] = {}
         self._buttons: dict[int, list[tuple[int, Field]]] = {}
-        for each in layout.of(ReportField.INPUT):
+        for each in layout.fields:
+            if each.way != ReportField.INPUT:
+                continue
             if each.page == _DESKTOP and 0 <= each.usage - _FIRST_AXIS < 6:
                 axis = each.usage - _FIRST_AXIS
                 rest = _rest(each)

@@ -49,8 +49,6 @@ class Client:
     """Of the simulation when ``pose`` was true."""
     devices: dict[int, DeviceMessage] = field(default_factory=dict[int, DeviceMessage])
     """By pointer: those that are there."""
-    lost_devices: int = 0
-    """How often a device has gone since the start; what it held was let go."""
     pointers: dict[int, PointerMessage] = field(default_factory=dict[int, PointerMessage])
     calibrating: dict[int, CalibrationMessage] = field(
         default_factory=dict[int, CalibrationMessage]
@@ -86,7 +84,7 @@ class Client:
         self._arguments, self._python = tuple(arguments), python
         self._forget_devices()
         self.times = self.hello = None
-        self.lost_devices = self._placed = 0
+        self._placed = 0
         self._child = Child.start(("bridge", *arguments), python)
         self._child.channel.most_waiting = _MOST_WAITING
         self.state = ClientState.RUNNING
@@ -142,11 +140,7 @@ class Client:
         self.send(messages.Place(pose.positions, pose.orientations))
 
     def send_pins(self, pins: dict[int, bool]) -> None:
-        """Pin these bodies where they are, and no others.
-
-        Args:
-            pins: By body, whether its orientation is held as well.
-        """
+        """Pin these bodies and no others where they are; those that say so do not turn either."""
         self._pins = dict(pins)
         count = len(self._figure[0]) if self._figure else 0
         self.send(messages.Pins.of(pins, count))
@@ -207,7 +201,6 @@ class Client:
         if message.present:
             self.devices[message.pointer] = message
         else:
-            self.lost_devices += 1
             self.devices.pop(message.pointer, None)
             self.pointers.pop(message.pointer, None)
             self.calibrating.pop(message.pointer, None)

@@ -178,12 +178,7 @@ class Haply(Driver):
 
 
 def parse(text: str, device: str = "") -> tuple[str, Sample] | None:
-    """Device and state that a message of the service tells; None where it tells none.
-
-    Args:
-        text: JSON.
-        device: Id of the device that is wanted; else the first one.
-    """
+    """Id and state of the wanted device, or the first, in the service's JSON; None without one."""
     try:
         message: Any = json.loads(text)
         entries: Any = message["inverse3"]
