@@ -67,21 +67,6 @@ class Bridge:
         """S from one turn to the next."""
         return _IDLE_PERIOD if self.simulation is None else self.simulation.step_seconds
 
-    def start_hands(self) -> None:
-        """Start the process at the devices, and tell it what it needs to know.
-
-        Where that fails it is tried again at the next turns, a few times.
-        """
-        self._starts += 1
-        self._started = time.monotonic()
-        try:
-            self._hands = Child.start(("hands", *self._hand_arguments), Path(sys.executable))
-            for message in self._remembered.values():
-                self._hands.channel.send(message)
-        except (DeviceError, ChannelClosedError) as error:
-            log.warning("The process at the devices did not start: %s", error)
-            self._hands = None
-
     def turn(self, now: float) -> None:
         """Hear both sides, go on by a step, tell both sides.
 
@@ -91,7 +76,7 @@ class Bridge:
         for message in self._blender.receive():
             self._hear_blender(message)
         if self._hands is None:
-            self._start_again()
+            self._start_hands()
         self._hear_hands()
         simulation = self.simulation
         if simulation is not None:
@@ -291,18 +276,30 @@ class Bridge:
             self._hear_device(replace(device, present=False))
         log.warning("The process at the devices ended")
 
-    def _start_again(self) -> None:
-        if self._starts <= _STARTS:
-            self.start_hands()
-            return
-        if not self._gave_up:
-            self._gave_up = True
-            self._blender.send(
-                messages.Notice(
-                    "The program at the devices ends again and again.",
-                    "Unplug the device, then start the bridge again.",
+    def _start_hands(self) -> None:
+        """Start the process at the devices, and tell it what it needs to know.
+
+        Where that fails it is tried again at the next turns, a few times.
+        """
+        if self._starts > _STARTS:
+            if not self._gave_up:
+                self._gave_up = True
+                self._blender.send(
+                    messages.Notice(
+                        "The program at the devices ends again and again.",
+                        "Unplug the device, then start the bridge again.",
+                    )
                 )
-            )
+            return
+        self._starts += 1
+        self._started = time.monotonic()
+        try:
+            self._hands = Child.start(("hands", *self._hand_arguments), Path(sys.executable))
+            for message in self._remembered.values():
+                self._hands.channel.send(message)
+        except (DeviceError, ChannelClosedError) as error:
+            log.warning("The process at the devices did not start: %s", error)
+            self._hands = None
 
     def close(self) -> None:
         """End the process at the devices."""

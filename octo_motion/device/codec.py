@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from io import BytesIO
-from typing import Any, Final
+from typing import Any, Final, get_args, get_type_hints
 
 import numpy as np
 
@@ -151,16 +151,21 @@ Codec = Number | Text | Many | Table
 class Record:
     """Packs and reads the fields of one kind of message; at once where all sizes are fixed."""
 
-    def __init__(self, codecs: tuple[Codec, ...]) -> None:
-        self._codecs = codecs
-        self._numbers = [each for each in codecs if isinstance(each, Number)]
+    def __init__(self, kind: type) -> None:
+        hints = get_type_hints(kind, include_extras=True)
+        self.codecs: dict[str, Codec] = {
+            each.name: get_args(hints[each.name])[1] for each in fields(kind)
+        }
+        """By name of the field."""
+        self._numbers = [each for each in self.codecs.values() if isinstance(each, Number)]
         self._struct: struct.Struct | None = None
-        if len(self._numbers) == len(codecs):
+        if len(self._numbers) == len(self.codecs):
             numbers = (f"{each.count}{each.code}" for each in self._numbers)
             self._struct = struct.Struct("<" + "".join(numbers))
 
-    def pack(self, values: tuple[Any, ...]) -> bytes:
+    def pack(self, message: object) -> bytes:
         """Bytes of a message's fields."""
+        values = [getattr(message, name) for name in self.codecs]
         if self._struct is not None:
             flat: list[Any] = []
             for number, value in zip(self._numbers, values, strict=True):
@@ -170,7 +175,7 @@ class Record:
                     flat.append(value)
             return self._struct.pack(*flat)
         out = bytearray()
-        for codec, value in zip(self._codecs, values, strict=True):
+        for codec, value in zip(self.codecs.values(), values, strict=True):
             codec.put(value, out)
         return bytes(out)
 
@@ -185,7 +190,7 @@ class Record:
                 raise MessageError("of another length")
             return tuple(self._split(self._struct.unpack(data)))
         left = BytesIO(data)
-        values = tuple(codec.take(left) for codec in self._codecs)
+        values = tuple(codec.take(left) for codec in self.codecs.values())
         if left.read(1):
             raise MessageError("too long")
         return values

@@ -40,13 +40,10 @@ _LOOK_EVERY: Final = 0.1
 class HandLoop:
     """All devices of this machine, tick by tick."""
 
-    def __init__(
-        self, channel: MessageChannel, discovery: Discovery, schedule: Schedule, period: float
-    ) -> None:
+    def __init__(self, channel: MessageChannel, discovery: Discovery, schedule: Schedule) -> None:
         self._channel = channel
         self._discovery = discovery
         self._schedule = schedule
-        self._period = period
         self._pointers: dict[int, Pointer] = {}
         self._numbers: dict[str, int] = {}
         self._workspaces: dict[int, messages.Workspace] = {}
@@ -145,7 +142,7 @@ class HandLoop:
             pointer.use(settings)
 
     def _send(self, now: float) -> None:
-        due = now - self._hands_sent > _SEND_EVERY - 0.5 * self._period
+        due = now - self._hands_sent > _SEND_EVERY - 0.5 * self._schedule.period
         if due:
             self._hands_sent = now
         for pointer in self.pointers:
@@ -181,7 +178,7 @@ class HandLoop:
             return
         if number in self._pointers:  # the same program, and another device
             self._send_device(self._pointers[number], present=False)
-        pointer = Pointer(number, driver, self._period, self._settings)
+        pointer = Pointer(number, driver, self._schedule.period, self._settings)
         if number in self._corrections:
             pointer.correct(self._corrections[number])
         if number in self._workspaces:
@@ -215,10 +212,10 @@ class HandLoop:
         self._send_device(pointer, present=False)
 
     def _send_device(self, pointer: Pointer, *, present: bool) -> None:
-        who, limits, gains = pointer.driver.description, pointer.limits, pointer.gains
+        who, dynamics, gains = pointer.driver.description, pointer.dynamics, pointer.gains
         self._channel.send(
             messages.DeviceMessage(
-                *(pointer.number, present, who.kind, limits.force, limits.torque),
+                *(pointer.number, present, who.kind, dynamics.force, dynamics.torque),
                 *(gains.stiffness, gains.angular_stiffness, who.name),
                 *(who.lasting or who.identity, who.buttons),
             )
@@ -248,7 +245,7 @@ def run(sources: Sources, rate: float = RATE) -> int:
     priority = make_real_time()
     channel.send(messages.Hello(os.getpid(), platform.python_version(), priority))
     schedule = Schedule(1.0 / rate)
-    loop = HandLoop(channel, discovery, schedule, schedule.period)
+    loop = HandLoop(channel, discovery, schedule)
     try:
         while not parent.gone:
             now = schedule.begin()

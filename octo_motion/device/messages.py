@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
-from typing import Annotated, ClassVar, Final, NamedTuple, Self, get_args, get_type_hints
+from typing import Annotated, ClassVar, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -52,8 +52,6 @@ class Message:
     """What all messages have in common."""
 
     KIND: ClassVar[int]
-    _record: ClassVar[Record]
-    _names: ClassVar[tuple[str, ...]]
 
 
 # --- Blender and the bridge ----------------------------------------------------------------------
@@ -558,24 +556,15 @@ class HeldMessage(Message):
     """N·m, likewise."""
 
 
-def _kinds() -> dict[int, type[Message]]:
-    kinds: dict[int, type[Message]] = {}
-    for kind in (*Message.__subclasses__(), *LoopTimesMessage.__subclasses__()):
-        hints = get_type_hints(kind, include_extras=True)
-        kind._names = tuple(each.name for each in fields(kind))  # noqa: SLF001 - ours
-        codecs = tuple(get_args(hints[name])[1] for name in kind._names)  # noqa: SLF001
-        kind._record = Record(codecs)  # noqa: SLF001
-        kinds[kind.KIND] = kind
-    return kinds
-
-
-KINDS: Final = _kinds()
+KINDS: Final[dict[int, type[Message]]] = {
+    kind.KIND: kind for kind in (*Message.__subclasses__(), *LoopTimesMessage.__subclasses__())
+}
+RECORDS: Final = {kind: Record(kind) for kind in KINDS.values()}
 
 
 def pack(message: Message) -> bytes:
     """A message with its header."""
-    values = tuple(getattr(message, name) for name in message._names)  # noqa: SLF001 - ours
-    body = message._record.pack(values)  # noqa: SLF001
+    body = RECORDS[type(message)].pack(message)
     return HEADER.pack(MAGIC, VERSION, message.KIND, len(body)) + body
 
 
@@ -603,5 +592,4 @@ def read_body(kind: int, body: bytes) -> Message:
     Raises:
         MessageError: they are not.
     """
-    values = KINDS[kind]._record.unpack(body)  # noqa: SLF001 - ours
-    return KINDS[kind](*values)
+    return KINDS[kind](*RECORDS[KINDS[kind]].unpack(body))

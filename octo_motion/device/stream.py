@@ -22,10 +22,6 @@ class Stream:
         """To be taken away by whoever reads it."""
         self.unsent = bytearray()
 
-    def fileno(self) -> int:
-        """For ``select``."""
-        return self._socket.fileno()
-
     def receive(self) -> bool:
         """Take in what has come; False once the peer has ended and nothing more came."""
         before = len(self.received)

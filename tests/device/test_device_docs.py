@@ -84,7 +84,7 @@ def name_of(codec: Codec) -> str:
 
 @pytest.mark.parametrize("kind", say.KINDS.values(), ids=lambda each: each.__name__)
 def test_every_message_is_described_as_it_is(kind: type[say.Message]) -> None:
-    fields = zip(kind._names, kind._record._codecs, strict=True)
+    fields = say.RECORDS[kind].codecs.items()
     text = ", ".join(f"{name.replace('_', ' ')} {name_of(codec)}" for name, codec in fields)
     told = {row[1]: (row[0], row[3]) for row in rows() if len(row) == 4 and row[0].isdigit()}
     assert told[f"`{kind.__name__}`"] == (str(kind.KIND), text)

@@ -75,7 +75,7 @@ class Desk:
         self.here = got[0]
         self.discovery = FakeDiscovery()
         self.loop = HandLoop(
-            *(self.here, self.discovery, Schedule(PERIOD), PERIOD)  # pyright: ignore[reportArgumentType]
+            *(self.here, self.discovery, Schedule(PERIOD))  # pyright: ignore[reportArgumentType]
         )
         self.now = 100.0
         self.heard: list[say.Message] = []

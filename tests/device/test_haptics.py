@@ -29,10 +29,10 @@ from octo_motion.device.haptics.force import (
     DAMPER_SHARE,
     DAMPING,
     FALL,
+    FULL_IN,
     RISE,
     SHARE,
     STORED,
-    ForceLimits,
     Observer,
     Shaper,
     freshness,
@@ -46,6 +46,14 @@ from octo_motion.device.messages import HeldMessage, Pull
 from octo_motion.device.sources.simulated_hand import Hand, rest
 
 PERIOD = 0.001
+
+
+def energy(hand: Hand) -> float:
+    """J of motion."""
+    pushing = hand.mass * dot(hand.velocity, hand.velocity)
+    return 0.5 * (pushing + hand.inertia * dot(hand.angular_velocity, hand.angular_velocity))
+
+
 DEVICE = Dynamics(force=8.0, torque=0.4, damping=0.5, angular_damping=0.0012)
 
 
@@ -85,7 +93,7 @@ def against_a_rock(
     gains = gains_for(device, PERIOD, share)
     observer = Observer(STORED, DAMPING * device.damping if controlled else 0.0)
     last, force = hand.measured(), ZERO
-    start = hand.energy() + 0.5 * gains.stiffness * 0.002**2
+    start = energy(hand) + 0.5 * gains.stiffness * 0.002**2
     peak = tail = 0.0
     count = round(seconds / PERIOD)
     for index in range(count):
@@ -99,7 +107,7 @@ def against_a_rock(
         hand.feel(force, ZERO)
         hand.move(PERIOD)
         off = length(hand.position)
-        peak = max(peak, hand.energy() + 0.5 * gains.stiffness * off * off)
+        peak = max(peak, energy(hand) + 0.5 * gains.stiffness * off * off)
         if index > 0.8 * count:
             tail = max(tail, off)
     return Outcome(gains.stiffness, peak, start, tail, observer.given)
@@ -231,25 +239,24 @@ asks = st.tuples(*[st.floats(-1e6, 1e6)] * 3)
 def test_force_is_limited_in_size_and_change_and_gone_when_data_is_old(
     steps: list[tuple[Vector, Vector, bool, float]],
 ) -> None:
-    limits = ForceLimits(force=8.0, torque=0.4)
-    shaper = Shaper(limits)
+    shaper = Shaper(8.0, 0.4)
     for force, torque, holding, age in steps:
         before, before_torque = shaper.force, shaper.torque
         shaper.shape(force, torque, PERIOD, holding=holding, age=age)
-        assert length(shaper.force) <= limits.force * (1 + 1e-9)
-        assert length(shaper.torque) <= limits.torque * (1 + 1e-9)
+        assert length(shaper.force) <= shaper.most * (1 + 1e-9)
+        assert length(shaper.torque) <= shaper.most_torque * (1 + 1e-9)
         if age >= FRESH_SECONDS:
             assert shaper.force == ZERO
             assert shaper.torque == ZERO
         else:
-            most = PERIOD / limits.full_in
-            assert length(subtract(shaper.force, before)) <= limits.force * most * (1 + 1e-6)
+            most = PERIOD / FULL_IN
+            assert length(subtract(shaper.force, before)) <= shaper.most * most * (1 + 1e-6)
             change = length(subtract(shaper.torque, before_torque))
-            assert change <= limits.torque * most * (1 + 1e-6)
+            assert change <= shaper.most_torque * most * (1 + 1e-6)
 
 
 def test_force_rises_gently_after_a_grab_and_is_gone_soon_after_letting_go() -> None:
-    shaper = Shaper(ForceLimits(8.0, 0.4))
+    shaper = Shaper(8.0, 0.4)
     sizes: list[float] = []
     for _ in range(round(1.5 * RISE / PERIOD)):
         shaper.shape((4.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.0)
@@ -266,7 +273,7 @@ def test_force_fades_before_data_counts_as_lost_so_that_nothing_jerks() -> None:
     assert freshness(0.0) == freshness(0.01) == 1.0
     assert freshness(0.015) == pytest.approx(0.5)
     assert freshness(FRESH_SECONDS) == freshness(1.0) == 0.0
-    shaper = Shaper(ForceLimits(8.0, 0.4))
+    shaper = Shaper(8.0, 0.4)
     for _ in range(300):
         shaper.shape((8.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.0)
     last, largest = shaper.force[0], 0.0
@@ -279,7 +286,7 @@ def test_force_fades_before_data_counts_as_lost_so_that_nothing_jerks() -> None:
 
 
 def test_after_a_stall_the_force_rises_anew() -> None:
-    shaper = Shaper(ForceLimits(8.0, 0.4))
+    shaper = Shaper(8.0, 0.4)
     for _ in range(300):
         shaper.shape((8.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.0)
     shaper.shape((8.0, 0.0, 0.0), ZERO, PERIOD, holding=True, age=0.05)
@@ -290,7 +297,7 @@ def test_after_a_stall_the_force_rises_anew() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e200])
 @pytest.mark.parametrize("which", ["force", "torque"])
 def test_what_is_no_number_becomes_no_force(bad: float, which: str) -> None:
-    shaper = Shaper(ForceLimits(8.0, 0.4))
+    shaper = Shaper(8.0, 0.4)
     good: Vector = (8.0, 0.0, 0.0)
     for _ in range(300):
         shaper.shape(good, good, PERIOD, holding=True, age=0.0)

@@ -325,7 +325,7 @@ class Loop:
         assert got[0]
         self._here = got[0]
         schedule = Schedule(PERIOD)
-        self.loop = HandLoop(self._here, Discovery(HID_ALONE), schedule, PERIOD)
+        self.loop = HandLoop(self._here, Discovery(HID_ALONE), schedule)
         self.devices: list[say.DeviceMessage] = []
         self.notices: list[say.Notice] = []
         self.hand: say.HandMessage | None = None

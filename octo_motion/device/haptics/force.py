@@ -180,21 +180,11 @@ RISE: Final = 0.2
 """s from nothing to all of the force after a grab."""
 FALL: Final = 0.03
 """s from all of the force to nothing after letting go."""
+FULL_IN: Final = 0.01
+"""s: from no force to the most, or from the most to none, takes at least so long. As fast as force
+fades when data grows old."""
 _FULL: Final = 0.5
 """Of the time that data counts as fresh, this much is without any loss of force."""
-
-
-@dataclass(frozen=True)
-class ForceLimits:
-    """The most that a hand is ever given."""
-
-    force: float
-    """N"""
-    torque: float
-    """N·m"""
-    full_in: float = 0.01
-    """s: from no force to the most, or from the most to none, takes at least so long. As fast as
-    force fades when data grows old."""
 
 
 def freshness(age: float) -> float:
@@ -208,7 +198,10 @@ def freshness(age: float) -> float:
 class Shaper:
     """Turns what the coupling asks for into what the hand gets."""
 
-    limits: ForceLimits
+    most: float
+    """N, the most that a hand is ever given."""
+    most_torque: float
+    """N·m, likewise."""
     share: float = 0.0
     """Of the asked force: rises after a grab, falls after letting go."""
     force: Vector = ZERO
@@ -232,16 +225,15 @@ class Shaper:
         step = period / RISE if holding else -period / FALL
         self.share = max(0.0, min(1.0, self.share + step))
         part = self.share * fresh
-        most, most_torque = self.limits.force, self.limits.torque
-        change = period / self.limits.full_in
-        self.force = _toward(self.force, force, part, most, most * change)
-        self.torque = _toward(self.torque, torque, part, most_torque, most_torque * change)
+        change = period / FULL_IN
+        self.force = _toward(self.force, force, part, self.most, change)
+        self.torque = _toward(self.torque, torque, part, self.most_torque, change)
 
     def drop(self) -> None:
         """No force from now on: the device is gone, or the loop ends."""
         self.share, self.force, self.torque = 0.0, ZERO, ZERO
 
 
-def _toward(now: Vector, asked: Vector, part: float, most: float, step: float) -> Vector:
+def _toward(now: Vector, asked: Vector, part: float, most: float, change: float) -> Vector:
     wanted = scale(clamp_length(asked, most), part)
-    return add(now, clamp_length(subtract(wanted, now), step))
+    return add(now, clamp_length(subtract(wanted, now), most * change))

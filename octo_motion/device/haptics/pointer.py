@@ -27,7 +27,7 @@ from ...core.rotations.scalars import (
 from ..calibration import NONE, Calibration, Calibrator, corrected
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..messages import HandMessage, HeldMessage, Settings, Workspace
-from .force import DAMPING, STORED, ForceLimits, Observer, Shaper, gains_for, wrench
+from .force import DAMPING, STORED, Observer, Shaper, gains_for, wrench
 from .local_model import LocalModel
 
 _FULL_PUSH: Final = 0.1
@@ -75,11 +75,12 @@ class Pointer:
         self.has_force = who.dynamics is not None
         """Whether the device has motors."""
         device = who.dynamics or Dynamics(0.0, damping=0.0, angular_damping=0.0)
+        self.dynamics = device
+        """All zeros where it has none."""
         self._kind = who.kind
         self._response = self.settings.response()
         self.gains = gains_for(device, self.period)
-        self.limits = ForceLimits(device.force, device.torque)
-        self._shaper = Shaper(self.limits)
+        self._shaper = Shaper(device.force, device.torque)
         self._push = Observer(STORED, DAMPING * device.damping)
         self._turn = Observer(STORED, DAMPING * device.angular_damping)
         self._model = LocalModel()
@@ -275,7 +276,7 @@ class Pointer:
         """Force and torque that the coupling asks for, in the device's axes, and how old it is."""
         age = now - self.sample.time
         if now < self._test_until and not self._answered:
-            size = _TEST_SHARE * self.limits.force * self.settings.force
+            size = _TEST_SHARE * self.dynamics.force * self.settings.force
             late = self._test_until - now
             return (size if late > 0.5 * _TEST_SECONDS else -size, 0.0, 0.0), ZERO, age
         if not self._answered:

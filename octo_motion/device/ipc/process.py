@@ -67,10 +67,6 @@ class MessageChannel:
         """Bytes that may wait for a peer which does not read; then it counts as gone."""
         self.closed = False
 
-    def fileno(self) -> int:
-        """For ``select``."""
-        return self._stream.fileno()
-
     def send(self, message: Message, *, droppable: bool = False) -> bool:
         """Send a message, or keep it until the peer reads.
 

@@ -23,7 +23,6 @@ from ...core.rotations.scalars import (
     add,
     add_scaled,
     conjugate,
-    dot,
     from_rotation_vector,
     integrate,
     length,
@@ -142,12 +141,6 @@ class Hand:
             return self.position
         x, y, z = (math.floor(each / step) * step for each in self.position)
         return (x, y, z)
-
-    def energy(self) -> float:
-        """J of motion."""
-        return 0.5 * self.mass * dot(self.velocity, self.velocity) + 0.5 * self.inertia * dot(
-            self.angular_velocity, self.angular_velocity
-        )
 
 
 def _friction(velocity: Vector, viscous: float, dry: float) -> Vector:
