@@ -138,14 +138,12 @@ def _text(value: Any) -> str | None:
     return value if isinstance(value, str) and value else None
 
 
-def _share(value: Any) -> float | None:
-    number = _number(value)
-    return number if number is not None and 0.0 <= number <= 1.0 else None
+def _number_up_to(most: float) -> Callable[[Any], float | None]:
+    def read(value: Any) -> float | None:
+        number = _number(value)
+        return number if number is not None and 0.0 <= number <= most else None
 
-
-def _seconds(value: Any) -> float | None:
-    number = _number(value)
-    return number if number is not None and 0.0 <= number <= LONGEST else None
+    return read
 
 
 def _number(value: Any) -> float | None:
@@ -161,8 +159,7 @@ def _whole(value: Any) -> int | None:
 def _vector(value: Any) -> Vector | None:
     if not isinstance(value, list) or len(value) != 3:
         return None
-    numbers = [_number(each) for each in value]
-    x, y, z = numbers
+    x, y, z = map(_number, value)
     return None if x is None or y is None or z is None else (x, y, z)
 
 
@@ -176,11 +173,11 @@ def _names(value: Any) -> str | tuple[str, ...] | None:
 
 _READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "bone": _text,
-    "at": _share,
+    "at": _number_up_to(1.0),
     "by": _vector,
     "to": _vector,
     "turn": _vector,
-    "seconds": _seconds,
+    "seconds": _number_up_to(LONGEST),
     "frame": _whole,
     "bones": _names,
 }

@@ -19,7 +19,7 @@ from ...core.posing.solver import Obstacle
 from ...core.rotations import Floats, from_matrix
 from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
-from ...device.ipc import Client
+from ...device.ipc import Client, ClientState
 from ...device.messages import (
     Button,
     CalibrationMessage,
@@ -98,6 +98,12 @@ class HandsBase:
     def holding(self) -> bool:
         """Whether any hand holds a limb."""
         return self.hover is not None
+
+    def trouble(self) -> str:
+        """What is wrong with the program at the devices; empty where it answers."""
+        if self.client.state is ClientState.LOST:
+            return "has ended"
+        return "does not answer" if self.client.silent else ""
 
     def pin(self) -> None:
         """Pin what is held, or take the pin out."""

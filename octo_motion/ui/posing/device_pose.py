@@ -13,7 +13,7 @@ from bpy.props import EnumProperty, IntProperty
 from ...core.errors import DeviceError, OctoMotionError, SettingsError
 from ...core.rotations import Floats
 from ...device.driver import Kind
-from ...device.ipc import Client, ClientState
+from ...device.ipc import Client
 from ...device.messages import Buzz, Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
@@ -273,10 +273,8 @@ def line(hands: Hands) -> str:
     """One line about devices, for the header."""
     parts = [f"Posing {hands.session.puppet.name}"]
     shown = hands.shown()
-    if hands.client.state is ClientState.LOST:
-        parts.append("The device's program has ended: B starts it again")
-    elif hands.client.silent:
-        parts.append("The device's program does not answer: B starts it again")
+    if trouble := hands.trouble():
+        parts.append(f"The device's program {trouble}: B starts it again")
     elif not shown:
         is_blenders = isinstance(hands, NdofHands)
         parts.append(NAME if is_blenders else "No device yet: plug one in")

@@ -97,27 +97,24 @@ _kept: Final[dict[str, Any]] = {}
 """What holds while another file is opened: Blender then begins with settings as made."""
 
 
+def _current() -> Any:
+    """The settings of now, and none where there is no window manager."""
+    manager = bpy.context.window_manager
+    return None if manager is None else device_settings(manager)
+
+
 @persistent
 def _before_loading(*_: object) -> None:
-    manager = bpy.context.window_manager
-    if manager is not None:
-        settings = device_settings(manager)
-        _kept.update((name, getattr(settings, name)) for name in _names(settings))
+    settings = _current()
+    for name in OCTO_MOTION_PG_device.__annotations__ if settings else ():
+        _kept[name] = getattr(settings, name)
 
 
 @persistent
 def _after_loading(*_: object) -> None:
-    manager = bpy.context.window_manager
-    if manager is not None:
-        settings = device_settings(manager)
-        for name in _names(settings):
-            if name in _kept:
-                setattr(settings, name, _kept[name])
-
-
-def _names(settings: Any) -> list[str]:
-    own = settings.bl_rna.properties
-    return [each.identifier for each in own if each.identifier not in {"rna_type", "name"}]
+    settings = _current()
+    for name, value in _kept.items() if settings else ():
+        setattr(settings, name, value)
 
 
 def _handlers() -> tuple[tuple[list[Any], Any], ...]:

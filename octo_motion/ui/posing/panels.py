@@ -9,7 +9,6 @@ import bpy
 
 from ...device.calibration import Phase, reached
 from ...device.driver import Kind
-from ...device.ipc import ClientState
 from ...device.messages import DeviceMessage
 from ..panel_base import ArmaturePanel
 from .device_hands import DeviceHands
@@ -67,8 +66,7 @@ class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
         row.scale_y = 1.5
         row.operator_context = "INVOKE_DEFAULT"
         row.operator(OCTO_MOTION_OT_pose_start.bl_idname, icon="VIEW_PAN")
-        session = active_session()
-        if session is not None:
+        if active_session() is not None:
             layout.label(text="Enter keeps, Esc takes back", icon="INFO")
 
 
@@ -153,11 +151,8 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         hands = active_hands()
         if hands is not None:
             self._devices(layout, hands)
-        layout.prop(own, "force")
-        layout.prop(own, "toggle")
-        layout.prop(own, "speed")
-        layout.prop(own, "scale")
-        layout.prop(own, "reach")
+        for name in ("force", "toggle", "speed", "scale", "reach"):
+            layout.prop(own, name)
         row = layout.row()
         row.active = hands is None
         row.prop(own, "simulate")
@@ -166,17 +161,12 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
     def _devices(layout: Any, hands: Hands) -> None:
         box = layout.box()
         client = hands.client
-        if client.state is ClientState.LOST:
-            box.alert = True
-            box.label(text="The program has ended", icon="ERROR")
-            box.label(text="B over the viewport starts it again")
-            return
         if isinstance(hands, NdofHands):
             box.label(text=NAME, icon="ORIENTATION_GIMBAL")
             return
-        if client.silent:
+        if trouble := hands.trouble():
             box.alert = True
-            box.label(text="The program does not answer", icon="ERROR")
+            box.label(text=f"The program {trouble}", icon="ERROR")
             box.label(text="B over the viewport starts it again")
             return
         if not client.devices:

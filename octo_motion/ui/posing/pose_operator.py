@@ -17,7 +17,7 @@ from ..operator_base import ArmatureOperator
 from .controls import Outcome, PoseControls
 from .overlay import Overlay
 from .puppet_session import PuppetSession, active_session
-from .viewport import Strip, frame_under, go_to, strip_under, view_under
+from .viewport import frame_under, go_to, strip_under, view_under
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -169,7 +169,8 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
     )
 
     _controls: PoseControls | None = None
-    _strip: Strip | None = None
+    _strip: int | None = None
+    """The area in whose frame numbers a drag began."""
     _last: float = 0.0
     _shown: tuple[str, int | None] = ("", None)
 

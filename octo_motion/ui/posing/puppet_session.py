@@ -160,21 +160,6 @@ class PosedPuppet:
         """The body that a ray of the world meets; the hit's point is in the puppet's metres."""
         return pick(self.figure, self.shown_pose, origin * self.unit, direction, margin=margin)
 
-    def point_on(self, bone: str, share: float) -> tuple[int, Floats]:
-        """The body of a bone, and the point (3,) at a share of its length, puppet metres.
-
-        Raises:
-            RigError: there is no such bone.
-        """
-        body = self.body(bone)
-        start, end = capsules_in_world(self.figure, self.core.pose)[body]
-        # Capsules end a radius before the limb does.
-        way = end - start
-        size = float(np.linalg.norm(way))
-        radius = self.figure.radii[body] * (way / size if size > 0.0 else way)
-        point = (start - radius) + share * (way + 2.0 * radius) if size > 1e-9 else start
-        return body, point
-
     # --- Settings -------------------------------------------------------------------------------
 
     def apply_settings(self, armature: bpy.types.Object) -> None:
@@ -304,7 +289,8 @@ class PuppetSession(PosedPuppet):
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
         self._recording: Recording | None = None
-        self._down = False
+        self.ended = False
+        """Whether it is over."""
         self.report: TickReport | None = None
         self._trouble: OctoMotionError | None = None
         self._one_thread = OneThread()
@@ -320,8 +306,19 @@ class PuppetSession(PosedPuppet):
         self.core.grab(body, point)
 
     def grab_bone(self, bone: str, share: float) -> Floats:
-        """Take hold of a bone by name, at a share of its length; the point (3,) in the world."""
-        body, point = self.point_on(bone, share)
+        """Take hold of a bone by name, at a share of its length; the point (3,) in the world.
+
+        Raises:
+            RigError: there is no such bone.
+        """
+        body = self.body(bone)
+        point, end = capsules_in_world(self.figure, self.core.pose)[body]
+        way = end - point
+        size = float(np.linalg.norm(way))
+        if size > 1e-9:
+            # Capsules end a radius before the limb does.
+            radius = self.figure.radii[body] * (way / size)
+            point = (point - radius) + share * (way + 2.0 * radius)
         self.grab(body, point)
         return point / self.unit
 
@@ -480,7 +477,7 @@ class PuppetSession(PosedPuppet):
         Raises:
             OctoMotionError: what is still to be keyed cannot be; it is over all the same.
         """
-        if self._down:
+        if self.ended:
             return
         try:
             self.drop_measure()
@@ -492,7 +489,7 @@ class PuppetSession(PosedPuppet):
 
     def cancel(self) -> None:
         """End, and put back pose and keys as they were; safe to call twice."""
-        if self._down:
+        if self.ended:
             return
         self.core.release()
         self._leave()
@@ -509,15 +506,10 @@ class PuppetSession(PosedPuppet):
             # What has keys is at another frame now.
             scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
 
-    def abandon(self) -> None:
+    def abandon(self, *_: object) -> None:
         """End without touching the file, which is about to go; safe to call twice."""
-        if not self._down:
+        if not self.ended:
             self._leave()
-
-    @property
-    def ended(self) -> bool:
-        """Whether it is over."""
-        return self._down
 
     def _handlers(self) -> tuple[tuple[Any, Any], ...]:
         """Blender's lists of what it calls, and what it is to call of this session."""
@@ -526,20 +518,16 @@ class PuppetSession(PosedPuppet):
             (known.frame_change_post, self._follow),
             (known.undo_post, self._undone),
             (known.redo_post, self._undone),
-            (known.load_pre, self._file_goes),
+            (known.load_pre, self.abandon),
         )
 
-    def _file_goes(self, *_: object) -> None:
-        self.abandon()
-
     def _leave(self) -> None:
-        self._down = True
+        self.ended = True
         self._one_thread.end()
         for called, handler in self._handlers():
             if handler in called:
                 called.remove(handler)
-        if self in _active:
-            _active.remove(self)
+        _active.remove(self)
 
     # --- Inside ---------------------------------------------------------------------------------
 

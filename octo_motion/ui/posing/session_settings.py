@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from types import SimpleNamespace
 from typing import Any, Final
 
 import bpy
@@ -19,7 +19,7 @@ from .properties import marked_obstacles, posing_settings
 
 CUSTOM: Final = "CUSTOM"
 
-NAMES: Final = (
+CUSTOM_NAMES: Final = (
     *("material", "custom_yields", "custom_bears", "custom_springs"),
     *("custom_settles", "custom_gives"),
 )
@@ -30,30 +30,21 @@ _CALMING: Final = 3.0
 """1/s: how fast a free puppet without weight comes to rest."""
 
 
-@dataclass(frozen=True)
-class SessionSettings:
-    """The settings that may be changed in the panel while a session goes on."""
+_FOLLOWED: Final = (
+    *CUSTOM_NAMES,
+    *("strength", "root", "gravity", "floor", "floor_height", "use_obstacles"),
+    *("self_collision", "friction"),
+)
 
-    material: str
-    strength: float
-    custom_yields: bool
-    custom_bears: float
-    custom_springs: float
-    custom_settles: float
-    custom_gives: float
-    root: str
-    gravity: bool
-    floor: bool
-    floor_height: float
-    use_obstacles: bool
-    self_collision: bool
-    friction: float
+
+class SessionSettings(SimpleNamespace):
+    """The settings that may be changed in the panel while a session goes on, by their names."""
 
     @classmethod
     def of(cls, armature: bpy.types.Object) -> SessionSettings:
         """As they are now."""
-        settings: Any = posing_settings(armature)
-        return cls(**{each.name: getattr(settings, each.name) for each in fields(cls)})
+        settings = posing_settings(armature)
+        return cls(**{name: getattr(settings, name) for name in _FOLLOWED})
 
     @property
     def joints(self) -> tuple[Any, float]:
@@ -190,7 +181,7 @@ def kept_before(
     armature: bpy.types.Object, settings: Any, bone: str
 ) -> Callable[[bpy.types.Object], None]:
     """What puts back the armature's material of now; asked for before ``keep_material``."""
-    values = {each: getattr(settings, each) for each in NAMES}
+    values = {each: getattr(settings, each) for each in CUSTOM_NAMES}
     own = bone_materials(armature).get(bone)
 
     def put_back(armature: bpy.types.Object) -> None:

@@ -81,15 +81,8 @@ _STRIP: Final = 23.0
 """Height of the strip with the frame numbers, in pixels of a screen without scaling."""
 
 
-@dataclass(frozen=True)
-class Strip:
-    """Where a drag began: which area of the screen, by its number."""
-
-    area: int
-
-
-def strip_under(window: bpy.types.Window, x: int, y: int) -> Strip | None:
-    """The strip of frame numbers under a pixel of the window; None beside one."""
+def strip_under(window: bpy.types.Window, x: int, y: int) -> int | None:
+    """The area with a strip of frame numbers under a pixel of the window; None beside one."""
     preferences = bpy.context.preferences
     scale = (preferences and preferences.system.ui_scale) or 1.0
     for number, area in enumerate(window.screen.areas):
@@ -98,14 +91,14 @@ def strip_under(window: bpy.types.Window, x: int, y: int) -> Strip | None:
             continue
         top = region.y + region.height
         if region.x <= x < region.x + region.width and top - _STRIP * scale <= y < top:
-            return Strip(number)
+            return number
     return None
 
 
-def frame_under(window: bpy.types.Window, strip: Strip, x: int) -> int | None:
+def frame_under(window: bpy.types.Window, area: int, x: int) -> int | None:
     """The frame at a pixel of the window, over the strip or not; None if the strip is gone."""
     areas = window.screen.areas
-    region = _time_region(areas[strip.area]) if strip.area < len(areas) else None
+    region = _time_region(areas[area]) if area < len(areas) else None
     if region is None:
         return None
     place: Any = region.view2d.region_to_view(float(x - region.x), 0.0)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from operator import attrgetter
-from typing import Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ...rotations import Floats, cross, rotate, to_matrix
 from ..puppet import Figure, Flags, Integers, capsules_in_world, rest_pose
 from .obstacle_shapes import Obstacle, Plane
 
+_Kept = TypeVar("_Kept")
 _MOST_SAMPLES: Final = 9
 _MOST_KEPT: Final = 1024
 _TINY: Final = 1e-12
@@ -61,7 +62,6 @@ _NONE: Final = Contacts(
 class _Touched:
     """A plane, and what touched it in the last step: often the same ends again."""
 
-    plane: Plane
     normal: Floats
     """(3,)"""
     reach: Floats
@@ -91,8 +91,8 @@ class Detector:
         most = float(np.max(lengths / np.maximum(figure.radii, _TINY), initial=1.0))
         self._samples = int(min(max(np.ceil(most) + 1, 3), _MOST_SAMPLES))
         self._pairs = _pairs(figure) if self_collision else None
-        self._planes: dict[int, _Touched] = {}
-        self._corner_cache: dict[int, tuple[Obstacle, Floats | None]] = {}
+        self._known: dict[int, tuple[Obstacle, Any]] = {}
+        """By id: what was worked out of obstacles, kept as long as they stay the same."""
         self._reach = float(figure.radii.max(initial=0.0))
 
     def find(
@@ -291,32 +291,32 @@ class Detector:
         return Contacts(bodies, others, points, normals, gaps, speeds, friction, labels)
 
     def _touched(self, plane: Plane) -> _Touched:
-        """What is known of a plane; kept as long as it stays the same."""
-        known = self._planes.get(id(plane))
-        if known is None or known.plane is not plane:
-            normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
-            known = _Touched(plane, normal, self._end_radii + float(normal @ plane.position))
-            if len(self._planes) > _MOST_KEPT:
-                self._planes.clear()
-            self._planes[id(plane)] = known
-        return known
+        """What is known of a plane."""
+        known = self._known.get(id(plane))
+        if known is not None and known[0] is plane:
+            return known[1]
+        normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
+        touched = _Touched(normal, self._end_radii + float(normal @ plane.position))
+        return self._keep_known(plane, touched)
 
     def _world_box(self, obstacle: Obstacle) -> Floats | None:
-        """Lower and upper corner in the world; kept as long as the obstacle stays the same."""
-        known = self._corner_cache.get(id(obstacle))
+        """Lower and upper corner in the world."""
+        known = self._known.get(id(obstacle))
         if known is not None and known[0] is obstacle:
             return known[1]
         bounds = obstacle.bounds
-        box: Floats | None = None
-        if bounds is not None:
-            frame = to_matrix(obstacle.orientation)
-            middle = frame @ bounds.mean(axis=0) + obstacle.position
-            half = np.abs(frame) @ (0.5 * (bounds[1] - bounds[0]))
-            box = np.stack([middle - half, middle + half])
-        if len(self._corner_cache) > _MOST_KEPT:
-            self._corner_cache.clear()
-        self._corner_cache[id(obstacle)] = (obstacle, box)
-        return box
+        if bounds is None:
+            return None
+        frame = to_matrix(obstacle.orientation)
+        middle = frame @ bounds.mean(axis=0) + obstacle.position
+        half = np.abs(frame) @ (0.5 * (bounds[1] - bounds[0]))
+        return self._keep_known(obstacle, np.stack([middle - half, middle + half]))
+
+    def _keep_known(self, obstacle: Obstacle, value: _Kept) -> _Kept:
+        if len(self._known) > _MOST_KEPT:
+            self._known.clear()
+        self._known[id(obstacle)] = obstacle, value
+        return value
 
 
 def nearest_on_segments(first: Floats, second: Floats) -> tuple[Floats, Floats]:
