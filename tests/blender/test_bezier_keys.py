@@ -40,7 +40,7 @@ def channels_of(
 ) -> list[Channel]:
     """A travel and three bones, in the rotation modes that the bones have."""
     names = [bone.name for bone in pose_bones(obj)]
-    turned = actions.rotation_channels(obj, names, swinging(bones=len(names)))
+    turned = actions.read_channels(obj, names).rotations(names, swinging(bones=len(names)))
     moved = Channel("location", places(), "Object Transforms")
     if not reduced:
         return [moved, *turned]

@@ -59,7 +59,7 @@ def generate(
     turns[..., 0] = 1.0
     channels = [
         Channel("location", np.tile([0.0, 0.0, height], (count, 1)), "Object Transforms"),
-        *actions.rotation_channels(obj, bones, turns),
+        *actions.read_channels(obj, bones).rotations(bones, turns),
     ]
     frames = np.arange(1.0, count + 1.0)
     return actions.write_action(

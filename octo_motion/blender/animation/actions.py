@@ -18,14 +18,15 @@ import bpy
 import numpy as np
 
 from ...core.errors import RigError, WriteError
-from ...core.keyframes import BezierKeys, Channel, ObjectChannels, RigChannels
-from ...core.rotations import (
-    Floats,
-    from_euler,
-    from_matrix,
-    normalized,
+from ...core.keyframes import (
+    BezierKeys,
+    Channel,
+    ObjectChannels,
+    RigChannels,
+    rotation_property,
 )
-from ..rig import ALIGNED, armature_data
+from ...core.rotations import IDENTITY, Floats, from_matrix, from_mode_values
+from ..rig import ALIGNED, armature_data, pose_of
 
 MARK: Final = "octo_motion_generated"
 """Custom property of an action made here: a group with the fields of ``_mark``."""
@@ -129,41 +130,6 @@ def read_object_channels(obj: bpy.types.Object) -> ObjectChannels:
     )
 
 
-def rotation_channels(
-    armature: bpy.types.Object, bones: Sequence[str], quaternions: Floats
-) -> list[Channel]:
-    """Bones' rotations, each in the rotation mode that its bone has; the mode stays as it is.
-
-    Args:
-        armature: the armature object.
-        bones: names of its bones.
-        quaternions: (frames, bones, 4), rotations from rest, what Blender calls ``matrix_basis``.
-
-    Raises:
-        RigError: the armature has no such bone.
-    """
-    return read_channels(armature, bones).rotations(bones, quaternions)
-
-
-def location_channel(armature: bpy.types.Object, bone: str, locations: Floats) -> Channel:
-    """A bone's locations (frames, 3), in its rest frame.
-
-    Raises:
-        RigError: the armature has no such bone.
-    """
-    return read_channels(armature, [bone]).location(bone, locations)
-
-
-def object_channels(obj: bpy.types.Object, locations: Floats, quaternions: Floats) -> list[Channel]:
-    """An object's travel through the world, (frames, 3) and (frames, 4), in its own channels; its
-    scale stays as it is.
-
-    Raises:
-        RigError: the parent's scale is zero in some direction.
-    """
-    return read_object_channels(obj).channels(locations, quaternions)
-
-
 def write_action(
     obj: bpy.types.Object,
     name: str,
@@ -210,11 +176,8 @@ def write_action(
     else:
         action = _new_action(obj, name)
     # Actions made here have one layer, one strip and one slot; with more, they count as edited.
-    (slot,), (layer,) = action.slots, action.layers
-    (strip,) = layer.strips
-    assert isinstance(strip, bpy.types.ActionKeyframeStrip)
-    channelbag = strip.channelbag(slot, ensure=True)
-    assert channelbag is not None
+    (slot,) = action.slots
+    channelbag = own_channelbag(action, slot)
     digests, handles = _write_curves(channelbag, times, channels, automatic=automatic)
     _repeat(channelbag, repeats=repeats)
     action.use_cyclic = repeats
@@ -224,10 +187,19 @@ def write_action(
     data.action_slot = slot
     if assigned is not None and assigned.library is None and assigned.users == 0:
         assigned.use_fake_user = True
-    _mark(action, obj, settings_note, _fingerprint(action, digests), handles)
-    action[MARK]["keys"] = key_count(action)
-    action[MARK]["frames"] = len(times)
-    action[MARK]["curves"] = sum(channel.values.shape[1] for channel in channels)
+    action[MARK] = {
+        "owner": obj.name,
+        "name": action.name,
+        "version": _MARK_VERSION,
+        "fingerprint": _fingerprint(action, digests),
+        "note": settings_note,
+        "keys": key_count(action),
+        "frames": len(times),
+        "curves": sum(channel.values.shape[1] for channel in channels),
+    }
+    if handles:
+        ordered = [handles[place] for place in sorted(handles)]
+        action[MARK]["handles"] = np.concatenate(ordered).tobytes()
     return action
 
 
@@ -267,11 +239,7 @@ def key_counts(action: bpy.types.Action) -> tuple[int, int]:
 
 def key_count(action: bpy.types.Action) -> int:
     """Number of keys on all curves of an action."""
-    return sum(
-        len(curve.keyframe_points)
-        for channelbag in _channelbags(action)
-        for curve in channelbag.fcurves
-    )
+    return sum(len(curve.keyframe_points) for curve in curves_of(action))
 
 
 def may_replace(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
@@ -361,8 +329,7 @@ def _write_curves(
     automatic: bool,
 ) -> tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]:
     """Make the curves what the channels say. Curves that are there already are filled anew, so
-    that their colours, selection and place in the editors stay. All keys of one that has a key on
-    each frame are of one kind, as nobody has edited them.
+    that their colours, selection and place in the editors stay.
 
     Returns:
         The hash of each curve's keys, by its data path and index: to read them back takes longer
@@ -374,53 +341,36 @@ def _write_curves(
     # Everything goes through the same few buffers: memory stays modest, however many the bones.
     points = np.empty((len(times), 2), dtype=np.float32)
     points[:, 0] = times
-    flat = points.ravel()
     # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
-    generated = _filled(len(times), "type", "GENERATED")
     kinds = np.stack(
-        [_filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR"), generated]
+        [_filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR")]
+        + [_filled(len(times), "type", "GENERATED")]
         + [_filled(len(times), "handle_left_type", "AUTO")] * automatic
     )
     for channel in channels:
         for component in range(channel.values.shape[1]):
-            curve = curves.pop((channel.data_path, component), None)
+            place = (channel.data_path, component)
+            curve = curves.pop(place, None)
             if curve is None:
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
-            keys = curve.keyframe_points
-            interpolation, handles_are = _kind_of(keys)
-            own_handles = interpolation == "BEZIER" and handles_are != "AUTO"
             # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
-            regrouped = own_handles != (channel.keys is not None)
+            regrouped = _has_own_handles(curve) != (channel.keys is not None)
             if curve.group is None or (regrouped and curve.group.name != channel.group):
-                group = channelbag.groups.get(channel.group)
-                curve.group = group or channelbag.groups.new(channel.group)
-            place = (channel.data_path, component)
+                curve.group = group_named(channelbag, channel.group)
             if channel.keys is not None:
                 digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
-                continue
-            as_many = len(keys) == len(times)
-            alike = as_many and interpolation == ("BEZIER" if automatic else "LINEAR")
-            alike = alike and (handles_are == "AUTO" or not automatic)
-            if not as_many:
-                keys.clear()
-                keys.add(len(times))
-            points[:, 1] = channel.values[:, component]
-            keys.foreach_set("co", flat)
-            if not alike:
-                keys.foreach_set("interpolation", kinds[0])
-                keys.foreach_set("type", generated)
-                if automatic:
-                    keys.foreach_set("handle_left_type", kinds[2])
-                    keys.foreach_set("handle_right_type", kinds[2])
-            if automatic and curve.auto_smoothing != "NONE":
-                # Else handles depend on those of all other keys, and swing after a sudden turn.
-                curve.auto_smoothing = "NONE"
-            curve.update()
-            digests[place] = _keys_digest(points, kinds)
+            else:
+                points[:, 1] = channel.values[:, component]
+                digests[place] = _write_dense(curve, points, kinds)
     for curve in curves.values():
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
     return digests, handles
+
+
+def group_named(channelbag: bpy.types.ActionChannelbag, name: str) -> bpy.types.ActionGroup:
+    """A group of channels, made if it is not there."""
+    return channelbag.groups.get(name) or channelbag.groups.new(name)
 
 
 def _repeat(channelbag: bpy.types.ActionChannelbag, *, repeats: bool) -> None:
@@ -429,6 +379,36 @@ def _repeat(channelbag: bpy.types.ActionChannelbag, *, repeats: bool) -> None:
             curve.modifiers.remove(modifier)
         if repeats:
             curve.modifiers.new("CYCLES")
+
+
+def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray) -> bytes:
+    """Fill a curve with a key on each frame; the hash of its keys.
+
+    Args:
+        curve: all keys of one that has as many are of one kind, as nobody has edited them.
+        points: (keys, 2) frames and values, single precision.
+        kinds: (2 or 3, keys) interpolation, type, and the handles' type if they are automatic.
+    """
+    keys, automatic = curve.keyframe_points, len(kinds) > 2
+    interpolation, handles_are = _kind_of(keys)
+    as_many = len(keys) == len(points)
+    alike = as_many and interpolation == ("BEZIER" if automatic else "LINEAR")
+    alike = alike and (handles_are == "AUTO" or not automatic)
+    if not as_many:
+        keys.clear()
+        keys.add(len(points))
+    keys.foreach_set("co", points.ravel())
+    if not alike:
+        keys.foreach_set("interpolation", kinds[0])
+        keys.foreach_set("type", kinds[1])
+        if automatic:
+            keys.foreach_set("handle_left_type", kinds[2])
+            keys.foreach_set("handle_right_type", kinds[2])
+    if automatic and curve.auto_smoothing != "NONE":
+        # Else handles depend on those of all other keys, and swing after a sudden turn.
+        curve.auto_smoothing = "NONE"
+    curve.update()
+    return _keys_digest(points, kinds)
 
 
 def _write_bezier(
@@ -488,7 +468,7 @@ def _handles_moved(action: bpy.types.Action) -> bool:
         # Then it has no curve with handles of its own: its keys would be others.
         return False
     start = 0
-    for curve in _sorted_curves(action):
+    for *_, curve in _listed(action):
         points = curve.keyframe_points
         if not _has_own_handles(curve):
             continue
@@ -518,25 +498,6 @@ def enum_value(name: str, item: str) -> int:
     return definition.enum_items[item].value
 
 
-def _mark(
-    action: bpy.types.Action,
-    obj: bpy.types.Object,
-    settings_note: str,
-    fingerprint: str,
-    handles: Mapping[tuple[str, int], np.ndarray],
-) -> None:
-    action[MARK] = {
-        "owner": obj.name,
-        "name": action.name,
-        "version": _MARK_VERSION,
-        "fingerprint": fingerprint,
-        "note": settings_note,
-    }
-    if handles:
-        ordered = [handles[place] for place in sorted(handles)]
-        action[MARK]["handles"] = np.concatenate(ordered).tobytes()
-
-
 def _fingerprint(
     action: bpy.types.Action, known: Mapping[tuple[str, int], bytes] | None = None
 ) -> str:
@@ -561,7 +522,7 @@ def _fingerprint(
     add([slot.handle for slot in action.slots])
     add([len(layer.strips) for layer in action.layers])
     buffer = np.empty((0, 2), dtype=np.float32)
-    for path, index, state, curve in _told(action):
+    for path, index, state, curve in _listed(action):
         keys = curve.keyframe_points
         count = len(keys)
         digest.update(f"({path!r}, {index}, {state}({count}, {len(curve.modifiers)})".encode())
@@ -575,12 +536,12 @@ def _fingerprint(
     return digest.hexdigest()
 
 
-def _told(action: bpy.types.Action) -> list[tuple[str, int, str, bpy.types.FCurve]]:
+def _listed(action: bpy.types.Action) -> list[tuple[str, int, str, bpy.types.FCurve]]:
     """Path, component, state as text and curve of all curves, by path and component: an artist may
     move channels up and down in the list.
     """
     found: list[tuple[str, int, str, bpy.types.FCurve]] = []
-    for channelbag in _channelbags(action):
+    for channelbag in channelbags_of(action):
         curves = channelbag.fcurves
         # What can be read of all at once is.
         index, extrapolation = np.empty((2, len(curves)), dtype=np.int32)
@@ -633,45 +594,68 @@ def _keys_digest(points: np.ndarray, kinds: np.ndarray) -> bytes:
     return digest.digest()
 
 
-def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
-    """All F-curves of an action, whatever they move."""
-    for channelbag in _channelbags(action):
+def curves_of(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot | None = None
+) -> Iterator[bpy.types.FCurve]:
+    """F-curves of an action, whatever they move: of one slot, or all."""
+    for channelbag in channelbags_of(action, slot):
         yield from channelbag.fcurves
 
 
-def _sorted_curves(action: bpy.types.Action) -> list[bpy.types.FCurve]:
-    """All curves by path and component: an artist may move channels up and down in the list."""
-    return sorted(curves_of(action), key=lambda each: (each.data_path, each.array_index))
+def shown_curves(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot
+) -> Iterator[bpy.types.FCurve]:
+    """A slot's curves that Blender lets act; a muted group alone silences nothing."""
+    return (each for each in curves_of(action, slot) if not (each.mute or each.is_empty))
 
 
-def _channelbags(action: bpy.types.Action) -> Iterator[bpy.types.ActionChannelbag]:
-    for layer in action.layers:
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                yield from channelbags_of(strip)
-
-
-def channelbags_of(strip: bpy.types.ActionKeyframeStrip) -> Iterator[bpy.types.ActionChannelbag]:
-    """Its channelbags, such that their curves' keys can be read quickly.
+def channelbags_of(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot | None = None
+) -> Iterator[bpy.types.ActionChannelbag]:
+    """Channelbags of an action, such that their curves' keys can be read quickly.
 
     What is reached from one property to the next carries all that it was reached through, and so
     does each of its keys while they are read: that takes four times as long as the reading.
     """
-    for each in strip.channelbags:
-        slot = each.slot
-        yield (strip.channelbag(slot) if slot is not None else None) or each
+    strips = (strip for layer in action.layers for strip in layer.strips)
+    for strip in strips:
+        if not isinstance(strip, bpy.types.ActionKeyframeStrip):
+            continue
+        for each in strip.channelbags:
+            own = each.slot
+            if slot is None or (own is not None and own.handle == slot.handle):
+                yield (strip.channelbag(own) if own is not None else None) or each
+
+
+def own_channelbag(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot
+) -> bpy.types.ActionChannelbag:
+    """A slot's curves in an action's first keyframe strip, made if there are none."""
+    layer = action.layers[0] if action.layers else action.layers.new("Layer")
+    if not layer.strips:
+        layer.strips.new(type="KEYFRAME")
+    strip = next(each for each in layer.strips if isinstance(each, bpy.types.ActionKeyframeStrip))
+    channelbag = strip.channelbag(slot, ensure=True)
+    assert channelbag is not None
+    return channelbag
+
+
+def acting_curves(data: bpy.types.AnimData | None) -> Iterator[bpy.types.FCurve]:
+    """Curves by which a data-block is moved at present: its action's, and its NLA strips'."""
+    if data is None:
+        return
+    acting = [(data.action, data.action_slot)]
+    tracks = [track for track in data.nla_tracks if not track.mute] if data.use_nla else []
+    strips = (strip for track in tracks for strip in flattened(track.strips) if not strip.mute)
+    acting += [(strip.action, strip.action_slot) for strip in strips]
+    for action, slot in acting:
+        if action is not None and slot is not None:
+            yield from shown_curves(action, slot)
 
 
 def _pose_bones(armature: bpy.types.Object, bones: Sequence[str]) -> list[bpy.types.PoseBone]:
     armature_data(armature)
-    if armature.pose is None:
-        # An armature that was made a moment ago gets its pose with the next update.
-        bpy.context.view_layer.update()
-    if armature.pose is None:
-        raise RigError(
-            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
-        )
-    found = armature.pose.bones
+    found = pose_of(armature).bones
     missing = [name for name in bones if name not in found]
     if missing:
         raise RigError(
@@ -710,9 +694,8 @@ def _parent_turn(obj: bpy.types.Object) -> Floats:
 
 def delta_rotation(obj: bpy.types.Object) -> Floats:
     """An object's delta rotation, (4,), in its rotation mode."""
-    if obj.rotation_mode == "QUATERNION":
-        return normalized(obj.delta_rotation_quaternion)
-    if obj.rotation_mode == "AXIS_ANGLE":
+    mode = obj.rotation_mode
+    if mode == "AXIS_ANGLE":
         # Blender has such a delta, but no way to see or set it.
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    return from_euler(obj.delta_rotation_euler, obj.rotation_mode)
+        return IDENTITY.copy()
+    return from_mode_values(np.array(getattr(obj, f"delta_{rotation_property(mode)}")), mode)

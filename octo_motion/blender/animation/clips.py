@@ -12,33 +12,31 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.errors import ClipError
-from ...core.keyframes import Channel
+from ...core.keyframes import Channel, RigChannels, rotation_property
 from ...core.rotations import (
     IDENTITY,
     Floats,
-    from_axis_angle,
-    from_euler,
     from_matrix,
+    from_mode_values,
     multiply,
-    normalized,
     to_matrix,
 )
 from ...core.skeleton import Skeleton
 from ...core.splicing.clip import Clip, orientations_of, unposed, without_scale
 from ...core.splicing.transfer import bones_beneath
-from ..rig import armature_data, read_skeleton, world_matrix
+from ..rig import armature_data, bone_and_property, pose_of, read_skeleton, world_matrix
 from .actions import (
+    curves_of,
     delta_rotation,
-    location_channel,
-    object_channels,
     parent_frame,
+    read_channels,
     read_object_channels,
-    rotation_channels,
+    shown_curves,
     writable_armature,
     write_action,
 )
-from .fcurves import evaluate_fcurve, is_shown, key_range
-from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, rotation_channel, unkeyed_pose
+from .fcurves import evaluate_fcurve, key_range
+from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, unkeyed_pose
 from .scene_playback import assigned, shown_poses
 
 _LEAST_SCALING: Final = 1e-6
@@ -151,8 +149,9 @@ def write_clip(
     """
     writable_armature(armature)
     skeleton = clip.skeleton
-    channels = rotation_channels(armature, skeleton.names, clip.rotations)
-    channels += _location_channels(armature, clip)
+    known = read_channels(armature, skeleton.names)
+    channels = known.rotations(skeleton.names, clip.rotations)
+    channels += _location_channels(armature, clip, known)
     assert armature.pose is not None
     scales = np.ones(clip.locations.shape) if clip.scales is None else clip.scales
     channels += [
@@ -196,14 +195,9 @@ def further_channels(
     """
     bones = armature_data(armature).bones
     found: dict[str, dict[int, bpy.types.FCurve]] = defaultdict(dict)
-    for curve in _channelbag_curves(action, slot or _slot_for(armature, action)):
-        start, _, rest = curve.data_path.partition('pose.bones["')
-        name, _, channel = rest.rpartition('"].')
-        if start:
-            told = curve.data_path in _PLACED
-        else:
-            told = channel in _POSED and bpy.utils.unescape_identifier(name) in bones
-        if is_shown(curve) and not told:
+    for curve in shown_curves(action, slot or _slot_for(armature, action)):
+        name, channel = bone_and_property(curve.data_path)
+        if not (channel in _POSED and name in bones if name else channel in _PLACED):
             found[curve.data_path][curve.array_index] = curve
     channels: list[Channel] = []
     for path, components in found.items():
@@ -273,7 +267,7 @@ def scaled_channels(
         channels += [
             Channel(armature.pose.bones[name].path_from_id(channel), values(name, channel), name)
             for name in names
-            for channel in ("location", rotation_channel(modes[name]), "scale")
+            for channel in ("location", rotation_property(modes[name]), "scale")
         ]
     return channels, lost
 
@@ -320,7 +314,7 @@ def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
         return []
     if clip.own is None:
         turns = from_matrix(moved[:, :3, :3] / clip.scale)
-        return object_channels(armature, moved[:, :3, 3], turns)
+        return read_object_channels(armature).channels(moved[:, :3, 3], turns)
     signs = np.sign(np.array(armature.scale) * np.array(armature.delta_scale))
     turns = from_matrix(
         moved[:, :3, :3] / (np.linalg.norm(moved[:, :3, :3], axis=1) * signs)[:, None]
@@ -328,7 +322,7 @@ def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
     return read_object_channels(armature).own_channels(moved[:, :3, 3], turns)
 
 
-def _location_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
+def _location_channels(armature: bpy.types.Object, clip: Clip, known: RigChannels) -> list[Channel]:
     """Locations of roots, and of all bones that are not, or would not stay, where rest has them."""
     skeleton = clip.skeleton
     size = np.ptp(skeleton.heads, axis=0).max() + skeleton.lengths.max()
@@ -344,7 +338,7 @@ def _location_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
             continue
         if not bone.bone.use_local_location:
             values = values @ _location_axes(skeleton, number).T
-        channels.append(location_channel(armature, name, values))
+        channels.append(known.location(name, values))
     return channels
 
 
@@ -416,7 +410,7 @@ def _slot_for(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types
             f"Action '{action.name}' has several slots that fit '{armature.name}': {names}.",
             "Assign the action to the armature and choose its slot in the Action editor.",
         )
-    if any(_channelbag_curves(action, slot) for slot in action.slots):
+    if next(curves_of(action), None) is not None:
         raise ClipError(
             f"Action '{action.name}' has no slot for '{armature.name}'.",
             "Choose an action made for this armature.",
@@ -424,34 +418,14 @@ def _slot_for(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types
     raise ClipError(f"Action '{action.name}' is empty.", "Choose an action that has keys.")
 
 
-def _channelbag_curves(
-    action: bpy.types.Action, slot: bpy.types.ActionSlot
-) -> list[bpy.types.FCurve]:
-    found: list[bpy.types.FCurve] = []
-    for layer in action.layers:
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                channelbag = strip.channelbag(slot)
-                if channelbag is not None:
-                    found.extend(channelbag.fcurves)
-    return found
-
-
 def _curves_of(action: bpy.types.Action, slot: bpy.types.ActionSlot, skeleton: Skeleton) -> _Curves:
     """The curves that move the armature or its bones; none at all if no bone is among them."""
     curves: _Curves = defaultdict(dict)
     bones = False
-    for curve in _channelbag_curves(action, slot):
-        if not is_shown(curve):
+    for curve in shown_curves(action, slot):
+        name, channel = bone_and_property(curve.data_path)
+        if name and name not in skeleton.index:
             continue
-        start, _, rest = curve.data_path.partition('pose.bones["')
-        name, _, channel = rest.rpartition('"].')
-        if start:
-            name, channel = "", curve.data_path
-        else:
-            name = bpy.utils.unescape_identifier(name)
-            if name not in skeleton.index:
-                continue
         if channel.removeprefix("delta_") in AT_REST:
             curves[name, channel][curve.array_index] = curve
             bones = bones or bool(name)
@@ -554,14 +528,14 @@ def _bone_motion(
         if (name, "scale") in present:
             scales[:, number] = values(name, "scale")
     for mode in set(modes.values()):
-        channel = rotation_channel(mode)
+        channel = rotation_property(mode)
         chosen = [
             name for name in skeleton.names if modes[name] == mode and (name, channel) in present
         ]
         if chosen:
             numbers = [skeleton.index[name] for name in chosen]
             turned = np.stack([values(name, channel) for name in chosen], axis=1)
-            rotations[:, numbers] = _as_quaternions(turned, mode)
+            rotations[:, numbers] = from_mode_values(turned, mode)
     off = np.abs(scales - 1.0).max(axis=(0, 2))
     stretching = (off > _ROUNDING) & _stretches_apart(armature, skeleton, off > _ROUNDING)
     kept = None
@@ -628,29 +602,8 @@ def _check_inheritance(armature: bpy.types.Object, skeleton: Skeleton, scaled: n
 
 
 def _rotation_modes(armature: bpy.types.Object, skeleton: Skeleton) -> dict[str, str]:
-    if armature.pose is None:
-        bpy.context.view_layer.update()
-    if armature.pose is None:
-        raise ClipError(
-            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
-        )
-    pose = {bone.name: bone.rotation_mode for bone in armature.pose.bones}
+    pose = {bone.name: bone.rotation_mode for bone in pose_of(armature).bones}
     return {name: pose.get(name, "QUATERNION") for name in skeleton.names}
-
-
-def _as_quaternions(values: Floats, mode: str) -> Floats:
-    """Values (…, components) of a rotation mode as unit quaternions (…, 4)."""
-    if mode == "QUATERNION":
-        return _unit(values)
-    if mode == "AXIS_ANGLE":
-        return _unit(from_axis_angle(normalized(values[..., 1:]), values[..., 0]))
-    return from_euler(values, mode)
-
-
-def _unit(quaternions: Floats) -> Floats:
-    """Of length one; one of no length is no rotation, as in Blender."""
-    unit = normalized(quaternions)
-    return np.where(np.any(unit, axis=-1, keepdims=True), unit, IDENTITY)
 
 
 def _object_motion(
@@ -667,11 +620,11 @@ def _object_motion(
         return _values(curves, "", channel, tuple(getattr(armature, channel)), times)
 
     mode = armature.rotation_mode
-    channel = rotation_channel(mode)
-    rotations = _as_quaternions(values(channel), mode)
+    channel = rotation_property(mode)
+    rotations = from_mode_values(values(channel), mode)
     delta = f"delta_{channel}"
     if ("", delta) in curves and mode != "AXIS_ANGLE":
-        rotations = multiply(_as_quaternions(values(delta), mode), rotations)
+        rotations = multiply(from_mode_values(values(delta), mode), rotations)
     else:
         rotations = multiply(delta_rotation(armature), rotations)
     own = np.zeros((len(times), 4, 4))

@@ -52,11 +52,6 @@ def key_range(curve: bpy.types.FCurve) -> tuple[float, float]:
     return float(start), float(end)
 
 
-def is_shown(curve: bpy.types.FCurve) -> bool:
-    """Whether Blender lets the curve act; a muted group alone silences nothing."""
-    return not (curve.mute or curve.is_empty)
-
-
 def _plain_keys(curve: bpy.types.FCurve) -> tuple[Floats, Floats, np.ndarray] | None:
     """Times, values and whether each key holds its value until the next, all (keys,)."""
     count = len(curve.keyframe_points)

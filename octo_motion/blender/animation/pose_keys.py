@@ -17,12 +17,18 @@ import bpy
 import numpy as np
 
 from ...core.errors import WriteError
-from ...core.keyframes import LOCATION, Channel, Limb, Track, reduce_keys
+from ...core.keyframes import LOCATION, Channel, Limb, Track, reduce_keys, rotation_property
 from ...core.rotations import Floats
 from ..rig import carrying_axes
-from .actions import location_channel, rotation_channels, writable_armature
+from .actions import (
+    channelbags_of,
+    curves_of,
+    group_named,
+    own_channelbag,
+    read_channels,
+    writable_armature,
+)
 from .fcurves import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
-from .poses import rotation_channel
 
 Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
 
@@ -149,7 +155,7 @@ class PoseKeys:
                     done.append(each.bone)
         if not done and len(self._noted) > known:
             # No action is left behind that nothing went into.
-            self._take_back(armature, self._noted.pop())
+            _take_back(armature, self._noted.pop())
         self.count += bool(done)
         return [name for name in done if name]
 
@@ -199,19 +205,16 @@ class PoseKeys:
         self._prepare(armature)
         names = list(rotations)
         assert armature.pose is not None
-        modes = [armature.pose.bones[name].rotation_mode for name in names]
+        bones, known = armature.pose.bones, read_channels(armature, [*names, *locations])
+        modes = [bones[name].rotation_mode for name in names]
+        turns = np.stack([rotations[name] for name in names], axis=1)
+        action, slot = _assigned(armature)
         turned = [
-            self._going_on(armature, channel, mode, float(frames[0]))
-            for channel, mode in zip(
-                rotation_channels(
-                    armature, names, np.stack([rotations[name] for name in names], axis=1)
-                ),
-                modes,
-                strict=True,
-            )
+            _going_on(action, slot, channel, mode, float(frames[0]))
+            for channel, mode in zip(known.rotations(names, turns), modes, strict=True)
         ]
         placed = [
-            location_channel(armature, name, _placed(armature.pose.bones[name].bone, each))
+            known.location(name, _placed(bones[name].bone, each))
             for name, each in locations.items()
         ]
         tracks = [Track(each.values, mode) for each, mode in zip(turned, modes, strict=True)]
@@ -230,7 +233,7 @@ class PoseKeys:
         An action that the artist has given the armature since is left to it.
         """
         while self._noted:
-            self._take_back(armature, self._noted.pop())
+            _take_back(armature, self._noted.pop())
 
     # --- Where keys go ----------------------------------------------------------------------
 
@@ -255,112 +258,25 @@ class PoseKeys:
             fake_user=data.action.use_fake_user if data.action else False,
         )
         try:
-            self._give_action(armature, data, before)
+            _give_action(armature, data, before, self._target, self._chosen)
             assert data.action is not None
             _writable_action(data.action)
         except BaseException:
             before.keyed = _number(data.action)
-            self._take_back(armature, before)
+            _take_back(armature, before)
             raise
         self._noted.append(before)
-
-    def _give_action(
-        self, armature: bpy.types.Object, data: bpy.types.AnimData, before: _Before
-    ) -> None:
-        action, slot = data.action, data.action_slot
-        if self._target == "CHOSEN":
-            chosen = _chosen_action(self._chosen)
-            if chosen != action:
-                _keep(action)
-                data.action = chosen
-                before.new_slot = _use_slot(data, armature)
-        elif self._target == "COPY" and action is not None:
-            copy = _copy(action)
-            before.made = True
-            _keep(action)
-            data.action = copy
-            data.action_slot = next(
-                (each for each in copy.slots if slot and each.identifier == slot.identifier), None
-            )
-        elif self._target == "LAYER" and action is not None and slot is not None:
-            if not data.use_nla:
-                raise WriteError(
-                    f"The NLA of '{armature.name}' is switched off: no layer would be seen.",
-                    "Switch it on in the NLA editor, or let the keys go to a copy.",
-                )
-            track = data.nla_tracks.new()
-            track.name = f"{action.name} below"
-            before.track = track.name
-            strip = track.strips.new(action.name, round(action.frame_range[0]), action)
-            strip.action_slot = slot
-            _blend_alike(strip, data)
-            # Strips are made on whole frames; this one is to play what was played before.
-            length = strip.frame_end - strip.frame_start
-            strip.frame_start = action.frame_range[0]
-            strip.frame_end = strip.frame_start + length
-        if data.action is None or before.track is not None:
-            made = bpy.data.actions.new(f"{armature.name} Pose")
-            made.slots.new("OBJECT", armature.name)
-            made.layers.new("Layer").strips.new(type="KEYFRAME")
-            data.action = made
-            before.made = True
-            data.action_slot = made.slots[made.slots[0].identifier]
-            data.action_blend_type, data.action_influence = "REPLACE", 1.0
-        assert data.action is not None
-        _writable_action(data.action)
-        if data.action_slot is None:
-            before.new_slot = _use_slot(data, armature)
-        before.keyed, before.keyed_slot = _number(data.action), data.action_slot_handle
-        slot = data.action_slot
-        channelbag = None if slot is None else _channelbag(data.action, slot)
-        if channelbag is not None:
-            before.groups = {group.name for group in channelbag.groups}
-
-    @staticmethod
-    def _take_back(armature: bpy.types.Object, before: _Before) -> None:
-        keyed = _action_of(before.keyed)
-        if keyed is not None and not before.made:
-            _restore_curves(keyed, before)
-        data = armature.animation_data
-        if data is not None and _number(data.action) == before.keyed:
-            action = _action_of(before.action)
-            data.action = action
-            if action is not None:
-                data.action_slot = next(
-                    (slot for slot in action.slots if slot.handle == before.slot), None
-                )
-                if action.library is None:
-                    action.use_fake_user = before.fake_user
-            for name, value in zip(_BLENDING, before.blending, strict=True):
-                setattr(data, name, value)
-            if before.track is not None and before.track in data.nla_tracks:
-                data.nla_tracks.remove(data.nla_tracks[before.track])
-        if keyed is not None and before.new_slot is not None and not before.made:
-            for slot in keyed.slots:
-                if slot.handle == before.new_slot:
-                    keyed.slots.remove(slot)
-                    break
-        if keyed is not None and before.made and keyed.users <= keyed.use_fake_user:
-            bpy.data.actions.remove(keyed)
-        unused = data is not None and not (data.action or data.nla_tracks or data.drivers)
-        if not before.had_data and unused:
-            armature.animation_data_clear()
 
     # --- Single keys ------------------------------------------------------------------------
 
     def _note(self, armature: bpy.types.Object, path: str) -> None:
         """Keep the curves of a property as they were before their first key."""
-        before, data = self._noted[-1], armature.animation_data
-        assert data is not None
-        assert data.action is not None
-        if data.action_slot is None or path in before.curves:
-            return
-        channelbag = _channelbag(data.action, data.action_slot)
-        before.curves[path] = {
-            curve.array_index: read_keys(curve)
-            for curve in (channelbag.fcurves if channelbag is not None else ())
-            if curve.data_path == path
-        }
+        noted = self._noted[-1].curves
+        if path not in noted:
+            curves = curves_of(*_assigned(armature))
+            noted[path] = {
+                each.array_index: read_keys(each) for each in curves if each.data_path == path
+            }
 
     def _insert(
         self,
@@ -411,55 +327,146 @@ class PoseKeys:
                 done.append(bpy.utils.unescape_identifier(name))
         return list(dict.fromkeys(done))
 
-    @staticmethod
-    def _going_on(armature: bpy.types.Object, channel: Channel, mode: str, start: float) -> Channel:
-        """The same turns in the sign or the round that the curves have where they begin.
-
-        Else the way there from the key before would lead through a whole turn.
-        """
-        data = armature.animation_data
-        assert data is not None
-        assert data.action is not None
-        channelbag = _channelbag(data.action, data.action_slot) if data.action_slot else None
-        if channelbag is None:
-            return channel
-        values = channel.values
-        curves = [
-            channelbag.fcurves.find(channel.data_path, index=component)
-            for component in range(values.shape[1])
-        ]
-        if not all(curve is not None and len(curve.keyframe_points) for curve in curves):
-            return channel
-        before = np.array([curve.evaluate(start) for curve in curves if curve is not None])
-        if mode == "QUATERNION":
-            same = values if before @ values[0] >= 0.0 else -values
-        elif mode == "AXIS_ANGLE":
-            same = values if before[1:] @ values[0, 1:] >= 0.0 else -values
-            rounds = np.round((before[0] - same[0, 0]) / (2.0 * np.pi))
-            same = same + np.array([2.0 * np.pi * rounds, 0.0, 0.0, 0.0])
-        else:
-            same = values + 2.0 * np.pi * np.round((before - values[0]) / (2.0 * np.pi))
-        return replace(channel, values=same)
-
     def _replace(
         self, armature: bpy.types.Object, channel: Channel, keys: Sequence[KeyArrays]
     ) -> None:
         self._note(armature, channel.data_path)
-        data = armature.animation_data
-        assert data is not None
-        assert data.action is not None
-        assert data.action_slot is not None
-        channelbag = _channelbag(data.action, data.action_slot, ensure=True)
-        assert channelbag is not None
+        channelbag = own_channelbag(*_assigned(armature))
         for component, each in enumerate(keys):
             curve = channelbag.fcurves.find(channel.data_path, index=component)
             if curve is not None and (curve.lock or (curve.group and curve.group.lock)):
                 continue
             if curve is None:
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
-                group = channelbag.groups.get(channel.group)
-                curve.group = group or channelbag.groups.new(channel.group)
+                curve.group = group_named(channelbag, channel.group)
             replace_stretch(curve, each)
+
+
+def _assigned(armature: bpy.types.Object) -> tuple[bpy.types.Action, bpy.types.ActionSlot]:
+    """The action and the slot that keys go to, once the armature has them."""
+    data = armature.animation_data
+    assert data is not None
+    assert data.action is not None
+    assert data.action_slot is not None
+    return data.action, data.action_slot
+
+
+def _give_action(
+    armature: bpy.types.Object,
+    data: bpy.types.AnimData,
+    before: _Before,
+    target: Target,
+    chosen_number: int,
+) -> None:
+    """Give the armature the action that keys go to, and note which that is.
+
+    Raises:
+        WriteError: there is none that could be written.
+    """
+    action, slot = data.action, data.action_slot
+    if target == "CHOSEN":
+        chosen = _chosen_action(chosen_number)
+        if chosen != action:
+            _keep(action)
+            data.action = chosen
+            before.new_slot = _use_slot(data, armature)
+    elif target == "COPY" and action is not None:
+        copy = action.copy()
+        assert copy is not None
+        before.made = True
+        _keep(action)
+        data.action = copy
+        data.action_slot = next(
+            (each for each in copy.slots if slot and each.identifier == slot.identifier), None
+        )
+    elif target == "LAYER" and action is not None and slot is not None:
+        if not data.use_nla:
+            raise WriteError(
+                f"The NLA of '{armature.name}' is switched off: no layer would be seen.",
+                "Switch it on in the NLA editor, or let the keys go to a copy.",
+            )
+        track = data.nla_tracks.new()
+        track.name = f"{action.name} below"
+        before.track = track.name
+        strip = track.strips.new(action.name, round(action.frame_range[0]), action)
+        strip.action_slot = slot
+        _blend_alike(strip, data)
+        # Strips are made on whole frames; this one is to play what was played before.
+        length = strip.frame_end - strip.frame_start
+        strip.frame_start = action.frame_range[0]
+        strip.frame_end = strip.frame_start + length
+    if data.action is None or before.track is not None:
+        made = bpy.data.actions.new(f"{armature.name} Pose")
+        made.slots.new("OBJECT", armature.name)
+        made.layers.new("Layer").strips.new(type="KEYFRAME")
+        data.action = made
+        before.made = True
+        data.action_slot = made.slots[made.slots[0].identifier]
+        data.action_blend_type, data.action_influence = "REPLACE", 1.0
+    assert data.action is not None
+    _writable_action(data.action)
+    if data.action_slot is None:
+        before.new_slot = _use_slot(data, armature)
+    before.keyed, before.keyed_slot = _number(data.action), data.action_slot_handle
+    channelbags = channelbags_of(*_assigned(armature))
+    before.groups = {group.name for each in channelbags for group in each.groups}
+
+
+def _take_back(armature: bpy.types.Object, before: _Before) -> None:
+    keyed = _action_of(before.keyed)
+    if keyed is not None and not before.made:
+        _restore_curves(keyed, before)
+    data = armature.animation_data
+    if data is not None and _number(data.action) == before.keyed:
+        action = _action_of(before.action)
+        data.action = action
+        if action is not None:
+            data.action_slot = next(
+                (slot for slot in action.slots if slot.handle == before.slot), None
+            )
+            if action.library is None:
+                action.use_fake_user = before.fake_user
+        for name, value in zip(_BLENDING, before.blending, strict=True):
+            setattr(data, name, value)
+        if before.track is not None and before.track in data.nla_tracks:
+            data.nla_tracks.remove(data.nla_tracks[before.track])
+    if keyed is not None and before.new_slot is not None and not before.made:
+        for slot in keyed.slots:
+            if slot.handle == before.new_slot:
+                keyed.slots.remove(slot)
+                break
+    if keyed is not None and before.made and keyed.users <= keyed.use_fake_user:
+        bpy.data.actions.remove(keyed)
+    unused = data is not None and not (data.action or data.nla_tracks or data.drivers)
+    if not before.had_data and unused:
+        armature.animation_data_clear()
+
+
+def _going_on(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot, channel: Channel, mode: str, start: float
+) -> Channel:
+    """The same turns in the sign or the round that the curves have where they begin.
+
+    Else the way there from the key before would lead through a whole turn.
+    """
+    values = channel.values
+    curves = {
+        curve.array_index: curve
+        for curve in curves_of(action, slot)
+        if curve.data_path == channel.data_path and len(curve.keyframe_points)
+    }
+    if len(curves) < values.shape[1]:
+        return channel
+    before = np.array([curves[each].evaluate(start) for each in range(values.shape[1])])
+    if mode == "QUATERNION":
+        same = values if before @ values[0] >= 0.0 else -values
+    elif mode == "AXIS_ANGLE":
+        same = values if before[1:] @ values[0, 1:] >= 0.0 else -values
+        rounds = np.round((before[0] - same[0, 0]) / (2.0 * np.pi))
+        same = same + np.array([2.0 * np.pi * rounds, 0.0, 0.0, 0.0])
+    else:
+        same = values + 2.0 * np.pi * np.round((before - values[0]) / (2.0 * np.pi))
+    return replace(channel, values=same)
 
 
 def _placed(bone: bpy.types.Bone, locations: Floats) -> Floats:
@@ -501,12 +508,6 @@ def _writable_action(action: bpy.types.Action) -> None:
         )
 
 
-def _copy(action: bpy.types.Action) -> bpy.types.Action:
-    copied = action.copy()
-    assert isinstance(copied, bpy.types.Action)
-    return copied
-
-
 def _keep(action: bpy.types.Action | None) -> None:
     """Save an action that is taken off from being purged."""
     if action is not None and action.library is None:
@@ -526,7 +527,7 @@ def _blend_alike(strip: bpy.types.NlaStrip, data: bpy.types.AnimData) -> None:
 
 def _restore_curves(action: bpy.types.Action, before: _Before) -> None:
     slot = next((each for each in action.slots if each.handle == before.keyed_slot), None)
-    channelbag = None if slot is None else _channelbag(action, slot)
+    channelbag = next(channelbags_of(action, slot), None) if slot is not None else None
     if channelbag is None:
         return
     for curve in list(channelbag.fcurves):
@@ -561,20 +562,6 @@ def _use_slot(data: bpy.types.AnimData, armature: bpy.types.Object) -> int | Non
     made = action.slots.new("OBJECT", armature.name)
     data.action_slot = made
     return made.handle
-
-
-def _channelbag(
-    action: bpy.types.Action, slot: bpy.types.ActionSlot, *, ensure: bool = False
-) -> bpy.types.ActionChannelbag | None:
-    if ensure and not action.layers:
-        action.layers.new("Layer")
-    for layer in action.layers:
-        if ensure and not layer.strips:
-            layer.strips.new(type="KEYFRAME")
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                return strip.channelbag(slot, ensure=ensure)
-    return None
 
 
 # --- The artist's own settings of keying: which channels get a key, and under which conditions ----
@@ -634,7 +621,7 @@ def keyed_properties(
     bone: bpy.types.PoseBone, active: bpy.types.KeyingSet | None, *, placed: bool
 ) -> list[str]:
     """Properties of a bone that get a key."""
-    rotation = rotation_channel(bone.rotation_mode)
+    rotation = rotation_property(bone.rotation_mode)
     if active is not None:
         name = active.bl_idname
         if name.startswith(("Available", "WholeCharacter")):

@@ -5,17 +5,26 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final, cast
+from typing import Final
 
 import bpy
 import numpy as np
-from mathutils import Euler, Matrix, Quaternion, Vector
+from mathutils import Matrix, Quaternion, Vector
 
-from ...core.rotations import Floats
+from ...core.keyframes import in_rotation_mode, rotation_property
+from ...core.rotations import Floats, from_mode_values
 from ...core.skeleton import Skeleton
-from ..rig import carrying_axes
-from .actions import curves_of, flattened, is_generated
-from .fcurves import is_shown
+from ..rig import bone_and_property, carrying_axes
+from .actions import acting_curves, curves_of, is_generated
+
+AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
+    "location": (0.0, 0.0, 0.0),
+    "scale": (1.0, 1.0, 1.0),
+    "rotation_quaternion": (1.0, 0.0, 0.0, 0.0),
+    "rotation_euler": (0.0, 0.0, 0.0),
+    "rotation_axis_angle": (0.0, 0.0, 1.0, 0.0),
+}
+"""Values of a bone's properties at rest."""
 
 SCALE: Final = ("scale",)
 """Channels of a bone that stretches."""
@@ -32,46 +41,21 @@ def animated_bones(
 ) -> set[str]:
     """Names of the bones whose channels of these kinds the action keys."""
     # The components of a property have the same path.
-    paths = {
-        curve.data_path
-        for layer in action.layers
-        for strip in layer.strips
-        if isinstance(strip, bpy.types.ActionKeyframeStrip)
-        for channelbag in strip.channelbags
-        for curve in channelbag.fcurves
-    }
-    names: set[str] = set()
-    for path in paths:
-        start, _, rest = path.partition('pose.bones["')
-        name, _, channel = rest.partition('"].')
-        if not start and channel.startswith(channels):
-            names.add(bpy.utils.unescape_identifier(name))
-    return names
+    found = map(bone_and_property, {curve.data_path for curve in curves_of(action)})
+    return {name for name, channel in found if name and channel.startswith(channels)}
 
 
-def rest_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
-    """Put bones back to their rest location and rotation; names that are no bone's are passed."""
-    if armature.pose is None:
-        return
-    for name in names:
-        bone = armature.pose.bones.get(name)
-        if bone is None:
-            continue
-        bone.location = (0.0, 0.0, 0.0)
-        if bone.rotation_mode == "QUATERNION":
-            bone.rotation_quaternion = (1.0, 0.0, 0.0, 0.0)
-        elif bone.rotation_mode == "AXIS_ANGLE":
-            bone.rotation_axis_angle = (0.0, 0.0, 1.0, 0.0)
-        else:
-            bone.rotation_euler = (0.0, 0.0, 0.0)
-
-
-def unscale_bones(armature: bpy.types.Object, names: Iterable[str]) -> None:
-    """Put bones back to their rest scale; names that are no bone's are passed."""
+def rest_bones(
+    armature: bpy.types.Object,
+    names: Iterable[str],
+    channels: Sequence[str] = ("location", "rotation"),
+) -> None:
+    """Put channels of bones back to what they are at rest; names that are no bone's are passed."""
     bones = armature.pose.bones if armature.pose is not None else {}
-    for name in names:
-        if name in bones:
-            bones[name].scale = (1.0, 1.0, 1.0)
+    for bone in (bones[name] for name in names if name in bones):
+        for channel in channels:
+            own = rotation_property(bone.rotation_mode) if channel == "rotation" else channel
+            setattr(bone, own, AT_REST[own])
 
 
 def standing_of(
@@ -177,8 +161,6 @@ def displaced_bones(
 # --- A pose that is only shown: put on an armature for a while, without keys, and taken off again
 
 
-_CHANNELS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
-
 PoseValues = dict[str, tuple[tuple[float, ...], ...]]
 """A bone's own values by its name."""
 
@@ -188,7 +170,7 @@ def pose_values(armature: bpy.types.Object) -> PoseValues:
     if armature.pose is None:
         return {}
     return {
-        bone.name: tuple(tuple(getattr(bone, channel)) for channel in _CHANNELS)
+        bone.name: tuple(tuple(getattr(bone, channel)) for channel in AT_REST)
         for bone in armature.pose.bones
     }
 
@@ -198,7 +180,7 @@ def restore_pose(armature: bpy.types.Object, values: PoseValues) -> None:
     if armature.pose is None:
         return
     for bone in armature.pose.bones:
-        for channel, value in zip(_CHANNELS, values.get(bone.name, ()), strict=False):
+        for channel, value in zip(AT_REST, values.get(bone.name, ()), strict=False):
             setattr(bone, channel, value)
 
 
@@ -241,15 +223,6 @@ def show_pose(
 # and taken anew when an artist has changed it meanwhile.
 
 
-AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
-    "location": (0.0, 0.0, 0.0),
-    "scale": (1.0, 1.0, 1.0),
-    "rotation_quaternion": (1.0, 0.0, 0.0, 0.0),
-    "rotation_euler": (0.0, 0.0, 0.0),
-    "rotation_axis_angle": (0.0, 0.0, 1.0, 0.0),
-}
-"""Values of a bone's properties at rest."""
-
 UnkeyedPose = dict[tuple[str, str], tuple[float, ...]]
 """Values by bone and property, where they are not those at rest."""
 
@@ -258,11 +231,6 @@ _SAME: Final = 1e-5
 
 KEPT: Final = "octo_motion_unkeyed_pose"
 """Custom property of an armature object: its unkeyed pose before we last gave it an action."""
-
-
-def rotation_channel(mode: str) -> str:
-    """The property that holds a bone's rotation in this mode."""
-    return f"rotation_{mode.lower()}" if mode in ("QUATERNION", "AXIS_ANGLE") else "rotation_euler"
 
 
 def unkeyed_pose(armature: bpy.types.Object) -> UnkeyedPose:
@@ -278,7 +246,7 @@ def unkeyed_pose(armature: bpy.types.Object) -> UnkeyedPose:
     moved = {(name, _plain(channel)) for name, channel in _moved(armature)}
     ours = _Generated(armature)
     for bone in armature.pose.bones:
-        for channel in ("location", "scale", rotation_channel(bone.rotation_mode)):
+        for channel in ("location", "scale", rotation_property(bone.rotation_mode)):
             place = bone.name, channel
             values = tuple(getattr(bone, channel))
             if (bone.name, _plain(channel)) in moved or ours.left_behind(bone, channel, values):
@@ -312,7 +280,7 @@ def _kept(armature: bpy.types.Object) -> UnkeyedPose:
         for channel, values in channels.items():
             if bone is not None and channel.startswith("rotation"):
                 # The bone may have another rotation mode by now.
-                wanted = rotation_channel(bone.rotation_mode)
+                wanted = rotation_property(bone.rotation_mode)
                 pose[name, wanted] = _converted(channel, tuple(values), bone.rotation_mode)
             else:
                 pose[name, channel] = tuple(values)
@@ -321,21 +289,12 @@ def _kept(armature: bpy.types.Object) -> UnkeyedPose:
 
 def _converted(channel: str, values: tuple[float, ...], mode: str) -> tuple[float, ...]:
     """Values of a rotation in a bone's mode; Euler angles are taken to be of its order."""
-    if channel == rotation_channel(mode):
+    if channel == rotation_property(mode):
         return values
-    if channel == "rotation_quaternion":
-        turn = Quaternion(values)
-    elif channel == "rotation_axis_angle":
-        turn = Quaternion(values[1:], values[0])
-    else:
-        turn = Euler(values).to_quaternion()
-    if mode == "QUATERNION":
-        return (turn.w, turn.x, turn.y, turn.z)
-    if mode == "AXIS_ANGLE":
-        axis, angle = turn.to_axis_angle()
-        return (angle, *axis)
-    angles = turn.to_euler(cast("Any", mode))
-    return (angles.x, angles.y, angles.z)
+    # Of three angles the order is not known; the other two are modes of their own.
+    before = channel.removeprefix("rotation_").upper() if len(values) == 4 else "XYZ"
+    turn = from_mode_values(np.array([values]), before)
+    return tuple(in_rotation_mode(turn, mode)[0].tolist())
 
 
 class _Generated:
@@ -390,32 +349,7 @@ def _shows(curves: Mapping[int, bpy.types.FCurve], values: tuple[float, ...]) ->
 
 def _moved(armature: bpy.types.Object) -> Iterator[tuple[str, str]]:
     """Bones and properties that some action moves at present."""
-    data = armature.animation_data
-    if data is None:
-        return
-    acting = [(data.action, data.action_slot)]
-    if data.use_nla:
-        tracks = (track for track in data.nla_tracks if not track.mute)
-        acting += [
-            (strip.action, strip.action_slot)
-            for track in tracks
-            for strip in flattened(track.strips)
-            if not strip.mute
-        ]
-    for action, slot in acting:
-        if action is None or slot is None:
-            continue
-        for path in _paths(action, slot):
-            start, _, rest = path.partition('pose.bones["')
-            name, _, channel = rest.rpartition('"].')
-            if not start:
-                yield bpy.utils.unescape_identifier(name), channel
-
-
-def _paths(action: bpy.types.Action, slot: bpy.types.ActionSlot) -> Iterable[str]:
-    for layer in action.layers:
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                channelbag = strip.channelbag(slot)
-                if channelbag is not None:
-                    yield from (curve.data_path for curve in channelbag.fcurves if is_shown(curve))
+    for path in {curve.data_path for curve in acting_curves(armature.animation_data)}:
+        name, channel = bone_and_property(path)
+        if name:
+            yield name, channel

@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ...core.errors import ClipError
 from ...core.rotations import Floats
-from .actions import flattened
+from .actions import acting_curves
+from .poses import AT_REST
 
 _Value = tuple[bpy.types.ID, str, Any]
 """A data-block, the path of one of its properties, and what that is."""
@@ -48,7 +49,7 @@ def time_kept(scene: bpy.types.Scene) -> Iterator[Callable[[float], None]]:
 def _animated_values() -> Iterator[_Value]:
     """Values that some action moves: of the whole file, for data-blocks use one another."""
     for owner in _animated():
-        for path in _paths(owner.animation_data):
+        for path in {curve.data_path for curve in acting_curves(owner.animation_data)}:
             try:
                 value = owner.path_resolve(path)
             except ValueError:
@@ -67,25 +68,6 @@ def _animated() -> Iterator[Any]:
             for owner in parts:
                 if getattr(owner, "animation_data", None) and owner.library is None:
                     yield owner
-
-
-def _paths(data: bpy.types.AnimData) -> set[str]:
-    tracks = data.nla_tracks if data.use_nla else ()
-    strips = [strip for track in tracks for strip in flattened(track.strips)]
-    acting = [
-        (data.action, data.action_slot),
-        *((each.action, each.action_slot) for each in strips),
-    ]
-    return {
-        curve.data_path
-        for action, slot in acting
-        if action is not None and slot is not None
-        for layer in action.layers
-        for strip in layer.strips
-        if isinstance(strip, bpy.types.ActionKeyframeStrip)
-        if (channelbag := strip.channelbag(slot)) is not None
-        for curve in channelbag.fcurves
-    }
 
 
 def _plain(value: Any) -> Any:
@@ -107,12 +89,6 @@ def _set_again(values: Iterable[_Value]) -> None:
 
 
 # --- Poses as the scene shows them, frame by frame: NLA, constraints, drivers and all -------------
-
-
-_CHANNELS: Final = (
-    *("location", "scale"),
-    *("rotation_quaternion", "rotation_euler", "rotation_axis_angle"),
-)
 
 
 def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats, Floats]:
@@ -187,11 +163,11 @@ def _pose_kept(armature: bpy.types.Object) -> Iterator[None]:
     """The pose as it was: what an action that is assigned for a while moves is no one else's."""
     assert armature.pose is not None
     owners = (armature, *armature.pose.bones)
-    values = [[tuple(getattr(owner, name)) for name in _CHANNELS] for owner in owners]
+    values = [[tuple(getattr(owner, name)) for name in AT_REST] for owner in owners]
     try:
         yield
     finally:
         for owner, mine in zip(owners, values, strict=True):
-            for name, value in zip(_CHANNELS, mine, strict=True):
+            for name, value in zip(AT_REST, mine, strict=True):
                 if tuple(getattr(owner, name)) != value:
                     setattr(owner, name, value)

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, Final
 
@@ -74,6 +75,22 @@ def armature_data(armature: bpy.types.Object) -> bpy.types.Armature:
     if not isinstance(data, bpy.types.Armature):
         raise RigError(f"'{armature.name}' is not an armature.", "Select an armature.")
     return data
+
+
+def pose_of(armature: bpy.types.Object) -> bpy.types.Pose:
+    """An armature object's pose.
+
+    Raises:
+        RigError: it has none yet.
+    """
+    if armature.pose is None:
+        # An armature that was made a moment ago gets its pose with the next update.
+        bpy.context.view_layer.update()
+    if armature.pose is None:
+        raise RigError(
+            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+        )
+    return armature.pose
 
 
 def read_skeleton(armature: bpy.types.Object) -> Skeleton:
@@ -149,14 +166,32 @@ def _driven_bones(armature: bpy.types.Object) -> set[str]:
         for bone in armature.pose.bones
         if any(not constraint.mute and constraint.influence > 0 for constraint in bone.constraints)
     }
-    if armature.animation_data is not None:
-        transforms = ("location", "rotation_", "scale")
-        for curve in armature.animation_data.drivers:
-            start, _, rest = curve.data_path.partition('pose.bones["')
-            name, _, channel = rest.partition('"].')
-            if not start and channel.startswith(transforms):
-                names.add(bpy.utils.unescape_identifier(name))
-    return names
+    transforms = ("location", "rotation_", "scale")
+    return names | {
+        name for name, channel, _ in driven_channels(armature) if channel.startswith(transforms)
+    }
+
+
+def driven_channels(
+    armature: bpy.types.Object,
+) -> Iterator[tuple[str, str, bpy.types.FCurve]]:
+    """Bone, property and driver of all properties of bones that have one."""
+    data = armature.animation_data
+    for curve in data.drivers if data is not None else ():
+        name, channel = bone_and_property(curve.data_path)
+        if name:
+            yield name, channel, curve
+
+
+_BONE_PATH: Final = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.?(.*)', re.DOTALL)
+
+
+def bone_and_property(data_path: str) -> tuple[str, str]:
+    """Name of the bone and its property that a data path leads to; "" and the path for others."""
+    found = _BONE_PATH.fullmatch(data_path)
+    if found is None:
+        return "", data_path
+    return bpy.utils.unescape_identifier(found[1]), found[2]
 
 
 def is_driven_object(obj: bpy.types.Object) -> bool:

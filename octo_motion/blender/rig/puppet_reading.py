@@ -31,7 +31,7 @@ from ...core.posing.puppet import (
 )
 from ...core.rotations import Floats, from_matrix
 from ...core.skeleton import Skeleton
-from .armature import armature_data, read_skeleton
+from .armature import armature_data, driven_channels, pose_of, read_skeleton
 from .skin import vertex_positions
 
 MARK: Final = "octo_motion_puppet"
@@ -95,12 +95,8 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
             it is shown at rest.
     """
     skeleton = read_skeleton(armature)
-    if armature.pose is None or len(armature.pose.bones) != len(skeleton):
+    if len(pose_of(armature).bones) != len(skeleton):
         bpy.context.view_layer.update()
-    if armature.pose is None:
-        raise RigError(
-            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
-        )
     if armature_data(armature).pose_position == "REST":
         raise RigError(
             f"'{armature.name}' is shown at rest, whatever its pose is.",
@@ -209,12 +205,11 @@ def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
                 count = getattr(constraint, "chain_count", 0)
                 chain = [bone, *bone.parent_recursive]
                 found.update(each.name for each in chain[: count or len(chain)])
-    if armature.animation_data is not None:
-        for curve in armature.animation_data.drivers:
-            start, _, rest = curve.data_path.partition('pose.bones["')
-            name, _, channel = rest.partition('"].')
-            if not start and channel.startswith("rotation_") and not curve.mute:
-                found.add(bpy.utils.unescape_identifier(name))
+    found.update(
+        name
+        for name, channel, driver in driven_channels(armature)
+        if channel.startswith("rotation_") and not driver.mute
+    )
     return frozenset(found)
 
 

@@ -22,7 +22,7 @@ from ...core.errors import ClipError, WriteError
 from ...core.rotations import normalized
 from ...core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ...core.splicing.humanoid import map_skeleton
-from ..animation import channelbags_of, read_clip, time_kept
+from ..animation import curves_of, read_clip, time_kept
 from ..rig import read_skeleton
 
 NOTE: Final = "octo_motion_clip"
@@ -335,7 +335,7 @@ def _motion(
     ]
     actions = [each for each in made if isinstance(each, bpy.types.Action)]
     moving = [
-        each for each in actions if any(len(curve.keyframe_points) for curve in _curves(each))
+        each for each in actions if any(len(curve.keyframe_points) for curve in curves_of(each))
     ]
     if not armatures:
         raise ClipError("There is no armature in it.", "Choose a file of a character's motion.")
@@ -344,17 +344,9 @@ def _motion(
             "Its armature has no motion.", "Use Blender's own importer for a rig without any."
         )
     for action in moving:
-        if not all(np.isfinite(_points(curve)).all() for curve in _curves(action)):
+        if not all(np.isfinite(_points(curve)).all() for curve in curves_of(action)):
             raise ClipError("Some of its keys are no finite numbers.", "Export it again.")
     return armatures, moving
-
-
-def _curves(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
-    for layer in action.layers:
-        for strip in layer.strips:
-            if isinstance(strip, bpy.types.ActionKeyframeStrip):
-                for channelbag in channelbags_of(strip):
-                    yield from channelbag.fcurves
 
 
 def _points(curve: bpy.types.FCurve, name: str = "co") -> np.ndarray:
@@ -382,7 +374,7 @@ def _rate_of_keys(actions: Iterable[bpy.types.Action], placed_by: float) -> floa
     """Frames per second that the distances of keys tell, else those they were placed by."""
     steps = []
     for action in actions:
-        times = [_points(curve)[:, 0] for curve in _curves(action)]
+        times = [_points(curve)[:, 0] for curve in curves_of(action)]
         longest = max(times, key=len)
         steps += list(np.diff(longest))
     usual = float(np.median(steps)) if steps else 0.0
@@ -394,7 +386,7 @@ def _starts(actions: Iterable[bpy.types.Action], *, takes: bool) -> dict[str, fl
     own: dict[str, float] = {}
     shared: dict[str, float] = {}
     for action in actions:
-        curves = (curve for curve in _curves(action) if len(curve.keyframe_points))
+        curves = (curve for curve in curves_of(action) if len(curve.keyframe_points))
         own[action.name] = min(float(_points(curve)[:, 0].min()) for curve in curves)
         take = _take(action.name)
         shared[take] = min(own[action.name], shared.get(take, np.inf))
@@ -408,7 +400,7 @@ def _take(action: str) -> str:
 
 def _place_keys(action: bpy.types.Action, factor: float, start: float, frame_start: int) -> None:
     """Stretch an action in time, and move a moment of it to a frame."""
-    curves = [curve for curve in _curves(action) if len(curve.keyframe_points)]
+    curves = [curve for curve in curves_of(action) if len(curve.keyframe_points)]
     first, last = np.inf, -np.inf
     for curve in curves:
         for name in ("co", "handle_left", "handle_right"):

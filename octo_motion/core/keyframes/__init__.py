@@ -7,6 +7,7 @@ from .channels import (
     ObjectChannels,
     RigChannels,
     halfway_values,
+    in_rotation_mode,
     rotation_property,
     values_at,
 )
@@ -28,6 +29,7 @@ __all__ = [
     "chain_to_tip",
     "check_bounds",
     "halfway_values",
+    "in_rotation_mode",
     "reduce_keys",
     "reducing",
     "rotation_property",

@@ -254,13 +254,17 @@ EULER_ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 
 def from_mode_values(values: Floats, mode: str) -> Floats:
-    """Unit quaternions (…, 4) of values (…, 3 or 4) of a rotation mode."""
-    if mode == "QUATERNION":
-        return normalized(values)
+    """Unit quaternions (…, 4) of values (…, 3 or 4) of a rotation mode.
+
+    A quaternion of no length is no rotation, as in Blender.
+    """
+    if mode not in ("QUATERNION", "AXIS_ANGLE"):
+        return from_euler(values, mode)
     if mode == "AXIS_ANGLE":
-        # Normalized again: about no axis at all the angle would remain.
-        return normalized(from_axis_angle(normalized(values[..., 1:]), values[..., 0]))
-    return from_euler(values, mode)
+        values = from_axis_angle(normalized(values[..., 1:]), values[..., 0])
+    # Of an axis of no length the angle remains, and is taken off here.
+    unit = normalized(values)
+    return np.where(np.any(unit, axis=-1, keepdims=True), unit, IDENTITY)
 
 
 def from_euler(angles: ArrayLike, order: str) -> Floats:

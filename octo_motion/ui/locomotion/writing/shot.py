@@ -14,9 +14,8 @@ from ....blender.animation import (
     SCALE,
     animated_bones,
     key_counts,
-    object_channels,
+    read_object_channels,
     rest_bones,
-    unscale_bones,
     writable_armature,
     write_action,
 )
@@ -124,7 +123,7 @@ def write_carried(armature: bpy.types.Object, carried: Sequence[Carried]) -> Non
             target,
             f"{target.name} Carried",
             each.frames,
-            object_channels(target, each.positions, each.rotations),
+            read_object_channels(target).channels(each.positions, each.rotations),
             previous=data.action if data is not None else None,
             settings_note=carrying_note(armature.name),
         )
@@ -249,7 +248,7 @@ class Shot:
             raise
         settings.result = action
         rest_bones(armature, left_behind - animated_bones(action))
-        unscale_bones(armature, scaled - animated_bones(action, SCALE))
+        rest_bones(armature, scaled - animated_bones(action, SCALE), SCALE)
         return action
 
     def _extend_range(self, last: int) -> tuple[str, ...]:
