@@ -170,7 +170,7 @@ def _run(frames: int) -> Result:
             (stack.Splice, "retargets"),
         ],
         "compute": [(stack.Stack, "compute")],
-        "values of the channels": [(clips, "rotation_channels"), (clips, "_location_channels")],
+        "values of the channels": [(clips, "read_channels"), (clips, "_location_channels")],
         "write keys": [(actions, "_write_curves")],
         "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
     }
