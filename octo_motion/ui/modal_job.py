@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from ..core.errors import OctoMotionError
 from . import at_work
-from .operator_base import OctoOperator
+from .operator_base import OctoOperator, window_manager
 
 if TYPE_CHECKING:
     import bpy
@@ -81,11 +81,10 @@ class ModalJob(OctoOperator):
                 return self._finish(context)
         except OctoMotionError as error:
             return self._fail(context, error)
-        window_manager = context.window_manager
-        assert window_manager is not None
-        self._timer = window_manager.event_timer_add(0.01, window=context.window)
-        window_manager.progress_begin(0.0, 1.0)
-        window_manager.modal_handler_add(cast("bpy.types.Operator", self))
+        manager = window_manager(context)
+        self._timer = manager.event_timer_add(0.01, window=context.window)
+        manager.progress_begin(0.0, 1.0)
+        manager.modal_handler_add(cast("bpy.types.Operator", self))
         at_work.begun(self, self._stop)
         self._show(context)
         return {"RUNNING_MODAL"}
@@ -130,9 +129,8 @@ class ModalJob(OctoOperator):
 
     def _show(self, context: bpy.types.Context) -> None:
         assert self._job is not None
-        assert context.window_manager is not None
         if self._job.progress > 0.0:
-            context.window_manager.progress_update(self._job.progress)
+            window_manager(context).progress_update(self._job.progress)
         if context.workspace is not None:
             context.workspace.status_text_set(self.status(self._job.progress))
 
@@ -142,9 +140,8 @@ class ModalJob(OctoOperator):
         at_work.done(self)
         if self._timer is None:
             return
-        assert context.window_manager is not None
-        context.window_manager.event_timer_remove(self._timer)
+        window_manager(context).event_timer_remove(self._timer)
         self._timer = None
-        context.window_manager.progress_end()
+        window_manager(context).progress_end()
         if context.workspace is not None:
             context.workspace.status_text_set(None)

@@ -25,6 +25,8 @@ class OctoOperator:
     fault of ours and surfaces as Python's own traceback.
     """
 
+    bl_options = {"REGISTER", "UNDO"}
+
     def run(self, context: bpy.types.Context) -> None:
         """Do the work, or raise ``OctoMotionError`` and leave everything as it was."""
         raise NotImplementedError
@@ -37,6 +39,21 @@ class OctoOperator:
             self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
             return {"CANCELLED"}
         return {"FINISHED"}
+
+
+class FileOperator(OctoOperator):
+    """Mix-in: asks for a file first."""
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
+        """Open the file browser."""
+        window_manager(context).fileselect_add(cast("bpy.types.Operator", self))
+        return {"RUNNING_MODAL"}
+
+
+def window_manager(context: bpy.types.Context) -> bpy.types.WindowManager:
+    """The window manager, which is there as long as Blender runs."""
+    assert context.window_manager is not None
+    return context.window_manager
 
 
 # --- What operators on the active armature share --------------------------------------------------
@@ -117,14 +134,7 @@ class ItemOperator(ListOperator):
 class RemoveOperator(ItemOperator):
     """Takes the active item off the list."""
 
-    bl_options = {"REGISTER", "UNDO"}
-
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         kind = self.KIND
         name = kind.active_item(settings).name
         if name in linked_names(settings, kind.items):
@@ -138,8 +148,6 @@ class RemoveOperator(ItemOperator):
 
 class MoveOperator(ItemOperator):
     """Moves the active item by one place."""
-
-    bl_options = {"REGISTER", "UNDO"}
 
     direction: EnumProperty(
         name="Direction",
@@ -156,12 +164,7 @@ class MoveOperator(ItemOperator):
             return {"CANCELLED"}
         return super().execute(context)
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         kind = self.KIND
         name = kind.active_item(settings).name
         if name in linked_names(settings, kind.items):

@@ -39,6 +39,33 @@ def draw_sentence(layout: Any, context: bpy.types.Context, text: str, icon: str)
         column.label(text=line, icon="BLANK1" if number else icon)
 
 
+def draw_list(
+    layout: Any,
+    row_type: type,
+    settings: Any,
+    names: tuple[str, str],
+    buttons: tuple[Any, Any],
+    **size: int,
+) -> Any:
+    """A list with the buttons that add and remove; the column of the buttons, for more.
+
+    Args:
+        layout: where it goes.
+        row_type: what draws its rows.
+        settings: the group that has the list.
+        names: of the list, and of the number of its active item.
+        buttons: operators that add and that remove.
+        size: how many rows it shows, as Blender calls it.
+    """
+    items, active = names
+    row = layout.row()
+    row.template_list(row_type.__name__, "", settings, items, settings, active, **size)
+    column = row.column(align=True)
+    for operator, icon in zip(buttons, ("ADD", "REMOVE"), strict=True):
+        column.operator(operator.bl_idname, text="", icon=icon)
+    return column
+
+
 class TabPanel:
     """Where the panels of the tab are."""
 

@@ -9,37 +9,22 @@ import bpy
 
 from ...blender.animation import key_counts
 from ...blender.files import NODE, curve_node
-from ..panel_base import ArmaturePanel, ItemRows, TabPanel, armature_in, draw_sentence
+from ..panel_base import ArmaturePanel, TabPanel, armature_in, draw_sentence
 from .operators import (
     OCTO_MOTION_MT_gait,
-    OCTO_MOTION_MT_gait_offset,
     OCTO_MOTION_OT_add_octopus,
     OCTO_MOTION_OT_add_route,
-    OCTO_MOTION_OT_gait_curve_add,
-    OCTO_MOTION_OT_gait_curve_remove,
-    OCTO_MOTION_OT_gait_knot_add,
-    OCTO_MOTION_OT_gait_knot_remove,
-    OCTO_MOTION_OT_gait_load,
-    OCTO_MOTION_OT_gait_offset_remove,
     OCTO_MOTION_OT_generate_locomotion,
+    OCTO_MOTION_PT_arms,
+    OCTO_MOTION_PT_change,
+    OCTO_MOTION_PT_ground,
+    OCTO_MOTION_PT_quality,
+    OCTO_MOTION_PT_reaches,
     OCTO_MOTION_PT_setups,
-    draw_arms,
-    draw_changes,
-    draw_figures,
-    draw_ground,
-    draw_reaches,
+    OCTO_MOTION_PT_table,
     draw_rest,
 )
-from .settings import (
-    OCTO_MOTION_PG_gait_curve,
-    OCTO_MOTION_PG_gait_table,
-    OCTO_MOTION_PG_locomotion,
-    known_figures,
-    locomotion_settings,
-    used,
-)
-
-_SIDES: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
+from .settings import OCTO_MOTION_PG_locomotion, locomotion_settings, used
 
 
 class _Panel(ArmaturePanel):
@@ -51,7 +36,6 @@ class _Panel(ArmaturePanel):
 
 
 class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_rig"
     bl_label = "Rig"
     bl_order = 0
 
@@ -74,18 +58,7 @@ class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
         )
 
 
-class OCTO_MOTION_PT_arms(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_arms"
-    bl_label = "Arms"
-    bl_order = 1
-
-    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        layout.use_property_split = False
-        draw_arms(layout, bpy.context, settings)
-
-
 class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_route"
     bl_label = "Route"
     bl_order = 2
 
@@ -111,26 +84,9 @@ class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
             draw_rest(layout, settings)
 
 
-class OCTO_MOTION_PT_ground(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_ground"
-    bl_label = "Hold the Ground"
-    bl_parent_id = OCTO_MOTION_PT_route.bl_idname
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw_header(self, context: bpy.types.Context) -> None:
-        armature = armature_in(context)
-        layout = cast("Any", self).layout
-        if armature is not None and layout is not None:
-            layout.prop(locomotion_settings(armature).ground, "use", text="")
-
-    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        draw_ground(layout, settings)
-
-
 class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_heading"
     bl_label = "Heading and Height"
-    bl_parent_id = OCTO_MOTION_PT_route.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_route"
     bl_options = {"DEFAULT_CLOSED"}
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
@@ -154,7 +110,6 @@ class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_gait"
     bl_label = "Gait"
     bl_order = 3
 
@@ -166,7 +121,7 @@ class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
         row = layout.row(align=True)
         row.alert = bool(used(table.curves)) and table.name != settings.gait
         row.prop(settings, "gait")
-        row.menu(OCTO_MOTION_MT_gait.bl_idname, text="", icon="DOWNARROW_HLT")
+        row.menu(OCTO_MOTION_MT_gait.__name__, text="", icon="DOWNARROW_HLT")
         layout.prop(table, "stride")
         layout.prop(settings, "contraction")
         layout.prop(settings, "turning")
@@ -178,104 +133,9 @@ class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
             column.prop(settings, "breath_time", text="Breath Time")
 
 
-class OCTO_MOTION_PT_table(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_table"
-    bl_label = "Table"
-    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        table = settings.table
-        layout.row().prop(table, "manner", expand=True)
-        if table.manner == "SWIM":
-            layout.prop(table, "power_phase")
-        column = layout.column(align=True)
-        column.prop(table, "spread_pairs", text="Spread Pairs")
-        column.prop(table, "spread_sides")
-        _draw_offsets(layout, table)
-        curves = used(table.curves)
-        if not curves:
-            layout.operator(
-                OCTO_MOTION_OT_gait_load.bl_idname, text="Edit Angles", icon="GREASEPENCIL"
-            )
-            return
-        row = layout.row()
-        row.template_list(
-            OCTO_MOTION_UL_gait_curves.__name__, "", table, "curves", table, "active_curve", rows=2
-        )
-        column = row.column(align=True)
-        column.operator(OCTO_MOTION_OT_gait_curve_add.bl_idname, text="", icon="ADD")
-        column.operator(OCTO_MOTION_OT_gait_curve_remove.bl_idname, text="", icon="REMOVE")
-        if 0 <= table.active_curve < len(curves):
-            _draw_knots(layout, table, curves[table.active_curve])
-
-
-def _draw_offsets(layout: Any, table: OCTO_MOTION_PG_gait_table) -> None:
-    column = layout.column(align=True)
-    for number, offset in enumerate(used(table.offsets)):
-        row = column.row(align=True)
-        row.prop(offset, "phase", text=f"Arm {offset.pair} {_SIDES[offset.side]}")
-        remove = row.operator(
-            OCTO_MOTION_OT_gait_offset_remove.bl_idname, text="", icon="X", emboss=False
-        )
-        remove.offset = number
-    layout.menu(OCTO_MOTION_MT_gait_offset.bl_idname, icon="ADD")
-
-
-def _draw_knots(
-    layout: Any, table: OCTO_MOTION_PG_gait_table, curve: OCTO_MOTION_PG_gait_curve
-) -> None:
-    layout.use_property_split = False
-    layout.row().prop(table, "shown_angle", expand=True)
-    angle = table.shown_angle.lower()
-    column = layout.column(align=True)
-    row = column.row(align=True)
-    for title in ("Phase", "Root", "Middle", "Tip"):
-        row.label(text=title)
-    row.label(text="", icon="BLANK1")
-    for number, knot in enumerate(used(curve.knots)):
-        row = column.row(align=True)
-        row.prop(knot, "phase", text="")
-        for link in range(3):
-            row.prop(knot, angle, index=link, text="")
-        remove = row.operator(
-            OCTO_MOTION_OT_gait_knot_remove.bl_idname, text="", icon="X", emboss=False
-        )
-        remove.knot = number
-    layout.operator(OCTO_MOTION_OT_gait_knot_add.bl_idname, icon="ADD")
-    if table.manner != "SWIM":
-        layout.prop(curve, "free")
-
-
-class OCTO_MOTION_UL_gait_curves(ItemRows, bpy.types.UIList):
-    """A row for the angles of all arms, and one for each pair that has its own."""
-
-    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
-        if item.unused:
-            layout.active = False
-            layout.label(text="Unused, of the linked file")
-        elif item.pair == 0:
-            layout.label(text="All Arms", icon="FCURVE")
-        else:
-            row = layout.row()
-            row.label(text="Only Pair", icon="FCURVE")
-            row.prop(item, "pair", text="", emboss=False)
-
-
-class OCTO_MOTION_PT_change(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_change"
-    bl_label = "Change of Gait"
-    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        draw_changes(layout, settings)
-
-
 class OCTO_MOTION_PT_variation(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_variation"
     bl_label = "Variation"
-    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_gait"
     bl_options = {"DEFAULT_CLOSED"}
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
@@ -289,9 +149,8 @@ class OCTO_MOTION_PT_variation(_Panel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_weights"
     bl_label = "Joint Weights"
-    bl_parent_id = OCTO_MOTION_PT_gait.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_gait"
     bl_options = {"DEFAULT_CLOSED"}
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
@@ -314,18 +173,7 @@ class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
         layout.prop(settings, "sway")
 
 
-class OCTO_MOTION_PT_reaches(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_reaches"
-    bl_label = "Reaches"
-    bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 3
-
-    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        draw_reaches(layout, settings)
-
-
 class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_generate"
     bl_label = "Generate"
     bl_order = 4
 
@@ -366,21 +214,6 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
         _draw_result(layout, bpy.context, settings)
 
 
-class OCTO_MOTION_PT_quality(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_quality"
-    bl_label = "Quality"
-    bl_parent_id = OCTO_MOTION_PT_generate.bl_idname
-    bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        armature = armature_in(context)
-        return armature is not None and bool(known_figures(locomotion_settings(armature)))
-
-    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        draw_figures(layout, settings)
-
-
 def _draw_result(
     layout: Any, context: bpy.types.Context, settings: OCTO_MOTION_PG_locomotion
 ) -> None:
@@ -399,7 +232,6 @@ def _draw_result(
 
 
 CLASSES: Final = (
-    OCTO_MOTION_UL_gait_curves,
     OCTO_MOTION_PT_rig,
     OCTO_MOTION_PT_arms,
     OCTO_MOTION_PT_route,

@@ -4,7 +4,7 @@
 import json
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -236,7 +236,7 @@ def test_rows_say_what_how_much_and_whose_with_a_button_to_the_frame(small: Any)
         ],
     )
     drawn = Drawn()
-    quality_operators.draw_figures(drawn, settings)
+    quality_operators.OCTO_MOTION_PT_quality.show(cast("Any", None), drawn, settings)
     assert drawn.labels == [
         "Slip: 0.12 %, Right",
         "Strain: 25.1 %, Left",
@@ -401,6 +401,6 @@ def test_what_one_would_see_is_marked_in_the_panel(small: Any) -> None:
         settings, [Figure(kind, value, 7, "Arm") for kind, value in values.items()]
     )
     drawn = Drawn()
-    quality_operators.draw_figures(drawn, settings)
+    quality_operators.OCTO_MOTION_PT_quality.show(cast("Any", None), drawn, settings)
     assert len(drawn.labels) == len(values)
     assert drawn.marked == ["Slip: 2.0 %, Arm", "Miss: 10.0 %, Arm"]

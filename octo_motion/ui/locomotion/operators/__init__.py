@@ -9,21 +9,12 @@ from .adding import (
     draw_octopus_entry,
     draw_route_entry,
 )
-from .arms import draw_arms
-from .contacts import draw_ground, draw_rest
-from .gait_table import (
-    OCTO_MOTION_MT_gait,
-    OCTO_MOTION_MT_gait_offset,
-    OCTO_MOTION_OT_gait_curve_add,
-    OCTO_MOTION_OT_gait_curve_remove,
-    OCTO_MOTION_OT_gait_knot_add,
-    OCTO_MOTION_OT_gait_knot_remove,
-    OCTO_MOTION_OT_gait_load,
-    OCTO_MOTION_OT_gait_offset_remove,
-)
+from .arms import OCTO_MOTION_PT_arms
+from .contacts import OCTO_MOTION_PT_ground, draw_rest
+from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_PT_table
 from .generate import OCTO_MOTION_OT_generate_locomotion
-from .quality import draw_figures
-from .reaches import draw_changes, draw_reaches
+from .quality import OCTO_MOTION_PT_quality
+from .reaches import OCTO_MOTION_PT_change, OCTO_MOTION_PT_reaches
 from .setups import OCTO_MOTION_PT_setups
 
 CLASSES = (
@@ -51,21 +42,15 @@ __all__ = [
     "MENUS",
     "STEPS",
     "OCTO_MOTION_MT_gait",
-    "OCTO_MOTION_MT_gait_offset",
     "OCTO_MOTION_OT_add_octopus",
     "OCTO_MOTION_OT_add_route",
-    "OCTO_MOTION_OT_gait_curve_add",
-    "OCTO_MOTION_OT_gait_curve_remove",
-    "OCTO_MOTION_OT_gait_knot_add",
-    "OCTO_MOTION_OT_gait_knot_remove",
-    "OCTO_MOTION_OT_gait_load",
-    "OCTO_MOTION_OT_gait_offset_remove",
     "OCTO_MOTION_OT_generate_locomotion",
+    "OCTO_MOTION_PT_arms",
+    "OCTO_MOTION_PT_change",
+    "OCTO_MOTION_PT_ground",
+    "OCTO_MOTION_PT_quality",
+    "OCTO_MOTION_PT_reaches",
     "OCTO_MOTION_PT_setups",
-    "draw_arms",
-    "draw_changes",
-    "draw_figures",
-    "draw_ground",
-    "draw_reaches",
+    "OCTO_MOTION_PT_table",
     "draw_rest",
 ]

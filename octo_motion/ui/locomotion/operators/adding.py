@@ -31,7 +31,6 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         "Add an octopus to animate: an armature whose arms mirror by name, facing -Y at the 3D "
         "cursor, with a skin that bends with it"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     arms: IntProperty(
         name="Arms",
@@ -156,7 +155,6 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
     bl_idname = "octo_motion.add_route"
     bl_label = "Octopus Route"
     bl_description = "Add a curve of four control points and make it the armature's route"
-    bl_options = {"REGISTER", "UNDO"}
 
     b0: _control_point("B0", "Start of the route, in world space")
     b1: _control_point("B1", "Handle of the start: the route leaves towards it")

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ....blender.rig import (
     active_armature,
-    armature_data,
     hidden_bones,
     read_skeleton,
     require_editable,
@@ -24,18 +23,16 @@ from ....core.errors import RigError
 from ....core.locomotion.rig import ArmChain, body_frame, chain_of, detect_arms, place_added
 from ...declared_settings import assign
 from ...operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
-from ...panel_base import ItemRows
+from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..reading import (
-    active_arm,
     add_item,
     body_axes,
     bones_of,
-    list_owner,
     placed_arms,
     write_arms,
     write_body,
 )
-from ..settings import AXES, OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..settings import AXES, locomotion_settings
 
 _SIDE_LETTERS: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": "-"}
 _AXIS_CHOICES: Final = (
@@ -76,56 +73,38 @@ _ARMS: Final = ListKind(
 )
 
 
-class _ArmListOperator(ListOperator):
-    """An operator on the list of arms."""
-
-    KIND = _ARMS
-
-
-class _ActiveArmOperator(ItemOperator):
-    """An operator on the list's active arm."""
-
-    KIND = _ARMS
+def _axis(name: str, description: str) -> Any:
+    return EnumProperty(
+        name=name,
+        description=description,
+        items=_AXIS_CHOICES,
+        default="AUTO",
+        options={"SKIP_SAVE"},
+    )
 
 
-class OCTO_MOTION_OT_detect_arms(_ArmListOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_detect_arms(ListOperator, bpy.types.Operator):
     bl_idname = "octo_motion.detect_arms"
     bl_label = "Detect Arms"
     bl_description = (
         "Find the chains of bones that are arms, and list them with side and pair. Done again, it "
         "keeps names, phases and flips of arms whose bones are the same"
     )
-    bl_options = {"REGISTER", "UNDO"}
+    KIND = _ARMS
 
-    front: EnumProperty(
-        name="Front",
-        description="Which way the body faces, as an axis of the armature",
-        items=_AXIS_CHOICES,
-        default="AUTO",
-        options={"SKIP_SAVE"},
-    )
-    up: EnumProperty(
-        name="Up",
-        description="Where the body's top is, as an axis of the armature",
-        items=_AXIS_CHOICES,
-        default="AUTO",
-        options={"SKIP_SAVE"},
-    )
+    front: _axis("Front", "Which way the body faces, as an axis of the armature")
+    up: _axis("Up", "Where the body's top is, as an axis of the armature")
 
-    def edit(
-        self,
-        context: bpy.types.Context,
-        armature: bpy.types.Object,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
         # Transforms that a script has just set count as well.
         context.view_layer.update()
-        listed = len(settings.arms) > 0
+        set_before = (settings.body_up, settings.body_front) if settings.arms else (None, None)
+        up, front = (
+            before if chosen == "AUTO" else chosen
+            for chosen, before in zip((self.up, self.front), set_before, strict=True)
+        )
         found = detect_arms(
-            read_skeleton(armature),
-            *world_directions(armature),
-            up=_axis(self.up, settings.body_up if listed else None),
-            front=_axis(self.front, settings.body_front if listed else None),
+            read_skeleton(armature), *world_directions(armature), up=up, front=front
         )
         left_over = write_arms(settings, found.arms)
         write_body(settings, found)
@@ -139,14 +118,14 @@ class OCTO_MOTION_OT_detect_arms(_ArmListOperator, bpy.types.Operator):
             )
 
 
-class OCTO_MOTION_OT_arm_add(_ArmListOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_arm_add(ListOperator, bpy.types.Operator):
     bl_idname = "octo_motion.arm_add"
     bl_label = "Add Arm"
     bl_description = (
         "Add an arm made of the selected bones: three or more of one chain, in any order. Side "
         "and pair follow from where it lies. In edit mode it goes to pose mode"
     )
-    bl_options = {"REGISTER", "UNDO"}
+    KIND = _ARMS
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -155,12 +134,7 @@ class OCTO_MOTION_OT_arm_add(_ArmListOperator, bpy.types.Operator):
             return False
         return True
 
-    def edit(
-        self,
-        context: bpy.types.Context,
-        armature: bpy.types.Object,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
         skeleton = read_skeleton(armature)
         bones = chain_of(skeleton, selected_bones(armature))
         others = placed_arms(settings, skeleton)
@@ -199,33 +173,28 @@ class OCTO_MOTION_OT_arm_move(MoveOperator, bpy.types.Operator):
     KIND = _ARMS
 
 
-class OCTO_MOTION_OT_arm_flip(_ActiveArmOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_arm_flip(ItemOperator, bpy.types.Operator):
     bl_idname = "octo_motion.arm_flip"
     bl_label = "Flip Arm"
     bl_description = (
         "Mirror the active arm's motion: forward and twist turn the other way. For an arm that "
         "moves backward where its neighbors move forward. Done again, it takes that back"
     )
-    bl_options = {"REGISTER", "UNDO"}
+    KIND = _ARMS
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         arm = settings.arms[settings.active_arm]
         arm.flip = not arm.flip
 
 
-class OCTO_MOTION_OT_arm_select(_ActiveArmOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_arm_select(ItemOperator, bpy.types.Operator):
     bl_idname = "octo_motion.arm_select"
     bl_label = "Select Arm's Bones"
     bl_description = (
         "Show which bones the active arm is made of: select them in pose mode. Hold Shift to add "
         "them to what is selected"
     )
-    bl_options = {"REGISTER", "UNDO"}
+    KIND = _ARMS
 
     extend: BoolProperty(
         name="Extend",
@@ -246,12 +215,7 @@ class OCTO_MOTION_OT_arm_select(_ActiveArmOperator, bpy.types.Operator):
         self.extend = event.shift
         return self.execute(context)
 
-    def edit(
-        self,
-        context: bpy.types.Context,
-        armature: bpy.types.Object,
-        settings: OCTO_MOTION_PG_locomotion,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
         arm = settings.arms[settings.active_arm]
         bones = bones_of(arm)
         hidden = hidden_bones(armature, bones)
@@ -271,64 +235,52 @@ class OCTO_MOTION_OT_arm_select(_ActiveArmOperator, bpy.types.Operator):
             )
 
 
-def draw_arms(
-    layout: bpy.types.UILayout,
-    _context: bpy.types.Context,
-    settings: OCTO_MOTION_PG_locomotion,
-) -> None:
-    """The list with its buttons, the active arm's details, and which way the body faces."""
-    layout.operator(OCTO_MOTION_OT_detect_arms.bl_idname, icon="VIEWZOOM")
-    row = layout.row()
-    row.template_list(
-        OCTO_MOTION_UL_arms.__name__,
-        "",
-        settings,
-        "arms",
-        settings,
-        "active_arm",
-        # As high as the buttons beside it, or as an octopus needs.
-        rows=7,
-        maxrows=8,
-    )
-    _draw_buttons(row.column(align=True))
-    arm = active_arm(settings)
-    if arm is not None:
-        _draw_details(layout, arm, list_owner(settings))
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
-    column.prop(settings, "body_front")
-    column.prop(settings, "body_up")
-    column.prop_search(settings, "root_bone", list_owner(settings).data, "bones")
+class OCTO_MOTION_PT_arms(ArmaturePanel, bpy.types.Panel):
+    bl_label = "Arms"
+    bl_order = 1
+    settings_of = staticmethod(locomotion_settings)
+
+    def show(self, layout: Any, settings: Any) -> None:
+        """The list with its buttons, the active arm's details, and which way the body faces."""
+        layout.use_property_split = False
+        layout.operator(OCTO_MOTION_OT_detect_arms.bl_idname, icon="VIEWZOOM")
+        buttons = draw_list(
+            *(layout, OCTO_MOTION_UL_arms, settings, ("arms", "active_arm")),
+            (OCTO_MOTION_OT_arm_add, OCTO_MOTION_OT_arm_remove),
+            # As high as the buttons beside it, or as an octopus needs.
+            rows=7,
+            maxrows=8,
+        )
+        buttons.separator()
+        for direction in ("UP", "DOWN"):
+            move = buttons.operator(
+                OCTO_MOTION_OT_arm_move.bl_idname, text="", icon=f"TRIA_{direction}"
+            )
+            move.direction = direction
+        buttons.separator()
+        buttons.operator(OCTO_MOTION_OT_arm_select.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
+        buttons.operator(OCTO_MOTION_OT_arm_flip.bl_idname, text="", icon="ARROW_LEFTRIGHT")
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        arm = _ARMS.active_item(settings)
+        if arm is not None:
+            _draw_details(column, arm)
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(settings, "body_front")
+        column.prop(settings, "body_up")
+        column.prop_search(settings, "root_bone", settings.id_data.data, "bones")
 
 
-def _draw_buttons(column: bpy.types.UILayout) -> None:
-    column.operator(OCTO_MOTION_OT_arm_add.bl_idname, text="", icon="ADD")
-    column.operator(OCTO_MOTION_OT_arm_remove.bl_idname, text="", icon="REMOVE")
-    column.separator()
-    up = column.operator(OCTO_MOTION_OT_arm_move.bl_idname, text="", icon="TRIA_UP")
-    cast("Any", up).direction = "UP"
-    down = column.operator(OCTO_MOTION_OT_arm_move.bl_idname, text="", icon="TRIA_DOWN")
-    cast("Any", down).direction = "DOWN"
-    column.separator()
-    column.operator(OCTO_MOTION_OT_arm_select.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
-    column.operator(OCTO_MOTION_OT_arm_flip.bl_idname, text="", icon="ARROW_LEFTRIGHT")
-
-
-def _draw_details(layout: bpy.types.UILayout, arm: Any, armature: bpy.types.Object) -> None:
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
+def _draw_details(column: Any, arm: Any) -> None:
     if arm.bones:
         told = f"{len(arm.bones)} bones, {arm.bones[0].name} … {arm.bones[-1].name}"
         column.label(text=told, icon="BONE_DATA")
-    missing = [bone.name for bone in arm.bones if bone.name not in armature_data(armature).bones]
+    missing = [bone.name for bone in arm.bones if bone.name not in arm.id_data.data.bones]
     if missing:
         column.label(text=f"No bone '{missing[0]}': detect again", icon="ERROR")
     for name in ("side", "pair", "phase", "flip"):
         column.prop(arm, name)
-
-
-def _axis(chosen: str, otherwise: str | None) -> str | None:
-    return otherwise if chosen == "AUTO" else chosen
 
 
 def _summary(arms: Sequence[ArmChain]) -> str:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import bpy
 from bpy.props import FloatProperty
@@ -12,6 +12,7 @@ from ....blender.rig import active_armature, require_editable
 from ....blender.scene import markers, remove_markers
 from ....core.errors import OctoMotionError, SettingsError
 from ...operator_base import ArmatureOperator, OctoOperator, show_in_local_view
+from ...panel_base import ArmaturePanel, TabPanel, armature_in
 from ..reading import resting
 from ..settings import (
     OCTO_MOTION_PG_locomotion,
@@ -31,7 +32,6 @@ class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
         "Put a marker wherever an arm takes hold of the ground. Drag or turn a marker and the arm "
         "holds on there; delete it and the arm does not; then generate again"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
@@ -51,7 +51,6 @@ class OCTO_MOTION_OT_contacts_hide(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.contacts_hide"
     bl_label = "Hide Contacts"
     bl_description = "Take the markers away. What was changed on them is kept"
-    bl_options = {"REGISTER", "UNDO"}
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
@@ -68,7 +67,6 @@ class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
         "Forget what was moved, locked, shifted or deleted: all contacts are again where the gait "
         "has them"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
@@ -97,7 +95,6 @@ class OCTO_MOTION_OT_contacts_shift(OctoOperator, bpy.types.Operator):
         "Let the arms of the selected markers take hold so many frames later, or earlier if it is "
         "negative; then generate again"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     frames: FloatProperty(
         name="Frames",
@@ -154,35 +151,37 @@ def draw_rest(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     column.prop(ground, "rest_within")
 
 
-def draw_ground(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-    """How arms hold the ground, and where."""
-    ground = settings.ground
-    layout.active = ground.use and settings.table.manner != "SWIM"
-    column = layout.column(align=True)
-    column.prop(ground, "duty")
-    column.prop(ground, "planted")
-    column = layout.column(align=True)
-    column.prop(ground, "stretch")
-    column.prop(ground, "lift")
-    column = layout.column(align=True)
-    column.prop(ground, "lean")
-    column.prop(ground, "smoothing")
-    row = layout.row(align=True)
-    if ground.shown:
-        row.operator(OCTO_MOTION_OT_contacts_hide.bl_idname, icon="HIDE_ON")
-    else:
-        row.operator(OCTO_MOTION_OT_contacts_show.bl_idname, icon="EMPTY_SINGLE_ARROW")
-    row.operator(OCTO_MOTION_OT_contacts_clear.bl_idname, text="", icon="LOOP_BACK")
-    if count := changed_by_hand(ground):
-        layout.label(text=f"{count} contact{'s' * (count > 1)} changed by hand", icon="PINNED")
+class OCTO_MOTION_PT_ground(ArmaturePanel, bpy.types.Panel):
+    bl_label = "Hold the Ground"
+    bl_parent_id = "OCTO_MOTION_PT_route"
+    bl_options = {"DEFAULT_CLOSED"}
+    settings_of = staticmethod(locomotion_settings)
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        armature = armature_in(context)
+        if armature is not None:
+            cast("Any", self).layout.prop(locomotion_settings(armature).ground, "use", text="")
+
+    def show(self, layout: Any, settings: Any) -> None:
+        """How arms hold the ground, and where."""
+        ground = settings.ground
+        layout.active = ground.use and settings.table.manner != "SWIM"
+        for names in (("duty", "planted"), ("stretch", "lift"), ("lean", "smoothing")):
+            column = layout.column(align=True)
+            for name in names:
+                column.prop(ground, name)
+        row = layout.row(align=True)
+        if ground.shown:
+            row.operator(OCTO_MOTION_OT_contacts_hide.bl_idname, icon="HIDE_ON")
+        else:
+            row.operator(OCTO_MOTION_OT_contacts_show.bl_idname, icon="EMPTY_SINGLE_ARROW")
+        row.operator(OCTO_MOTION_OT_contacts_clear.bl_idname, text="", icon="LOOP_BACK")
+        if count := changed_by_hand(ground):
+            layout.label(text=f"{count} contact{'s' * (count > 1)} changed by hand", icon="PINNED")
 
 
-class OCTO_MOTION_PT_contact(bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_contact"
+class OCTO_MOTION_PT_contact(TabPanel, bpy.types.Panel):
     bl_label = "Contact"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "UI"
-    bl_category = "Octo Motion"
     bl_order = 0
 
     @classmethod
@@ -191,10 +190,8 @@ class OCTO_MOTION_PT_contact(bpy.types.Panel):
         return item is not None and bool(item.octo_motion.contact.armature)  # type: ignore[attr-defined]
 
     def draw(self, context: bpy.types.Context) -> None:
-        item, layout = context.object, self.layout
-        assert item is not None
-        assert layout is not None
-        own: Any = item.octo_motion.contact  # type: ignore[attr-defined]
+        layout = cast("Any", self).layout
+        own = cast("Any", context.object).octo_motion.contact
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.label(text=f"{own.arm}, cycle {own.cycle}", icon="PINNED")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
@@ -24,9 +24,12 @@ from ....blender.files import (
 from ....blender.rig import active_armature
 from ....core.errors import GaitError
 from ....core.locomotion.gait import CYCLE, GaitCurve, renamed_gait
-from ...operator_base import ArmatureOperator
+from ...operator_base import ArmatureOperator, FileOperator, window_manager
+from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..settings import (
     SIDES,
+    OCTO_MOTION_PG_gait_curve,
+    OCTO_MOTION_PG_gait_table,
     OCTO_MOTION_PG_locomotion,
     fill_curve,
     fill_gait_table,
@@ -38,19 +41,18 @@ from ..settings import (
     used,
 )
 
-if TYPE_CHECKING:
-    from bpy.stub_internal.rna_enums import OperatorReturnItems
 
+class _GaitOperator(ArmatureOperator):
+    """An operator on the gait of an armature whose settings can be written."""
 
-def _settings(context: bpy.types.Context) -> OCTO_MOTION_PG_locomotion:
-    """Settings that can be written.
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        writable_armature(armature)
+        self.edit(locomotion_settings(armature))
 
-    Raises:
-        WriteError: the armature is linked.
-    """
-    armature = active_armature(context)
-    writable_armature(armature)
-    return locomotion_settings(armature)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
+        """Do the work."""
+        raise NotImplementedError
 
 
 def _editable(settings: OCTO_MOTION_PG_locomotion) -> Any:
@@ -59,6 +61,12 @@ def _editable(settings: OCTO_MOTION_PG_locomotion) -> Any:
     if not used(settings.table.curves):
         set_gait(settings, table)
     return settings.table
+
+
+def _row(name: str, description: str) -> Any:
+    return IntProperty(
+        name=name, description=description, default=-1, min=-1, options={"SKIP_SAVE"}
+    )
 
 
 def _active(collection: Any, index: int, what: str) -> Any:
@@ -87,11 +95,10 @@ def _curve_of(table: Any, pair: int) -> Any:
 # --- Presets -------------------------------------------------------------------------------------
 
 
-class OCTO_MOTION_OT_gait_load(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_load(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_load"
     bl_label = "Load Gait"
     bl_description = "Load a gait into the table, in place of what is there"
-    bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(
         name="Name",
@@ -100,16 +107,14 @@ class OCTO_MOTION_OT_gait_load(ArmatureOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         fill_gait_table(settings, self.name or settings.gait)
 
 
-class OCTO_MOTION_OT_gait_save(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_save(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_save"
     bl_label = "Save Gait as Preset"
     bl_description = "Keep the table among your own gaits, for this and all other files"
-    bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(
         name="Name", description="What the gait is called from now on", options={"SKIP_SAVE"}
@@ -120,28 +125,22 @@ class OCTO_MOTION_OT_gait_save(ArmatureOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Ask for the name."""
         current = locomotion_settings(active_armature(context)).gait
         own = current in user_gait_names()
         self.name = current if own else f"my {current}"
         self.overwrite = own
-        assert context.window_manager is not None
-        return context.window_manager.invoke_props_dialog(self)
+        return window_manager(context).invoke_props_dialog(self)
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         table = renamed_gait(read_gait(settings), self.name.strip())
         save_gait(table, overwrite=self.overwrite)
         set_gait(settings, table)
         self.report({"INFO"}, f"Saved the gait '{table.name}'.")
 
 
-class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_remove(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_remove"
     bl_label = "Remove Gait Preset"
     bl_description = (
@@ -156,21 +155,18 @@ class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def invoke(
-        self, context: bpy.types.Context, event: bpy.types.Event
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:
         """Ask first."""
-        assert context.window_manager is not None
-        return context.window_manager.invoke_confirm(self, event)
+        return window_manager(context).invoke_confirm(self, event)
 
-    def run(self, context: bpy.types.Context) -> None:
-        name = self.name or _settings(context).gait
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
+        name = self.name or settings.gait
         remove_gait(name)
         self.report({"INFO"}, f"Removed the gait '{name}'.")
 
 
-class _FileOperator(ArmatureOperator):
-    """Asks for a file."""
+class _GaitFile(FileOperator):
+    """Asks for a gait's file."""
 
     filename_ext: Final = SUFFIX
 
@@ -182,23 +178,13 @@ class _FileOperator(ArmatureOperator):
     )
     filter_glob: StringProperty(default=f"*{SUFFIX}", options={"HIDDEN"})
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
-        """Open the file browser."""
-        assert context.window_manager is not None
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
     def _path(self) -> Path:
         if not self.filepath:
             raise GaitError("No file is given.", "Choose one.")
         return Path(bpy.path.abspath(self.filepath))
 
 
-class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_export(_GaitFile, ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_export"
     bl_label = "Export Gait"
     bl_description = "Write the table to a JSON file, to hand it on or to edit it as text"
@@ -207,9 +193,7 @@ class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
 
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
 
-    def invoke(
-        self, context: bpy.types.Context, event: bpy.types.Event
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:
         """Propose the gait's name, in the file browser."""
         if not self.filepath:
             name = bpy.path.clean_name(locomotion_settings(active_armature(context)).gait)
@@ -232,24 +216,22 @@ class OCTO_MOTION_OT_gait_export(_FileOperator, bpy.types.Operator):
         self.report({"INFO"}, f"Wrote the gait '{table.name}' to '{path.name}'.")
 
 
-class OCTO_MOTION_OT_gait_import(_FileOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_import(_GaitFile, _GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_import"
     bl_label = "Import Gait"
     bl_description = "Load the table from a JSON file"
-    bl_options = {"REGISTER", "UNDO"}
 
-    def run(self, context: bpy.types.Context) -> None:
-        set_gait(_settings(context), read_gait_file(self._path()))
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
+        set_gait(settings, read_gait_file(self._path()))
 
 
 # --- The table -----------------------------------------------------------------------------------
 
 
-class OCTO_MOTION_OT_gait_curve_add(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_curve_add(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_curve_add"
     bl_label = "Add Pair"
     bl_description = "Give one pair of arms angles of its own, to begin with those it has now"
-    bl_options = {"REGISTER", "UNDO"}
 
     pair: IntProperty(
         name="Pair",
@@ -258,26 +240,23 @@ class OCTO_MOTION_OT_gait_curve_add(ArmatureOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
-        taken = set(read_gait(settings).curves)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
+        table = read_gait(settings)
+        taken = set(table.curves)
         pair = self.pair or next(each for each in range(1, len(taken) + 2) if each not in taken)
         if pair in taken:
             raise GaitError(f"Pair {pair} has angles of its own already.", "Choose another pair.")
-        table = read_gait(settings)
         curves = {**table.curves, pair: table.curves[0]}
         fill_table(_editable(settings), replace(table, curves=curves))
         settings.table.active_curve = sorted(curves).index(pair)
 
 
-class OCTO_MOTION_OT_gait_curve_remove(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_curve_remove(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_curve_remove"
     bl_label = "Remove Pair"
     bl_description = "Let the chosen pair move like all others again"
-    bl_options = {"REGISTER", "UNDO"}
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         table, group = read_gait(settings), settings.table
         pair = _active(used(group.curves), group.active_curve, "pair").pair
         if pair == 0:
@@ -288,22 +267,14 @@ class OCTO_MOTION_OT_gait_curve_remove(ArmatureOperator, bpy.types.Operator):
         group.active_curve = before - 1
 
 
-class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_knot_add(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_knot_add"
     bl_label = "Add Knot"
     bl_description = "Add a knot half-way to the next one, without changing the motion"
-    bl_options = {"REGISTER", "UNDO"}
 
-    knot: IntProperty(
-        name="Knot",
-        description="Row after which the knot is added, counted from 0; -1 fills the widest gap",
-        default=-1,
-        min=-1,
-        options={"SKIP_SAVE"},
-    )
+    knot: _row("Knot", "Row after which the knot is added, counted from 0; -1 fills the widest gap")
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         pair, shape = _chosen_curve(settings)
         # As they are listed, which need not be in order.
         listed = used(settings.table.curves)
@@ -335,22 +306,14 @@ class OCTO_MOTION_OT_gait_knot_add(ArmatureOperator, bpy.types.Operator):
         curve.active_knot = gap + 1
 
 
-class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_knot_remove(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_knot_remove"
     bl_label = "Remove Knot"
     bl_description = "Remove this knot: the angles then run evenly between its neighbours"
-    bl_options = {"REGISTER", "UNDO"}
 
-    knot: IntProperty(
-        name="Knot",
-        description="Row to remove, counted from 0; -1 takes the last",
-        default=-1,
-        min=-1,
-        options={"SKIP_SAVE"},
-    )
+    knot: _row("Knot", "Row to remove, counted from 0; -1 takes the last")
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         pair, shape = _chosen_curve(settings)
         count = len(shape.phases) - 1
         knot = self.knot if self.knot >= 0 else count - 1
@@ -364,17 +327,15 @@ class OCTO_MOTION_OT_gait_knot_remove(ArmatureOperator, bpy.types.Operator):
         fill_curve(_curve_of(_editable(settings), pair), shape)
 
 
-class OCTO_MOTION_OT_gait_offset_add(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_offset_add(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_offset_add"
     bl_label = "Add Offset"
     bl_description = "Give one arm a phase of its own, whatever the spread says"
-    bl_options = {"REGISTER", "UNDO"}
 
     pair: IntProperty(name="Pair", description="Pair of the arm, 1 in front", min=1, default=1)
     side: EnumProperty(name="Side", description="Side of the arm", items=SIDES)
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         table = read_gait(settings)
         if (self.pair, self.side) in table.offsets:
             raise GaitError(
@@ -386,22 +347,14 @@ class OCTO_MOTION_OT_gait_offset_add(ArmatureOperator, bpy.types.Operator):
         settings.table.active_offset = sorted(offsets).index((self.pair, self.side))
 
 
-class OCTO_MOTION_OT_gait_offset_remove(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_offset_remove(_GaitOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_offset_remove"
     bl_label = "Remove Offset"
     bl_description = "Let this arm follow the spread again"
-    bl_options = {"REGISTER", "UNDO"}
 
-    offset: IntProperty(
-        name="Offset",
-        description="Row to remove, counted from 0; -1 takes the last",
-        default=-1,
-        min=-1,
-        options={"SKIP_SAVE"},
-    )
+    offset: _row("Offset", "Row to remove, counted from 0; -1 takes the last")
 
-    def run(self, context: bpy.types.Context) -> None:
-        settings = _settings(context)
+    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         offsets = sorted(read_gait(settings).offsets.items())
         number = self.offset if self.offset >= 0 else len(offsets) - 1
         _active(offsets, number, "offset")
@@ -410,32 +363,27 @@ class OCTO_MOTION_OT_gait_offset_remove(ArmatureOperator, bpy.types.Operator):
 
 
 class OCTO_MOTION_MT_gait_offset(bpy.types.Menu):
-    bl_idname = "OCTO_MOTION_MT_gait_offset"
     bl_label = "Add Offset"
     bl_description = "Give one arm a phase of its own, whatever the spread says"
 
     def draw(self, context: bpy.types.Context | None) -> None:
-        layout = self.layout
-        assert layout is not None
-        assert context is not None
-        settings = locomotion_settings(active_armature(context))
+        layout = cast("Any", self).layout
+        settings = locomotion_settings(active_armature(cast("bpy.types.Context", context)))
         taken = {(each.pair, each.side) for each in used(settings.table.offsets)}
         for pair, side, name in sorted({(arm.pair, arm.side, arm.name) for arm in settings.arms}):
             if (pair, side) not in taken:
-                chosen: Any = layout.operator(OCTO_MOTION_OT_gait_offset_add.bl_idname, text=name)
+                chosen = layout.operator(OCTO_MOTION_OT_gait_offset_add.bl_idname, text=name)
                 chosen.pair, chosen.side = pair, side
         if not settings.arms:
             layout.label(text="Detect the arms first", icon="INFO")
 
 
 class OCTO_MOTION_MT_gait(bpy.types.Menu):
-    bl_idname = "OCTO_MOTION_MT_gait"
     bl_label = "Gait"
     bl_description = "Load, save, import and export gaits"
 
     def draw(self, context: bpy.types.Context | None) -> None:  # noqa: ARG002
-        layout = self.layout
-        assert layout is not None
+        layout = cast("Any", self).layout
         layout.operator(OCTO_MOTION_OT_gait_load.bl_idname, text="Reload", icon="FILE_REFRESH")
         layout.separator()
         layout.operator(OCTO_MOTION_OT_gait_save.bl_idname, text="Save as Preset…", icon="ADD")
@@ -443,6 +391,95 @@ class OCTO_MOTION_MT_gait(bpy.types.Menu):
         layout.separator()
         layout.operator(OCTO_MOTION_OT_gait_import.bl_idname, text="Import…", icon="IMPORT")
         layout.operator(OCTO_MOTION_OT_gait_export.bl_idname, text="Export…", icon="EXPORT")
+
+
+# --- The table drawn ------------------------------------------------------------------------------
+
+
+_SIDE_LETTERS: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": ""}
+
+
+class OCTO_MOTION_PT_table(ArmaturePanel, bpy.types.Panel):
+    bl_label = "Table"
+    bl_parent_id = "OCTO_MOTION_PT_gait"
+    bl_options = {"DEFAULT_CLOSED"}
+    settings_of = staticmethod(locomotion_settings)
+
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+        table = settings.table
+        layout.row().prop(table, "manner", expand=True)
+        if table.manner == "SWIM":
+            layout.prop(table, "power_phase")
+        column = layout.column(align=True)
+        column.prop(table, "spread_pairs", text="Spread Pairs")
+        column.prop(table, "spread_sides")
+        _draw_offsets(layout, table)
+        curves = used(table.curves)
+        if not curves:
+            layout.operator(
+                OCTO_MOTION_OT_gait_load.bl_idname, text="Edit Angles", icon="GREASEPENCIL"
+            )
+            return
+        buttons = OCTO_MOTION_OT_gait_curve_add, OCTO_MOTION_OT_gait_curve_remove
+        draw_list(
+            *(layout, OCTO_MOTION_UL_gait_curves, table, ("curves", "active_curve")),
+            buttons,
+            rows=2,
+        )
+        if 0 <= table.active_curve < len(curves):
+            _draw_knots(layout, table, curves[table.active_curve])
+
+
+def _draw_offsets(layout: Any, table: OCTO_MOTION_PG_gait_table) -> None:
+    column = layout.column(align=True)
+    for number, offset in enumerate(used(table.offsets)):
+        row = column.row(align=True)
+        row.prop(offset, "phase", text=f"Arm {offset.pair} {_SIDE_LETTERS[offset.side]}")
+        remove = row.operator(
+            OCTO_MOTION_OT_gait_offset_remove.bl_idname, text="", icon="X", emboss=False
+        )
+        remove.offset = number
+    layout.menu(OCTO_MOTION_MT_gait_offset.__name__, icon="ADD")
+
+
+def _draw_knots(
+    layout: Any, table: OCTO_MOTION_PG_gait_table, curve: OCTO_MOTION_PG_gait_curve
+) -> None:
+    layout.use_property_split = False
+    layout.row().prop(table, "shown_angle", expand=True)
+    angle = table.shown_angle.lower()
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    for title in ("Phase", "Root", "Middle", "Tip"):
+        row.label(text=title)
+    row.label(text="", icon="BLANK1")
+    for number, knot in enumerate(used(curve.knots)):
+        row = column.row(align=True)
+        row.prop(knot, "phase", text="")
+        for link in range(3):
+            row.prop(knot, angle, index=link, text="")
+        remove = row.operator(
+            OCTO_MOTION_OT_gait_knot_remove.bl_idname, text="", icon="X", emboss=False
+        )
+        remove.knot = number
+    layout.operator(OCTO_MOTION_OT_gait_knot_add.bl_idname, icon="ADD")
+    if table.manner != "SWIM":
+        layout.prop(curve, "free")
+
+
+class OCTO_MOTION_UL_gait_curves(ItemRows, bpy.types.UIList):
+    """A row for the angles of all arms, and one for each pair that has its own."""
+
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
+        if item.unused:
+            layout.active = False
+            layout.label(text="Unused, of the linked file")
+        elif item.pair == 0:
+            layout.label(text="All Arms", icon="FCURVE")
+        else:
+            row = layout.row()
+            row.label(text="Only Pair", icon="FCURVE")
+            row.prop(item, "pair", text="", emboss=False)
 
 
 CLASSES: Final = (
@@ -459,4 +496,5 @@ CLASSES: Final = (
     OCTO_MOTION_OT_gait_offset_remove,
     OCTO_MOTION_MT_gait_offset,
     OCTO_MOTION_MT_gait,
+    OCTO_MOTION_UL_gait_curves,
 )

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
@@ -37,9 +37,6 @@ from ..settings import (
 )
 from ..writing import RESULTS, Shot, Summary, generate_locomotion, prepare
 
-if TYPE_CHECKING:
-    from bpy.stub_internal.rna_enums import OperatorReturnItems
-
 PATIENCE: Final = 1.5
 """Seconds that the window may stand still; a longer job shows its progress and can be stopped."""
 
@@ -51,7 +48,6 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         "Let the armature walk or swim along its route. What was generated before is made anew "
         "in place; an action that you have edited is kept, and a new one is made"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     _shot: Shot | None = None
 
@@ -60,11 +56,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         self._tell(generate_locomotion(armature, context))
         made(armature)
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Run at once if that is quick, else go on with progress and Esc."""
         try:
             self._shot = prepare(active_armature(context), context)

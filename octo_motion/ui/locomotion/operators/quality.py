@@ -13,10 +13,10 @@ from ....blender.rig import active_armature
 from ....core.errors import RigError, SettingsError
 from ....core.locomotion.metrics import TOLD
 from ...operator_base import ArmatureOperator
+from ...panel_base import ArmaturePanel, armature_in
 from ..settings import (
     KIND_NAMES,
     KINDS,
-    OCTO_MOTION_PG_locomotion,
     known_figures,
     locomotion_settings,
 )
@@ -34,20 +34,6 @@ def shown(kind: str, value: float) -> str:
     percent = 100.0 * value
     # The aims are hundredths of a percent; of what is large nobody wants to know so much.
     return f"{percent:.2f} %" if percent < 1.0 else f"{percent:.1f} %"
-
-
-def draw_figures(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-    """A row for each figure, with a button that goes to its frame."""
-    column = layout.column(align=True)
-    for item in known_figures(settings):
-        row = column.split(factor=_WORDS, align=True)
-        words = row.row()
-        words.alert = item.value > TOLD.get(item.kind, np.inf)
-        words.label(text=_told(item))
-        jump = row.operator(
-            OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
-        )
-        jump.kind = item.kind
 
 
 def _told(item: Any) -> str:
@@ -92,6 +78,31 @@ class OCTO_MOTION_OT_quality_jump(ArmatureOperator, bpy.types.Operator):
         assert context.scene is not None
         context.scene.frame_set(item.frame)
         self.report({"INFO"}, f"{_told(item)}.")
+
+
+class OCTO_MOTION_PT_quality(ArmaturePanel, bpy.types.Panel):
+    bl_label = "Quality"
+    bl_parent_id = "OCTO_MOTION_PT_generate"
+    bl_options = {"DEFAULT_CLOSED"}
+    settings_of = staticmethod(locomotion_settings)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        armature = armature_in(context)
+        return armature is not None and bool(known_figures(locomotion_settings(armature)))
+
+    def show(self, layout: Any, settings: Any) -> None:
+        """A row for each figure, with a button that goes to its frame."""
+        column = layout.column(align=True)
+        for item in known_figures(settings):
+            row = column.split(factor=_WORDS, align=True)
+            words = row.row()
+            words.alert = item.value > TOLD.get(item.kind, np.inf)
+            words.label(text=_told(item))
+            jump = row.operator(
+                OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
+            )
+            jump.kind = item.kind
 
 
 CLASSES: Final = (OCTO_MOTION_OT_quality_jump,)

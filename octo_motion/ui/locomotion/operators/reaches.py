@@ -14,9 +14,9 @@ from ....blender.rig import active_armature, require_editable
 from ....blender.scene import WITH_SURFACE
 from ....core.errors import RigError, SettingsError
 from ...operator_base import ArmatureOperator, ListKind, ListOperator, RemoveOperator
-from ...panel_base import ItemRows
+from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..reading import bones_of
-from ..settings import MODES, OCTO_MOTION_PG_locomotion, locomotion_settings
+from ..settings import MODES, locomotion_settings
 
 _SECONDS_TO_REACH: Final = 1.25
 _SECONDS_TO_HOLD: Final = 2.0
@@ -58,7 +58,6 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
         "object the arm curls up. In pose mode it is the arm of the active bone, else the one "
         "nearest to the object"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     mode: EnumProperty(name="Mode", description="What the arm does", items=MODES, default="COIL")
     target: StringProperty(
@@ -150,42 +149,45 @@ class OCTO_MOTION_OT_reach_remove(RemoveOperator, bpy.types.Operator):
     KIND = _REACHES
 
 
-def draw_reaches(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-    """The list, and what belongs to its active reach."""
-    row = layout.row()
-    row.template_list(
-        OCTO_MOTION_UL_reaches.__name__, "", settings, "reaches", settings, "active_reach", rows=2
-    )
-    column = row.column(align=True)
-    column.operator(OCTO_MOTION_OT_reach_add.bl_idname, text="", icon="ADD")
-    column.operator(OCTO_MOTION_OT_reach_remove.bl_idname, text="", icon="REMOVE")
-    item = _REACHES.active_item(settings)
-    if item is None:
-        return
-    layout = layout.column()
-    layout.active = not item.mute
-    layout.row().prop(item, "mode", expand=True)
-    if item.mode != "CURL":
-        layout.prop(item, "target")
-    layout.prop_search(item, "arm", settings, "arms")
-    if item.mode == "COIL":
-        layout.prop(item, "turns")
-        layout.prop(item, "carry")
-    if item.mode != "CURL":
-        layout.prop(item, "axis")
-    column = layout.column(align=True)
-    column.prop(item, "frame_start", text="Frame Start")
-    column.prop(item, "frame_contact", text="Closed" if item.mode == "CURL" else "Contact")
-    column.prop(item, "frame_release", text="Release")
-    column = layout.column(align=True)
-    if item.mode == "COIL":
-        column.prop(item, "coil_frames", text="Frames to Coil")
-        column.prop(item, "back_frames", text="Back")
-    else:
-        column.prop(item, "back_frames", text="Frames Back")
+class OCTO_MOTION_PT_reaches(ArmaturePanel, bpy.types.Panel):
+    bl_label = "Reaches"
+    bl_options = {"DEFAULT_CLOSED"}
+    bl_order = 3
+    settings_of = staticmethod(locomotion_settings)
+
+    def show(self, layout: Any, settings: Any) -> None:
+        """The list, and what belongs to its active reach."""
+        buttons = OCTO_MOTION_OT_reach_add, OCTO_MOTION_OT_reach_remove
+        draw_list(
+            layout, OCTO_MOTION_UL_reaches, settings, ("reaches", "active_reach"), buttons, rows=2
+        )
+        item = _REACHES.active_item(settings)
+        if item is None:
+            return
+        layout = layout.column()
+        layout.active = not item.mute
+        layout.row().prop(item, "mode", expand=True)
+        if item.mode != "CURL":
+            layout.prop(item, "target")
+        layout.prop_search(item, "arm", settings, "arms")
+        if item.mode == "COIL":
+            layout.prop(item, "turns")
+            layout.prop(item, "carry")
+        if item.mode != "CURL":
+            layout.prop(item, "axis")
+        column = layout.column(align=True)
+        column.prop(item, "frame_start", text="Frame Start")
+        column.prop(item, "frame_contact", text="Closed" if item.mode == "CURL" else "Contact")
+        column.prop(item, "frame_release", text="Release")
+        column = layout.column(align=True)
+        if item.mode == "COIL":
+            column.prop(item, "coil_frames", text="Frames to Coil")
+            column.prop(item, "back_frames", text="Back")
+        else:
+            column.prop(item, "back_frames", text="Frames Back")
 
 
-# --- The list of places where the gait changes: added, removed, drawn -----------------------------
+# --- Places where the gait changes ----------------------------------------------------------------
 
 
 def _change_settings(armature: bpy.types.Object) -> Any:
@@ -216,7 +218,6 @@ class OCTO_MOTION_OT_change_add(ListOperator, bpy.types.Operator):
     bl_idname = "octo_motion.change_add"
     bl_label = "Add Change of Gait"
     bl_description = "Let another gait go from a place of the route on"
-    bl_options = {"REGISTER", "UNDO"}
 
     KIND = _PLACES
 
@@ -235,12 +236,7 @@ class OCTO_MOTION_OT_change_add(ListOperator, bpy.types.Operator):
         max=1.0,
     )
 
-    def edit(
-        self,
-        context: bpy.types.Context,  # noqa: ARG002
-        armature: bpy.types.Object,  # noqa: ARG002
-        settings: Any,
-    ) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         load_gait(self.gait)
         item = settings.places.add()
         # Library overrides tell items apart by name.
@@ -262,30 +258,34 @@ class OCTO_MOTION_OT_change_remove(RemoveOperator, bpy.types.Operator):
     KIND = _PLACES
 
 
-def draw_changes(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-    """What decides, and the list."""
-    change = cast("Any", settings).change
-    layout.prop(change, "by")
-    if change.by == "HEIGHT":
-        column = layout.column(align=True)
-        column.prop(change, "gait")
-        column.prop(change, "height")
-        column.prop(change, "length")
-    elif change.by == "MARKERS":
-        row = layout.row()
-        row.template_list(
-            *(OCTO_MOTION_UL_changes.__name__, "", change, "places", change, "active_place"),
-            rows=3,
-        )
-        column = row.column(align=True)
-        column.operator(OCTO_MOTION_OT_change_add.bl_idname, text="", icon="ADD")
-        column.operator(OCTO_MOTION_OT_change_remove.bl_idname, text="", icon="REMOVE")
-        if 0 <= change.active_place < len(change.places):
-            item = change.places[change.active_place]
+class OCTO_MOTION_PT_change(ArmaturePanel, bpy.types.Panel):
+    bl_label = "Change of Gait"
+    bl_parent_id = "OCTO_MOTION_PT_gait"
+    bl_options = {"DEFAULT_CLOSED"}
+    settings_of = staticmethod(_change_settings)
+
+    def show(self, layout: Any, settings: Any) -> None:
+        """What decides, and the list."""
+        layout.prop(settings, "by")
+        if settings.by == "HEIGHT":
             column = layout.column(align=True)
-            column.prop(item, "gait")
-            column.prop(item, "position")
-            column.prop(item, "length")
+            for name in ("gait", "height", "length"):
+                column.prop(settings, name)
+        elif settings.by == "MARKERS":
+            buttons = OCTO_MOTION_OT_change_add, OCTO_MOTION_OT_change_remove
+            draw_list(
+                layout,
+                OCTO_MOTION_UL_changes,
+                settings,
+                ("places", "active_place"),
+                buttons,
+                rows=3,
+            )
+            item = _PLACES.active_item(settings)
+            if item is not None:
+                column = layout.column(align=True)
+                for name in ("gait", "position", "length"):
+                    column.prop(item, name)
 
 
 CLASSES: Final = (

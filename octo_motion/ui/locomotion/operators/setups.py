@@ -137,7 +137,6 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
         "Move like this: gait, stance and rhythm are set, while arms, route, ground, frames and "
         "keys stay as they are"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(
         name="Name",
