@@ -100,12 +100,7 @@ radians, texts may be in degrees.
 
 
 def parser(program: str, *, has_open_file: bool) -> argparse.ArgumentParser:
-    """The parser of all commands.
-
-    Args:
-        program: how it is called, for its help.
-        has_open_file: whether the file may be left out because Blender has one open.
-    """
+    """The parser of all commands; the file may be left out where Blender has one open."""
     main = argparse.ArgumentParser(
         prog=program,
         description="Octo Motion: creatures with arms walk and swim along a route, parts of one "

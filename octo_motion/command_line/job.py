@@ -71,12 +71,7 @@ class JobFile:
 
 
 def read_job(path: Path, known: Known, report: Path) -> JobFile:
-    """The shots of a job file.
-
-    Args:
-        path: the file.
-        known: what shots may name.
-        report: the report's path, which no output may have.
+    """The shots of a job file; none of their outputs may have the report's path.
 
     Raises:
         JobError: the file cannot be read or is wrong, with everything that is wrong with it.
@@ -371,8 +366,8 @@ class _Run:
 
     def _conclude(self, plans: Sequence[_Plan]) -> int:
         records = [self.records[plan.shot.name] for plan in plans]
-        told = (f"{count(records, each)} {each}" for each in ("done", "skipped", "failed"))
-        _say(f"{', '.join(told)}. Report: {self.report_problem or self.report}")
+        counts = (f"{count(records, each)} {each}" for each in ("done", "skipped", "failed"))
+        _say(f"{', '.join(counts)}. Report: {self.report_problem or self.report}")
         return 1 if count(records, "failed") or self.report_problem else 0
 
     def _report(self) -> None:

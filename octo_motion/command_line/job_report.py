@@ -96,13 +96,9 @@ def figures_in_words(figures: Sequence[Figure]) -> str:
 
 
 def check_limits(limits: Mapping[str, float], summary: Any) -> None:
-    """Make sure that a motion is as good as it has to be.
+    """Make sure that a motion is as good as it has to be: limits are in the units of ``quality``.
 
     A figure that it does not have, such as the slip of a swim, keeps to any limit.
-
-    Args:
-        limits: by name, in the units of :func:`quality`.
-        summary: of the motion, with its ``figures``.
 
     Raises:
         LimitError: a figure is above its limit, or nobody has looked.

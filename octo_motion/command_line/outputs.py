@@ -169,15 +169,8 @@ def check_export(path: Path, armature: bpy.types.Object, scene: bpy.types.Scene)
 def export(
     path: Path, armature: bpy.types.Object, scene: bpy.types.Scene, first: int, last: int
 ) -> None:
-    """Write an armature, all that hangs on it, and its motion to a file. Changes the selection and
-    the scene's frame range.
-
-    Args:
-        path: the file; its ending decides the format.
-        armature: the creature.
-        scene: the context's scene.
-        first: first frame of the motion.
-        last: last frame of the motion.
+    """Write an armature, all that hangs on it, and its motion to a file, whose ending decides the
+    format. Changes the selection and the frame range of the scene, which is the context's.
 
     Raises:
         WriteError: the file cannot be written, or the armature is hidden.

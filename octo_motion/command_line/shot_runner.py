@@ -51,11 +51,7 @@ class Performed:
 
 
 def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
-    """Make a shot and write its outputs.
-
-    Args:
-        shot: what is asked for.
-        places: where each of its outputs is to be written.
+    """Make a shot and write each of its outputs to its place.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -275,12 +271,7 @@ def _filled(settings: Any, name: str, items: Sequence[Mapping[str, Any]]) -> Non
 def _object(
     name: str, kind: str = "", instead: str = "Give a file that has one."
 ) -> bpy.types.Object:
-    """The object of that name.
-
-    Args:
-        name: of the object.
-        kind: of objects that will do; any without it.
-        instead: the remedy where there is none at all.
+    """The object of that name and kind, of any kind without; ``instead`` helps where none is there.
 
     Raises:
         SettingsError: there is none, or it is of another kind.

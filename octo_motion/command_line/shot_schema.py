@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -108,7 +107,7 @@ class ShotRequest:
     """In order, or none for the list that the file has."""
     settings: Settings = field(default_factory=dict)
     limits: dict[str, float] = field(default_factory=dict)
-    """How bad the figures of its motion may be, by name; see ``quality_limits``."""
+    """How bad the figures of its motion may be, by name; see ``check_limits``."""
     fps: float | None = None
     output: Path | None = None
     export: tuple[Path, ...] = ()
@@ -244,9 +243,9 @@ def _drawn(values: Mapping[str, Any], reading: Reading) -> NewRoute | None:
     if points is None:
         return None
     if "points" in values:
-        least, told = (3, "three") if cyclic else (2, "two")
+        least, number = (3, "three") if cyclic else (2, "two")
         if len(set(points)) < least:
-            reading.fault(f"points must be at least {told} that lie apart.")
+            reading.fault(f"points must be at least {number} that lie apart.")
         return NewRoute(points, is_bezier=False, cyclic=cyclic)
     if cyclic:
         reading.fault("four control points make no cyclic route: give points.")
@@ -504,7 +503,10 @@ def _check_generate(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
         if ground:
             reading.fault(f"A new octopus has no ground '{ground}': leave it to walk on its route.")
     limits = values.get("limits") or {}
-    return {**values, "limits": {name: each for name, each in limits.items() if isfinite(each)}}
+    return {
+        **values,
+        "limits": {name: each for name, each in limits.items() if math.isfinite(each)},
+    }
 
 
 def _check_splice(values: dict[str, Any], reading: Reading) -> dict[str, Any]:

@@ -138,13 +138,9 @@ def has_splices(armature: bpy.types.Object) -> bool:
 def splice(
     armature: bpy.types.Object, shot: ShotRequest, clips: Clips, base_file: Path | None
 ) -> ShotSummary:
-    """Fill the list of an armature as it is asked for, and build.
+    """Fill the list of an armature as it is asked for, and build; the context has its scene.
 
-    Args:
-        armature: what gets the result; the context has its scene.
-        shot: what to splice.
-        clips: files that have been imported.
-        base_file: the motion file that the armature was imported from, if it was.
+    ``clips`` have been imported, and the armature with them, if it is from a motion file.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.

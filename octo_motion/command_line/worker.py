@@ -241,10 +241,8 @@ def child_command(request: Path, answer: Path) -> list[str]:
 
 
 def child_environment(scratch: Path) -> dict[str, str]:
-    """Environment in which another Python finds this package.
-
-    Args:
-        scratch: folder for temporary files; a Blender that is killed leaves its own there.
+    """Environment in which another Python finds this package, and has a folder for temporary files:
+    a Blender that is killed leaves its own there.
     """
     root = Path(__file__).resolve().parents[1 + len(_PACKAGE.split("."))]
     paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH", "")])]
@@ -258,11 +256,7 @@ def write_request(
 ) -> None:
     """Write down what a process is to do; ``run_shot`` does it.
 
-    Args:
-        path: of the request.
-        job: path of the job file.
-        table: of the shot, as it stands there.
-        places: where each of its outputs is to be written.
+    It is told the job file, the shot's table there, and where each output is to be written.
     """
     plain = {str(output): str(place) for output, place in places.items()}
     text = json.dumps({"job": str(job), "table": table, "places": plain})

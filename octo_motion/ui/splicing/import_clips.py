@@ -21,13 +21,8 @@ if TYPE_CHECKING:
 
 
 class ImportSession:
-    """An import that can be stopped between files, and taken back.
-
-    Args:
-        paths: the files; one that is named twice is imported once.
-        frame_start: frame of the first key of each.
-        context: of the import; not kept.
-        up: which axis of BVH files points up.
+    """An import that can be stopped between files, and taken back. A file that is named twice is
+    imported once.
 
     Raises:
         ClipError: there are no files.
@@ -63,10 +58,8 @@ class ImportSession:
         return f"'{path.name}' ({min(number + 1, len(self._paths))} of {len(self._paths)})"
 
     def steps(self, progress: Callable[[float], None] = lambda _: None) -> Iterator[float]:
-        """Import them file by file; yields the share of the work that is done.
-
-        Args:
-            progress: is told the same more often.
+        """Import them file by file; yields the share of the work that is done, and calls
+        ``progress`` with it more often.
         """
         for number, path in enumerate(self._paths):
 

@@ -8,21 +8,18 @@ for: artists know them, and they need no files of ours.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, cast
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ...blender.animation import writable_armature
-from ...blender.rig import active_armature, armature_data, read_skeleton
+from ...blender.rig import armature_data, read_skeleton
 from ...core.errors import RigError
 from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
-from ..operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd
+from ..operator_base import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in
-from .properties import PROPERTIES, read_landmarks, splicing_settings, title, write_landmarks
-
-if TYPE_CHECKING:
-    from .properties import OCTO_MOTION_PG_splicing
+from .properties import PROPERTIES, read_landmarks, title, write_landmarks
+from .splice_operators import StackOperator
 
 _CHOICES: Final = tuple(
     (name, each, "Part of the body", number)
@@ -30,27 +27,13 @@ _CHOICES: Final = tuple(
 )
 
 
-class _TableOperator(ArmatureOperator):
-    """An operator on the table of the active armature."""
-
-    def run(self, context: bpy.types.Context) -> None:
-        armature = active_armature(context)
-        writable_armature(armature)
-        self.edit(context, armature, splicing_settings(armature).landmarks)
-
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:
-        """Do the work on an armature that can be edited."""
-        raise NotImplementedError
-
-
-class OCTO_MOTION_OT_map_skeleton(_TableOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
     bl_idname = "octo_motion.map_skeleton"
     bl_label = "Find Landmarks"
     bl_description = (
         "Find out which bone is which part of the body, from the names of the bones and from the "
         "rest pose, and fill the table. What cannot be told is left empty for you to choose"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     keep: BoolProperty(
         name="Keep What Is Set",
@@ -58,7 +41,7 @@ class OCTO_MOTION_OT_map_skeleton(_TableOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:  # noqa: ARG002
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         found = map_skeleton(read_skeleton(armature))
         if found.problem:
             raise RigError(
@@ -67,8 +50,8 @@ class OCTO_MOTION_OT_map_skeleton(_TableOperator, bpy.types.Operator):
             )
         bones = dict(found.landmarks.bones)
         if self.keep:
-            bones |= read_landmarks(table).bones
-        write_landmarks(table, bones)
+            bones |= read_landmarks(settings.landmarks).bones
+        write_landmarks(settings.landmarks, bones)
         self.report({"INFO"}, f"{len(bones)} of {len(LANDMARKS)} landmarks are set.")
         asked = [each for each in found.asked if each not in bones]
         if asked:
@@ -78,11 +61,10 @@ class OCTO_MOTION_OT_map_skeleton(_TableOperator, bpy.types.Operator):
             self.report({"WARNING"}, note)
 
 
-class OCTO_MOTION_OT_landmark_pick(_TableOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_landmark_pick(StackOperator, bpy.types.Operator):
     bl_idname = "octo_motion.landmark_pick"
     bl_label = "Pick Landmark"
     bl_description = "Take the active bone of pose mode for this part of the body"
-    bl_options = {"REGISTER", "UNDO"}
 
     landmark: EnumProperty(
         name="Landmark",
@@ -100,22 +82,21 @@ class OCTO_MOTION_OT_landmark_pick(_TableOperator, bpy.types.Operator):
             return False
         return True
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
         bone = context.active_pose_bone
         if bone is None or bone.id_data != armature:
             raise RigError(
                 f"The active bone is not of '{armature.name}'.", "Click a bone of that armature."
             )
-        setattr(table, self.landmark, bone.name)
+        setattr(settings.landmarks, self.landmark, bone.name)
 
 
-class OCTO_MOTION_OT_landmarks_mirror(_TableOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_landmarks_mirror(StackOperator, bpy.types.Operator):
     bl_idname = "octo_motion.landmarks_mirror"
     bl_label = "Mirror Landmarks"
     bl_description = (
         "Fill one side of the table with the bones that are called like those of the other side"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     direction: EnumProperty(
         name="Direction",
@@ -132,8 +113,8 @@ class OCTO_MOTION_OT_landmarks_mirror(_TableOperator, bpy.types.Operator):
         other = "right" if properties.direction == "LEFT_TO_RIGHT" else "left"
         return f"Fill the {other} side with the bones that are called like those of this side"
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:  # noqa: ARG002
-        bones = dict(read_landmarks(table).bones)
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
+        bones = dict(read_landmarks(settings.landmarks).bones)
         source, target = ("L", "R") if self.direction == "LEFT_TO_RIGHT" else ("R", "L")
         given = {part: bones[f"{part}.{source}"] for part in SIDED if f"{part}.{source}" in bones}
         word = {"L": "left", "R": "right"}
@@ -148,17 +129,16 @@ class OCTO_MOTION_OT_landmarks_mirror(_TableOperator, bpy.types.Operator):
                     "Choose that side's bones by hand.",
                 )
             bones[f"{part}.{target}"] = other
-        write_landmarks(table, bones)
+        write_landmarks(settings.landmarks, bones)
 
 
-class OCTO_MOTION_OT_landmarks_clear(_TableOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_landmarks_clear(StackOperator, bpy.types.Operator):
     bl_idname = "octo_motion.landmarks_clear"
     bl_label = "Clear Landmarks"
     bl_description = "Empty the table. Bones and their keys stay as they are"
-    bl_options = {"REGISTER", "UNDO"}
 
-    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, table: Any) -> None:  # noqa: ARG002
-        write_landmarks(table, {})
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
+        write_landmarks(settings.landmarks, {})
 
 
 class OCTO_MOTION_MT_landmark_presets(bpy.types.Menu):
@@ -195,7 +175,7 @@ class OCTO_MOTION_OT_landmark_preset_add(  # pyright: ignore[reportIncompatibleM
 def draw_landmarks(
     layout: bpy.types.UILayout,
     context: bpy.types.Context,
-    settings: OCTO_MOTION_PG_splicing,
+    settings: Any,
 ) -> None:
     """The table with its buttons; missing and unknown bones are marked."""
     row = layout.row(align=True)
@@ -207,8 +187,7 @@ def draw_landmarks(
     row.menu(menu.__name__, text=menu.bl_label)
     row.operator(preset, text="", icon="ADD")
     cast("Any", row.operator(preset, text="", icon="REMOVE")).remove_active = True
-    table = cast("Any", settings).landmarks
-    armature = cast("bpy.types.Object", settings.id_data)
+    table, armature = settings.landmarks, settings.id_data
     # Picking is for pose mode: elsewhere the buttons would only take room.
     can_pick = context.mode == "POSE"
     _draw_rows(layout, table, armature, MIDDLE, can_pick=can_pick)

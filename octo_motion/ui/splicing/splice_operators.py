@@ -41,14 +41,9 @@ def add_splice(
     base_start: float,
     frames: Floats,
 ) -> Any:
-    """Add a splice without a name to the list, from the clip's first frame on.
+    """Add a splice without a name to the list, of a source and its action.
 
-    Args:
-        settings: of the base's splicing.
-        source: the armature that the clip is for.
-        action: the clip.
-        base_start: frame of the base at which it begins.
-        frames: (frames,) the clip's.
+    It begins at a frame of the base with the first of the clip's frames (frames,).
     """
     item = settings.splices.add()
     item.source, item.action = source, action
@@ -100,15 +95,17 @@ def active_splice(settings: Any) -> Any:
 
 
 class StackOperator(ListOperator):
-    """An operator on the stack of the active armature."""
+    """An operator on the stack of the active armature, and what else it has of splicing."""
 
     KIND = _SPLICES
+    bl_options = {"REGISTER", "UNDO"}
 
 
 class SpliceOperator(ItemOperator):
     """An operator on the active splice."""
 
     KIND = _SPLICES
+    bl_options = {"REGISTER", "UNDO"}
 
 
 class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
@@ -119,7 +116,6 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
         "click the one that gets it; its action becomes the base. Without another armature you "
         "are asked for an action"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     part: EnumProperty(
         name="Part", description="Which part of the body is taken", items=PARTS, default="RIGHT_ARM"
@@ -286,7 +282,6 @@ class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
         "Put all splices of the list onto the base, as one new action. What was built before is "
         "made anew in place; an action that you have edited, the base and the clips are kept"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         stack = prepare_splices(armature)
@@ -300,7 +295,6 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
         "Begin the active splice where the legs of base and clip do the same, and build. The best "
         "moments are told; choose another one in the panel of the last operation"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     choice: IntProperty(
         name="Choice",

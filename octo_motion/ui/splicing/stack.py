@@ -183,12 +183,7 @@ class ClipReader:
     ) -> Source:
         """A clip by armature, action, and identifier of its slot ("" for the one that fits).
 
-        Args:
-            armature: the armature.
-            action: the action.
-            slot: the slot's identifier.
-            visual: whether it is read as the scene shows it.
-            between: whether it is read between whole frames as well.
+        ``visual``: as the scene shows it; ``between``: between whole frames as well.
         """
         key = (armature.name_full, action.name_full, slot, visual, between)
         if key not in self._sources:
@@ -391,29 +386,30 @@ def _listed(names: Iterable[str]) -> str:
 def _warnings(stack: Stack, items: Any) -> Iterator[str]:
     """Why something that was built cannot be seen."""
     base = stack.base.clip
-    held: dict[str, None] = {}
+    constrained: dict[str, None] = {}
     for splice, item in zip(stack.splices, items, strict=False):
         if splice is None:
             continue
         timing, clip = splice.timing, splice.clip
         if not splice_window(timing, base, clip).weights.any():
-            told, start, frames = "", timing.base_start, base.frames
+            whose, start, frames = ", and the base", timing.base_start, base.frames
             if timing.after == "stop" and timing.splice_start >= clip.frames[-1]:
-                told, start, frames = " of its clip, which", timing.splice_start, clip.frames
+                whose = " of its clip, which"
+                start, frames = timing.splice_start, clip.frames
             yield (
                 f"'{item.name}' changes nothing: it begins at frame {start:g}"
-                f"{told or ', and the base'} has frames {frames[0]:g} to {frames[-1]:g}."
+                f"{whose} has frames {frames[0]:g} to {frames[-1]:g}."
             )
-        held |= dict.fromkeys(_held(stack.base, splice))
-    if held:
-        whose = "its" if len(held) == 1 else "their"
+        constrained |= dict.fromkeys(_constrained(stack.base, splice))
+    if constrained:
+        whose = "its" if len(constrained) == 1 else "their"
         yield (
-            f"Constraints or drivers act on {_listed(held)} after {whose} keys: mute them if the "
+            f"Constraints or drivers act on {_listed(constrained)} after {whose} keys: mute them if the "
             "splice does not show."
         )
 
 
-def _held(base: Source, splice: Splice) -> list[str]:
+def _constrained(base: Source, splice: Splice) -> list[str]:
     """Bones of a splice that constraints or drivers move, of a body those that are landmarks."""
     skeleton, part = base.clip.skeleton, splice.part
     bones = _changed(base, splice)

@@ -36,11 +36,8 @@ Handle = Literal["base", "splice"]
 
 
 class TimingDrag:
-    """The two starts of a splice, one of them moved by hand: on the base, or in the clip.
-
-    Args:
-        base_start: frame of the base at which the splice begins.
-        splice_start: frame of the clip that is shown then.
+    """The two starts of a splice, one of them moved by hand: the frame of the base at which it
+    begins, or that of the clip which is shown then.
     """
 
     def __init__(self, base_start: float, splice_start: float) -> None:
@@ -106,10 +103,7 @@ class TimingDrag:
 class DragSession:
     """A drag on an armature: its pose follows, also when the frame changes, until it is taken down.
 
-    Args:
-        stack: all that was read.
-        number: which of its splices, none that is muted.
-        scene: whose current frame is shown.
+    The splice is none that is muted.
     """
 
     def __init__(self, stack: Stack, number: int, scene: bpy.types.Scene) -> None:

@@ -236,12 +236,8 @@ def _between(clip: Clip, frames: Floats) -> tuple[np.ndarray, np.ndarray, Floats
 def unposed(skeleton: Skeleton, orientations: Floats, heads: Floats) -> tuple[Floats, Floats]:
     """Rotations (…, bones, 4) and locations (…, bones, 3) in each bone's rest frame.
 
-    The inverse of ``Skeleton.pose``.
-
-    Args:
-        skeleton: the bones.
-        orientations: (…, bones, 4) quaternions, armature space.
-        heads: (…, bones, 3), armature space.
+    The inverse of ``Skeleton.pose``: of orientations (…, bones, 4) and heads (…, bones, 3) in
+    armature space.
     """
     rotations, locations = np.empty(orientations.shape), np.empty(heads.shape)
     for bone, parent in enumerate(skeleton.parents):
@@ -284,13 +280,8 @@ def without_scale(
 ) -> tuple[Floats, Floats]:
     """Rotations and locations that put all bones where they are when each scales its children.
 
-    For bones that inherit all of their parent's scale and rotation, which is the usual.
-
-    Args:
-        skeleton: the bones.
-        rotations: (frames, bones, 4) in each bone's rest frame.
-        locations: (frames, bones, 3) in each bone's rest frame.
-        scales: (frames, bones, 3) in each bone's rest frame.
+    For bones that inherit all of their parent's scale and rotation, which is the usual. All are
+    (frames, bones, 4) or (frames, bones, 3), in each bone's rest frame.
     """
     scales = np.where(np.abs(scales) < _LEAST, _LEAST, scales)
     basis = np.zeros((*rotations.shape[:2], 4, 4))

@@ -114,7 +114,7 @@ def splice_window(timing: Timing, base: Clip, splice: Clip) -> SpliceWindow:
     if timing.after == "loop":
         moments, rounds, seams = _looped(moments, times, eases)
     elif timing.after == "hold":
-        moments = _held(moments, times, eases[1])
+        moments = _slowed(moments, times, eases[1])
     return SpliceWindow(frames, weights, entering, moments, rounds, seams)
 
 
@@ -142,7 +142,7 @@ def _looped(
     return wrapped, rounds.astype(np.intp), seams
 
 
-def _held(moments: Floats, times: tuple[float, float], ease: float) -> Floats:
+def _slowed(moments: Floats, times: tuple[float, float], ease: float) -> Floats:
     """Moments that slow down to the clip's last one where they would run past it."""
     last = times[1]
     if not len(moments) or moments[-1] <= last + 1e-6:

@@ -265,13 +265,8 @@ _NEAR_THE_LEGS: Final = 0.9
 def find_trunk(
     body: BodyProportions, thighs: Sequence[int], shins: Sequence[int], shoulders: Sequence[int]
 ) -> dict[str, int]:
-    """The bones of the trunk.
-
-    Args:
-        body: the skeleton.
-        thighs: left and right.
-        shins: left and right.
-        shoulders: left and right, clavicles or upper arms.
+    """The bones of the trunk between limbs, left and right each; shoulders are clavicles or upper
+    arms.
     """
     head = _named(body, "head")
     if head is None:

@@ -94,9 +94,9 @@ def shape_of(skeleton: Skeleton, names: Sequence[BoneName]) -> Shape:
             f"start at '{skeleton.names[many[0]]}'."
         )
     if len(forks) != 2:
-        told = "no pair" if not forks else "one pair" if len(forks) == 1 else f"{len(forks)} pairs"
+        found = "no pair" if not forks else "one pair" if len(forks) == 1 else f"{len(forks)} pairs"
         return Shape(
-            problem=f"This is no humanoid by its shape: it has {told} of limbs that mirror each "
+            problem=f"This is no humanoid by its shape: it has {found} of limbs that mirror each "
             "other instead of two."
         )
     lower, upper = sorted(forks, key=lambda bone: len(skeleton.ancestors(bone)))

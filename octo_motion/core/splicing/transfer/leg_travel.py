@@ -49,9 +49,7 @@ class _Path:
 class LegTravel:
     """What of the way through the world does not hang on its timing.
 
-    Args:
-        retarget: of a leg, seen from the pelvis.
-        ground: height of the ground on which the base stands, world units.
+    The leg is seen from the pelvis; ``ground`` is the height on which the base stands, world units.
 
     Raises:
         ClipError: the base's hips cannot leave their parent.

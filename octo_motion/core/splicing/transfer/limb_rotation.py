@@ -164,13 +164,8 @@ def bend_to_reach(
 
 
 def _wanted_bend(upper: Floats, lower: Floats, limb: LimbTriangle, target: Floats) -> Floats:
-    """The bend (frames,) with which a hand is as far from the joint as its target, softened.
-
-    Args:
-        upper: (frames,) length of the upper limb.
-        lower: (frames,) of the lower limb.
-        limb: the limb.
-        target: (frames, 3)
+    """The bend (frames,) with which a hand is as far from the joint as its target (frames, 3),
+    softened. Upper and lower limb are given with their lengths (frames,).
     """
     product = np.maximum(upper * lower, 1e-12)
     distance = np.linalg.norm(target - limb.joint, axis=-1)
@@ -213,11 +208,8 @@ def _untwisted(turn: Floats, segment: Floats) -> Floats:
 
 
 def hinge_axis(limb: LimbTriangle, orientation: Floats) -> Floats:
-    """The axis (3,) about which a limb bends over a clip, along the upper limb's own axes.
-
-    Args:
-        limb: the joints over the clip.
-        orientation: (frames, 4) of the upper limb.
+    """The axis (3,) about which a limb bends over a clip, along the upper limb's own axes, whose
+    orientations (frames, 4) are given.
     """
     mean = rotate(conjugate(orientation), limb.normal).mean(axis=0)
     along = rotate(conjugate(orientation), limb.upper).mean(axis=0)

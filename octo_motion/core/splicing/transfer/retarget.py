@@ -343,17 +343,19 @@ def _side_retarget(
     marks = base.humanoid(), splice.humanoid()
     if kind.clavicle and clavicle:
         clavicle = all(_hangs_on_clavicle(kind, side, each) for each in clips)
-    from_pelvis = kind.frame(seen_from) == "pelvis"
-    with base.named_in_errors():
-        bones = kind_bones(kind, side, base.skeleton, marks[0], clavicle=clavicle)
-        chest = chest_frame(base.skeleton, marks[0])
-        pelvis = pelvis_frame(base.skeleton, marks[0]) if from_pelvis else chest
-    with splice.named_in_errors():
-        others = kind_bones(kind, side, splice.skeleton, marks[1], clavicle=clavicle)
-        chests = chest, laid_over(chest_frame(splice.skeleton, marks[1]), chest)
-        frames = chests
-        if from_pelvis:
-            frames = pelvis, laid_over(pelvis_frame(splice.skeleton, marks[1]), pelvis)
+
+    def seen(mapped: MappedClip) -> tuple[list[int], AnatomicalFrame, AnatomicalFrame]:
+        """Bones of the part, the chest's frame, and the frame from which the part is seen."""
+        skeleton, landmarks = mapped.skeleton, mapped.humanoid()
+        with mapped.named_in_errors():
+            bones = kind_bones(kind, side, skeleton, landmarks, clavicle=clavicle)
+            chest = chest_frame(skeleton, landmarks)
+            from_pelvis = kind.frame(seen_from) == "pelvis"
+            return bones, chest, pelvis_frame(skeleton, landmarks) if from_pelvis else chest
+
+    (bones, chest, frame), (others, other_chest, other_frame) = map(seen, clips)
+    chests = chest, laid_over(other_chest, chest)
+    frames = frame, laid_over(other_frame, frame)
     if kind.spine:
         return _spine_retarget(clips, (bones, others), frames, chests)
     pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, marks)

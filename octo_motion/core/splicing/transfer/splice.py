@@ -98,11 +98,7 @@ class Splicer:
     """
 
     def __init__(self, base: Clip, landmarks: Landmarks | None, splice: Splice) -> None:
-        """Match the two skeletons.
-
-        Raises:
-            ClipError: a bone or landmark is missing.
-        """
+        """Match the two skeletons; ClipError if a bone or landmark is missing."""
         if splice.travel and not (splice.part.kind is not None and splice.part.kind.travels):
             raise ClipError(
                 f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
@@ -117,11 +113,7 @@ class Splicer:
             self._travel = LegTravel(self._retargets[0], ground_height(mapped))
 
     def window(self, timing: Timing) -> SpliceWindow:
-        """What a timing means for the base.
-
-        Raises:
-            ClipError: the timing makes no sense.
-        """
+        """What a timing means for the base; ClipError if it makes no sense."""
         return splice_window(timing, self._base, self.splice.clip)
 
     def needed(self, span: SpliceWindow, rows: Iterable[int]) -> list[int]:
@@ -134,11 +126,8 @@ class Splicer:
         return sorted(needed)
 
     def onto(self, base: Clip, span: SpliceWindow) -> Clip:
-        """Put the part onto a clip of the base's skeleton.
-
-        Args:
-            base: the clip, or of its frames those that are :meth:`needed`.
-            span: when the splice acts on these frames.
+        """Put the part onto a clip of the base's skeleton, or onto those of its frames that are
+        :meth:`needed`; the span says when it acts on these.
         """
         if span.frames.stop == span.frames.start:
             return base
@@ -225,12 +214,6 @@ class SplicePreview:
     What does not hang on that timing is computed once: all splices beneath it, which bones answer
     to which, where the ground is. Each look then takes the frame in sight and the few others that
     it hangs on.
-
-    Args:
-        base: the base.
-        landmarks: the base's.
-        splices: the stack, the first one first.
-        number: the splice that is timed.
 
     Raises:
         ClipError: a bone or landmark is missing, or a timing makes no sense.
