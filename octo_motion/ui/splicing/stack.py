@@ -404,8 +404,8 @@ def _warnings(stack: Stack, items: Any) -> Iterator[str]:
     if constrained:
         whose = "its" if len(constrained) == 1 else "their"
         yield (
-            f"Constraints or drivers act on {_listed(constrained)} after {whose} keys: mute them if the "
-            "splice does not show."
+            f"Constraints or drivers act on {_listed(constrained)} after {whose} keys: mute them "
+            "if the splice does not show."
         )
 
 
