@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 
 import pytest
@@ -16,6 +17,7 @@ from octo_motion.core.rotations.scalars import (
     ZERO,
     Vector,
     add,
+    add_scaled,
     clamp_length,
     dot,
     from_rotation_vector,
@@ -46,6 +48,34 @@ from octo_motion.device.messages import HeldMessage, Pull
 from octo_motion.device.sources.simulated_hand import Hand, rest
 
 PERIOD = 0.001
+
+
+class RealHand(Hand):
+    """With what a real device adds: dry friction, steps of its position, a delay."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._coming: deque[tuple[float, Vector, Vector]] = deque()
+
+    def feel(self, force: Vector, torque: Vector) -> None:
+        self._coming.append((self.seconds + self.device.delay, force, torque))
+
+    def _step(self, step: float) -> None:
+        while self._coming and self._coming[0][0] <= self.seconds + 1e-9:
+            super().feel(*self._coming.popleft()[1:])
+        # Dry friction over the first tenth of a millimetre per second is a steep viscous one.
+        steep = self.device.friction / max(length(self.velocity), 1e-4)
+        force, self._force = self._force, add_scaled(self._force, self.velocity, -steep)
+        super()._step(step)
+        self._force = force
+
+    def measured(self) -> Vector:
+        """Where the device says that the hand is."""
+        step = self.device.resolution
+        if not step:
+            return self.position
+        x, y, z = (math.floor(each / step) * step for each in self.position)
+        return (x, y, z)
 
 
 def energy(hand: Hand) -> float:
@@ -82,7 +112,7 @@ def against_a_rock(
     seconds: float = 2.0,
 ) -> Outcome:
     """Let a hand swing on the coupling to a rock, the stiffest contact that there is."""
-    hand = Hand(
+    hand = RealHand(
         device=device,
         mass=mass,
         stiffness=stiffness,

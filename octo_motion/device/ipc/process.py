@@ -13,6 +13,7 @@ import contextlib
 import hashlib
 import hmac
 import importlib.util
+import itertools
 import logging
 import os
 import secrets
@@ -241,20 +242,10 @@ def python_executable() -> Path:
         DeviceError: none was found.
     """
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    names = [f"python{version}", "python3", "python"]
-    if os.name == "nt":
-        names = ["python.exe"]
+    names = (f"python{version}", "python3", "python") if os.name != "nt" else ("python.exe",)
     prefixes = dict.fromkeys((sys.prefix, sys.base_prefix, sys.exec_prefix))
-    candidates = [
-        Path(sys.executable or "."),
-        *(
-            Path(prefix) / place / name
-            for prefix in prefixes
-            for place in ("bin", ".")
-            for name in names
-        ),
-    ]
-    for path in candidates:
+    below = (Path(*each) for each in itertools.product(prefixes, ("bin", "."), names))
+    for path in (Path(sys.executable or "."), *below):
         if path.name.lower().startswith("python") and path.is_file() and os.access(path, os.X_OK):
             return path
     raise DeviceError(

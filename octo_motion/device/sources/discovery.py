@@ -71,7 +71,7 @@ class Discovery:
     def __init__(self, sources: Sources) -> None:
         self._port = Port(*sources.network, sources.key) if sources.network else None
         self._simulated = sources.simulated
-        self._search = _Search(sources) if sources.hid or sources.haply else None
+        self._search = _Search(sources)
         self.problems: list[DeviceError] = []
         """What the user should know; each once."""
 
@@ -84,24 +84,21 @@ class Discovery:
             device = self._port.device()
             if device is not None:
                 yield device
-        if self._search is not None:
-            self._search.ask()
-            while self._search.problems:
-                self.problems.append(self._search.problems.popleft())
-            while self._search.drivers:
-                yield self._search.drivers.popleft()
+        self._search.ask()
+        while self._search.problems:
+            self.problems.append(self._search.problems.popleft())
+        while self._search.drivers:
+            yield self._search.drivers.popleft()
 
     def lost(self, identity: str) -> None:
         """A device that was opened is gone; it may come again."""
-        if self._search is not None:
-            self._search.gone.append(identity)
+        self._search.gone.append(identity)
 
     def close(self) -> None:
         """Look no more."""
         if self._port is not None:
             self._port.close()
-        if self._search is not None:
-            self._search.close()
+        self._search.close()
 
 
 class _Search:
@@ -130,7 +127,7 @@ class _Search:
 
     def ask(self) -> None:
         """Ask for one more look; where one is under way, it must do."""
-        if self._thread.ident is None:
+        if self._thread.ident is None and (self._sources.hid or self._sources.haply):
             self._thread.start()
         self._asked.set()
 

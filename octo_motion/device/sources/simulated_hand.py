@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A hand on a force device that exists in numbers alone: for tests, and for trying out.
 
-The device is a mass with viscous and dry friction that measures in steps; the hand is a spring and
-a damper towards where it wants to be, and trembles. Between two samples the force is held, and the
+The device is a mass with viscous friction; the hand is a spring and a damper towards where it wants
+to be, and trembles. Between two samples the force is held, and the
 mass moves on in many small steps, as a real one would: what a sampled loop does to it shows here.
 """
 
@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 import random
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Final
 
 from ...core.rotations.scalars import (
     IDENTITY,
@@ -25,13 +25,15 @@ from ...core.rotations.scalars import (
     conjugate,
     from_rotation_vector,
     integrate,
-    length,
     multiply,
     scale,
     subtract,
     to_rotation_vector,
 )
 from ..driver import Description, Driver, Dynamics, Kind, Sample
+
+_STEPS: Final = 8
+"""Small ones to a millisecond."""
 
 Wish = Callable[[float], tuple[Vector, Quaternion]]
 """Where the hand wants to be at a time (s)."""
@@ -70,11 +72,7 @@ class Hand:
     """N·m·s/rad"""
     tremor: float = 1e-4
     """m, of a hand that trembles at 8 to 12 Hz."""
-    seed: int = 1
     wish: Wish = rest
-    steps: int = 8
-    """Small steps to a millisecond."""
-
     position: Vector = ZERO
     orientation: Quaternion = IDENTITY
     velocity: Vector = ZERO
@@ -82,37 +80,31 @@ class Hand:
     seconds: float = 0.0
     _force: Vector = ZERO
     _torque: Vector = ZERO
-    _coming: deque[tuple[float, Vector, Vector]] = field(
-        default_factory=deque[tuple[float, Vector, Vector]]
-    )
 
     def __post_init__(self) -> None:
         """Draw the tremor."""
-        dice = random.Random(self.seed)  # noqa: S311 - a tremor, not a secret
+        dice = random.Random(1)  # noqa: S311 - a tremor, not a secret
         self._waves = [
-            [(dice.uniform(50.0, 75.0), dice.uniform(0.0, 6.3), 1.0 / 3.0) for _ in range(3)]
+            [(dice.uniform(50.0, 75.0), dice.uniform(0.0, 6.3)) for _ in range(3)]
             for _axis in range(3)
         ]
 
     def feel(self, force: Vector, torque: Vector) -> None:
-        """Hold a force from now on (after the device's delay)."""
-        self._coming.append((self.seconds + self.device.delay, force, torque))
+        """Hold a force from now on."""
+        self._force, self._torque = force, torque
 
     def move(self, period: float) -> None:
         """Let time pass."""
-        count = max(1, round(period * 1000.0 * self.steps))
-        step = period / count
+        count = max(1, round(period * 1000.0 * _STEPS))
         for _ in range(count):
-            while self._coming and self._coming[0][0] <= self.seconds + 1e-9:
-                _, self._force, self._torque = self._coming.popleft()
-            self._step(step)
+            self._step(period / count)
 
     def _step(self, step: float) -> None:
         place, turn = self.wish(self.seconds)
         device, held = self.device, 1.0 if self.stiffness else 0.0
         apart = subtract(add(place, self._tremble()), self.position)
         pull = add_scaled(scale(apart, self.stiffness), self.velocity, -held * self.damping)
-        pull = subtract(pull, _friction(self.velocity, device.damping, device.friction))
+        pull = subtract(pull, scale(self.velocity, device.damping))
         self.velocity = add_scaled(self.velocity, add(pull, self._force), step / self.mass)
         self.position = add_scaled(self.position, self.velocity, step)
         spin = self.angular_velocity
@@ -120,7 +112,7 @@ class Hand:
         twist = add_scaled(
             scale(turned, self.angular_stiffness), spin, -held * self.angular_damping
         )
-        twist = subtract(twist, _friction(spin, device.angular_damping, device.angular_friction))
+        twist = subtract(twist, scale(spin, device.angular_damping))
         self.angular_velocity = add_scaled(spin, add(twist, self._torque), step / self.inertia)
         self.orientation = integrate(self.orientation, self.angular_velocity, step)
         self.seconds += step
@@ -129,24 +121,10 @@ class Hand:
         if not self.tremor or not self.stiffness:
             return ZERO
         x, y, z = (
-            self.tremor * sum(size * math.sin(rate * self.seconds + at) for rate, at, size in waves)
+            self.tremor / 3.0 * sum(math.sin(rate * self.seconds + at) for rate, at in waves)
             for waves in self._waves
         )
         return (x, y, z)
-
-    def measured(self) -> Vector:
-        """Where the device says that the hand is."""
-        step = self.device.resolution
-        if not step:
-            return self.position
-        x, y, z = (math.floor(each / step) * step for each in self.position)
-        return (x, y, z)
-
-
-def _friction(velocity: Vector, viscous: float, dry: float) -> Vector:
-    speed = length(velocity)
-    # Dry friction over the first tenth of a millimetre per second is a steep viscous one.
-    return scale(velocity, viscous + dry / max(speed, 1e-4))
 
 
 class SimulatedHand(Driver):
@@ -177,7 +155,7 @@ class SimulatedHand(Driver):
         self._last = now
         hand = self.hand
         return Sample(
-            *(now, hand.measured(), hand.orientation, hand.velocity, hand.angular_velocity),
+            *(now, hand.position, hand.orientation, hand.velocity, hand.angular_velocity),
             self.buttons,
         )
 
