@@ -19,7 +19,7 @@ from typing import Final
 
 from ..core.errors import DeviceError, OctoMotionError
 from ..core.posing.puppet import Pose
-from ..core.posing.solver import WorldSettings
+from ..core.posing.solver import Obstacle, WorldSettings
 from . import messages
 from .calibration import Phase
 from .haptics import Schedule
@@ -52,7 +52,8 @@ class Bridge:
         self._greeted = False
         self._figure: messages.FigureMessage | None = None
         self._world = WorldSettings(step=messages.WorldMessage.step)
-        self._obstacles: dict[int, messages.ObstacleMessage] = {}
+        self._obstacles: dict[int, Obstacle | None] = {}
+        """By Blender's number; None: gone."""
         self._remembered: dict[tuple[type[messages.Message], int], messages.Message] = {}
         self._devices: dict[int, messages.DeviceMessage] = {}
         self._workspaces: dict[int, messages.Workspace] = {}
@@ -124,10 +125,9 @@ class Bridge:
                 if simulation is not None:
                     simulation.change(self._world)
             case messages.ObstacleMessage():
-                obstacle = message.obstacle()
-                self._obstacles[message.number] = message
+                self._obstacles[message.number] = message.obstacle()
                 if simulation is not None:
-                    simulation.put_obstacle(message.number, obstacle)
+                    simulation.session.change_obstacles(self._solid())
             case messages.Settings():
                 message.response()
                 if simulation is not None:
@@ -159,12 +159,14 @@ class Bridge:
             self.simulation.place(pose)
             return
         simulation = Simulation(self._figure.figure(), pose, self._world)
-        for number, obstacle in self._obstacles.items():
-            simulation.put_obstacle(number, obstacle.obstacle())
+        simulation.session.change_obstacles(self._solid())
         settings = self._remembered.get((messages.Settings, 0))
         if isinstance(settings, messages.Settings):
             simulation.reach = settings.reach
         self.simulation = simulation
+
+    def _solid(self) -> tuple[Obstacle, ...]:
+        return tuple(each for each in self._obstacles.values() if each is not None)
 
     def _pass_on(self, message: messages.Message, number: int) -> None:
         self._remembered[type(message), number] = message
@@ -211,10 +213,8 @@ class Bridge:
                 self._lose_hands()
 
     def _hear_hands(self) -> None:
-        if self._hands is None:
-            return
         try:
-            came = self._hands.channel.receive()
+            came = self._hands.channel.receive() if self._hands else []
         except ChannelClosedError:
             self._lose_hands()
             return

@@ -9,13 +9,16 @@ Both are learned: what the axes say at rest, and the least and the most that the
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from math import copysign, isfinite
 from typing import Final
 
+import numpy as np
+
 from ..core.errors import DeviceError
+from ..core.rotations import Floats
 from ..core.rotations.scalars import subtract
 from .driver import Axes, Kind, Sample
 
@@ -156,18 +159,17 @@ def _share(raw: float, rest: float, least: float, most: float) -> float:
 class Calibrator:
     """Learns a device's zero and range from what it says.
 
-    Args:
-        kind: Of the device. A rate device must first be left alone; of a device that tells where
-            the hand is, the middle of its way is the zero.
+    A rate device must first be left alone; of a device that tells where the hand is, the middle of
+    its way is the zero.
     """
 
     def __init__(self, kind: Kind) -> None:
         self.phase = Phase.REST if kind is Kind.RATE else Phase.REACH
         self._kind = kind
         self._quiet: deque[tuple[float, Axes]] = deque()
-        self._rest = _NOTHING
-        self._least: Axes | None = None
-        self._most: Axes = _NOTHING
+        self._rest = np.zeros(6)
+        self._least: Floats | None = None
+        self._most = self._rest
 
     def feed(self, now: float, sample: Sample) -> None:
         """Take what the device says now."""
@@ -177,35 +179,30 @@ class Calibrator:
         if self.phase is Phase.REST:
             self._wait(now, raw)
         elif self.phase is Phase.REACH:
-            if self._least is None:
-                self._least = self._most = raw
-            self._least = _each(min, self._least, raw)
-            self._most = _each(max, self._most, raw)
+            first = self._least is None
+            self._least = np.array(raw) if first else np.minimum(self._least, raw)
+            self._most = np.array(raw) if first else np.maximum(self._most, raw)
 
     def _wait(self, now: float, raw: Axes) -> None:
         quiet = self._quiet
         if quiet and now - quiet[-1][0] < _EVERY:
             return
         quiet.append((now, raw))
-        values = [each for _, each in quiet]
-        least, most = (tuple(map(end, zip(*values, strict=True))) for end in (min, max))
-        if max(b - a for a, b in zip(least, most, strict=True)) > _TREMBLES or any(
-            abs(each) > _FARTHEST_REST for each in raw
-        ):
+        values = np.array([each for _, each in quiet])
+        if np.ptp(values, axis=0).max() > _TREMBLES or abs(values[-1]).max() > _FARTHEST_REST:
             quiet.clear()
-            return
-        if now - quiet[0][0] >= _REST_SECONDS:
-            self._rest = _axes(sum(each) / len(values) for each in zip(*values, strict=True))
+        elif now - quiet[0][0] >= _REST_SECONDS:
+            self._rest = values.mean(axis=0)
             self.phase = Phase.REACH
 
     @property
     def so_far(self) -> Calibration:
         """What the device has said by now."""
-        least, most = (self._least, self._most) if self._least else (self._rest, self._rest)
+        least, most = (self._rest, self._rest) if self._least is None else (self._least, self._most)
         if self._kind is Kind.POSE:
-            return Calibration(_each(lambda a, b: 0.5 * (a + b), least, most), least, most)
+            return _calibration(0.5 * (least + most), least, most)
         rest = self._rest
-        return Calibration(rest, _each(min, rest, least), _each(max, rest, most))
+        return _calibration(rest, np.minimum(rest, least), np.maximum(rest, most))
 
     def finish(self) -> Calibration:
         """What was learned; ends that were not reached are as on the other side, or as made.
@@ -223,36 +220,30 @@ class Calibrator:
         self.phase = Phase.DONE
         if self._kind is Kind.POSE:
             return learned
-        ends = [
-            _ends(*each) for each in zip(learned.rest, learned.least, learned.most, strict=True)
-        ]
-        least, most = (_axes(each) for each in zip(*ends, strict=True))
-        return Calibration(learned.rest, least, most)
+        rest, down, up = _ways(learned)
+        moved = np.maximum(down, up) >= _LEAST_PUSH
+        least = rest - np.where(down < _LEAST_PUSH, up, down)
+        most = rest + np.where(up < _LEAST_PUSH, down, up)
+        return _calibration(rest, np.where(moved, least, -1.0), np.where(moved, most, 1.0))
 
 
 def reached(learned: Calibration, kind: Kind) -> tuple[int, int]:
     """How many ends have been reached, and how many there are; of a room, how many of its ways."""
-    ends = list(zip(learned.rest, learned.least, learned.most, strict=True))
+    _, down, up = _ways(learned)
     if kind is Kind.POSE:
-        return sum(most - least >= _LEAST_WAY for _, least, most in ends[:3]), 3
-    ways = [each for rest, least, most in ends for each in (rest - least, most - rest)]
-    return sum(each >= _LEAST_PUSH for each in ways), len(ways)
+        return int((down + up >= _LEAST_WAY)[:3].sum()), 3
+    ways = np.concatenate([down, up])
+    return int((ways >= _LEAST_PUSH).sum()), len(ways)
 
 
-def _ends(rest: float, least: float, most: float) -> tuple[float, float]:
-    """The ends of one axis; one that was not moved goes as far as its maker says."""
-    down, up = rest - least, most - rest
-    if max(down, up) < _LEAST_PUSH:
-        return -1.0, 1.0
-    if down < _LEAST_PUSH:
-        down = up
-    if up < _LEAST_PUSH:
-        up = down
-    return rest - down, rest + up
+def _ways(learned: Calibration) -> tuple[Floats, Floats, Floats]:
+    """(6,) the rest, and how far each axis goes below and above it."""
+    rest = np.array(learned.rest)
+    return rest, rest - learned.least, learned.most - rest
 
 
-def _each(choose: Callable[[float, float], float], first: Axes, second: Axes) -> Axes:
-    return _axes(map(choose, first, second))
+def _calibration(rest: Floats, least: Floats, most: Floats) -> Calibration:
+    return Calibration(_axes(rest.tolist()), _axes(least.tolist()), _axes(most.tolist()))
 
 
 def _axes(values: Iterable[float]) -> Axes:

@@ -41,11 +41,7 @@ class Number:
         return struct.Struct(f"<{self.count}{self.code}")
 
     def check(self, values: tuple[Any, ...]) -> Any:
-        """The field's value from its numbers.
-
-        Raises:
-            MessageError: a number is not finite, or a truth value neither 0 nor 1.
-        """
+        """The field's value from its numbers."""
         if self.code == "d" and not all(map(math.isfinite, values)):
             raise MessageError("a number is not finite")
         return values if self.count > 1 else values[0]
@@ -149,7 +145,11 @@ Codec = Number | Text | Many | Table
 
 
 class Record:
-    """Packs and reads the fields of one kind of message; at once where all sizes are fixed."""
+    """Packs and reads the fields of one kind of message; at once where all sizes are fixed.
+
+    Raises:
+        MessageError: the bytes are no such message.
+    """
 
     def __init__(self, kind: type) -> None:
         hints = get_type_hints(kind, include_extras=True)
@@ -180,11 +180,7 @@ class Record:
         return bytes(out)
 
     def unpack(self, data: bytes) -> tuple[Any, ...]:
-        """Values of a message's fields.
-
-        Raises:
-            MessageError: the bytes are no such message.
-        """
+        """Values of a message's fields."""
         if self._struct is not None:
             if len(data) != self._struct.size:
                 raise MessageError("of another length")

@@ -24,8 +24,6 @@ from .sources import Discovery, Sources
 
 log = logging.getLogger(__name__)
 
-RATE: Final = 1000.0
-"""Hz"""
 MOST_POINTERS: Final = 8
 _SEND_EVERY: Final = 0.002
 """s between two messages on where the hands are."""
@@ -229,7 +227,7 @@ class HandLoop:
         self._discovery.close()
 
 
-def run(sources: Sources, rate: float = RATE) -> int:
+def run(sources: Sources, rate: float) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent(_LET_GO_SECONDS)
     channel = parent.line()

@@ -49,7 +49,11 @@ MOST_POINTS: Final = 150_000
 
 @dataclass(frozen=True)
 class Message:
-    """What all messages have in common."""
+    """What all messages have in common.
+
+    A message is right by its bytes and may still make no sense; then what makes something else of
+    it raises ``MessageError``.
+    """
 
     KIND: ClassVar[int]
 
@@ -101,11 +105,7 @@ class FigureMessage(Message):
         )
 
     def figure(self) -> Figure:
-        """The figure that came.
-
-        Raises:
-            MessageError: its arrays do not fit each other, or it is no tree.
-        """
+        """The figure that came."""
         count = len(self.names)
         if len(self.parents) != count or any(
             len(value) != count
@@ -202,11 +202,7 @@ class Settings(Message):
     curve: Annotated[Axes, SIX] = Response.curve
 
     def response(self) -> Response:
-        """Of space mice.
-
-        Raises:
-            MessageError: a value is out of range.
-        """
+        """Of space mice."""
         try:
             return Response(self.speed, self.angular_speed, self.gain, self.dead_zone, self.curve)
         except DeviceError as error:
@@ -343,11 +339,7 @@ class WorldMessage(Message):
     drag: Annotated[float, F64] = 0.0
 
     def settings(self) -> WorldSettings:
-        """The settings that came.
-
-        Raises:
-            MessageError: a value is out of range.
-        """
+        """The settings that came."""
         if not 1e-4 <= self.step <= 0.02 or self.friction < 0.0 or self.drag < 0.0:
             raise MessageError("settings of the world that cannot be")
         return WorldSettings(**vars(self))
@@ -417,11 +409,7 @@ class ObstacleMessage(Message):
         )
 
     def obstacle(self) -> Obstacle | None:
-        """The obstacle that came; None: it is gone.
-
-        Raises:
-            MessageError: it makes no sense.
-        """
+        """The obstacle that came; None: it is gone."""
         if self.shape == 0:
             return None
         turn = normalized(self.orientation)
@@ -481,11 +469,7 @@ class CalibrationMessage(Message):
         return cls(pointer, phase, calibration.rest, calibration.least, calibration.most)
 
     def calibration(self) -> Calibration:
-        """The calibration that came.
-
-        Raises:
-            MessageError: it makes no sense.
-        """
+        """The calibration that came."""
         try:
             return Calibration(self.rest, self.least, self.most)
         except DeviceError as error:

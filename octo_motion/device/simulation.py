@@ -15,7 +15,7 @@ import numpy as np
 from ..core.posing.picking import nearest_body
 from ..core.posing.puppet import Figure, Pose, capsules_in_world
 from ..core.posing.session import HandSample, Session, StepLength
-from ..core.posing.solver import Coupling, HandSpring, Obstacle, World, WorldSettings
+from ..core.posing.solver import Coupling, HandSpring, World, WorldSettings
 from ..core.rotations import Floats, conjugate, multiply, rotate
 from ..core.rotations.scalars import Vector
 from .messages import DeviceMessage, HandMessage, HeldMessage, Pull, Settings
@@ -101,7 +101,6 @@ class Simulation:
         self._turn = 0.0
         self._turns = 0
         self._now = -math.inf
-        self._obstacles: dict[int, Obstacle] = {}
 
     @property
     def world(self) -> World:
@@ -130,14 +129,6 @@ class Simulation:
         for body, firm in sorted(pins.items()):
             if before.get(body) != firm:
                 self.session.pin(body, state=True, firm=firm)
-
-    def put_obstacle(self, number: int, obstacle: Obstacle | None) -> None:
-        """Add, move or take away something solid."""
-        if obstacle is None:
-            self._obstacles.pop(number, None)
-        else:
-            self._obstacles[number] = obstacle
-        self.session.change_obstacles(tuple(self._obstacles.values()))
 
     def change(self, settings: WorldSettings) -> None:
         """Take other settings; motion goes on."""

@@ -116,11 +116,7 @@ class Pointer:
     # --- What is asked of it ---------------------------------------------------------------------
 
     def use(self, settings: Settings) -> None:
-        """Take over settings.
-
-        Raises:
-            MessageError: a value is out of range.
-        """
+        """Take over settings."""
         self._response = settings.response()
         self.settings = settings
 

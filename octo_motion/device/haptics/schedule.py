@@ -89,11 +89,8 @@ class Schedule:
         self._awake = awake
         self._clock = clock
         self._sleep = sleep
-        self.late = Histogram()
-        self.computing = Histogram()
-        self.missed = 0
-        self._begun = self._started = clock()
-        self._deadline = self._begun
+        self.forget()
+        self._begun = self._deadline = self._started
 
     def forget(self) -> None:
         """Start counting anew."""

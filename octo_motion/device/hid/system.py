@@ -206,7 +206,11 @@ def descriptor_of(device: Any) -> bytes | None:
 
 
 class HidDriver(Driver):
-    """A device that is an interface of the system's list, until it is closed or pulled out."""
+    """A device that is an interface of the system's list.
+
+    Raises:
+        DeviceLostError: it was unplugged or closed, and is read or written.
+    """
 
     name: ClassVar[str]
     """Of the kind, as ``python -m octo_motion.device list`` calls it."""
@@ -248,11 +252,7 @@ class HidDriver(Driver):
         """
 
     def reports(self) -> list[bytes]:
-        """All reports that wait, oldest first. More than 64 are the next call's.
-
-        Raises:
-            DeviceLostError: it was unplugged or closed.
-        """
+        """All reports that wait, oldest first. More than 64 are the next call's."""
         reports: list[bytes] = []
         for _ in range(_MOST_REPORTS):
             try:
@@ -265,11 +265,7 @@ class HidDriver(Driver):
         return reports
 
     def write(self, report: bytes) -> None:
-        """Send a report.
-
-        Raises:
-            DeviceLostError: it was unplugged or closed.
-        """
+        """Send a report."""
         try:
             written = self._there().write(report)
         except (OSError, ValueError) as error:

@@ -181,8 +181,6 @@ class Client:
                     self.hello = message
                 case Notice():
                     self.notices.append(message)
-                case _:
-                    pass
         return buttons
 
     def calibrate(self, pointer: int, order: messages.Order) -> None:

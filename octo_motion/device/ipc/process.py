@@ -71,9 +71,7 @@ class MessageChannel:
     def send(self, message: Message, *, droppable: bool = False) -> bool:
         """Send a message, or keep it until the peer reads.
 
-        Args:
-            message: What to say.
-            droppable: A newer one will replace it: leave it out if the peer is slow.
+        One that may be dropped, since a newer one will replace it, is left out if the peer is slow.
 
         Returns:
             Whether it is on its way; else it was left out.

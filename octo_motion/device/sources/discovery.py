@@ -177,7 +177,11 @@ class _Search:
             log.warning("Devices cannot be listed: %s", error)
             return
         twins = [replace(each, twin=True) for each in listed]
-        self._forget_refused({each.identity for each in (*listed, *twins)} | {"haply"})
+        # What was pulled out is reported anew when it is plugged in again.
+        there = {each.identity for each in (*listed, *twins)} | {"haply"}
+        for identity in self._refused.keys() - there:
+            del self._refused[identity]
+            self._reported.discard(identity)
         paths = {each.path for each in listed}
         for each in listed:
             if each.path in self._used.values():
@@ -221,9 +225,3 @@ class _Search:
             self._reported.add(identity)
             self.problems.append(error)
             log.warning("%s", error)
-
-    def _forget_refused(self, there: set[str]) -> None:
-        """Of what was pulled out; plugged in again it is reported anew."""
-        for identity in self._refused.keys() - there:
-            del self._refused[identity]
-            self._reported.discard(identity)

@@ -49,7 +49,7 @@ def masked(payload: bytes, mask: bytes) -> bytes:
 
 
 class FrameReader:
-    """Frames from a server, put together to messages."""
+    """Frames from a server, put together to messages; raises WebSocketError where they are none."""
 
     def __init__(self) -> None:
         self._data = bytearray()
@@ -57,11 +57,7 @@ class FrameReader:
         self._opcode = 0
 
     def feed(self, data: bytes | bytearray) -> list[tuple[int, bytes]]:
-        """Opcode and payload of the messages and control frames that are whole now.
-
-        Raises:
-            WebSocketError: this is not what a server sends.
-        """
+        """Opcode and payload of the messages and control frames that are whole now."""
         self._data += data
         done: list[tuple[int, bytes]] = []
         while (taken := self._frame()) is not None:
@@ -105,7 +101,11 @@ class FrameReader:
 
 
 class WebSocket:
-    """A connection that sends and receives text, never waiting once it is open."""
+    """A connection that sends and receives text, never waiting once it is open.
+
+    Raises:
+        WebSocketError: nobody is there, it is no server, broke the rules or is gone.
+    """
 
     def __init__(self, connection: socket.socket, rest: bytes) -> None:
         self._stream = Stream(connection)
@@ -114,11 +114,7 @@ class WebSocket:
 
     @classmethod
     def connect(cls, host: str, port: int, seconds: float = 0.3) -> WebSocket:
-        """Open a connection.
-
-        Raises:
-            WebSocketError: nobody is there, or no WebSocket server.
-        """
+        """Open a connection."""
         key = base64.b64encode(os.urandom(16))
         request = (
             f"GET / HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\n"
@@ -137,20 +133,12 @@ class WebSocket:
             raise WebSocketError(str(error)) from error
 
     def send(self, text: str) -> None:
-        """Send a text.
-
-        Raises:
-            WebSocketError: the connection is gone.
-        """
+        """Send a text."""
         self._stream.unsent += frame(_TEXT, text.encode(), os.urandom(4))
         self._flush()
 
     def receive(self) -> list[str]:
-        """All texts that have come.
-
-        Raises:
-            WebSocketError: the connection is gone, or broke the rules.
-        """
+        """All texts that have come."""
         self._flush()
         if not self._stream.receive():
             raise WebSocketError("the connection ended")
