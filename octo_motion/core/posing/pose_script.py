@@ -20,7 +20,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Step:
+class ScriptStep:
     """One line of a script; what it does not need is left as it is."""
 
     do: str
@@ -42,7 +42,7 @@ class Step:
 class PoseScript:
     """A session as data."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[ScriptStep, ...]
     settings: Mapping[str, Any]
     """By name, of ``Object.octo_motion.posing``."""
 
@@ -106,7 +106,7 @@ def parse_script(text: str, name: str) -> PoseScript:
     )
 
 
-def _step(data: Any, number: int) -> Step:
+def _step(data: Any, number: int) -> ScriptStep:
     def wrong(what: str) -> SettingsError:
         return SettingsError(f"Step {number} of the script {what}.", "See the scripting reference.")
 
@@ -131,7 +131,7 @@ def _step(data: Any, number: int) -> Step:
         if value is None:
             raise wrong(f"('{do}') has a '{key}' that makes no sense")
         values[key] = value
-    return Step(**values)
+    return ScriptStep(**values)
 
 
 def _text(value: Any) -> str | None:

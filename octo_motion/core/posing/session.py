@@ -24,7 +24,7 @@ from ..rotations import (
     to_rotation_vector,
 )
 from .puppet import Elements, Figure, Pose, joints_of, turned_bodies
-from .solver import Coupling, HandSpring, Obstacle, World, WorldSettings, WorldState
+from .solver import Coupling, HandSpring, Obstacle, World, WorldSettings, WorldSnapshot
 
 COARSEST: Final = 4e-3
 """Seconds: longer steps would let a fast hand shake the puppet."""
@@ -32,8 +32,6 @@ LONGEST_TICK: Final = 0.1
 """Seconds: what is longer (Blender was busy) is not made up for, so that nothing jerks."""
 LONGEST_WORK: Final = 0.1
 """Seconds that one tick may compute."""
-TOUCHED: Final = float(np.radians(0.1))
-"""A joint that was turned by more counts as touched."""
 BUSY: Final = 0.75
 """Share of real time that steps may take; above, they get longer."""
 STILL: Final = 2e-3
@@ -196,7 +194,7 @@ class Session:
         self._left = 0.0
         self._ratio = 1.0
         self._calm = 0.0
-        self._before: list[WorldState] = []
+        self._before: list[WorldSnapshot] = []
 
     @property
     def figure(self) -> Figure:
@@ -401,4 +399,4 @@ class Session:
         del self._before[:-MOST_STEPS_BACK]
 
     def _note_touched(self) -> None:
-        self._touched |= set(turned_bodies(self.figure, self._reference, self.pose, TOUCHED))
+        self._touched |= set(turned_bodies(self.figure, self._reference, self.pose))

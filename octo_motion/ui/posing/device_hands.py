@@ -7,16 +7,19 @@ Everything that the bridge hears is in the puppet's metres; whatever is shown is
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
 import numpy as np
 
 from ...blender.files import load_calibrations, save_calibrations
+from ...blender.versions import ndof_sensitivities
 from ...core.errors import SettingsError, WriteError
+from ...core.posing.picking import nearest_body
 from ...core.posing.puppet import Pose
 from ...core.posing.solver import Obstacle
-from ...core.rotations import Floats, from_matrix
+from ...core.rotations import IDENTITY, Floats, from_matrix, from_rotation_vector, multiply
 from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
 from ...device.ipc import Client, ClientState
@@ -43,10 +46,15 @@ RATE_WIDTH: Final = 1.0
 _ANSWER: Final = 0.4
 """s after which a grab that holds nothing has found nothing."""
 NOTHING_NEAR: Final = "No limb is near enough to grab"
+NDOF_NAME: Final = "Space mouse, through Blender"
+NDOF_GRAB_BUTTONS: Final = frozenset({"NDOF_BUTTON_MENU", "NDOF_BUTTON_1", "NDOF_BUTTON_V1"})
+NDOF_KEY_BUTTONS: Final = frozenset({"NDOF_BUTTON_FIT", "NDOF_BUTTON_2", "NDOF_BUTTON_V2"})
+_LONGEST: Final = 0.1
+"""s: a longer time between two events is a pause, not a long push."""
 
 
 @dataclass(frozen=True, eq=False)
-class Room:
+class ViewRoom:
     """What the view says of where devices are in the scene."""
 
     middle: Floats
@@ -58,7 +66,7 @@ class Room:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ShownPointer:
     """A pointer, as it is drawn."""
 
     number: int
@@ -233,15 +241,15 @@ class DeviceHands(HandsBase):
         held = (each.body for each in self.client.pointers.values() if each.body >= 0)
         return next(held, None)
 
-    def shown(self) -> list[Shown]:
+    def shown(self) -> list[ShownPointer]:
         """The pointers."""
         return [self._shown(each) for each in self.client.pointers.values()]
 
-    def _shown(self, pointer: PointerMessage) -> Shown:
+    def _shown(self, pointer: PointerMessage) -> ShownPointer:
         device = self.client.devices.get(pointer.pointer)
         most = device.force if device else 0.0
         unit = self.session.unit
-        return Shown(
+        return ShownPointer(
             pointer.pointer,
             np.array(pointer.position) / unit,
             np.array(pointer.coupled_position) / unit,
@@ -306,7 +314,7 @@ class DeviceHands(HandsBase):
 
     # --- Time -----------------------------------------------------------------------------------
 
-    def tick(self, settings: DeviceSettings, room: Room | None = None) -> list[Button]:
+    def tick(self, settings: DeviceSettings, room: ViewRoom | None = None) -> list[Button]:
         """Take over what the bridge says, pose the armature, and tell the bridge what changed.
 
         Args:
@@ -400,7 +408,7 @@ class DeviceHands(HandsBase):
             self.client.send_obstacle(number, None)
         self._obstacles = obstacles
 
-    def _place(self, room: Room) -> None:
+    def _place(self, room: ViewRoom) -> None:
         """Tell devices where the view is; a hand that holds something stays where it is."""
         right, up, towards = room.axes.T
         turn = from_matrix(np.stack([right, -towards, up], axis=1))
@@ -450,3 +458,109 @@ def _near(first: Workspace, second: Workspace) -> bool:
     far = max(abs(a - b) for a, b in zip(first.origin, second.origin, strict=True))
     off = max(abs(a - b) for a, b in zip(first.orientation, second.orientation, strict=True))
     return far < 1e-4 * second.scale and off < 1e-4 and abs(first.scale / second.scale - 1.0) < 1e-3
+
+
+class NdofHands(HandsBase):
+    """One pointer, moved by the events of a space mouse that Blender itself has.
+
+    No bridge is needed: the puppet is simulated in Blender, as with the mouse.
+
+    Args:
+        session: of posing.
+        clock: seconds.
+    """
+
+    def __init__(
+        self, session: PuppetSession, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        super().__init__(session, Client())
+        self.position: Floats | None = None
+        """(3,) of the pointer, world; none before the first push."""
+        self._turn = IDENTITY.copy()
+        self._reach = 0.0
+        self._clock = clock
+        self._last = clock()
+
+    @property
+    def hover(self) -> int | None:
+        held = self.session.held
+        return None if held is None else held.body
+
+    def shown(self) -> list[ShownPointer]:
+        """The pointer."""
+        if self.position is None:
+            return []
+        held, point = self.hover, self.session.held_point()
+        body = -1 if held is None else held
+        place = self.position if point is None else point
+        return [
+            ShownPointer(0, self.position, place, body, min(1.0, self.session.pull()), NDOF_NAME)
+        ]
+
+    def move(
+        self,
+        translation: Sequence[float],
+        rotation: Sequence[float],
+        seconds: float,
+        room: ViewRoom,
+        settings: DeviceSettings,
+    ) -> None:
+        """One event of Blender's.
+
+        It is made for a camera: a turn is told as the scene then seems to turn, against the cap
+        (GHOST_NDOFManagerUnix and libspnav's spnav_posrot_moveobj differ in all three signs). And
+        it is multiplied by what the preferences say of flying.
+
+        Args:
+            translation: (3,) push: right, up, towards the user.
+            rotation: (3,) turn about these, against the cap's.
+            seconds: since the event before.
+            room: what the view shows.
+            settings: how devices behave.
+        """
+        if self.position is None:
+            self.position = room.middle.copy()
+        seconds = min(max(seconds, 0.0), _LONGEST)
+        push, turn = ndof_sensitivities()
+        way = room.axes @ np.array(translation, dtype=np.float64) / push
+        self.position = self.position + way * (settings.speed * seconds * room.width / RATE_WIDTH)
+        swing = room.axes @ np.array(rotation, dtype=np.float64) / -turn
+        more = from_rotation_vector(swing * settings.angular_speed * seconds)
+        self._turn = multiply(more, self._turn)
+
+    def grab(self) -> None:
+        """Grab what is near, or let go."""
+        if self.holding:
+            self.session.release()
+            return
+        if self.position is None:
+            self.message = "Push the space mouse first"
+            return
+        point = self.position * self.session.unit
+        body, gap = nearest_body(self.session.figure, self.session.core.pose, point)
+        if gap > self._reach:
+            self.message = NOTHING_NEAR
+            return
+        self.message = ""
+        self._turn = IDENTITY.copy()
+        self.session.grab(body, point)
+
+    def recentre(self) -> None:
+        """Bring the pointer to the middle of the view, with the next push."""
+        self.position = None
+
+    def tick(self, settings: DeviceSettings, room: ViewRoom | None = None) -> list[Button]:  # noqa: ARG002
+        """Simulate what has passed, and pose the armature."""
+        now = self._clock()
+        seconds, self._last = now - self._last, now
+        self._reach = settings.reach
+        held = self.session.held
+        if held is None or self.position is None:
+            self.session.tick(seconds)
+        else:
+            self.session.tick(seconds, self.position, self._turn)
+        return []
+
+    def stop(self) -> None:
+        """Let go."""
+        self.session.core.release()

@@ -17,8 +17,14 @@ from ...device.ipc import Client
 from ...device.messages import Buzz, Notice
 from ..operator_base import OctoOperator
 from .controls import Outcome
-from .device_hands import DeviceHands, Room
-from .device_ndof import GRAB_BUTTONS, KEY_BUTTONS, NAME, NdofHands
+from .device_hands import (
+    NDOF_GRAB_BUTTONS,
+    NDOF_KEY_BUTTONS,
+    NDOF_NAME,
+    DeviceHands,
+    NdofHands,
+    ViewRoom,
+)
 from .device_settings import device_settings, message
 from .overlay import Overlay, device_lines, take_down_all
 from .pose_operator import SessionOperator, tell
@@ -51,7 +57,7 @@ def active_hands() -> Hands | None:
     return _going_on[0] if _going_on else None
 
 
-def room_of(context: bpy.types.Context, scale: float, session: PuppetSession) -> Room | None:
+def room_of(context: bpy.types.Context, scale: float, session: PuppetSession) -> ViewRoom | None:
     """What the largest 3D viewport of the window shows."""
     areas = (
         [each for each in context.screen.areas if each.type == "VIEW_3D"] if context.screen else []
@@ -64,10 +70,10 @@ def room_of(context: bpy.types.Context, scale: float, session: PuppetSession) ->
     if data.view_perspective == "CAMERA":
         return camera_room(data, scale, session.capsules()[0].reshape(-1, 3).mean(axis=0))
     middle = np.array(data.view_location, dtype=np.float64)
-    return Room(middle, _axes(data), scale * max(float(data.view_distance), 1e-6))
+    return ViewRoom(middle, _axes(data), scale * max(float(data.view_distance), 1e-6))
 
 
-def camera_room(data: Any, scale: float, figure: Floats) -> Room:
+def camera_room(data: Any, scale: float, figure: Floats) -> ViewRoom:
     """What is seen through a camera, at the depth of a figure.
 
     Where the view turns and how far it is from there, as Blender tells it, is then that of another
@@ -90,24 +96,13 @@ def camera_room(data: Any, scale: float, figure: Floats) -> Room:
     reach = 1.0 if lens[3, 3] else depth
     beside = (-lens[:2, 3] if lens[3, 3] else depth * lens[:2, 2]) / (lens[0, 0], lens[1, 1])
     middle = eye + axes @ np.array([*beside, -depth])
-    return Room(middle, axes, scale * _COVERS * 2.0 * reach / abs(float(lens[0, 0])))
+    return ViewRoom(middle, axes, scale * _COVERS * 2.0 * reach / abs(float(lens[0, 0])))
 
 
 def _axes(data: Any) -> Floats:
     """(3, 3) as columns: right, up, and towards the eye."""
     axes = np.array(data.view_matrix.inverted(), dtype=np.float64)[:3, :3]
     return axes / np.linalg.norm(axes, axis=0)
-
-
-def start_bridge(settings: Any) -> Client:
-    """A bridge that runs.
-
-    Raises:
-        DeviceError: it cannot be started.
-    """
-    client = Client()
-    client.start(["--simulate"] if settings.simulate else [])
-    return client
 
 
 class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
@@ -132,7 +127,8 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
     def take_up(self, context: bpy.types.Context, session: PuppetSession) -> Overlay:
         """Start the bridge, and take the armature into its hands."""
         settings = device_settings(context.window_manager)
-        client = start_bridge(settings)
+        client = Client()
+        client.start(["--simulate"] if settings.simulate else [])
         self._size = session.size * session.unit
         try:
             self._hands = DeviceHands(session, client, self._device_settings(settings))
@@ -204,12 +200,12 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             motion = event.ndof_motion
             if room is not None and motion is not None:
                 hands.move(*(motion.translation, motion.rotation, motion.time_delta, room, now))
-        elif event.type in GRAB_BUTTONS:
+        elif event.type in NDOF_GRAB_BUTTONS:
             if event.value == "PRESS" or (not now.toggle and hands.holding):
                 hands.grab()
                 if not hands.holding:
                     self._let_go(context, hands)
-        elif event.type in KEY_BUTTONS and event.value == "PRESS":
+        elif event.type in NDOF_KEY_BUTTONS and event.value == "PRESS":
             self._key(hands, all_bones=False)
         return Outcome.TAKEN
 
@@ -277,7 +273,7 @@ def line(hands: Hands) -> str:
         parts.append(f"The device's program {trouble}: B starts it again")
     elif not shown:
         is_blenders = isinstance(hands, NdofHands)
-        parts.append(NAME if is_blenders else "No device yet: plug one in")
+        parts.append(NDOF_NAME if is_blenders else "No device yet: plug one in")
     for each in shown:
         what = hands.session.bone(each.body) if each.body >= 0 else "free"
         if each.number in hands.client.calibrating:

@@ -14,8 +14,7 @@ from gpu_extras.batch import batch_for_shader
 from ...core.posing.wireframe import arrow_lines, capsule_lines, load_colours, pin_lines
 from ...core.rotations import Floats
 from .controls import PoseControls
-from .device_hands import DeviceHands
-from .device_ndof import NdofHands
+from .device_hands import DeviceHands, NdofHands
 from .properties import posing_settings
 
 _HOVERED: Final = (1.0, 1.0, 1.0, 0.9)

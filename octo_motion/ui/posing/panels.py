@@ -11,8 +11,7 @@ from ...device.calibration import Phase, reached
 from ...device.driver import Kind
 from ...device.messages import DeviceMessage
 from ..panel_base import ArmaturePanel
-from .device_hands import DeviceHands
-from .device_ndof import NAME, NdofHands
+from .device_hands import NDOF_NAME, DeviceHands, NdofHands
 from .device_pose import (
     Hands,
     OCTO_MOTION_OT_device_calibrate,
@@ -162,7 +161,7 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         box = layout.box()
         client = hands.client
         if isinstance(hands, NdofHands):
-            box.label(text=NAME, icon="ORIENTATION_GIMBAL")
+            box.label(text=NDOF_NAME, icon="ORIENTATION_GIMBAL")
             return
         if trouble := hands.trouble():
             box.alert = True

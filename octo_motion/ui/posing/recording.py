@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -12,23 +11,11 @@ import numpy as np
 from ...blender.animation import PoseKeys, pose_values, restore_pose
 from ...blender.rig import Puppet
 from ...core.posing.puppet import Pose, turned_bodies
-from ...core.posing.session import TOUCHED
 from ...core.rotations import Floats
 from .properties import posing_settings
 
 _LOCATION_SHARE: Final = 0.002
 """Of the figure's size: how far a recorded location's keys may be off."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Moment:
-    """One frame of a recording."""
-
-    pose: Pose
-    rotations: Floats
-    """(bodies, 4) of the bones, from rest."""
-    locations: Floats
-    """(bodies, 3)"""
 
 
 class Recording:
@@ -44,12 +31,13 @@ class Recording:
         self._puppet = puppet
         self._own = pose_values(puppet.armature())
         """Of the bones, at the beginning."""
-        self._moments: dict[float, _Moment] = {}
+        self._moments: dict[float, tuple[Pose, Floats, Floats]] = {}
+        """By frame: the pose, and rotations (bodies, 4) and locations (bodies, 3) of the bones."""
         self.keep(frame, pose)
 
     def keep(self, frame: float, pose: Pose) -> None:
         """One frame more, or another pose at one."""
-        self._moments[frame] = _Moment(pose, *self._puppet.local(pose))
+        self._moments[frame] = pose, *self._puppet.local(pose)
 
     def is_past(self, frame: float) -> bool:
         """Whether a frame lies before the last one: playback has come round."""
@@ -59,34 +47,27 @@ class Recording:
         """Set keys; names of the bones that got some, and the number of key frames."""
         puppet = self._puppet
         frames = np.array(sorted(self._moments))
-        moments = [self._moments[frame] for frame in frames]
+        moments = (self._moments[frame] for frame in frames)
+        poses, rotations, locations = zip(*moments, strict=True)
         moved: set[int] = set()
-        for each in moments[1:]:
-            moved |= set(turned_bodies(puppet.figure, moments[0].pose, each.pose, TOUCHED))
+        for pose in poses[1:]:
+            moved |= set(turned_bodies(puppet.figure, poses[0], pose))
         if not moved:
             return [], 0
-        names = puppet.figure.names
-        bodies = puppet.with_followers(moved)
-        rotations = {
-            names[body]: np.stack([each.rotations[body] for each in moments]) for body in bodies
-        }
-        locations = {
-            names[body]: np.stack([each.locations[body] for each in moments])
-            for body in bodies
-            if puppet.places(body)
-        }
+        bodies = {puppet.figure.names[body]: body for body in puppet.with_followers(moved)}
+        turns, places = np.stack(rotations, axis=1), np.stack(locations, axis=1)
         armature = puppet.armature()
         settings: Any = posing_settings(armature)
         size = float(np.ptp(puppet.rig.skeleton.heads, axis=0).max())
         count = keys.insert_motion(
             armature,
             frames,
-            rotations,
-            locations,
+            {name: turns[body] for name, body in bodies.items()},
+            {name: places[body] for name, body in bodies.items() if puppet.places(body)},
             angle=settings.record_angle,
             distance=_LOCATION_SHARE * size,
         )
-        return list(rotations), count
+        return list(bodies), count
 
     def go_along(self, recorded: Iterable[str]) -> bool:
         """Let what stood still in the recording go on with what carries it; whether anything did.

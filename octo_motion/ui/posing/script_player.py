@@ -12,7 +12,7 @@ from bpy.props import StringProperty
 
 from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
-from ...core.posing.pose_script import PoseScript, Step, parse_script
+from ...core.posing.pose_script import PoseScript, ScriptStep, parse_script
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
 from ..operator_base import ArmatureOperator
 from .properties import posing_settings
@@ -57,11 +57,11 @@ class Player:
                     f"Step {number} of the script cannot be done: {error.problem}", error.remedy
                 ) from error
 
-    def _grab(self, step: Step) -> None:
+    def _grab(self, step: ScriptStep) -> None:
         self._hand = self._session.grab_bone(step.bone, step.at)
         self._turn = IDENTITY.copy()
 
-    def _pull(self, step: Step) -> None:
+    def _pull(self, step: ScriptStep) -> None:
         if self._hand is None:
             raise SettingsError("Nothing is held.", "Put a step 'grab' before it.")
         start, turned = self._hand, self._turn
@@ -76,21 +76,21 @@ class Player:
             self._turn = multiply(from_rotation_vector(share * swing), turned)
             self._tick()
 
-    def _wait(self, step: Step) -> None:
+    def _wait(self, step: ScriptStep) -> None:
         for _ in range(round(step.seconds / TICK)):
             self._tick()
 
-    def _release(self, _step: Step) -> None:
+    def _release(self, _step: ScriptStep) -> None:
         self._hand = None
         self.keys += len(self._session.release())
 
-    def _pin(self, step: Step) -> None:
+    def _pin(self, step: ScriptStep) -> None:
         self._session.core.pin(self._session.body(step.bone), state=True)
 
-    def _unpin(self, step: Step) -> None:
+    def _unpin(self, step: ScriptStep) -> None:
         self._session.core.pin(self._session.body(step.bone), state=False)
 
-    def _frame(self, step: Step) -> None:
+    def _frame(self, step: ScriptStep) -> None:
         scene = self._session.scene()
         if not self._session.recording:
             scene.frame_set(step.frame)
@@ -100,18 +100,18 @@ class Player:
         while scene.frame_current < step.frame:
             self._tick()
 
-    def _key(self, step: Step) -> None:
+    def _key(self, step: ScriptStep) -> None:
         bones = None if isinstance(step.bones, str) else step.bones
         self.keys += len(self._session.key(all_bones=step.bones == "all", bones=bones))
 
-    def _record(self, _step: Step) -> None:
+    def _record(self, _step: ScriptStep) -> None:
         self._session.record()
 
-    def _stop(self, _step: Step) -> None:
+    def _stop(self, _step: ScriptStep) -> None:
         bones, count = self._session.stop_record()
         self.keys += bones * count
 
-    def _restore(self, _step: Step) -> None:
+    def _restore(self, _step: ScriptStep) -> None:
         self._hand = None
         self._session.restore()
 

@@ -163,12 +163,12 @@ def test_touched_is_what_was_turned_and_a_root_that_was_moved() -> None:
     orientations[hand] = multiply(orientations[hand], from_axis_angle([1.0, 0.0, 0.0], 0.1))
     positions[0] += [0.0, 0.0, 0.2]
     after = Pose(positions, orientations)
-    assert turned_bodies(figure, pose, after, 0.01) == [0, hand]
-    assert turned_bodies(figure, pose, pose, 0.01) == []
+    assert turned_bodies(figure, pose, after) == [0, hand]
+    assert turned_bodies(figure, pose, pose) == []
 
 
 def test_whole_figure_that_is_carried_round_is_touched_at_its_root_alone() -> None:
     figure, pose = built(BODY)
     turn = from_axis_angle([0.0, 0.0, 1.0], 0.7)
     after = Pose(rotate(turn, pose.positions), multiply(turn, pose.orientations))
-    assert turned_bodies(figure, pose, after, 0.01) == [0]
+    assert turned_bodies(figure, pose, after) == [0]

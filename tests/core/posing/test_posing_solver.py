@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from octo_motion.core.posing.puppet.figure import Elements
 from octo_motion.core.posing.solver.constraint_rows import Holds, RowImpulses, Rows
 from octo_motion.core.posing.solver.contact_detection import Contacts
-from octo_motion.core.posing.solver.newton import Start
+from octo_motion.core.posing.solver.newton import InitialGuess
 from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane
 from octo_motion.core.posing.solver.tree import Layout, Tree, plan
 from octo_motion.core.posing.solver.world import World, WorldSettings
@@ -105,7 +105,7 @@ def test_answer_does_not_hang_on_where_the_solver_begins():
     solver = world._newton
     warm = solver.solve(problem, start)
     problem, _ = world.problem()
-    cold = solver.solve(problem, Start(np.zeros_like(start.speeds)))
+    cold = solver.solve(problem, InitialGuess(np.zeros_like(start.speeds)))
     np.testing.assert_allclose(warm.velocities, cold.velocities, atol=1e-7)
 
 

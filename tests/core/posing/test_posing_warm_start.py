@@ -11,7 +11,7 @@ import pytest
 from octo_motion.core.posing.puppet.figure import Figure
 from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.solver.holds import Coupling, HandSpring
-from octo_motion.core.posing.solver.newton import Start
+from octo_motion.core.posing.solver.newton import InitialGuess
 from octo_motion.core.posing.solver.obstacle_shapes import Plane
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats, from_axis_angle
@@ -109,7 +109,7 @@ def test_a_warm_start_does_not_change_the_answer():
         problem, begin = world.problem()
         assert begin.rows is not None
         warm = world._newton.solve(problem, begin)
-        cold = world._newton.solve(problem, Start(begin.speeds))
+        cold = world._newton.solve(problem, InitialGuess(begin.speeds))
         if max(warm.miss, cold.miss) < 1e-9:
             scale = np.abs(warm.velocities).max()
             np.testing.assert_allclose(warm.velocities, cold.velocities, atol=1e-7 * scale)

@@ -25,8 +25,7 @@ from octo_motion.device.driver import Kind
 from octo_motion.device.ipc.client import Client, ClientState
 from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.controls import Outcome
-from octo_motion.ui.posing.device_hands import NOTHING_NEAR, DeviceHands, Room
-from octo_motion.ui.posing.device_ndof import NdofHands
+from octo_motion.ui.posing.device_hands import NOTHING_NEAR, DeviceHands, NdofHands, ViewRoom
 from octo_motion.ui.posing.device_settings import device_settings, message
 from octo_motion.ui.posing.overlay import device_lines
 from octo_motion.ui.posing.puppet_session import PuppetSession
@@ -76,8 +75,8 @@ FRONT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """The front view: right is X, up is Z, towards the eye is −Y."""
 
 
-def room(height: float = 1.3, width: float = 1.0) -> Room:
-    return Room(np.array([0.0, 0.0, height]), FRONT, width)
+def room(height: float = 1.3, width: float = 1.0) -> ViewRoom:
+    return ViewRoom(np.array([0.0, 0.0, height]), FRONT, width)
 
 
 def wait(hands: DeviceHands, what: Callable[[], object], why: str) -> list[say.Button]:
@@ -130,7 +129,7 @@ def test_armature_follows_the_hand_at_the_device(hands: DeviceHands) -> None:
 
 def test_hand_far_from_all_limbs_is_told_so(hands: DeviceHands) -> None:
     wait(hands, hands.shown, "the hand is there")
-    far = Room(np.array([50.0, 0.0, 0.0]), FRONT, 1.0)
+    far = ViewRoom(np.array([50.0, 0.0, 0.0]), FRONT, 1.0)
     hands.tick(TOLD, far)
     end = time.monotonic() + PATIENCE
     while hands.shown()[0].position[0] < 40.0:
@@ -223,12 +222,12 @@ def test_right_of_the_view_is_right_of_the_device(hands: DeviceHands) -> None:
     space = hands._spaces[0]
     assert space.orientation == pytest.approx((1.0, 0.0, 0.0, 0.0))  # the front view is home
     side = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    hands.tick(TOLD, Room(np.zeros(3), side, 1.0))
+    hands.tick(TOLD, ViewRoom(np.zeros(3), side, 1.0))
     half = 0.5**0.5
     assert hands._spaces[0].orientation == pytest.approx((half, 0.0, 0.0, half))
     # Twice as much in the view: twice the way for the same way of the hand.
     before = hands._spaces[0].scale
-    hands.tick(TOLD, Room(np.zeros(3), side, 2.0))
+    hands.tick(TOLD, ViewRoom(np.zeros(3), side, 2.0))
     assert hands._spaces[0].scale == pytest.approx(2.0 * before)
 
 
@@ -626,7 +625,7 @@ def test_turn_of_blenders_space_mouse_is_the_caps_own(monkeypatch: pytest.Monkey
     session = PuppetSession(arm(), bpy.context.scene, clock=None)
     hands = NdofHands(session, clock=lambda: 0.0)
     try:
-        monkeypatch.setattr("octo_motion.ui.posing.device_ndof.ndof_sensitivities", lambda: (4, 2))
+        monkeypatch.setattr("octo_motion.ui.posing.device_hands.ndof_sensitivities", lambda: (4, 2))
         # Half a push to the right; the cap turned to the left as seen from above, all the way.
         hands.move((2.0, 0.0, 0.0), (0.0, -2.0, 0.0), 0.1, room(), TOLD)
         assert hands.shown()[0].position == pytest.approx((0.5 * 0.4 * 0.1, 0.0, 1.3))

@@ -40,6 +40,8 @@ _LEAST_MASS: Final = 1e-3
 """No body is lighter than this share of the heaviest one."""
 _SLACK: Final = 1e-3
 """Radians by which a pose may lie inside its limits; one beyond widens them."""
+_TURNED: Final = float(np.radians(0.1))
+"""A joint that is turned by more counts, and a root that is moved by more of its length."""
 _MISLEADING: Final = 3.0
 """A bone that is so many times longer or shorter than the way to the next joint is no measure of
 the limb: importers make such bones."""
@@ -279,12 +281,12 @@ def joints_of(parents: Sequence[int], pose: Pose) -> Floats:
     return anchors
 
 
-def turned_bodies(figure: Figure, before: Pose, after: Pose, angle: float) -> list[int]:
-    """Bodies whose joint has turned by more than an angle, and roots that have moved or turned."""
+def turned_bodies(figure: Figure, before: Pose, after: Pose) -> list[int]:
+    """Bodies whose joint has turned, and roots that have moved or turned."""
     parents = np.array(figure.parents)
     first = _from_rest(parents, figure.rest, before.orientations)
     second = _from_rest(parents, figure.rest, after.orientations)
-    turned = np.linalg.norm(to_rotation_vector(multiply(conjugate(first), second)), axis=-1) > angle
+    angles = np.linalg.norm(to_rotation_vector(multiply(conjugate(first), second)), axis=-1)
     moved = np.linalg.norm(after.positions - before.positions, axis=-1)
-    turned |= (parents < 0) & (moved > angle * figure.lengths)
+    turned = (angles > _TURNED) | ((parents < 0) & (moved > _TURNED * figure.lengths))
     return np.flatnonzero(turned).tolist()

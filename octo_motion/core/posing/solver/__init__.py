@@ -4,7 +4,7 @@
 from .blas_threads import OneThread
 from .holds import Coupling, HandSpring
 from .obstacle_shapes import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
-from .world import World, WorldSettings, WorldState
+from .world import World, WorldSettings, WorldSnapshot
 
 __all__ = [
     "Box",
@@ -19,5 +19,5 @@ __all__ = [
     "Sphere",
     "World",
     "WorldSettings",
-    "WorldState",
+    "WorldSnapshot",
 ]

@@ -135,7 +135,7 @@ class Pin:
     """Whether the orientation is held as well."""
 
 
-class Holding:
+class HoldBuilder:
     """The rows of pins and grabs, pins first; of each its point and then its turn."""
 
     def __init__(self, mass: float, size: float, step: float) -> None:

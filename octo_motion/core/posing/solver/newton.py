@@ -35,7 +35,7 @@ from .tree import Tree
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class Iterate:
     """Velocities, and what all laws do there."""
 
     speeds: Floats
@@ -55,7 +55,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(Point):
+class Solution(Iterate):
     """Velocities and impulses after a step."""
 
     moving: Floats | None
@@ -73,7 +73,7 @@ class Solution(Point):
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class InitialGuess:
     """Where the step before ended."""
 
     speeds: Floats
@@ -114,7 +114,9 @@ class Newton:
         self._wide = tree.beyond
         self._maps = tuple(_with_columns(columns) for columns in (1, 2))
 
-    def solve(self, problem: Problem, start: Start, corrections: Floats | None = None) -> Solution:
+    def solve(
+        self, problem: Problem, start: InitialGuess, corrections: Floats | None = None
+    ) -> Solution:
         """Velocities at the end of the step.
 
         Args:
@@ -159,7 +161,7 @@ class Newton:
         moving = None if shift is None else end.speeds + shift
         return Solution(**vars(end), moving=moving, iterations=count, miss=miss)
 
-    def _begin(self, problem: Problem, start: Start) -> tuple[Point | None, _Tangents]:
+    def _begin(self, problem: Problem, start: InitialGuess) -> tuple[Iterate | None, _Tangents]:
         """The first tangents, and the velocities where they touch if all do at the same."""
         if start.rows is None and len(problem.rows.bodies):
             point = self._at(problem, start.speeds)
@@ -179,13 +181,13 @@ class Newton:
         speeds = (self._base - response.trial) * law.mobility
         return None, self._bent(problem, response, speeds, pressed, rows)
 
-    def _follow(self, problem: Problem, point: Point) -> bool:
+    def _follow(self, problem: Problem, point: Iterate) -> bool:
         rows = problem.rows
         if point.rows is None or (point.rows.slips is None and not rows.followed):
             return False
         return rows.follow(rows.slip(point.rows), problem.blow)
 
-    def _at(self, problem: Problem, speeds: Floats) -> Point:
+    def _at(self, problem: Problem, speeds: Floats) -> Iterate:
         """All laws at u (slots, 3)."""
         tree = self._tree
         velocities = tree.velocities(speeds)
@@ -193,7 +195,7 @@ class Newton:
         response, impulses, pressed = self._joints(problem, joint_speeds)
         rows = problem.rows
         answer = rows.respond(rows.wanted(velocities)) if len(rows.bodies) else None
-        return Point(speeds, velocities, joint_speeds, impulses, response, pressed, answer)
+        return Iterate(speeds, velocities, joint_speeds, impulses, response, pressed, answer)
 
     def _elements(self, problem: Problem, speeds: Floats) -> tuple[ElementResponse, Floats]:
         """Elements, and their impulses (bodies, 3), at relative turns of joints (bodies, 3)."""
@@ -219,7 +221,7 @@ class Newton:
             impulses += stops.spread @ (np.maximum(push, 0.0)[:, None] * stops.axes)
         return response, impulses, pressed
 
-    def _tangents(self, problem: Problem, point: Point) -> _Tangents:
+    def _tangents(self, problem: Problem, point: Iterate) -> _Tangents:
         """All laws as planes that touch them at a point."""
         rows = None if point.rows is None else problem.rows.tangent(point.rows)
         if point.response.flows is None and problem.frames is None:
@@ -316,11 +318,11 @@ class Newton:
     def _lowest(
         self,
         problem: Problem,
-        start: Point,
-        end: Point,
+        start: Iterate,
+        end: Iterate,
         joints: Floats,
         rows: Floats | None,
-    ) -> Point:
+    ) -> Iterate:
         """The lowest point of the convex function between two, or a little before the end.
 
         Along the way d its slope is d·SᵀMS(u − u*) − Σ p·dw. At the end the first part is what
@@ -337,7 +339,7 @@ class Newton:
             row_way = (start.rows.wanted - end.rows.wanted) / problem.rows.pattern.column
             pull += float((rows * row_way).sum())
 
-        def slope(at: Point, share: float) -> float:
+        def slope(at: Iterate, share: float) -> float:
             value = pull - (1.0 - share) * mass - float((at.joint_impulses * joint_way).sum())
             if at.rows is not None:
                 value -= float((at.rows.impulses * row_way).sum())
@@ -361,7 +363,7 @@ class Newton:
                 low, at_low = share, value
         return best
 
-    def _between(self, problem: Problem, start: Point, end: Point, share: float) -> Point:
+    def _between(self, problem: Problem, start: Iterate, end: Iterate, share: float) -> Iterate:
         """All laws on the way from one point to another, where velocities need no products."""
         joint_speeds = start.joint_speeds + share * (end.joint_speeds - start.joint_speeds)
         response, impulses, pressed = self._joints(problem, joint_speeds)
@@ -369,7 +371,7 @@ class Newton:
         if start.rows is not None and end.rows is not None:
             wanted = start.rows.wanted + share * (end.rows.wanted - start.rows.wanted)
             answer = problem.rows.respond(wanted)
-        return Point(
+        return Iterate(
             start.speeds + share * (end.speeds - start.speeds),
             start.velocities + share * (end.velocities - start.velocities),
             joint_speeds,
@@ -424,7 +426,7 @@ def _planes(
     return _Tangents(slopes, right, linear and pressed is None, rows)
 
 
-def _predicted(tangents: _Tangents, end: Point) -> tuple[Floats, Floats | None]:
+def _predicted(tangents: _Tangents, end: Iterate) -> tuple[Floats, Floats | None]:
     """Impulses at the end by the tangents: joints (bodies, 3), rows (rows, 3)."""
     joints, rows = end.joint_impulses, None
     if not (tangents.linear and end.response.flows is None):
@@ -437,7 +439,7 @@ def _predicted(tangents: _Tangents, end: Point) -> tuple[Floats, Floats | None]:
     return joints, rows
 
 
-def _miss(end: Point, joints: Floats, rows: Floats | None) -> float:
+def _miss(end: Iterate, joints: Floats, rows: Floats | None) -> float:
     miss = 0.0
     right = end.joint_impulses
     if joints is not right:

@@ -104,7 +104,7 @@ _BLOW = 50.0
 """m/s²: a change of speed in a step that only a blow makes."""
 
 
-class Gathering:
+class ProblemBuilder:
     """Puts together the problems of one figure; what hangs on it alone is worked out once."""
 
     def __init__(

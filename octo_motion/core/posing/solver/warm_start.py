@@ -12,13 +12,13 @@ from ..puppet import ElementResponse, Flags, Integers, PlasticLaw
 from .bodies import Bodies
 from .constraint_rows import RowImpulses, Rows
 from .contact_detection import Contacts
-from .newton import Solution, Start
+from .newton import InitialGuess, Solution
 from .problem import Problem
 from .tree import Tree
 
 
 @dataclass(frozen=True, eq=False)
-class WarmStartState:
+class WarmStartSnapshot:
     """Where the solver begins, to come back to."""
 
     speeds: Floats
@@ -53,13 +53,13 @@ class WarmStart:
         if self._response is not None:
             self._response = law.answer(self._response.trial)
 
-    def start(self, problem: Problem, bodies: Bodies) -> Start:
+    def start(self, problem: Problem, bodies: Bodies) -> InitialGuess:
         """Where to begin with a step's problem; its rows are told how fast they slip."""
         rows = self._rows(problem, bodies) if len(problem.rows.bodies) else None
         pressed = None
         if problem.stops:
             pressed = (problem.stops[0].labels[:, None] == self._pressed).any(axis=1)
-        return Start(self.speeds, rows, self._response, pressed)
+        return InitialGuess(self.speeds, rows, self._response, pressed)
 
     def _rows(self, problem: Problem, bodies: Bodies) -> RowImpulses:
         """What the rows of this step did in the step before."""
@@ -86,12 +86,12 @@ class WarmStart:
             self._pressed = problem.stops[0].labels[solution.pressed]
         self.contacts.keep(problem.rows, solution.rows, most)
 
-    def state(self) -> WarmStartState:
+    def state(self) -> WarmStartSnapshot:
         """All of it. No array of these is changed later: each step makes its own."""
         trial = None if self._response is None else self._response.trial
-        return WarmStartState(self.speeds, trial, self._pressed, self.contacts.state())
+        return WarmStartSnapshot(self.speeds, trial, self._pressed, self.contacts.state())
 
-    def restore(self, state: WarmStartState, law: PlasticLaw) -> None:
+    def restore(self, state: WarmStartSnapshot, law: PlasticLaw) -> None:
         """Go back to what was."""
         self.speeds, self._pressed = state.speeds, state.pressed
         self._response = None if state.trial is None else law.answer(state.trial)

@@ -26,12 +26,12 @@ from ..puppet import Elements, Figure, Integers, PlasticLaw, Pose
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
 from .contact_detection import Contacts, Detector
-from .holds import Coupling, HandSpring, Holding, Pin
-from .newton import Newton, Solution, Start
+from .holds import Coupling, HandSpring, HoldBuilder, Pin
+from .newton import InitialGuess, Newton, Solution
 from .obstacle_shapes import Obstacle
-from .problem import Gathering, Problem, typical_size
+from .problem import Problem, ProblemBuilder, typical_size
 from .tree import Tree
-from .warm_start import WarmStart, WarmStartState
+from .warm_start import WarmStart, WarmStartSnapshot
 
 _WEIGHT = 9.81
 
@@ -71,11 +71,11 @@ class WorldSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class WorldState:
+class WorldSnapshot:
     """All that a simulation remembers from step to step; holds are not part of it."""
 
     bodies: dict[str, Floats]
-    start: WarmStartState
+    start: WarmStartSnapshot
 
 
 class World:
@@ -126,10 +126,10 @@ class World:
         )
         # A blow is not held on to: no more than twice the figure's weight on a point.
         self._firmest = 2.0 * _WEIGHT * settings.step * mass
-        self._gathering = Gathering(
+        self._builder = ProblemBuilder(
             figure, self._tree, settings.step, settings.gravity, settings.drag
         )
-        self._holding = Holding(mass, self._size, settings.step)
+        self._hold_builder = HoldBuilder(mass, self._size, settings.step)
         self._pattern: Pattern | None = None
         self._use_elements()
 
@@ -272,11 +272,11 @@ class World:
         bodies = self._bodies
         return bodies.positions[spring.body] + bodies.matrices[spring.body] @ spring.point
 
-    def state(self) -> WorldState:
+    def state(self) -> WorldSnapshot:
         """A snapshot for ``restore``. Pins and grabs are the caller's and not part of it."""
-        return WorldState(self._bodies.state(), self._warm.state())
+        return WorldSnapshot(self._bodies.state(), self._warm.state())
 
-    def restore(self, state: WorldState) -> None:
+    def restore(self, state: WorldSnapshot) -> None:
         """Go back to a snapshot; the same steps after it give the same result."""
         self._bodies.restore(state.bodies)
         self._warm.restore(state.start, self._law)
@@ -293,13 +293,13 @@ class World:
         self._take(problem, solution)
         self._move(problem, solution)
 
-    def problem(self) -> tuple[Problem, Start]:
+    def problem(self) -> tuple[Problem, InitialGuess]:
         """The question of the coming step, and where to begin with its answer."""
         bodies = self._bodies
         contacts = self._find()
         rows = Rows(
             contacts,
-            self._holding.rows(bodies, tuple(self._pins.values()), self._springs),
+            self._hold_builder.rows(bodies, tuple(self._pins.values()), self._springs),
             bodies.roots[0],
             self.figure.masses,
             self.settings.step,
@@ -307,7 +307,7 @@ class World:
             self._pattern,
         )
         self._pattern = rows.pattern
-        problem = self._gathering.problem(bodies, self._law, self.forces, rows, self._warm.speeds)
+        problem = self._builder.problem(bodies, self._law, self.forces, rows, self._warm.speeds)
         return problem, self._warm.start(problem, bodies)
 
     def _find(self) -> Contacts:
@@ -326,7 +326,7 @@ class World:
         self._loads = loads = solution.response.load
         if problem.frames is not None:
             self._loads = (problem.frames @ loads[:, :, None])[:, :, 0]
-        self._holding.take(self._springs, solution.impulses[rows.count :])
+        self._hold_builder.take(self._springs, solution.impulses[rows.count :])
 
     def _move(self, problem: Problem, solution: Solution) -> None:
         h, tree, bodies = self.settings.step, self._tree, self._bodies
