@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import chain, count
 from typing import Any, Final, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -11,6 +12,7 @@ import bpy
 import numpy as np
 from bpy import props
 
+from ..blender.rig import linked_names
 from ..core.settings import Setting, declared_settings
 
 BoolProperty: Final = partial(props.BoolProperty, override={"LIBRARY_OVERRIDABLE"})
@@ -48,6 +50,28 @@ def assign(group: Any, name: str, value: Any) -> None:
     is_array = isinstance(value, tuple | list | np.ndarray)
     if list(before) != list(value) if is_array else before != value:
         setattr(group, name, value)
+
+
+def free_name(items: Any, name: str) -> str:
+    """A name like this that no item of a list has: Blender numbers its own names so as well."""
+    taken = {each.name for each in items}
+    numbered = (f"{name}.{number:03}" for number in count(1))
+    return next(each for each in chain((name,), numbered) if each not in taken)
+
+
+def emptied(group: Any, name: str) -> list[Any]:
+    """Take all items off a list but those that a library override has from its linked file.
+
+    Those can be changed, but not removed.
+
+    Returns:
+        the items that stay.
+    """
+    items, linked = getattr(group, name), linked_names(group, name)
+    for number in reversed(range(len(items))):
+        if items[number].name not in linked:
+            items.remove(number)
+    return list(items)
 
 
 def _look_at(group: bpy.types.PropertyGroup) -> None:
@@ -128,8 +152,6 @@ def _value(value: Any, setting: Setting) -> Any:
 # --- Groups of properties as plain data, for JSON -------------------------------------------------
 
 
-_PASSED = frozenset({"rna_type"})
-
 _known: WeakKeyDictionary[type, list[tuple[str, str, bool]]] = WeakKeyDictionary()
 """The properties of each kind of group, as long as it is registered."""
 
@@ -170,6 +192,6 @@ def _properties(kind: type, group: Any) -> list[tuple[str, str, bool]]:
         _known[kind] = [
             (each.identifier, each.type, getattr(each, "is_array", False))
             for each in group.bl_rna.properties
-            if each.identifier not in _PASSED
+            if each.identifier != "rna_type"
         ]
     return _known[kind]

@@ -27,6 +27,19 @@ class OctoOperator:
 
     bl_options = {"REGISTER", "UNDO"}
 
+    @classmethod
+    def obstacle(cls, context: bpy.types.Context) -> str:  # noqa: ARG003
+        """Why it cannot be done now, for the tooltip; "" if it can."""
+        return ""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Blender's entry point."""
+        found = cls.obstacle(context)
+        if found:
+            cls.poll_message_set(found)  # type: ignore[attr-defined]
+        return not found
+
     def run(self, context: bpy.types.Context) -> None:
         """Do the work, or raise ``OctoMotionError`` and leave everything as it was."""
         raise NotImplementedError
@@ -63,17 +76,20 @@ class ArmatureOperator(OctoOperator):
     """An operator on the armature that the user works on, see ``active_armature``."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def obstacle(cls, context: bpy.types.Context) -> str:
         if context.mode not in {"OBJECT", "POSE"}:
             # Undo in other modes takes back what was done in that mode, and nothing else.
-            cls.poll_message_set("Go to object mode or pose mode first")  # type: ignore[attr-defined]
-            return False
-        try:
-            active_armature(context)
-        except RigError as error:
-            cls.poll_message_set(str(error).rstrip("."))  # type: ignore[attr-defined]
-            return False
-        return True
+            return "Go to object mode or pose mode first"
+        return without_armature(context)
+
+
+def without_armature(context: bpy.types.Context) -> str:
+    """Why there is no armature to work on, "" if there is one."""
+    try:
+        active_armature(context)
+    except RigError as error:
+        return str(error).rstrip(".")
+    return ""
 
 
 # --- What operators on the lists of an armature's settings share: arms, splices -------------------
@@ -122,13 +138,11 @@ class ItemOperator(ListOperator):
     """An operator on the list's active item."""
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if cls.KIND.active_item(cls.KIND.settings(active_armature(context))) is None:
-            cls.poll_message_set(f"Choose {cls.KIND.one} in the list first")  # type: ignore[attr-defined]
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        if found := super().obstacle(context):
+            return found
+        chosen = cls.KIND.active_item(cls.KIND.settings(active_armature(context)))
+        return "" if chosen is not None else f"Choose {cls.KIND.one} in the list first"
 
 
 class RemoveOperator(ItemOperator):
@@ -203,12 +217,10 @@ class ArmaturePresetAdd(AddPresetBase):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        try:
-            active_armature(context)
-        except RigError as error:
-            cast("Any", cls).poll_message_set(str(error).rstrip("."))
-            return False
-        return True
+        found = without_armature(context)
+        if found:
+            cast("Any", cls).poll_message_set(found)
+        return not found
 
     def execute(self, context: bpy.types.Context) -> Any:
         """Write the file, or remove it."""

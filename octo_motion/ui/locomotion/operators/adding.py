@@ -20,7 +20,7 @@ from ...panel_base import armature_in
 from ..settings import locomotion_settings
 
 _DEFAULT: Final = OctopusShape()
-_FORM: Final = ("arms", "joints", "arm_length", "first_diameter", "taper", "with_mesh")
+_SHAPE: Final = ("arms", "joints", "arm_length", "first_diameter", "taper")
 _PLACE: Final = ("align", "location", "rotation")
 
 
@@ -94,26 +94,17 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         assert layout is not None
         layout.use_property_split = True
         # What it is first, where it is last, as in Blender's own Add operators.
-        for names in (_FORM, _PLACE):
+        for names in ((*_SHAPE, "with_mesh"), _PLACE):
             column = layout.column()
             for name in names:
                 column.prop(self, name)
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Switch to object mode first")
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        return "" if context.mode == "OBJECT" else "Switch to object mode first"
 
     def run(self, context: bpy.types.Context) -> None:
-        shape = OctopusShape(
-            arms=self.arms,
-            joints=self.joints,
-            arm_length=self.arm_length,
-            first_diameter=self.first_diameter,
-            taper=self.taper,
-        )
+        shape = OctopusShape(**{name: getattr(self, name) for name in _SHAPE})
         armature = add_octopus(context, shape, self._place(context), with_skin=self.with_mesh)
         show_in_local_view(context, armature, *armature.children)
 
@@ -162,11 +153,8 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
     b3: _control_point("B3", "End of the route, in world space")
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode not in {"OBJECT", "POSE"}:
-            cls.poll_message_set("Leave edit mode first")
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        return "" if context.mode in {"OBJECT", "POSE"} else "Leave edit mode first"
 
     def run(self, context: bpy.types.Context) -> None:
         active = context.object

@@ -128,11 +128,10 @@ class OCTO_MOTION_OT_arm_add(ListOperator, bpy.types.Operator):
     KIND = _ARMS
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode not in {"POSE", "EDIT_ARMATURE"}:
-            cls.poll_message_set("Select the arm's bones in pose mode or edit mode first")
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        if context.mode in {"POSE", "EDIT_ARMATURE"}:
+            return ""
+        return "Select the arm's bones in pose mode or edit mode first"
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
         skeleton = read_skeleton(armature)
@@ -203,13 +202,11 @@ class OCTO_MOTION_OT_arm_select(ItemOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if context.object != active_armature(context):
-            cls.poll_message_set("Make the armature itself the active object first")
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        if found := super().obstacle(context):
+            return found
+        itself = context.object == active_armature(context)
+        return "" if itself else "Make the armature itself the active object first"
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:
         self.extend = event.shift

@@ -105,14 +105,10 @@ class OCTO_MOTION_OT_contacts_shift(OctoOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def obstacle(cls, context: bpy.types.Context) -> str:
         if context.mode != "OBJECT":
-            cls.poll_message_set("Go to object mode first")
-            return False
-        if not _selected(context):
-            cls.poll_message_set("Select markers of contacts")
-            return False
-        return True
+            return "Go to object mode first"
+        return "" if _selected(context) else "Select markers of contacts"
 
     def run(self, context: bpy.types.Context) -> None:
         for item in _selected(context):

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
 import bpy
@@ -24,7 +25,7 @@ from ....blender.animation import is_edited, may_replace
 from ....blender.rig import active_armature, deformed_meshes, read_skeleton
 from ....core.content_cache import clear_caches, content_key
 from ....core.errors import OctoMotionError, RigError
-from ...declared_settings import plain
+from ...declared_settings import assign, plain
 from ...modal_job import ModalJob
 from ...operator_base import ArmatureOperator
 from ..reading import playing_action, previous_action
@@ -95,26 +96,22 @@ _NO_MATTER: Final = RESULTS | {
 """
 
 
+@dataclass
 class _State:
     """What is known between two updates."""
 
-    def __init__(self) -> None:
-        self.seen: dict[str, str | None] = {}
-        """What each live armature's motion was made from, by the object's name."""
-        self.changed: dict[str, bool] = {}
-        """Armatures to look at, and whether it is known already that they changed."""
-        self.rates: dict[str, float] = {}
-        """Frames per second of each scene."""
-        self.complete = False
-        """Whether all live armatures of the file are among those seen."""
-        self.busy = False
+    seen: dict[str, str | None] = field(default_factory=dict)
+    """What each live armature's motion was made from, by the object's name."""
+    changed: dict[str, bool] = field(default_factory=dict)
+    """Armatures to look at, and whether it is known already that they changed."""
+    rates: dict[str, float] = field(default_factory=dict)
+    """Frames per second of each scene."""
+    complete: bool = False
+    """Whether all live armatures of the file are among those seen."""
+    busy: bool = False
 
     def clear(self) -> None:
-        self.seen.clear()
-        self.changed.clear()
-        self.rates.clear()
-        self.complete = False
-        self.busy = False
+        vars(self).update(vars(_State()))
 
 
 _state: Final = _State()
@@ -156,8 +153,7 @@ def made(armature: bpy.types.Object) -> None:
     settings = locomotion_settings(armature)
     if settings.live:
         _state.seen[armature.name] = _made_from(armature, settings)
-    if settings.live_error:
-        settings.live_error = ""
+    assign(settings, "live_error", "")
 
 
 def pending() -> bool:
@@ -444,8 +440,7 @@ def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> No
     for _ in shot.compute():
         pass
     shot.write(unedited=True)
-    if settings.live_error:
-        settings.live_error = ""
+    assign(settings, "live_error", "")
 
 
 def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
@@ -500,7 +495,7 @@ def _deaf() -> Iterator[None]:
 
 
 def _within_scene(armature: bpy.types.Object) -> bool:
-    return _windows(armature) != [] or armature.name in bpy.context.view_layer.objects
+    return bool(_windows(armature)) or armature.name in bpy.context.view_layer.objects
 
 
 def _windows(armature: bpy.types.Object) -> list[bpy.types.Window]:
@@ -511,12 +506,7 @@ def _windows(armature: bpy.types.Object) -> list[bpy.types.Window]:
     return [each for each in manager.windows if armature.name in each.view_layer.objects]
 
 
-@contextmanager
-def _window_of(armature: bpy.types.Object) -> Iterator[None]:
+def _window_of(armature: bpy.types.Object) -> AbstractContextManager[object]:
     """A context in which the armature's scene is the one that is worked on."""
     windows = _windows(armature)
-    if not windows:
-        yield
-        return
-    with bpy.context.temp_override(window=windows[0]):
-        yield
+    return bpy.context.temp_override(window=windows[0]) if windows else nullcontext()

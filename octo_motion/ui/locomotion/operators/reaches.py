@@ -13,6 +13,7 @@ from ....blender.files import gait_names, has_gait, load_gait
 from ....blender.rig import active_armature, require_editable
 from ....blender.scene import WITH_SURFACE
 from ....core.errors import RigError, SettingsError
+from ...declared_settings import free_name
 from ...operator_base import ArmatureOperator, ListKind, ListOperator, RemoveOperator
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..reading import bones_of
@@ -88,12 +89,8 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
         scene = context.scene
         assert scene is not None
         rate = scene.render.fps / scene.render.fps_base
+        name = free_name(settings.reaches, "Curl" if target is None else target.name)
         item = settings.reaches.add()
-        taken = {each.name for each in settings.reaches if each != item}
-        base = name = "Curl" if target is None else target.name
-        number = 1
-        while name in taken:
-            name, number = f"{base}.{number:03}", number + 1
         item.name, item.arm, item.target, item.mode = name, arm, target, mode
         item.frame_contact = scene.frame_current
         item.frame_start = item.frame_contact - round(_SECONDS_TO_REACH * rate)

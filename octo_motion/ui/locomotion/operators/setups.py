@@ -21,7 +21,7 @@ from ....blender.files import load_gait
 from ....blender.rig import active_armature
 from ....core.errors import SettingsError
 from ...declared_settings import assign, plain
-from ...operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd
+from ...operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd, window_manager
 from ..settings import (
     DEFAULT_GAIT,
     OCTO_MOTION_PG_locomotion,
@@ -46,23 +46,8 @@ ORDER: Final = (
 
 APART: Final = frozenset(
     {
-        "table",
-        "change",
-        *(
-            "name",
-            "seed",
-            "active_arm",
-            "active_reach",
-            "cycles",
-            "repeat",
-            "tell_overlaps",
-            "body_front",
-            "body_up",
-            "root_bone",
-            "spline",
-            "height",
-            "height_mode",
-        ),
+        *("table", "change", "name", "seed", "active_arm", "active_reach", "cycles", "repeat"),
+        *("tell_overlaps", "body_front", "body_up", "root_bone", "spline", "height", "height_mode"),
         *("ground.start_at_rest", "ground.come_to_rest", "ground.rest_within"),
         *("heading", "heading_angle", "gait", "timing", "speed", "frame_start", "frame_end"),
         *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),
@@ -104,11 +89,15 @@ def setup_paths() -> dict[str, Path]:
     return {name: found[name] for name in (*first, *rest)}
 
 
+def _group_of(settings: Any, path: str) -> tuple[Any, str]:
+    owner, _, name = path.rpartition(".")
+    return settings.path_resolve(owner) if owner else settings, name
+
+
 def reset(settings: Any) -> None:
     """Give all settings that a set-up holds their defaults."""
     for path in governed():
-        owner, _, name = path.rpartition(".")
-        group = settings.path_resolve(owner) if owner else settings
+        group, name = _group_of(settings, path)
         definition = group.bl_rna.properties[name]
         is_array = getattr(definition, "is_array", False)
         assign(group, name, definition.default_array[:] if is_array else definition.default)
@@ -170,8 +159,7 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
         except Exception as error:
             # Whatever a file of the user's does: nothing of it is left.
             for path, value in before.items():
-                owner, _, name = path.rpartition(".")
-                assign(settings.path_resolve(owner) if owner else settings, name, value)
+                assign(*_group_of(settings, path), value)
             # At last: the name of a gait, when it is set, fills the table.
             _put_back(settings.table, table)
             raise SettingsError(
@@ -243,11 +231,10 @@ class OCTO_MOTION_PT_setups(PresetPanel, bpy.types.Panel):
             _button(row, name, text=shown_name(name))
             remove = row.operator(self.preset_add_operator, text="", icon="REMOVE")
             remove.name, remove.remove_name = name, True
-        assert context.window_manager is not None
         row = layout.row()
-        row.prop(context.window_manager, "preset_name", text="")
+        row.prop(window_manager(context), "preset_name", text="")
         add = row.operator(self.preset_add_operator, text="", icon="ADD")
-        add.name = context.window_manager.preset_name
+        add.name = cast("Any", window_manager(context)).preset_name
 
 
 def _button(layout: Any, name: str, **look: Any) -> None:

@@ -2,13 +2,11 @@
 """From settings and scene to what core works on."""
 
 from .motion import (
-    breathing,
     gait_settings,
     read_changes,
     read_gaits,
     read_ground,
     read_reaches,
-    read_route_of,
     read_timing,
     resting,
     tolerances_of,
@@ -16,12 +14,10 @@ from .motion import (
 )
 from .rig import (
     RigRead,
-    active_arm,
     add_item,
     body_axes,
     bones_of,
     keyed_anew,
-    list_owner,
     placed_arms,
     playing_action,
     previous_action,
@@ -34,14 +30,11 @@ from .rig import (
 
 __all__ = [
     "RigRead",
-    "active_arm",
     "add_item",
     "body_axes",
     "bones_of",
-    "breathing",
     "gait_settings",
     "keyed_anew",
-    "list_owner",
     "placed_arms",
     "playing_action",
     "previous_action",
@@ -50,7 +43,6 @@ __all__ = [
     "read_gaits",
     "read_ground",
     "read_reaches",
-    "read_route_of",
     "read_timing",
     "read_volume",
     "resting",

@@ -20,7 +20,6 @@ from ....blender.scene import (
     is_enabled,
     read_form,
     read_places,
-    read_route,
     read_triangles,
 )
 from ....core.errors import SettingsError
@@ -28,7 +27,6 @@ from ....core.keyframes import check_bounds
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.ground import StanceSettings
 from ....core.locomotion.motion import (
-    Breathing,
     ChangeAt,
     ChangesByHeight,
     Creature,
@@ -37,7 +35,7 @@ from ....core.locomotion.motion import (
     Timing,
     Tolerances,
 )
-from ....core.locomotion.path import Route, TravelSettings
+from ....core.locomotion.path import TravelSettings
 from ....core.locomotion.reaching import Reach, Reaching, Timeline, profile_of
 from ....core.locomotion.rig import frames_of_arm
 from ....core.rotations import Floats
@@ -120,18 +118,6 @@ def tolerances_of(settings: OCTO_MOTION_PG_locomotion) -> Tolerances | None:
     return Tolerances(settings.key_angle, settings.key_distance, by_bone, _HELD)
 
 
-# --- Where a motion goes, and when: the settings' route and timing --------------------------------
-
-
-def read_route_of(settings: OCTO_MOTION_PG_locomotion, depsgraph: bpy.types.Depsgraph) -> Route:
-    """The route that is set; the caller sees to it that there is one.
-
-    Raises:
-        RouteError: the curve has no such spline, or it cannot be travelled.
-    """
-    return read_route(settings.route, depsgraph, settings.spline)
-
-
 def read_timing(settings: OCTO_MOTION_PG_locomotion, render: bpy.types.RenderSettings) -> Timing:
     """When it moves, and how fast."""
     return Timing(
@@ -143,11 +129,6 @@ def read_timing(settings: OCTO_MOTION_PG_locomotion, render: bpy.types.RenderSet
         rate=render.fps / render.fps_base,
         duty=settings.ground.duty,
     )
-
-
-def breathing(settings: OCTO_MOTION_PG_locomotion) -> Breathing:
-    """How its mantle breathes."""
-    return Breathing(settings.breathing, settings.breath_time)
 
 
 # --- Where the gait changes, as the settings say --------------------------------------------------

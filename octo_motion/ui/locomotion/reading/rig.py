@@ -48,22 +48,11 @@ from ....core.locomotion.rig import (
 )
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
-from ...declared_settings import assign
+from ...declared_settings import assign, emptied, free_name
 from ..settings import OCTO_MOTION_PG_locomotion
 
 # Names that detection gives, and the numbers that keep them apart.
 _GIVEN_NAME: Final = re.compile(r"Arm \d+( [LR])?(\.\d+)?")
-
-
-def list_owner(settings: OCTO_MOTION_PG_locomotion) -> bpy.types.Object:
-    """The armature object that the settings belong to."""
-    return cast("bpy.types.Object", settings.id_data)
-
-
-def active_arm(settings: OCTO_MOTION_PG_locomotion) -> Any:
-    """The list's active arm, ``None`` in an empty list."""
-    number = settings.active_arm
-    return settings.arms[number] if 0 <= number < len(settings.arms) else None
 
 
 def bones_of(arm: Any) -> tuple[str, ...]:
@@ -97,13 +86,8 @@ def write_arms(settings: OCTO_MOTION_PG_locomotion, arms: Iterable[ArmChain]) ->
     Returns how many arms of a linked file could only be switched off.
     """
     linked = linked_names(settings, "arms")
-    kept: dict[tuple[str, ...], dict[str, Any]] = {}
-    for number in reversed(range(len(settings.arms))):
-        item = settings.arms[number]
-        if item.name not in linked:
-            kept[bones_of(item)] = _set_by_hand(item)
-            settings.arms.remove(number)
-    remaining = {bones_of(item): item.name for item in settings.arms}
+    kept = {bones_of(item): _set_by_hand(item) for item in settings.arms if item.name not in linked}
+    remaining = {bones_of(item): item.name for item in emptied(settings, "arms")}
     for arm in arms:
         name = remaining.pop(arm.bones, None)
         if name is None:
@@ -127,15 +111,9 @@ def _set_by_hand(item: Any) -> dict[str, Any]:
 
 def add_item(settings: OCTO_MOTION_PG_locomotion, arm: ArmChain, **values: Any) -> Any:
     """Append an arm under a name that no other has, with these values of its properties."""
-    name = values.pop("name", arm.name)
-    taken = {each.name for each in settings.arms}
-    number = 1
-    unique = name
-    while unique in taken:
-        unique = f"{name}.{number:03}"
-        number += 1
+    name = free_name(settings.arms, values.pop("name", arm.name))
     item = settings.arms.add()
-    item.name, item.side, item.pair = unique, arm.side, arm.pair
+    item.name, item.side, item.pair = name, arm.side, arm.pair
     for bone in arm.bones:
         item.bones.add().name = bone
     for key, value in values.items():
@@ -147,7 +125,7 @@ def write_body(settings: OCTO_MOTION_PG_locomotion, found: Detection) -> None:
     """Set which way the body faces; the root bone stays as it is if it is one."""
     assign(settings, "body_up", found.up)
     assign(settings, "body_front", found.front)
-    if settings.root_bone not in armature_data(list_owner(settings)).bones:
+    if settings.root_bone not in cast("Any", settings.id_data).data.bones:
         assign(settings, "root_bone", found.root_bone)
 
 
@@ -236,8 +214,8 @@ def read_creature(
         detection=detection,
         # Detection has looked for constraints itself.
         warnings=(
-            *(detection.notes if detection else warnings_for_driven(skeleton, arms)),
-            *warnings_for_constraints(settings, armature, skeleton, root_bone),
+            *(detection.notes if detection else warnings_for_driven_arms(skeleton, arms)),
+            *warnings_for_driven(settings, armature, skeleton, root_bone),
         ),
         poses=tuple(warnings_for_poses(settings, armature, arms, carriers)),
     )
@@ -348,20 +326,7 @@ def chosen_root_bone(
     return name
 
 
-def warnings_for_driven(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
-    """What there is to say of arms that constraints or drivers move."""
-    bones = [bone for arm in arms for bone in arm.bones if is_driven(skeleton, [bone])]
-    if not bones:
-        return []
-    count = "one bone" if len(bones) == 1 else f"{len(bones)} bones"
-    told = (
-        f"Constraints or drivers move {count} of the arms ('{bones[0]}'{' …' * (len(bones) > 1)}): "
-        "keys there have little or no effect while those are on."
-    )
-    return [told]
-
-
-def warnings_for_constraints(
+def warnings_for_driven(
     settings: OCTO_MOTION_PG_locomotion,
     armature: bpy.types.Object,
     skeleton: Skeleton,
@@ -374,13 +339,29 @@ def warnings_for_constraints(
             f"Constraints or drivers move the root bone '{root_bone}': its keys have no "
             "effect while those are on."
         )
-    if settings.travel_on == "OBJECT" and any(
-        not each.mute and each.influence > 0.0 for each in armature.constraints
-    ):
+    travels = settings.travel_on == "OBJECT"
+    if travels and any(not each.mute and each.influence > 0.0 for each in armature.constraints):
         told.append(f"Constraints move '{armature.name}' away from its route.")
-    if settings.travel_on == "OBJECT" and is_driven_object(armature):
+    if travels and is_driven_object(armature):
         told.append(f"Drivers move '{armature.name}' away from its route.")
     return told
+
+
+def warnings_for_driven_arms(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[str]:
+    """What there is to say of arms that constraints or drivers move."""
+    bones = [bone for arm in arms for bone in arm.bones if is_driven(skeleton, [bone])]
+    if not bones:
+        return []
+    told = (
+        f"Constraints or drivers move {_counted(bones)} of the arms "
+        f"('{bones[0]}'{' …' * (len(bones) > 1)}): keys there have little or no effect while those "
+        "are on."
+    )
+    return [told]
+
+
+def _counted(bones: Sequence[str]) -> str:
+    return "one bone" if len(bones) == 1 else f"{len(bones)} bones"
 
 
 def warnings_for_display(armature: bpy.types.Object, render: bpy.types.RenderSettings) -> list[str]:
@@ -440,12 +421,7 @@ def posed_carriers(
         # Complains of bones that are gone.
         chain_of(skeleton, arm.bones)
     turned = {bone for arm in arms for bone in arm.bones}
-    carrying: set[int] = set()
-    for bone in turned:
-        parent = skeleton.parents[skeleton.index[bone]]
-        while parent >= 0 and parent not in carrying:
-            carrying.add(parent)
-            parent = skeleton.parents[parent]
+    carrying = {each for bone in turned for each in skeleton.ancestors(skeleton.index[bone])}
     own = {skeleton.names[number] for number in carrying} - turned
     own -= keyed_anew(settings, armature, root_bone)
     return displaced_bones(armature, (), sorted(own))
@@ -472,10 +448,9 @@ def warnings_for_poses(
     found = [*displaced_bones(armature, turned, ()), *carriers]
     if not found:
         return []
-    count = "one bone" if len(found) == 1 else f"{len(found)} bones"
     told = (
-        f"The pose of {count} moves the arms ('{found[0]}'): the body stands off its route by "
-        "that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not."
+        f"The pose of {_counted(found)} moves the arms ('{found[0]}'): the body stands off its "
+        "route by that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not."
     )
     return [told]
 
@@ -514,13 +489,14 @@ def read_volume(
 def _read_volume(
     armature: bpy.types.Object, skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame
 ) -> BodyVolume:
-    limbs = {bone for arm in arms for bone in arm.bones}
+    limbs = {skeleton.index[bone] for arm in arms for bone in arm.bones}
     parts = [
         name
         for number, name in enumerate(skeleton.names)
         if skeleton.deform[number]
         and skeleton.weighted[number]
-        and not _hangs(skeleton, name, limbs)
+        # Neither of an arm, nor hanging on one.
+        and limbs.isdisjoint([number, *skeleton.ancestors(number)])
     ]
     radii = radii_of_skin(armature, [arm.bones for arm in arms])
     still = [
@@ -533,13 +509,3 @@ def _read_volume(
         still=tuple(still),
         upward=body.rotation[:, 2],
     )
-
-
-def _hangs(skeleton: Skeleton, name: str, limbs: set[str]) -> bool:
-    """Whether a bone is of an arm, or hangs on one."""
-    bone = skeleton.index[name]
-    while bone >= 0:
-        if skeleton.names[bone] in limbs:
-            return True
-        bone = skeleton.parents[bone]
-    return False

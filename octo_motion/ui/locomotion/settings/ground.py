@@ -12,7 +12,6 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ....blender.rig import linked_names
 from ....blender.scene import Contact, markers, read_markers
 from ....core.locomotion.gait import Arm
 from ....core.locomotion.ground import ContactOverride, StanceSettings
@@ -26,6 +25,7 @@ from ...declared_settings import (
     PointerProperty,
     StringProperty,
     declared,
+    emptied,
 )
 
 
@@ -237,17 +237,9 @@ def overrides_for_core(
 
 
 def store(settings: OCTO_MOTION_PG_ground, wanted: dict[Place, ContactEdit]) -> None:
-    """Keep wishes in the settings.
-
-    What a library override has from its linked file can be changed, but not removed: there it says
-    nothing any more.
-    """
-    linked = linked_names(settings, "contacts")
-    for number in reversed(range(len(settings.contacts))):
-        item = settings.contacts[number]
-        if item.name not in linked:
-            settings.contacts.remove(number)
-        elif (item.arm, item.cycle) not in wanted:
+    """Keep wishes in the settings."""
+    for item in emptied(settings, "contacts"):
+        if (item.arm, item.cycle) not in wanted:
             item.removed, item.shift, item.locked = False, 0.0, False
     for (arm, cycle), each in sorted(wanted.items()):
         name = _name(arm, cycle)

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ....blender.files import curve_node, ensure_weight_curve, load_gait
-from ....blender.rig import armature_data, linked_names
+from ....blender.rig import armature_data
 from ....core.errors import GaitError
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.metrics import Figure
@@ -31,6 +31,7 @@ from ...declared_settings import (
     PointerProperty,
     StringProperty,
     declared,
+    emptied,
     make_overridable,
 )
 from .gait import DEFAULT_GAIT, GaitName, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
@@ -80,17 +81,10 @@ def known_figures(settings: Any) -> list[Any]:
 
 
 def write_figures(settings: Any, found: Sequence[Figure]) -> None:
-    """Keep figures with the settings.
-
-    What a library override has from its linked file can be changed, but not removed.
-    """
+    """Keep figures with the settings."""
     items = settings.figures
-    linked = linked_names(settings, "figures")
-    for number in reversed(range(len(items))):
-        if items[number].name in linked:
-            items[number].known = False
-        else:
-            items.remove(number)
+    for item in emptied(settings, "figures"):
+        item.known = False
     for figure in found:
         item = items.get(figure.kind)
         if item is None:

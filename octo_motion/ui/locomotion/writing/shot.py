@@ -20,10 +20,18 @@ from ....blender.animation import (
     write_action,
 )
 from ....blender.rig import world_matrix
-from ....blender.scene import Contact, carrying_note, left_behind, put_back, write_markers
+from ....blender.scene import (
+    Contact,
+    carrying_note,
+    left_behind,
+    put_back,
+    read_route,
+    write_markers,
+)
 from ....core.errors import RouteError, WriteError
 from ....core.locomotion.metrics import Figure
 from ....core.locomotion.motion import (
+    Breathing,
     MotionJob,
     MotionPlan,
     MotionResult,
@@ -37,14 +45,12 @@ from ....core.locomotion.rig import Detection
 from ...declared_settings import plain
 from ..reading import (
     bones_of,
-    breathing,
     previous_action,
     read_changes,
     read_creature,
     read_gaits,
     read_ground,
     read_reaches,
-    read_route_of,
     read_timing,
     read_volume,
     tolerances_of,
@@ -181,7 +187,9 @@ class Shot:
         """
         made = self.result
         assert made is not None
-        armature = _local_object(self.armature)
+        armature = bpy.data.objects.get((self.armature, None))
+        if armature is None:
+            raise WriteError(f"'{self.armature}' is gone.", "Generate again.")
         writable_armature(armature)
         settings = locomotion_settings(armature)
         action = self._write_action(armature, settings, made, unedited=unedited)
@@ -296,13 +304,6 @@ def show_contacts(
     return len(contacts)
 
 
-def _local_object(name: str) -> bpy.types.Object:
-    try:
-        return bpy.data.objects[name, None]  # type: ignore[index]
-    except KeyError:
-        raise WriteError(f"'{name}' is gone.", "Generate again.") from None
-
-
 RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
 """What is no setting, though it is kept with them."""
 
@@ -346,7 +347,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     walks = any(each.settings.gait.on_ground for each in gaits)
     job = MotionJob(
         creature=creature,
-        route=None if in_place else read_route_of(settings, depsgraph),
+        route=None if in_place else read_route(settings.route, depsgraph, settings.spline),
         cycles=settings.cycles,
         repeats=in_place and settings.repeat,
         gaits=gaits,
@@ -354,7 +355,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         timing=read_timing(settings, scene.render),
         height=settings.height if settings.height_mode == "MANUAL" else None,
         streamline=settings.streamline,
-        breathing=breathing(settings),
+        breathing=Breathing(settings.breathing, settings.breath_time),
         ground=read_ground(settings, armature, depsgraph, creature, edits, walks=walks),
         volume=read_volume(settings, armature, creature, live=live),
         keep_apart=settings.keep_apart,
@@ -374,13 +375,8 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         detection=found.detection,
         edits=edits,
         extend_scene_range=settings.extend_scene_range,
-        note=settings_note(settings),
+        note=json.dumps(plain(settings, without=RESULTS), sort_keys=True),
     )
-
-
-def settings_note(settings: OCTO_MOTION_PG_locomotion) -> str:
-    """The settings as JSON, without what is no setting."""
-    return json.dumps(plain(settings, without=RESULTS), sort_keys=True)
 
 
 def _write_back(*objects: bpy.types.Object | None) -> None:
