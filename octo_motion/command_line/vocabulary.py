@@ -73,13 +73,11 @@ def _settings(group: Any, before: str = "") -> Iterator[tuple[str, Kind]]:
             yield name, Choice(tuple(item.identifier for item in each.enum_items))
         elif each.type == "STRING":
             yield name, Text(may_be_empty=True)
-        elif each.type in {"BOOLEAN", "INT", "FLOAT"} and not each.is_array:
-            yield name, flag if each.type == "BOOLEAN" else _number(each)
-
-
-def _number(each: Any) -> Number:
-    whole, is_angle = each.type == "INT", each.unit == "ROTATION"
-    return Number(each.hard_min, each.hard_max, whole=whole, is_angle=is_angle)
+        elif each.type == "BOOLEAN" and not each.is_array:
+            yield name, flag
+        elif each.type in {"INT", "FLOAT"} and not each.is_array:
+            whole, is_angle = each.type == "INT", each.unit == "ROTATION"
+            yield name, Number(each.hard_min, each.hard_max, whole=whole, is_angle=is_angle)
 
 
 def resolver(job: Path, name: str) -> Callable[[str], Path]:

@@ -361,7 +361,8 @@ def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
             armature,
             clip,
             name=f"{stack.base.clip.name} Spliced",
-            note=_note(settings),
+            # What it was made from.
+            note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
             previous=previous,
             besides=besides,
         )
@@ -466,8 +467,3 @@ def local_object(name: str) -> bpy.types.Object:
     except KeyError:
         raise WriteError(f"'{name}' is gone.", "Build again.") from None
     return found
-
-
-def _note(settings: Any) -> str:
-    """The settings as JSON, kept with the action: what it was made from."""
-    return json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True)

@@ -183,30 +183,27 @@ def _words(name: str) -> tuple[str, ...]:
 
 def _read(words: tuple[str, ...], common: set[str]) -> BoneName:
     side, rest = "", list[str]()
+    filling = _FILLING | common | ({"base"} if "cc" in words else set())
     layer = next((word for word in words if word in _COPY_WEIGHTS), "")
     for word in words:
         if word in _SIDES and not side:
             side = _SIDES[word]
-        elif not word.isdigit() and word not in common and not _is_filling(word, words):
+        elif not (word.isdigit() or word in filling):
             rest.append(word)
     if not side:
         side, rest = _side_within(rest)
     numbers = [word for word in words if word.isdigit()]
-    barred = any(word in _NO_PART for word in rest)
-    weights = {} if barred else _lookup(rest, side)
+    machinery = any(word in _NO_PART for word in rest)
+    weights = {} if machinery else _lookup(rest, side)
     return BoneName(
         side=side,
         weights=MappingProxyType(
             {part: weight * _COPY_WEIGHTS.get(layer, 1.0) for part, weight in weights.items()}
         ),
         stem=" ".join([layer, *rest, *numbers]),
-        machinery=any(word in _NO_PART for word in rest),
+        machinery=machinery,
         layer=layer,
     )
-
-
-def _is_filling(word: str, words: tuple[str, ...]) -> bool:
-    return word in _FILLING or (word == "base" and "cc" in words)
 
 
 def _side_within(words: list[str]) -> tuple[str, list[str]]:

@@ -215,13 +215,19 @@ def _follows(body: BodyProportions, before: int, bone: int, chain: Mapping[str, 
     return score - (0.5 if _continues(body, before, bone, chain) else 2.0)
 
 
+def _upper(before: int, chain: Mapping[str, int]) -> int | None:
+    """The bone at which the upper part of a limb begins, if the lower one begins at ``before``."""
+    uppers = (chain[part] for part in ("upper_arm", "thigh") if part in chain)
+    return next((bone for bone in uppers if bone != before), None)
+
+
 def _continues(body: BodyProportions, before: int, bone: int, chain: Mapping[str, int]) -> bool:
     """Whether a bone lies where the lower part of a limb would end, about as long as the upper."""
-    uppers = [chain[part] for part in ("upper_arm", "thigh") if part in chain]
-    if not uppers or uppers[0] == before:
+    start = _upper(before, chain)
+    if start is None:
         return False
     heads = body.skeleton.heads
-    upper, lower = heads[before] - heads[uppers[0]], heads[bone] - heads[before]
+    upper, lower = heads[before] - heads[start], heads[bone] - heads[before]
     lengths = float(np.linalg.norm(upper)), float(np.linalg.norm(lower))
     straight = float(upper @ lower) > 0.5 * lengths[0] * lengths[1]
     return straight and 0.6 * lengths[0] < lengths[1] < 1.7 * lengths[0]
@@ -229,11 +235,10 @@ def _continues(body: BodyProportions, before: int, bone: int, chain: Mapping[str
 
 def _unevenness(body: BodyProportions, before: int, chain: Mapping[str, int], gap: float) -> float:
     """What it costs if the two long parts of a limb are of very different lengths."""
-    uppers = [chain[part] for part in ("upper_arm", "thigh") if part in chain]
-    if not uppers or uppers[0] == before:
+    start = _upper(before, chain)
+    if start is None:
         return 0.0
-    heads = body.skeleton.heads
-    upper = float(np.linalg.norm(heads[before] - heads[uppers[0]]))
+    upper = float(np.linalg.norm(body.skeleton.heads[before] - body.skeleton.heads[start]))
     least = 0.01 * body.size
     return min(1.0, 0.3 * abs(float(np.log(max(gap, least) / max(upper, least)))))
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -159,12 +159,6 @@ def _count(tree: _Tree, pairs: Sequence[tuple[int, int]]) -> int:
     return len(np.unique(np.round(ends / coarse), axis=0))
 
 
-def _steps(tree: _Tree, path: Sequence[int]) -> list[float]:
-    heads = tree.skeleton.heads
-    steps = [float(np.linalg.norm(heads[end] - heads[start])) for start, end in pairwise(path)]
-    return [*steps, float(tree.skeleton.lengths[path[-1]])]
-
-
 def _two_long_parts(
     tree: _Tree, paths: Sequence[Sequence[int]]
 ) -> list[tuple[int, int, int]] | None:
@@ -194,31 +188,26 @@ def _two_long_parts(
 
 def _costs_of_cuts(tree: _Tree, path: Sequence[int]) -> dict[tuple[int, int, int], float]:
     """How unlikely each way to cut a limb in two parts is, by the places of its joints."""
-    steps = _steps(tree, path)
-    total = sum(steps)
-    places = np.concatenate([[0.0], np.cumsum(steps)])
+    ways = np.diff(tree.skeleton.heads[list(path)], axis=0)
+    steps = np.linalg.norm(ways, axis=1)
+    places = np.cumsum([0.0, *steps, tree.skeleton.lengths[path[-1]]])
+    total = float(places[-1])
+    ways /= np.maximum(steps, 1e-12)[:, None]
+    # Turns by more than 10°.
+    bends = (np.einsum("ij,ij->i", ways[:-1], ways[1:]) <= np.cos(np.radians(10.0))).tolist()
     forks = [place for place, bone in enumerate(path) if len(tree.skeleton.children[bone]) > 1]
     last = min(forks[0] + 1, len(path) - 1) if forks else len(path) - 1
-    bends = _bends(tree, path)
     costs = {}
     for start, bend, end in combinations(range(last + 1), 3):
         upper, lower = places[bend] - places[start], places[end] - places[bend]
         if min(upper, lower) <= 1e-6 * total:
             continue
         cost = abs(float(np.log(upper / lower)))
-        cost += float(places[-1] - upper - lower) / total
-        cost += sum(_SKIPPED[bends[joint]] for joint in range(start + 1, end) if joint != bend)
+        cost += float(total - upper - lower) / total
+        cost += sum(_SKIPPED[bends[joint - 1]] for joint in range(start + 1, end) if joint != bend)
         cost -= _FORK * (end in forks[:1])
         costs[start, bend, end] = cost
     return costs
-
-
-def _bends(tree: _Tree, path: Sequence[int]) -> list[bool]:
-    """Whether the path turns by more than 10° at each of its joints."""
-    ways = np.diff(tree.skeleton.heads[list(path)], axis=0)
-    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
-    straight = np.einsum("ij,ij->i", ways[:-1], ways[1:]) > np.cos(np.radians(10.0))
-    return [True, *(not each for each in straight), True]
 
 
 def _limbs(tree: _Tree, pair: Sequence[int], names: Sequence[str]) -> list[dict[str, int]] | None:
