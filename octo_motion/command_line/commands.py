@@ -35,27 +35,18 @@ def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
     try:
         with stoppable():
             if options.command == "bake":
-                return _bake(options)
-            return _make(options)
+                said = {name: value for name, value in vars(options).items() if name != "command"}
+                return bake(BakeOptions(**said))
+            return _make(_requested(options))
+    except OctoMotionError as error:
+        return _complain(error, _WRONG)
     except KeyboardInterrupt:
         print("Stopped.", file=sys.stderr)
         return STOPPED
 
 
-def _bake(options: argparse.Namespace) -> int:
-    said = {name: value for name, value in vars(options).items() if name != "command"}
-    try:
-        return bake(BakeOptions(**said))
-    except OctoMotionError as error:
-        return _complain(error, _WRONG)
-
-
-def _make(options: argparse.Namespace) -> int:
+def _make(shot: ShotRequest) -> int:
     """One file, to walk or swim, with splices or posed."""
-    try:
-        shot = _requested(options)
-    except OctoMotionError as error:
-        return _complain(error, _WRONG)
     try:
         with staged(shot.outputs) as places:
             performed = perform(shot, places)

@@ -243,7 +243,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         self._mouse = event.mouse_x
         window_manager.modal_handler_add(self)
         at_work.begun(self, self._tear_down)
-        self._show_header(context)
+        _write(context, self._session.drag.header(), _HELP)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
@@ -265,7 +265,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         except BaseException:
             self._tear_down(context)
             raise
-        self._show_header(context)
+        _write(context, session.drag.header(), _HELP)
         return {"PASS_THROUGH"} if free else {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -303,13 +303,6 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         self.report({"ERROR"}, str(error))
         return {"CANCELLED"}
 
-    def _show_header(self, context: bpy.types.Context) -> None:
-        assert self._session is not None
-        if context.area is not None:
-            context.area.header_text_set(self._session.drag.header())
-        if context.workspace is not None:
-            context.workspace.status_text_set(_HELP)
-
     def _tear_down(self, context: bpy.types.Context) -> None:
         """Leave nothing on screen and armature; safe to call twice."""
         at_work.done(self)
@@ -317,10 +310,15 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
             return
         self._session.tear_down()
         self._session = None
-        if context.area is not None:
-            context.area.header_text_set(None)
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
+        _write(context, None, None)
+
+
+def _write(context: bpy.types.Context, header: str | None, status: str | None) -> None:
+    """Write into the area's header and the status bar, or give them back."""
+    if context.area is not None:
+        context.area.header_text_set(header)
+    if context.workspace is not None:
+        context.workspace.status_text_set(status)
 
 
 def _check_shown(item: Any) -> None:

@@ -172,22 +172,6 @@ def bones_beneath(skeleton: Skeleton, roots: Iterable[int]) -> list[int]:
     return sorted(inside)
 
 
-def path_down(skeleton: Skeleton, top: int, end: int, what: str) -> list[int]:
-    """The bones beneath ``top`` that lead to ``end``, which comes last.
-
-    Raises:
-        ClipError: ``end`` does not hang on ``top``.
-    """
-    above = skeleton.ancestors(end)
-    if top not in above:
-        raise ClipError(
-            f"The {what} cannot be spliced: '{skeleton.names[end]}' does not hang on "
-            f"'{skeleton.names[top]}'.",
-            "Look at the bone table, or choose another part.",
-        )
-    return [*above[: above.index(top)][::-1], end]
-
-
 def part_bones(
     part: Part, skeleton: Skeleton, landmarks: Landmarks | None, *, clavicle: bool = True
 ) -> tuple[str, ...]:
@@ -223,7 +207,15 @@ def kind_bones(
     if not kind.below:
         first = (kind.clavicle,) if clavicle and kind.clavicle else ()
         return bones_beneath(skeleton, [bone(*first, kind.root)])
-    path = path_down(skeleton, bone(kind.below), bone(kind.root), kind.name)
+    top, end = bone(kind.below), bone(kind.root)
+    above = skeleton.ancestors(end)
+    if top not in above:
+        raise ClipError(
+            f"The {kind.name} cannot be spliced: '{skeleton.names[end]}' does not hang on "
+            f"'{skeleton.names[top]}'.",
+            "Look at the bone table, or choose another part.",
+        )
+    path = [*above[: above.index(top)][::-1], end]
     return path if kind.spine else bones_beneath(skeleton, path[:1])
 
 
