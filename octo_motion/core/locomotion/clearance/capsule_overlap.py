@@ -366,21 +366,6 @@ class Touches:
         """(touches,) by how much they overlap, as a share of the thinner radius."""
         return (self.wide - self.distance) / self.thin
 
-    def part(self, chosen: np.ndarray) -> Touches:
-        """Some of them."""
-        return Touches(
-            frame=self.frame[chosen],
-            arms=(self.arms[0][chosen], self.arms[1][chosen]),
-            segments=(self.segments[0][chosen], self.segments[1][chosen]),
-            shares=(self.shares[0][chosen], self.shares[1][chosen]),
-            gap=self.gap[:, chosen],
-            distance=self.distance[chosen],
-            wide=self.wide[chosen],
-            thin=self.thin[chosen],
-            side=self.side[:, chosen],
-            pair=self.pair[chosen],
-        )
-
 
 class Touching:
     """The capsules that are so near to each other that they may ever touch, at all frames.

@@ -64,21 +64,6 @@ class Surface:
         return (world[..., 2] - self.ground.height(world[..., :2])) / self.scale
 
 
-@dataclass(frozen=True, eq=False)
-class Bulk:
-    """What there is of a creature that must not pass through itself."""
-
-    arms: Sequence[ArmFrames]
-    radii: Sequence[Floats]
-    """Of each arm (bones + 1,) at its joints, armature units."""
-    still: Sequence[Capsules]
-    """Parts of the body, one frame each."""
-    upward: Floats
-    """(3,) unit: the body's, armature space."""
-    opened: Opened | None = None
-    """Where arms stand round a body that swims as it lies, none for others."""
-
-
 def joints_that_count(bones: int) -> np.ndarray:
     """Numbers of the joints of an arm of so many bones that stand for all."""
     return np.unique(np.linspace(0, bones, min(bones, MOST_CAPSULES) + 1).astype(int))
@@ -90,7 +75,7 @@ def width_of(frames_per_cycle: float) -> int:
 
 
 def separate_arms(
-    bulk: Bulk,
+    volume: BodyVolume,
     rotations: Floats,
     strains: Floats,
     *,
@@ -100,12 +85,13 @@ def separate_arms(
     ground: Ground | None,
     scale: float,
     frames_per_cycle: float,
+    opened: Opened | None = None,
     cyclic: bool = False,
 ) -> Floats | None:
     """Rotations (frames, bones, 4) of arms that have made way; none if nobody has to.
 
     Args:
-        bulk: the arms and the body.
+        volume: the arms and the body.
         rotations: (frames, bones, 4) of all arms, one after the other.
         strains: (frames, bones) by how much bones are longer than at rest, as a share.
         in_contact: for each arm (frames, joints) which joints rest on the ground.
@@ -114,34 +100,37 @@ def separate_arms(
         ground: what they walk on, if anything.
         scale: metres of the armature's unit.
         frames_per_cycle: of the gait: the shorter, the quicker arms make way.
+        opened: where arms stand round a body that swims as it lies, none for others.
         cyclic: whether the last frame is the first again.
     """
-    ends = np.cumsum([0, *(len(arm.bones) for arm in bulk.arms)])
-    some, chosen = _joints_chosen(bulk.arms)
+    ends = np.cumsum([0, *(len(arm.bones) for arm in volume.arms)])
+    some, chosen = _joints_chosen(volume.arms)
     posed = [
         _Posed.of(numbers, together, ends, rotations)
-        for numbers, together in batches_by_bones(bulk.arms)
+        for numbers, together in batches_by_bones(volume.arms)
     ]
-    joints = np.empty((len(rotations), len(bulk.arms), len(chosen[0]), 3))
+    joints = np.empty((len(rotations), len(volume.arms), len(chosen[0]), 3))
     for each in posed:
         joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
     locations, orientations = travel
     crowd = Crowd(
         joints=joints,
-        radii=np.stack([own[which] for own, which in zip(bulk.radii, chosen, strict=True)]),
+        radii=np.stack([own[which] for own, which in zip(volume.radii, chosen, strict=True)]),
         at_rest=np.stack(
-            [arm.joints(arm.at_rest)[which] for arm, which in zip(bulk.arms, chosen, strict=True)]
+            [arm.joints(arm.at_rest)[which] for arm, which in zip(volume.arms, chosen, strict=True)]
         ),
         in_contact=np.stack(
             [_in_contact(own, which) for own, which in zip(in_contact, chosen, strict=True)], axis=1
         ),
         kept=busy,
-        upward=bulk.upward,
-        opened=bulk.opened,
+        upward=volume.upward,
+        opened=opened,
         up=rotate(conjugate(orientations), _UP),
     )
     floor = Surface(ground, locations, orientations, scale) if ground is not None else None
-    moved = parted(crowd, bulk.still, floor=floor, width=width_of(frames_per_cycle), cyclic=cyclic)
+    moved = parted(
+        crowd, volume.still, floor=floor, width=width_of(frames_per_cycle), cyclic=cyclic
+    )
     if moved is None:
         return None
     result = rotations.copy()
@@ -254,20 +243,16 @@ _MOST_DISTANCES: Final = 60_000_000
 
 @dataclass(frozen=True, eq=False)
 class BodyVolume:
-    """How much room arms and body take: what it takes to measure how far they keep apart."""
+    """How much room a creature's arms and body take."""
 
     arms: tuple[ArmFrames, ...]
     names: tuple[str, ...]
     radii: tuple[Floats, ...]
+    """Of each arm (bones + 1,) at its joints, armature units."""
     still: tuple[Capsules, ...]
-    """Of the body, one frame."""
+    """Parts of the body, one frame each."""
     upward: Floats
     """(3,) unit: the body's, armature space."""
-
-    @property
-    def bulk(self) -> Bulk:
-        """What must not pass through itself."""
-        return Bulk(self.arms, self.radii, self.still, self.upward)
 
     def _distances(self, frames: int) -> int:
         """How many there are to be looked at over so many frames."""

@@ -17,6 +17,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from ...array_parts import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
@@ -245,7 +246,7 @@ class _Parting:
         shape = self._joints.shape
         way, far = aside(touches)
         chosen = np.flatnonzero(far > 1e-6 * touches.thin)
-        way, far, touches = way[:, chosen], far[chosen], touches.part(chosen)
+        way, far, touches = way[:, chosen], far[chosen], part_of(touches, chosen)
         ways = way, -way
         can = [self._can(touches, which, ways[which]) for which in (0, 1)]
         whole = can[0] + can[1] + _LITTLE

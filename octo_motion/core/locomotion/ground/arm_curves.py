@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from ...array_parts import part_of
 from ...rotations import Floats, components_first, conjugate, rotate
 from ...rotations.components_first import cumulative_sum, dot
 from ..rig import ArmSkin, JointRoom
@@ -493,7 +494,7 @@ def raise_over_ground(
     own = np.ascontiguousarray(result[..., chosen])
     below = np.ascontiguousarray(below[:, chosen])
     lengths, free, roots = lengths[:, chosen], free[:, chosen], roots[:, chosen]
-    room = room.part(chosen)
+    room = part_of(room, chosen)
     least = (1e-4 * np.max(np.broadcast_to(room.soft, room.needed.shape), axis=0)) ** 2
     loosened, weak = free * lengths, _WEAK * lengths[0] ** 2
     for number in range(iterations):

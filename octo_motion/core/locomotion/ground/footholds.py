@@ -373,10 +373,6 @@ class Footholds:
     short: Floats
     """(arms, cycles) metres that it is out of reach."""
 
-    def unrolled(self) -> Floats:
-        """(arms, cycles) when all of it lies down."""
-        return self.touch_down + UNROLLING * (self.lift_off - self.touch_down)
-
     def peeled(self) -> Floats:
         """(arms, cycles) when it begins to be peeled off."""
         return self.lift_off - PEELING * (self.lift_off - self.touch_down)

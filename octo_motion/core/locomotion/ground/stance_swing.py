@@ -23,6 +23,7 @@ from typing import Final
 
 import numpy as np
 
+from ...array_parts import part_of
 from ...rotations import Floats, components_first
 from ...rotations.components_first import dot
 from ...smoothing import least_jerk, smooth_step
@@ -138,17 +139,6 @@ class Batch:
         """(segments + 1, batch) metres from each joint to the skin below it."""
         return self.limbs.radii[:, self.arms]
 
-    def part(self, chosen: np.ndarray) -> Batch:
-        """Some of them."""
-        return Batch(
-            self.limbs,
-            self.arms[chosen],
-            self.roots[:, chosen],
-            self.outward[:, chosen],
-            self.upward[:, chosen],
-            self.lift[chosen],
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class Stance:
@@ -172,20 +162,6 @@ class Stance:
     """(segments + 1 − c, batch) metres from each of these joints to the skin below it."""
     touching: int
     """c"""
-
-    def part(self, chosen: np.ndarray) -> Stance:
-        """Some of the batch."""
-        return Stance(
-            self.weight[chosen],
-            self.contact_from[chosen],
-            self.contact_to[chosen],
-            self.by_tip[chosen],
-            self.joints[..., chosen],
-            self.carried[:, chosen],
-            self.normals[..., chosen],
-            self.skins[:, chosen],
-            self.touching,
-        )
 
     @property
     def place(self) -> Floats:
@@ -299,7 +275,7 @@ def kept_over_ground(
     lengths = batch.lengths * (1.0 + strains)
     swinging = np.flatnonzero(weight < 1.0)
     if len(swinging):
-        part, own = batch.part(swinging), stance.part(swinging)
+        part, own = part_of(batch, swinging), part_of(stance, swinging)
         away = 1.0 - own.weight
         off_ground, at_once = smooth_step(_LETTING_GO * away), smooth_step(_AT_ONCE * away)
         free = _freedom(part, own)
@@ -359,7 +335,8 @@ def _in_stance(
     chosen = np.flatnonzero(stance.weight > 0.0)
     if len(chosen) == 0:
         return strains, directions
-    batch, stance, shapes = batch.part(chosen), stance.part(chosen), shapes[..., chosen]
+    batch, stance = part_of(batch, chosen), part_of(stance, chosen)
+    shapes = shapes[..., chosen]
     strain, guess, chord = _asked(batch, stance, settings)
     strain = strain * _freedom(batch, stance)
     # Some of the gait stays, but for what lies or unrolls.

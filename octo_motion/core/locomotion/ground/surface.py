@@ -14,6 +14,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from ...array_parts import part_of
 from ...content_cache import ContentCache, content_key
 from ...errors import GroundError
 from ...rotations import Floats
@@ -305,18 +306,6 @@ class _Faces:
     heights: tuple[Floats, Floats, Floats]
     """World Z of the first corner, and of the others above it."""
 
-    def part(self, chosen: np.ndarray) -> _Faces:
-        """Some of the faces."""
-        (s, sx, sy), (t, tx, ty), (z, z1, z2) = self.second, self.third, self.heights
-        return _Faces(
-            self.first[chosen],
-            self.columns[chosen],
-            self.rows[chosen],
-            (s[chosen], sx[chosen], sy[chosen]),
-            (t[chosen], tx[chosen], ty[chosen]),
-            (z[chosen], z1[chosen], z2[chosen]),
-        )
-
 
 def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Floats]]:
     """Numbers of samples and heights there, of faces that lie over or under them, in blocks."""
@@ -329,7 +318,7 @@ def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Fl
         alike = np.flatnonzero((longest > done) & (longest <= size))
         many = _AT_ONCE // (size * size)
         for start in range(0, len(alike), many):
-            part = faces.part(alike[start : start + many])
+            part = part_of(faces, alike[start : start + many])
             for column, row in np.ndindex(size, size):
                 over = (column < part.columns) & (row < part.rows)
                 second, third = _nearness(part, slice(None), column, row)

@@ -51,7 +51,7 @@ def slip(joints: Floats, lying: np.ndarray, cycles: np.ndarray, lengths: Floats)
     return _worst(moved.max(axis=-1, initial=0.0) / lengths)
 
 
-def depth(joints: Floats, ground: Ground, lengths: Floats, radii: Floats | None = None) -> Worst:
+def depth(joints: Floats, ground: Ground, lengths: Floats) -> Worst:
     """How far a joint is below the ground, in arm lengths; negative if all are above.
 
     The root is left out: it is the body's.
@@ -60,11 +60,8 @@ def depth(joints: Floats, ground: Ground, lengths: Floats, radii: Floats | None 
         joints: (frames, arms, joints, 3) world.
         ground: what they should be above of.
         lengths: (arms,) in the units of the joints.
-        radii: (arms, joints) of the skin below the joints, or none for the joints themselves.
     """
     below = ground.height(joints[..., 1:, :]) - joints[..., 1:, 2]
-    if radii is not None:
-        below = below + radii[:, 1:]
     return _worst(below.max(axis=-1) / lengths)
 
 
@@ -163,8 +160,9 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
 
     poses = measured.poses
     if measured.ground is not None:
+        half = halfway_linear(poses) if measured.halfway is None else measured.halfway
         for number, name in enumerate(measured.names):
-            joints, lying, cycles = _looked_at(measured, number)
+            joints, lying, cycles = _looked_at(measured, half, number)
             length = np.array([measured.arms[number].length * measured.scale])
             keep("SLIP", slip(joints, lying, cycles, length), [name], per_frame=2)
             keep("DEPTH", depth(joints, measured.ground, length), [name], per_frame=2)
@@ -177,7 +175,9 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
     return tuple(found[kind] for kind in KINDS if kind in found)
 
 
-def _looked_at(measured: Measured, number: int) -> tuple[Floats, np.ndarray, np.ndarray]:
+def _looked_at(
+    measured: Measured, half: Poses, number: int
+) -> tuple[Floats, np.ndarray, np.ndarray]:
     """One arm on every frame and half way between them.
 
     Returns:
@@ -186,15 +186,11 @@ def _looked_at(measured: Measured, number: int) -> tuple[Floats, np.ndarray, np.
     """
     ends = np.cumsum([0, *(len(arm.bones) for arm in measured.arms)])
     bones = slice(int(ends[number]), int(ends[number + 1]))
-    poses, half = measured.poses, measured.halfway
-    rotations = _halved(
-        poses.rotations[:, bones], None if half is None else half.rotations[:, bones], turns=True
-    )
-    strains = _halved(poses.strains[:, bones], None if half is None else half.strains[:, bones])
-    locations = _halved(poses.locations, None if half is None else half.locations)
-    orientations = _halved(
-        poses.orientations, None if half is None else half.orientations, turns=True
-    )
+    poses = measured.poses
+    rotations = _joined(poses.rotations[:, bones], half.rotations[:, bones])
+    strains = _joined(poses.strains[:, bones], half.strains[:, bones])
+    locations = _joined(poses.locations, half.locations)
+    orientations = _joined(poses.orientations, half.orientations)
     arm = measured.arms[number]
     own = arm.joints(arm.from_bones(rotations), strains)
     joints = locations[:, None] + rotate(orientations[:, None], measured.scale * own)
@@ -205,18 +201,8 @@ def _looked_at(measured: Measured, number: int) -> tuple[Floats, np.ndarray, np.
     return joints[:, None], lying[:, None], _joined(cycle, cycle[:-1])
 
 
-def _halved(values: Floats, half: Floats | None, *, turns: bool = False) -> Floats:
-    """Values (frames, …) with those half way in between (2 frames − 1, …).
-
-    Args:
-        values: at the frames.
-        half: those half way, none for straight on from one frame to the next.
-        turns: whether they are unit quaternions.
-    """
-    return _joined(values, halfway_linear(values, turns=turns) if half is None else half)
-
-
 def _joined(values: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """Values (frames, …) with those half way in between (2 frames − 1, …)."""
     result = np.empty((2 * len(values) - 1, *values.shape[1:]), dtype=values.dtype)
     result[::2], result[1::2] = values, half
     return result
@@ -271,14 +257,8 @@ def measure_keyed(measured: Measured, rig: KeyedRig, channels: Sequence[Channel]
     halves = 0.5 * (frames[:-1] + frames[1:])
     by_path = {channel.data_path: channel for channel in channels}
     poses = _poses(measured.poses, rig, by_path, frames, frames)
-    computed = measured.poses
-    halfway = Poses(
-        halfway_linear(computed.rotations, turns=True),
-        halfway_linear(computed.strains),
-        halfway_linear(computed.locations),
-        halfway_linear(computed.orientations, turns=True),
-    )
-    return replace(measured, poses=poses, halfway=_poses(halfway, rig, by_path, frames, halves))
+    halfway = _poses(halfway_linear(measured.poses), rig, by_path, frames, halves)
+    return replace(measured, poses=poses, halfway=halfway)
 
 
 def _poses(

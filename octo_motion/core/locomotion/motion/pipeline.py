@@ -124,7 +124,7 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     notes, carried, busy = _reach(plan, arms, keyed)
     warnings += _separate(plan, arms, busy, going, swimming=swimming, every=every)
     motion = _motion(plan, arms, keyed, swimming)
-    on_frames = arms.at_every(every)
+    on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
     measured, overlaps = _measured(plan, on_frames, framed)
     few: list[Channel] | None = None
@@ -256,7 +256,7 @@ def _separate(
     if too_many := volume.too_many(len(arms.rotations)):
         return [too_many]
     moved = separate_arms(
-        replace(volume.bulk, opened=_opened(plan, len(arms.rotations), swimming)),
+        volume,
         arms.rotations,
         arms.strains,
         in_contact=arms.in_contact,
@@ -265,6 +265,7 @@ def _separate(
         ground=_ground(plan),
         scale=job.creature.scale,
         frames_per_cycle=every * plan.pace.mean,
+        opened=_opened(plan, len(arms.rotations), swimming),
         cyclic=job.in_place,
     )
     if moved is not None:

@@ -389,7 +389,7 @@ class SegmentedMotion:
         again = [self._again(number, chosen, lift) for number in range(len(self.segments))]
         # All moments, so that bones turn the same way round from one to the next as they did.
         arms = self._joined(again)
-        return _rows(arms, chosen), None
+        return arms.at(chosen), None
 
     def _higher_on_one(
         self, chosen: np.ndarray, lift: Floats
@@ -400,7 +400,7 @@ class SegmentedMotion:
         raised = Raise(lift, made.shapes_at(chosen), evened)
         travel, places = self.travel.at(chosen), (self.places[0][chosen], self.places[1][chosen])
         stood = walk.pose(travel.phase, travel.turn, *places, raised)
-        arms = _rows(made.arms, chosen)
+        arms = made.arms.at(chosen)
         arms.rotations, arms.strains = stood.rotations, stood.strains
         arms.late[:, raised.arms] = stood.misses[:, raised.arms]
         return arms, walk.by_arm(stood.joints, raised)
@@ -462,16 +462,4 @@ def _over(first: ArmMotion, second: ArmMotion, shares: Floats, bones: Sequence[i
             )
         ],
         np.where(shares > 0.0, second.cycles, first.cycles),
-    )
-
-
-def _rows(arms: ArmMotion, chosen: np.ndarray) -> ArmMotion:
-    """The same at some moments (n,)."""
-    return ArmMotion(
-        arms.rotations[chosen],
-        arms.strains[chosen],
-        arms.late[chosen],
-        arms.misses[chosen],
-        [each[chosen] for each in arms.in_contact],
-        arms.cycles[chosen],
     )

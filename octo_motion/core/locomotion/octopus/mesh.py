@@ -10,16 +10,30 @@ from __future__ import annotations
 import numpy as np
 
 from ...rotations import Floats
-from .body import BodyForm, body_form
-from .head import add_head_details
-from .layout import ArmLayout
+from .organs import add_head_details, add_ventral_strips
 from .rig import BODY, MANTLE
-from .shape import OctopusShape
-from .sheets import ARMS_BELOW, BEAK_ROWS, END_POLAR, Sheet, column_angles, lower_sheet, upper_sheet
-from .suckers import add_ventral_strips
-from .surface import OctopusMesh, SkinMaterial, Surface
-from .topology import Indices, cap_size, closed, sheet_quads
-from .weights import along_arm, rigid
+from .shape import BodyForm, OctopusShape, body_form
+from .sheets import (
+    ARMS_BELOW,
+    BEAK_ROWS,
+    END_POLAR,
+    ArmLayout,
+    Sheet,
+    column_angles,
+    lower_sheet,
+    upper_sheet,
+)
+from .surface import (
+    Indices,
+    OctopusMesh,
+    SkinMaterial,
+    Surface,
+    along_arm,
+    cap_size,
+    closed,
+    rigid,
+    sheet_quads,
+)
 
 
 def build_mesh(shape: OctopusShape) -> OctopusMesh:

@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, normalized
-from .body import HEAD_BASE, NECK, BodyForm, body_form
-from .shape import OctopusShape
+from .shape import HEAD_BASE, NECK, BodyForm, OctopusShape, body_form
 
 ARM_COLLECTIONS: Final = ("Arms Left", "Arms Right", "Arms Middle")
 """Bone collections of the arms."""

@@ -17,6 +17,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...array_parts import part_of
 from ...content_cache import ContentCache, content_key
 from ...errors import SettingsError
 from ...rotations import Floats, from_axis_angle, multiply, rotate_in_plane
@@ -188,14 +189,7 @@ class Travel:
 
     def at(self, frames: np.ndarray) -> Travel:
         """The motion at some of the frames (n,)."""
-        return Travel(
-            self.times[frames],
-            self.distance[frames],
-            self.phase[frames],
-            self.positions[frames],
-            self.rotations[frames],
-            self.turn[frames],
-        )
+        return part_of(self, frames, axis=0)
 
 
 def bearings_of(route: Route, settings: TravelSettings) -> Bearings:

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arms that reach, wind round something, carry it and let go."""
 
-from .curl import curled
-from .grasp import Mode, Places, Target, plan_grasp
-from .plan import Carried, Reach, Reaching, Travelling
-from .timeline import Timeline
+from .grasp import Carried, Mode, Places, Reach, Reaching, Target, Travelling, plan_grasp
+from .timeline import Timeline, curled
 from .winding import Profile, profile_of
 
 __all__ = [

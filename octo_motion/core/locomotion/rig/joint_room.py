@@ -80,10 +80,6 @@ class JointRoom:
     soft: Floats
     """(…, batch) how much above what is needed they begin to be raised."""
 
-    def part(self, chosen: np.ndarray | slice) -> JointRoom:
-        """Some of the batch."""
-        return JointRoom(self.needed[:, chosen], self.loose[:, chosen], self.soft[..., chosen])
-
     def lacking(self, heights: Floats) -> Floats:
         """By how much (segments + 1, batch) joints at such heights are to be raised."""
         below = self.needed - heights

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from ...array_parts import part_of
 from ...keyframes import halfway_values
 from ...rotations import Floats, conjugate, continuous, from_matrix, multiply, normalized, rotate
 from ...skeleton import Skeleton
@@ -66,16 +67,9 @@ class ArmMotion:
             cycles=np.zeros((moments, len(bones)), dtype=np.int64),
         )
 
-    def at_every(self, count: int) -> ArmMotion:
-        """The same at every so many of these moments, from the first on."""
-        return ArmMotion(
-            rotations=self.rotations[::count],
-            strains=self.strains[::count],
-            late=self.late[::count],
-            misses=self.misses[::count],
-            in_contact=[each[::count] for each in self.in_contact],
-            cycles=self.cycles[::count],
-        )
+    def at(self, moments: np.ndarray | slice) -> ArmMotion:
+        """The same at some of these moments."""
+        return part_of(self, moments, axis=0)
 
     def copy(self) -> ArmMotion:
         """The same, whose poses may be changed."""
@@ -120,16 +114,19 @@ def _automatic(values: Floats, *, cyclic: bool, turns: bool = False) -> Floats:
     return normalized(half) if turns else half
 
 
-def halfway_linear(values: Floats, *, turns: bool = False) -> Floats:
-    """Values (frames − 1, …) half way from each frame's (frames, …) straight on to the next one's.
+def halfway_linear(poses: Poses) -> Poses:
+    """Half way between frames (frames − 1), straight on from each to the next."""
+    return Poses(
+        _half_turns(poses.rotations),
+        0.5 * (poses.strains[:-1] + poses.strains[1:]),
+        0.5 * (poses.locations[:-1] + poses.locations[1:]),
+        _half_turns(poses.orientations),
+    )
 
-    Args:
-        values: at the frames.
-        turns: whether they are unit quaternions.
-    """
-    before, after = values[:-1], values[1:]
-    if not turns:
-        return 0.5 * (before + after)
+
+def _half_turns(turns: Floats) -> Floats:
+    """Unit quaternions (frames − 1, …, 4) half way between those of frames (frames, …, 4)."""
+    before, after = turns[:-1], turns[1:]
     other = np.sum(before * after, axis=-1, keepdims=True) < 0.0
     return normalized(before + np.where(other, -after, after))
 

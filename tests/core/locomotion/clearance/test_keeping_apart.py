@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
-from octo_motion.core.locomotion.clearance.corrections import Bulk, separate_arms
+from octo_motion.core.locomotion.clearance.corrections import BodyVolume, separate_arms
 from octo_motion.core.locomotion.rig.arm_chains import body_frame
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, from_axis_angle, multiply
@@ -18,7 +18,7 @@ PLACES = np.array([[0.1, 0.0, 0.0], [0.1, 0.3, 0.0], [-0.1, 0.0, 0.0], [-0.1, 0.
 """Two arms side by side to the right, and two to the left."""
 
 
-def side_by_side(bones: Sequence[int]) -> Bulk:
+def side_by_side(bones: Sequence[int]) -> BodyVolume:
     """Straight arms of unit length, of so many bones each."""
     names, parents = ["root"], [-1]
     matrices, lengths = [bone_matrix(np.zeros(3), UP, 0.0)], [0.1]
@@ -34,7 +34,9 @@ def side_by_side(bones: Sequence[int]) -> Bulk:
     skeleton = skeleton_of(names, parents, matrices, lengths)
     body = body_frame(skeleton, arms, "Z", "-Y")
     frames = [frames_of_arm(skeleton, arm, body) for arm in arms]
-    return Bulk(frames, [np.full(count + 1, 0.05) for count in bones], [], UP)
+    names = tuple(str(number) for number in range(len(bones)))
+    radii = tuple(np.full(count + 1, 0.05) for count in bones)
+    return BodyVolume(tuple(frames), names, radii, (), UP)
 
 
 def swung(arms: Sequence[ArmFrames]) -> Floats:
@@ -51,7 +53,7 @@ def own(arms: Sequence[ArmFrames], values: Floats) -> list[Floats]:
     return np.split(values, np.cumsum([len(arm.bones) for arm in arms])[:-1], axis=1)
 
 
-def deepest(bulk: Bulk, rotations: Floats) -> float:
+def deepest(bulk: BodyVolume, rotations: Floats) -> float:
     chains = [
         Capsules(str(number), arm.joints(arm.from_bones(turns)), radii, arm.joints(arm.at_rest))
         for number, (arm, radii, turns) in enumerate(
@@ -61,7 +63,7 @@ def deepest(bulk: Bulk, rotations: Floats) -> float:
     return float(measure_overlap(chains).depths.max())
 
 
-def apart(bulk: Bulk, rotations: Floats) -> Floats | None:
+def apart(bulk: BodyVolume, rotations: Floats) -> Floats | None:
     travel = np.zeros((FRAMES, 3)), np.tile(IDENTITY, (FRAMES, 1))
     return separate_arms(
         bulk,

@@ -9,9 +9,8 @@ import pytest
 from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
-from octo_motion.core.locomotion.reaching.curl import curled
 from octo_motion.core.locomotion.reaching.grasp import Grasp, Mode, Places, Target, plan_grasp
-from octo_motion.core.locomotion.reaching.timeline import Timeline, first_place, front_width
+from octo_motion.core.locomotion.reaching.timeline import Timeline, curled, first_place, front_width
 from octo_motion.core.locomotion.reaching.winding import profile_of
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle, rotate
