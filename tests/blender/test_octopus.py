@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion
 from octo_motion.blender.rig.armature import SUCKER_PROPERTY, read_skeleton
 from octo_motion.blender.scene.octopus import add_octopus
 from octo_motion.core.errors import WriteError
-from octo_motion.core.locomotion.gait.ccd import segment_lengths
+from octo_motion.core.locomotion.gait.ccd import diameters
 from octo_motion.core.locomotion.octopus.mesh import build_mesh
 from octo_motion.core.locomotion.octopus.rig import (
     FIRST_ARM_BONE,
@@ -77,7 +77,7 @@ def test_bones_are_where_the_numbers_say(shape: OctopusShape) -> None:
 
 
 def test_the_sources_arm_has_the_sources_lengths() -> None:
-    lengths = segment_lengths(12, 1.0, 0.01)
+    lengths = 0.5 * diameters(12, 1.0, 0.01)
     shape = OctopusShape(
         joints=12, first_diameter=1.0, taper=0.12, arm_length=float(np.sum(lengths))
     )

@@ -43,11 +43,6 @@ def diameters(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
     return first * (1.0 - taper * np.arange(joints, dtype=np.float64))
 
 
-def segment_lengths(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
-    """Lengths ``l_i = w_i / 2`` (joints,) of the segments, root to tip [Octopus, eq. 3.2]."""
-    return 0.5 * diameters(joints, first, taper)
-
-
 def split_groups(lengths: Floats) -> tuple[int, int, int]:
     """Sizes of the three groups, as equal in length as whole segments allow.
 

@@ -424,7 +424,8 @@ class GaitPoser:
             phase: (frames,) of the body's gait, radians.
             turn: (frames, 2) turn that lies ahead, in the body's XY plane (``Travel.turn``).
         """
-        angles, steering = self.asked(phase, turn)
+        phases = self.arm_phases(np.asarray(phase, dtype=np.float64))
+        angles, steering = self.asked(phases, turn)
         step = max(1, _CHUNK // len(self.arms))
         parts = [
             self._pose(angles[start : start + step], steering[start : start + step])
@@ -434,25 +435,20 @@ class GaitPoser:
             parts = [self._pose(angles, steering)]
         return ArmPoses(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
-    def asked(self, phase: Floats, turn: Floats) -> tuple[Floats, Floats]:
-        """What the gait asks of the arms at some frames; arguments as of :meth:`pose`.
+    def asked(
+        self, phases: Floats, turn: Floats, cycle_period: Sequence[int] | None = None
+    ) -> tuple[Floats, Floats]:
+        """What the gait asks of the arms at some frames.
+
+        Args:
+            phases: (frames, arms) of the arms themselves, radians.
+            turn: as of :meth:`pose`.
+            cycle_period: each arm's cycles after which random additions come again, if that is not
+                the same for all.
 
         Returns:
             Angles (frames, arms, links, 3), turns anticlockwise for every arm, and by how much the
             arms steer (frames, arms), radians.
-        """
-        return self.asked_at(self.arm_phases(np.asarray(phase, dtype=np.float64)), turn)
-
-    def asked_at(
-        self, phases: Floats, turn: Floats, cycle_period: Sequence[int] | None = None
-    ) -> tuple[Floats, Floats]:
-        """The same for phases (frames, arms) of the arms themselves.
-
-        Args:
-            phases: radians.
-            turn: as of :meth:`pose`.
-            cycle_period: each arm's cycles after which random additions come again, if that is not
-                the same for all.
         """
         settings = self.settings
         steady = settings.smoothing_cycles

@@ -5,6 +5,7 @@ from .arm_curves import drawn, raise_over_ground
 from .contact_timing import (
     BodyLine,
     ContactTiming,
+    CrawlingBody,
     EvenTiming,
     body_line,
     crawling,
@@ -31,6 +32,7 @@ __all__ = [
     "ContactOverride",
     "ContactTiming",
     "CrawlSettings",
+    "CrawlingBody",
     "EvenTiming",
     "Ground",
     "GroundedPoses",

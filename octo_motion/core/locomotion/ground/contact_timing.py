@@ -345,112 +345,82 @@ def timing_at_rest(
     return TabledTiming(rested, middle)
 
 
+@dataclass(frozen=True, eq=False)
+class CrawlingBody:
+    """A body that crawls, and the gait that its arms' cycles are of."""
+
+    line: BodyLine
+    """Its way."""
+    roots: Floats
+    """(arms, 3) metres from the body's centre to where the arms begin, in its own frame."""
+    outward: Floats
+    """(arms, 4) from each arm's own frame, x outward, to the body's."""
+    reach: float
+    """Metres that its arms are long."""
+    middle: float
+    """Phase of the gait half way through a stance, radians."""
+    duty: float
+    """Share of a cycle that a stance takes in the gait."""
+
+    def samples(self, length: float) -> Floats:
+        """Distances (samples,) at which a way of such a length is looked at, metres."""
+        return np.linspace(0.0, length, max(2, int(np.ceil(length / self.reach * _PER_REACH)) + 1))
+
+    def path(
+        self,
+        distance: Floats,
+        centres: Floats,
+        rotations: Floats,
+        stands: tuple[bool, bool] = (False, False),
+    ) -> CrawlPath:
+        """What a crawl is planned from: the body's centres (samples, 3) and orientations there."""
+        directions = rotate(multiply(rotations[:, None], self.outward), np.array([1.0, 0.0, 0.0]))
+        places = centres[:, None] + rotate(rotations[:, None], self.roots)
+        return CrawlPath(
+            distance=distance,
+            roots=places[..., :2],
+            outward=normalized(directions[..., :2]),
+            ahead=normalized(np.gradient(centres[:, :2], axis=0)),
+            length=self.reach,
+            stands=stands,
+        )
+
+
 def crawling(
-    line: BodyLine,
-    roots: Floats,
-    outward: Floats,
-    settings: CrawlSettings,
-    *,
-    reach: float,
-    middle: float,
-    duty: float,
-    stands: tuple[bool, bool] = (False, False),
+    body: CrawlingBody, settings: CrawlSettings, stands: tuple[bool, bool] = (False, False)
 ) -> TabledTiming:
-    """The rhythm of a body that crawls.
+    """When the arms of a crawling body are in contact with the ground.
 
     Args:
-        line: its way.
-        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
-        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
+        body: on its way.
         settings: how it crawls.
-        reach: metres that its arms are long.
-        middle: phase of the gait half way through a hold, radians.
-        duty: share of a cycle that a hold takes in the gait.
         stands: whether it stands at the start of its way, and at the end, with all arms down.
     """
-    length = line.route.length
-    distance = _samples(length, reach)
-    way = line.at(distance)
-    journey = _journey(distance, way, roots, outward, reach=reach, stands=stands)
-    return crawl_timing(plan_crawl(journey, settings), len(roots), middle=middle, duty=duty)
+    distance = body.samples(body.line.route.length)
+    stances = plan_crawl(body.path(distance, *body.line.at(distance), stands), settings)
+    return crawl_timing(stances, len(body.roots), middle=body.middle, duty=body.duty)
 
 
-def crawling_in_place(
-    line: BodyLine,
-    roots: Floats,
-    outward: Floats,
-    settings: CrawlSettings,
-    *,
-    reach: float,
-    middle: float,
-    duty: float,
-) -> TabledTiming:
-    """The rhythm of a body that crawls straight on, and is after its route's length as before.
+def crawling_in_place(body: CrawlingBody, settings: CrawlSettings) -> TabledTiming:
+    """The same of one that crawls straight on over level ground, and is after its route as before.
 
-    Each arm's holds are cut from a longer crawl, as many as fill the loop best, and stretched or
-    shrunk to its length; the place where they are cut is the one where most arms hold on.
-
-    Args:
-        line: a straight way on level ground.
-        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
-        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
-        settings: how it crawls.
-        reach: metres that its arms are long.
-        middle: phase of the gait half way through a hold, radians.
-        duty: share of a cycle that a hold takes in the gait.
+    Each arm's stances are cut from a longer crawl, as many as fill the loop best, and stretched or
+    shrunk to its length; the place where they are cut is the one where most arms are in contact.
     """
-    loop = line.route.length
-    whole = loop + _SPARE * reach
-    distance = _samples(whole, reach)
-    (start, end), (turned, _) = line.at(np.array([0.0, loop]))
+    loop = body.line.route.length
+    whole = loop + _SPARE * body.reach
+    distance = body.samples(whole)
+    (start, end), (turned, _) = body.line.at(np.array([0.0, loop]))
     centres = start + distance[:, None] / loop * (end - start)
-    way = centres, np.tile(turned, (len(distance), 1))
-    journey = _journey(distance, way, roots, outward, reach=reach)
-    stances = plan_crawl(journey, settings)
+    path = body.path(distance, centres, np.tile(turned, (len(distance), 1)))
+    stances = plan_crawl(path, settings)
     cuts = [
-        [_cut(stances, arm, loop, start) for arm in range(len(roots))]
+        [_cut(stances, arm, loop, start) for arm in range(len(body.roots))]
         for start in np.linspace(0.25, 0.5, _CUTS) * (whole - loop)
     ]
     best = max(cuts, key=lambda arms: _support(arms, loop))
-    tables = [_looped(*stances, loop, duty) for stances in best]
-    return TabledTiming(tables, middle, cycle_period=[len(start) for start, _, _ in best])
-
-
-def _samples(length: float, reach: float) -> Floats:
-    """Distances along a way at which its journey is looked at."""
-    return np.linspace(0.0, length, max(2, int(np.ceil(length / reach * _PER_REACH)) + 1))
-
-
-def _journey(
-    distance: Floats,
-    way: tuple[Floats, Floats],
-    roots: Floats,
-    outward: Floats,
-    *,
-    reach: float,
-    stands: tuple[bool, bool] = (False, False),
-) -> CrawlPath:
-    """What a crawl is planned from.
-
-    Args:
-        distance: (samples,) along the way.
-        way: the body's centres (samples, 3) and orientations (samples, 4) there.
-        roots: (arms, 3) metres from the body's centre to where the arms begin, in its own frame.
-        outward: (arms, 4) from each arm's own frame, x outward, to the body's.
-        reach: metres that its arms are long.
-        stands: whether it stands at the start, and at the end.
-    """
-    centres, rotations = way
-    directions = rotate(multiply(rotations[:, None], outward), np.array([1.0, 0.0, 0.0]))
-    places = centres[:, None] + rotate(rotations[:, None], roots)
-    return CrawlPath(
-        distance=distance,
-        roots=places[..., :2],
-        outward=normalized(directions[..., :2]),
-        ahead=normalized(np.gradient(centres[:, :2], axis=0)),
-        length=reach,
-        stands=stands,
-    )
+    tables = [_looped(*stances, loop, body.duty) for stances in best]
+    return TabledTiming(tables, body.middle, cycle_period=[len(start) for start, _, _ in best])
 
 
 def _cut(
@@ -527,13 +497,8 @@ class ContactTable:
         """At distances (…,)."""
         low = self.at[0] if self.starts else -np.inf
         distance = np.clip(distance, low, self.at[-1] if self.stops else np.inf)
-        knot = np.clip(np.searchsorted(self.at, distance, "right") - 1, 0, len(self.at) - 2)
-        start, width = self.at[knot], self.at[knot + 1] - self.at[knot]
-        t = (distance - start) / width
-        rise = self.values[knot + 1] - self.values[knot]
-        first, last = width * self.slopes[knot], width * self.slopes[knot + 1]
-        bend = first + last - 2.0 * rise
-        inside = self.values[knot] + t * (first + t * (rise - first - bend + t * bend))
+        t, _, (start, slope, curve, bend) = self._piece(distance)
+        inside = start + t * (slope + t * (curve + t * bend))
         before = self.values[0] + (distance - self.at[0]) * self.slopes[0]
         after = self.values[-1] + (distance - self.at[-1]) * self.slopes[-1]
         return np.where(t < 0.0, before, np.where(t > 1.0, after, inside))
@@ -547,13 +512,19 @@ class ContactTable:
 
     def slopes_at(self, distance: Floats) -> Floats:
         """Cycles per metre at distances (…,)."""
+        t, width, (_, slope, curve, bend) = self._piece(distance)
+        t = np.clip(t, 0.0, 1.0)
+        return (slope + t * (2.0 * curve + 3.0 * t * bend)) / width
+
+    def _piece(self, distance: Floats) -> tuple[Floats, Floats, tuple[Floats, ...]]:
+        """Shares of the way between two knots, metres of it, and the cubic's four coefficients."""
         knot = np.clip(np.searchsorted(self.at, distance, "right") - 1, 0, len(self.at) - 2)
-        start, width = self.at[knot], self.at[knot + 1] - self.at[knot]
-        t = np.clip((distance - start) / width, 0.0, 1.0)
-        secant = (self.values[knot + 1] - self.values[knot]) / width
-        first, last = self.slopes[knot], self.slopes[knot + 1]
-        bend = first + last - 2.0 * secant
-        return first + t * (2.0 * (secant - first - bend) + 3.0 * t * bend)
+        width = self.at[knot + 1] - self.at[knot]
+        rise = self.values[knot + 1] - self.values[knot]
+        first, last = width * self.slopes[knot], width * self.slopes[knot + 1]
+        bend = first + last - 2.0 * rise
+        cubic = self.values[knot], first, rise - first - bend, bend
+        return (distance - self.at[knot]) / width, width, cubic
 
     def distances(self, cycles: Floats) -> Floats:
         """At cycles (…,)."""

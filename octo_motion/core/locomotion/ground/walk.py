@@ -13,7 +13,7 @@ from ...rotations import Floats, components_first, conjugate, from_matrix, multi
 from ...skeleton import Skeleton
 from ..gait import CYCLE, Build, GaitPoser, bone_twists
 from ..path import Line
-from ..rig import ArmSkin, BodyFrame, Facing, carried_to, rotate_bones, sucker_sides
+from ..rig import ArmSkin, BodyFrame, Facing, rotate_bones, sucker_sides
 from .arm_curves import Seen, skin_below
 from .contact_timing import ContactTiming, EvenTiming
 from .footholds import ContactOverride, Footholds, cycles_at, lay, relaid
@@ -139,7 +139,7 @@ class Moments:
     """What is asked of all arms of a body at some frames, and where it is then."""
 
     angles: Floats
-    """(frames, arms, links, 3) as of ``GaitPoser.asked_at`` …"""
+    """(frames, arms, links, 3) as of ``GaitPoser.asked`` …"""
     steering: Floats
     """(frames, arms) … and likewise."""
     cycles: np.ndarray
@@ -471,8 +471,8 @@ class GroundedWalk:
             footholds = part.footholds
             below = np.empty(footholds.skins.shape)
             for place, arm in enumerate(part.build.arms):
-                own = pose.rotations[:, None, self._ends[arm] : self._ends[arm + 1]]
-                carried = carried_to([self._poser.rests[arm]], own)[:, 0]
+                own = pose.rotations[:, self._ends[arm] : self._ends[arm + 1]]
+                carried = self._poser.rests[arm].orientations(own)
                 cycles = pose.cycles[:, arm] - footholds.first
                 seen = Seen(
                     joints=pose.joints[number][:, place],
@@ -514,7 +514,7 @@ class GroundedWalk:
                 the motion's own are of no use.
         """
         phases = self.arm_phases(phase)
-        angles, steering = self._poser.asked_at(phases, turn, self._timing.cycle_period)
+        angles, steering = self._poser.asked(phases, turn, self._timing.cycle_period)
         cycles, since = cycles_at(phases, self._middle)
         to_armature = multiply(self._body_turn, conjugate(orientations))
         moments = Moments(angles, steering, cycles, since, centres, orientations, to_armature)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Few keys in place of one per frame: what belongs together, and how far it may be off."""
+"""Few keys in place of one per frame: what belongs together, how far it may be off, what plays."""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -17,41 +17,24 @@ from ...keyframes import (
     Limb,
     LimbChain,
     Residuals,
-    RigChannels,
     Track,
     chain_to_tip,
     reduce_keys,
     reducing,
+    rotation_property,
     values_at,
 )
-from ...rotations import Floats
+from ...rotations import Floats, from_mode_values
 from ...skeleton import Skeleton
 from ..gait import Arm
-from .job import Tolerances
+from ..metrics import Measured
+from ..rig import Poses, carried_by_root_bone, halfway_linear
+from .job import Creature, Tolerances
 
 MANTLE_GROUP: Final = "Mantle"
 
 _TRAVEL_SHARE: Final = 0.25
 """Of the distance that a tip may be off, what travel may take at most."""
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """What moves."""
-
-    channels: RigChannels
-    scale: float
-    """Metres of the armature's unit."""
-    skeleton: Skeleton
-    arms: Sequence[Arm]
-    mantle: Sequence[str]
-    """Bones."""
-    travel_bone: str
-    """"" where the object travels."""
-
-    def modes(self, bones: Sequence[str]) -> list[str]:
-        """Rotation modes of bones."""
-        return [self.channels.modes[name] for name in bones]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +58,7 @@ class Motion:
 
 def reduced(
     frames: Floats,
-    body: Body,
+    creature: Creature,
     motion: Motion,
     tolerances: Tolerances,
     *,
@@ -87,7 +70,7 @@ def reduced(
 
     Args:
         frames: (moments,) at which the channels have their values.
-        body: its arms and mantle are those of the channels, in their order.
+        creature: its arms are those of the channels, in their order.
         motion: the channels.
         tolerances: how far they may be off.
         every: at every how many of these moments there is a frame, from the first to the last.
@@ -103,7 +86,7 @@ def reduced(
     distance: float | Floats = tolerances.distance
     carried: float | Floats = 0.0
     if motion.travel:
-        travel, unit = _travel(body, motion, tolerances)
+        travel, unit = _travel(creature, motion, tolerances)
         found += reduce_keys(frames, [travel], every=every, all_of_them=dense, loops=loops)
         parts.append(motion.travel)
         # What it does not take is left to the arms, frame by frame.
@@ -111,16 +94,16 @@ def reduced(
         carried = Residuals(travel).measure(played)[1] * travel.distance / unit
         distance = distance - carried
     rest = iter(motion.arms)
-    for number, arm in enumerate(body.arms):
+    for number, arm in enumerate(creature.arms):
         turned = [next(rest) for _ in arm.bones]
         stretched = [each for each in motion.stretch if each.group in arm.bones]
         parts.append([replace(each, group=arm.name) for each in (*turned, *stretched)])
         lying = motion.lying[number] if motion.lying else None
         left = replace(tolerances, distance=distance, held=tolerances.held - carried)
-        limbs.append(_limb(body, arm, turned, stretched, left, lying=lying))
-    if body.mantle:
+        limbs.append(_limb(creature, arm, turned, stretched, left, lying=lying))
+    if motion.mantle:
         parts.append([replace(each, group=MANTLE_GROUP) for each in motion.mantle])
-        tracks = _tracks(motion.mantle, body.modes(body.mantle))
+        tracks = _tracks(motion.mantle, _modes(creature, [each.group for each in motion.mantle]))
         columns = range(len(tracks)) if tolerances.by_bone else None
         limbs.append(Limb(tracks, tolerances.angle, tolerances.distance, columns=columns))
     found += yield from reducing(frames, limbs, every=every, all_of_them=dense, loops=loops)
@@ -132,7 +115,7 @@ def reduced(
 
 
 def _limb(
-    body: Body,
+    creature: Creature,
     arm: Arm,
     turned: Sequence[Channel],
     stretched: Sequence[Channel],
@@ -141,9 +124,9 @@ def _limb(
     lying: np.ndarray | None,
 ) -> Limb:
     """What belongs together of one arm, and how far that may be off."""
-    tracks = _tracks(turned, body.modes(arm.bones))
+    tracks = _tracks(turned, _modes(creature, arm.bones))
     tracks += [Track(each.values, SCALE) for each in stretched]
-    chain = _chain(body, arm, [each.group for each in stretched])
+    chain = _chain(creature, arm, [each.group for each in stretched])
     return Limb(
         tracks=tracks,
         angle=tolerances.angle,
@@ -154,16 +137,16 @@ def _limb(
     )
 
 
-def _chain(body: Body, arm: Arm, stretched: Sequence[str]) -> LimbChain:
+def _chain(creature: Creature, arm: Arm, stretched: Sequence[str]) -> LimbChain:
     """An arm's chain, of which some bones stretch: their tracks come after those of all turns."""
-    chain = chain_to_tip(body.skeleton, arm.bones)
+    chain = chain_to_tip(creature.skeleton, arm.bones)
     if not stretched:
         return chain
     tracks = {name: len(arm.bones) + place for place, name in enumerate(stretched)}
     return replace(
         chain,
         scaled=tuple(tracks.get(name, -1) for name in arm.bones),
-        handed=tuple(body.channels.handed(arm.bones)),
+        handed=tuple(creature.channels.handed(arm.bones)),
     )
 
 
@@ -177,32 +160,32 @@ def _room(chain: LimbChain, lying: np.ndarray, held: float | Floats) -> Floats:
     return result
 
 
-def _length(skeleton: Skeleton, arm: Arm) -> float:
-    return float(np.linalg.norm(chain_to_tip(skeleton, arm.bones).steps, axis=1).sum())
+def _modes(creature: Creature, bones: Sequence[str]) -> list[str]:
+    return [creature.channels.modes[name] for name in bones]
 
 
 def _tracks(channels: Sequence[Channel], kinds: Sequence[str]) -> list[Track]:
     return [Track(channel.values, kind) for channel, kind in zip(channels, kinds, strict=True)]
 
 
-def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> tuple[Limb, float]:
+def _travel(creature: Creature, motion: Motion, tolerances: Tolerances) -> tuple[Limb, float]:
     """The body's travel, whose turns carry the tips of the arms; the armature's unit in its own."""
-    if body.travel_bone:
-        (mode,) = body.modes([body.travel_bone])
-        pivot = body.skeleton.heads[body.skeleton.index[body.travel_bone]]
+    if bone := creature.root_bone:
+        (mode,) = _modes(creature, [bone])
+        pivot = creature.skeleton.heads[creature.skeleton.index[bone]]
         unit = 1.0
     else:
-        assert body.channels.own is not None
-        mode = body.channels.own.rotation_mode
+        assert creature.channels.own is not None
+        mode = creature.channels.own.rotation_mode
         pivot = np.zeros(3)
         # The armature's unit, as the object's location has it.
-        unit = body.scale / body.channels.own.unit
+        unit = creature.scale / creature.channels.own.unit
     held = tolerances.held if motion.lying else np.inf
     limb = Limb(
         tracks=_tracks(motion.travel, [LOCATION, mode]),
         angle=tolerances.angle,
         distance=_TRAVEL_SHARE * min(tolerances.distance, held) * unit,
-        lever=max(_reach(body.skeleton, arm, pivot) for arm in body.arms) * unit,
+        lever=max(_reach(creature.skeleton, arm, pivot) for arm in creature.arms) * unit,
     )
     return limb, unit
 
@@ -210,4 +193,87 @@ def _travel(body: Body, motion: Motion, tolerances: Tolerances) -> tuple[Limb, f
 def _reach(skeleton: Skeleton, arm: Arm, pivot: Floats) -> float:
     """How far from a point an arm can reach."""
     root = skeleton.heads[skeleton.index[arm.bones[0]]]
-    return float(np.linalg.norm(root - pivot)) + _length(skeleton, arm)
+    steps = chain_to_tip(skeleton, arm.bones).steps
+    return float(np.linalg.norm(root - pivot)) + float(np.linalg.norm(steps, axis=1).sum())
+
+
+# --- What few keys play, on frames and half way between them, to be measured ----------------------
+
+
+def measure_keyed(
+    measured: Measured, creature: Creature, channels: Sequence[Channel], *, travels: bool
+) -> Measured:
+    """What is measured of a motion, of what its keys play in place of what was computed.
+
+    Whether arms overlap, and how far they are from their targets, stays as it was computed.
+
+    Args:
+        measured: the motion as it was computed.
+        creature: whose keys they are.
+        channels: all that the motion has, those that have few keys and those that have one on
+            each frame.
+        travels: whether anything takes it along; in place it is measured as if something did.
+    """
+    frames = measured.frames
+    halves = 0.5 * (frames[:-1] + frames[1:])
+    by_path = {channel.data_path: channel for channel in channels}
+    poses, halfway = (
+        _played_poses(computed, creature, by_path, frames, times, travels=travels)
+        for computed, times in ((measured.poses, frames), (halfway_linear(measured.poses), halves))
+    )
+    return replace(measured, poses=poses, halfway=halfway)
+
+
+def _played_poses(
+    computed: Poses,
+    creature: Creature,
+    channels: Mapping[str, Channel],
+    frames: Floats,
+    times: Floats,
+    *,
+    travels: bool,
+) -> Poses:
+    """What channels play at some times; what they do not move is as it was computed."""
+
+    def played(path: str) -> Floats | None:
+        channel = channels.get(path)
+        if channel is None:
+            return None
+        if channel.keys is not None:
+            return values_at(channel.keys, times)
+        columns = [np.interp(times, frames, column) for column in channel.values.T]
+        return np.stack(columns, axis=-1)
+
+    own, named = creature.channels, [name for arm in creature.bones for name in arm]
+    rotations = computed.rotations.copy()
+    alongs: dict[str, Floats] = {}
+    for place, name in enumerate(named):
+        turned = played(own.rotation_path(name))
+        if turned is not None:
+            rotations[:, place] = from_mode_values(turned, own.modes[name])
+        scaled = played(own.path(name, "scale"))
+        if scaled is not None:
+            alongs[name] = scaled[:, 1]
+    strains = own.strains(creature.bones, alongs, len(times))
+    if not travels:
+        return Poses(rotations, strains, computed.locations, computed.orientations)
+    if bone := creature.root_bone:
+        location, rotation, mode = (
+            own.path(bone, "location"),
+            own.rotation_path(bone),
+            own.modes[bone],
+        )
+    else:
+        assert own.own is not None
+        mode = own.own.rotation_mode
+        location, rotation = "location", rotation_property(mode)
+    moved, turned = played(location), played(rotation)
+    if moved is None or turned is None:
+        return Poses(rotations, strains, computed.locations, computed.orientations)
+    turns = from_mode_values(turned, mode)
+    if bone:
+        places = carried_by_root_bone(creature.skeleton, bone, creature.world, moved, turns)
+    else:
+        assert own.own is not None
+        places = own.own.places(moved, turns)
+    return Poses(rotations, strains, *places)

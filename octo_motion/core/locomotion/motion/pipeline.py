@@ -17,11 +17,11 @@ from ...keyframes import Channel
 from ...rotations import IDENTITY, Floats, from_matrix, slerp
 from ..clearance import ArmsOverGround, Opened, keep_off_ground, raise_between_frames, separate_arms
 from ..ground import Ground
-from ..metrics import TOLD, Figure, KeyedRig, Measured, figures, measure_keyed
+from ..metrics import TOLD, Figure, Measured, figures
 from ..path import plan_travel
 from ..reaching import Carried, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
-from .few_keys import Body, Motion, reduced
+from .few_keys import Motion, measure_keyed, reduced
 from .job import MotionJob, Tolerances
 from .planning import MotionPlan, frames_of_arms, plan_motion
 from .segments import SegmentedMotion
@@ -131,7 +131,9 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     if reducing:
         yield moving
         few = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
-        measured = _as_keyed(plan, measured, few)
+        if measured is not None:
+            travels = not plan.job.in_place
+            measured = measure_keyed(measured, creature, few, travels=travels)
     result = MotionResult(
         plan=plan,
         channels=[*(few if few is not None else motion.all()), *plan.breath],
@@ -311,24 +313,6 @@ def _measured(
     return measured, overlaps
 
 
-def _as_keyed(
-    plan: MotionPlan, measured: Measured | None, few: Sequence[Channel]
-) -> Measured | None:
-    """What is measured of what the keys play, in place of what was computed."""
-    creature = plan.job.creature
-    if measured is None:
-        return None
-    rig = KeyedRig(
-        channels=creature.channels,
-        skeleton=creature.skeleton,
-        arms=creature.bones,
-        travels=not plan.job.in_place,
-        root_bone=creature.root_bone,
-        world=creature.world,
-    )
-    return measure_keyed(measured, rig, few)
-
-
 def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, swimming: Floats | None) -> Motion:
     """What was computed, as channels with a key at every moment."""
     creature, channels = plan.job.creature, plan.job.creature.channels
@@ -362,19 +346,11 @@ def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, swimming: Float
 
 def _reduced(plan: MotionPlan, motion: Motion, moments: Floats, every: int) -> Steps[list[Channel]]:
     """Keys with handles of their own: few, or on every frame and right between them."""
-    creature, tolerances = plan.job.creature, plan.tolerances
-    body = Body(
-        creature.channels,
-        creature.scale,
-        creature.skeleton,
-        creature.arms,
-        plan.mantle,
-        creature.root_bone,
-    )
+    tolerances = plan.tolerances
     exact = Tolerances(_EXACT_ANGLE, _EXACT_DISTANCE * plan.first.poser.arm_length)
     return reduced(
         moments,
-        body,
+        plan.job.creature,
         motion,
         tolerances or exact,
         every=every,

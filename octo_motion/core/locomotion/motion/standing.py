@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from ..ground import (
     BodyLine,
     ContactOverride,
     ContactTiming,
+    CrawlingBody,
     CrawlSettings,
     EvenTiming,
     Ground,
@@ -185,16 +185,16 @@ def _timing(
     gait, stance, timing = poser.settings.gait, job.stance, None
     if gait.manner == "CRAWL":
         near, far = span(stance, may_stretch=any(job.may_stretch))
-        make = crawling_in_place if cyclic else partial(crawling, stands=job.rest)
-        timing = make(
+        settings = CrawlSettings(near, far, planted=stance.planted, seed=poser.settings.seed)
+        body = CrawlingBody(
             line,
             poser.roots * scale,
             poser.outward,
-            CrawlSettings(near, far, planted=stance.planted, seed=poser.settings.seed),
             reach=poser.arm_length * scale,
             middle=gait.power_phase,
             duty=stance.duty,
         )
+        timing = crawling_in_place(body, settings) if cyclic else crawling(body, settings, job.rest)
     if not any(job.rest):
         return timing
     return timing_at_rest(

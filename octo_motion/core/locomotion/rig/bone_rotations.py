@@ -61,6 +61,15 @@ class ArmRest:
     outward: Floats | None = None
     """(3,) unit: straight out of the body, armature space; none for bones that are no arm."""
 
+    def orientations(self, rotations: Floats) -> Floats:
+        """Orientations (…, bones, 4), armature space, of rotations in the bones' rest frames."""
+        # Against the bone before; of those that follow nothing, in armature space already.
+        result = multiply(self.carried, rotations)
+        for bone, follows in enumerate(self.follows):
+            if follows:
+                result[..., bone, :] = multiply(result[..., bone - 1, :], result[..., bone, :])
+        return result
+
     def straight_on(self, bone: int) -> Floats:
         """(3,) unit, in its rest frame: where a bone points by way of which it is turned.
 
@@ -198,23 +207,6 @@ def rotate_bones(
     return result
 
 
-def carried_to(rests: Sequence[ArmRest], rotations: Floats) -> Floats:
-    """Orientations (frames, arms, bones, 4) that bones are carried to, armature space.
-
-    Args:
-        rests: the arms, all of as many bones.
-        rotations: (frames, arms, bones, 4) in each bone's rest frame.
-    """
-    result = np.empty(rotations.shape)
-    for arm, rest in enumerate(rests):
-        for bone, follows in enumerate(rest.follows):
-            carried = rest.carried[bone]
-            if follows:
-                carried = multiply(result[:, arm, bone - 1], carried)
-            result[:, arm, bone] = multiply(carried, rotations[:, arm, bone])
-    return result
-
-
 def _swing(rests: Sequence[ArmRest], bone: int, carried: Floats, wanted: Floats) -> Floats:
     """Quaternions (4, batch), in the bone's rest frame, that bring its segment where it is wanted.
 
@@ -288,12 +280,7 @@ class ArmFrames:
 
     def from_bones(self, rotations: Floats) -> Floats:
         """Frames (…, bones, 4) in armature space of bones' rotations (…, bones, 4)."""
-        # Against the bone before; of those that follow nothing, in armature space already.
-        result = multiply(self.rest.carried, rotations)
-        for bone, follows in enumerate(self.rest.follows):
-            if follows:
-                result[..., bone, :] = multiply(result[..., bone - 1, :], result[..., bone, :])
-        return multiply(result, self.own)
+        return multiply(self.rest.orientations(rotations), self.own)
 
     def to_bones(self, frames: Floats) -> Floats:
         """Rotations (…, bones, 4) in each bone's rest frame (Blender's ``matrix_basis``)."""

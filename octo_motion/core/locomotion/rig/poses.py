@@ -299,7 +299,7 @@ def stretch_mantle(
     """
     if not mantle:
         return np.empty((0, 4))
-    rest = _directions(skeleton, [skeleton.index[name] for name in mantle])
+    rest = normalized(np.diff(joint_positions(skeleton, mantle), axis=0))
     towards = normalized((1.0 - amount) * rest + amount * body.rotation[:, 2])
     turns = rotate_bones(
         [arm_rest(skeleton, mantle)],
@@ -348,11 +348,3 @@ def _path(skeleton: Skeleton, tip: int, carrying: set[int], same: float) -> tupl
         if all(np.linalg.norm(end - start) > same for end in ends):
             return ()
     return tuple(reversed(path))
-
-
-def _directions(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
-    """Unit vectors (bones, 3) along the segments, armature space."""
-    names = [skeleton.names[bone] for bone in bones]
-    if not names:
-        return np.empty((0, 3))
-    return normalized(np.diff(joint_positions(skeleton, names), axis=0))

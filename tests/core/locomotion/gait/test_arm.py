@@ -13,7 +13,7 @@ from tests.core import oracle
 
 
 def test_default_arm_has_the_measures_of_the_paper() -> None:
-    segments = arm.segment_lengths(12, 1.0, 0.01)
+    segments = 0.5 * arm.diameters(12, 1.0, 0.01)
     sizes = arm.split_groups(segments)
 
     assert np.allclose(arm.diameters(12, 1.0, 0.01), oracle.ARM_DIAMETERS, rtol=0, atol=1e-12)

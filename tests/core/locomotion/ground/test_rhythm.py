@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.locomotion.ground.contact_timing import (
+    CrawlingBody,
     EvenTiming,
     TabledTiming,
     body_line,
@@ -175,7 +176,8 @@ def test_a_crawl_in_place_has_its_loop_however_long_its_stances(arms: int, stret
     roots = np.zeros((arms, 3))
     stance = StanceSettings(planted=0.1, stretch=stretch)
     settings = CrawlSettings(*span(stance, may_stretch=True))
-    own = crawling_in_place(line, roots, outward, settings, reach=1.0, middle=MIDDLE, duty=DUTY)
+    body = CrawlingBody(line, roots, outward, reach=1.0, middle=MIDDLE, duty=DUTY)
+    own = crawling_in_place(body, settings)
     phases = own.phases(np.array([0.0, route.length]))
     assert own.cycle_period is not None
     np.testing.assert_allclose(np.diff(phases, axis=0)[0], 2.0 * np.pi * np.array(own.cycle_period))
