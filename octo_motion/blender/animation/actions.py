@@ -226,6 +226,23 @@ def note_of(action: bpy.types.Action) -> str:
     return str(mark.get("note", "")) if mark is not None else ""
 
 
+def unedited_with_note(note: str) -> list[bpy.types.Object]:
+    """Objects whose action has this note and may be replaced: what an artist has edited since is
+    theirs.
+    """
+    found: list[bpy.types.Object] = []
+    for action in bpy.data.actions:
+        if note_of(action) != note:
+            continue
+        for each in bpy.data.user_map(subset=[action])[action]:
+            if not isinstance(each, bpy.types.Object) or not each.is_editable:
+                continue
+            data = each.animation_data
+            if data is not None and data.action == action and may_replace(action, each):
+                found.append(each)
+    return found
+
+
 def key_counts(action: bpy.types.Action) -> tuple[int, int]:
     """How many keys an action had when it was generated, and how many one per frame would be.
 
@@ -451,11 +468,14 @@ def _has_own_handles(curve: bpy.types.FCurve) -> bool:
 
 def _handles(curve: bpy.types.FCurve) -> np.ndarray:
     """Left and right handles (keys, 4) of a curve."""
-    points = curve.keyframe_points
-    left, right = np.empty((2, len(points), 2), dtype=np.float32)
-    points.foreach_get("handle_left", left.ravel())
-    points.foreach_get("handle_right", right.ravel())
-    return np.column_stack([left, right])
+    return np.column_stack([key_points(curve, "handle_left"), key_points(curve, "handle_right")])
+
+
+def key_points(curve: bpy.types.FCurve, name: str = "co") -> np.ndarray:
+    """(keys, 2) frames and values of keys, or of their handles, single precision."""
+    points = np.empty((len(curve.keyframe_points), 2), dtype=np.float32)
+    curve.keyframe_points.foreach_get(name, points.ravel())
+    return points
 
 
 def _handles_moved(action: bpy.types.Action) -> bool:
@@ -476,9 +496,7 @@ def _handles_moved(action: bpy.types.Action) -> bool:
         start += len(points)
         if len(then) != len(now):
             return True
-        keys = np.empty((len(points), 2), dtype=np.float32)
-        points.foreach_get("co", keys.ravel())
-        keys = np.tile(keys, (1, 2))
+        keys = np.tile(key_points(curve), (1, 2))
         slack = _HANDLE_SLACK * np.abs(then - keys) + 8.0 * np.spacing(np.abs(keys))
         if (np.abs(now - then) > slack).any():
             return True

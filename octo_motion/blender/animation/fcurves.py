@@ -12,7 +12,7 @@ import numpy as np
 from ...core.errors import ClipError
 from ...core.keyframes import BezierKeys
 from ...core.rotations import Floats
-from .actions import curves_of, enum_value
+from .actions import curves_of, enum_value, key_points
 
 _ON_KEY: Final = 1e-4
 """Frames by which Blender lets a time miss a key and still takes the key's value."""
@@ -63,9 +63,7 @@ def _plain_keys(curve: bpy.types.FCurve) -> tuple[Floats, Floats, np.ndarray] | 
     # The last key's own interpolation matters to extrapolation only.
     if not (steps | (kinds == enum_value("interpolation", "LINEAR"))).all():
         return None
-    points = np.empty(2 * count, dtype=np.float32)
-    curve.keyframe_points.foreach_get("co", points)
-    times, values = points.reshape(-1, 2).T.astype(np.float64)
+    times, values = key_points(curve).T.astype(np.float64)
     if (np.diff(times) <= _ON_KEY).any():
         return None
     return times, values, steps
@@ -76,9 +74,7 @@ def _at_keys(curve: bpy.types.FCurve, frames: Floats) -> Floats | None:
     count = len(curve.keyframe_points)
     if count == 0 or len(curve.modifiers) or not len(frames):
         return None
-    points = np.empty(2 * count, dtype=np.float32)
-    curve.keyframe_points.foreach_get("co", points)
-    times, values = points.reshape(-1, 2).T.astype(np.float64)
+    times, values = key_points(curve).T.astype(np.float64)
     if (np.diff(times) <= 2.0 * _ON_KEY).any():
         return None
     nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), frames)
@@ -106,6 +102,17 @@ class KeyArrays:
 
     values: dict[str, np.ndarray]
 
+    @classmethod
+    def zeros(cls, count: int) -> KeyArrays:
+        """So many keys, all of whose numbers are 0."""
+        kinds = {
+            **dict.fromkeys(_NUMBERS, np.float32),
+            **dict.fromkeys(_KINDS, np.uint8),
+            **dict.fromkeys(_FLAGS, np.bool_),
+        }
+        values = {name: np.zeros((count, 2), dtype=np.float32) for name in _VECTORS}
+        return cls(values | {name: np.zeros(count, dtype=kind) for name, kind in kinds.items()})
+
     def __len__(self) -> int:
         """Number of keys."""
         return len(self.values["co"])
@@ -122,20 +129,10 @@ class KeyArrays:
 
 def read_keys(curve: bpy.types.FCurve) -> KeyArrays:
     """All keys of a curve."""
-    points = curve.keyframe_points
-    count = len(points)
-    values: dict[str, np.ndarray] = {}
-    for name in _VECTORS:
-        values[name] = np.empty((count, 2), dtype=np.float32)
-    for name in _NUMBERS:
-        values[name] = np.empty(count, dtype=np.float32)
-    for name in _KINDS:
-        values[name] = np.empty(count, dtype=np.uint8)
-    for name in _FLAGS:
-        values[name] = np.empty(count, dtype=bool)
-    for name, each in values.items():
-        points.foreach_get(name, each.ravel())
-    return KeyArrays(values)
+    keys = KeyArrays.zeros(len(curve.keyframe_points))
+    for name, each in keys.values.items():
+        curve.keyframe_points.foreach_get(name, each.ravel())
+    return keys
 
 
 def write_keys(curve: bpy.types.FCurve, keys: KeyArrays) -> None:
@@ -151,27 +148,19 @@ def write_keys(curve: bpy.types.FCurve, keys: KeyArrays) -> None:
 
 def bezier_arrays(keys: BezierKeys, component: int) -> KeyArrays:
     """Reduced keys of one component, as a tool's own."""
-    count = len(keys)
     aligned, free = (enum_value("handle_left_type", item) for item in ("ALIGNED", "FREE"))
-    kinds = np.where(keys.smooth, aligned, free).astype(np.uint8)
-    return KeyArrays(
-        {
-            "co": np.column_stack([keys.frames, keys.values[:, component]]).astype(np.float32),
-            "handle_left": np.ascontiguousarray(keys.left[:, component], dtype=np.float32),
-            "handle_right": np.ascontiguousarray(keys.right[:, component], dtype=np.float32),
-            "back": np.zeros(count, dtype=np.float32),
-            "amplitude": np.zeros(count, dtype=np.float32),
-            "period": np.zeros(count, dtype=np.float32),
-            "interpolation": np.full(count, enum_value("interpolation", "BEZIER"), dtype=np.uint8),
-            "easing": np.full(count, enum_value("easing", "AUTO"), dtype=np.uint8),
-            "type": np.full(count, enum_value("type", "GENERATED"), dtype=np.uint8),
-            "handle_left_type": kinds,
-            "handle_right_type": kinds.copy(),
-            "select_control_point": np.zeros(count, dtype=bool),
-            "select_left_handle": np.zeros(count, dtype=bool),
-            "select_right_handle": np.zeros(count, dtype=bool),
-        }
+    result = KeyArrays.zeros(len(keys))
+    values = result.values
+    values["co"][:] = np.column_stack([keys.frames, keys.values[:, component]])
+    values["handle_left"][:], values["handle_right"][:] = (
+        keys.left[:, component],
+        keys.right[:, component],
     )
+    for name, item in (("interpolation", "BEZIER"), ("easing", "AUTO"), ("type", "GENERATED")):
+        values[name][:] = enum_value(name, item)
+    for name in ("handle_left_type", "handle_right_type"):
+        values[name][:] = np.where(keys.smooth, aligned, free)
+    return result
 
 
 def replace_stretch(curve: bpy.types.FCurve, keys: KeyArrays) -> None:

@@ -15,7 +15,7 @@ from ...core.keyframes import in_rotation_mode, rotation_property
 from ...core.rotations import Floats, from_mode_values
 from ...core.skeleton import Skeleton
 from ..rig import bone_and_property, carrying_axes
-from .actions import acting_curves, curves_of, is_generated
+from .actions import acting_curves, curves_of, is_generated, key_points
 
 AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
     "location": (0.0, 0.0, 0.0),
@@ -336,9 +336,7 @@ def _shows(curves: Mapping[int, bpy.types.FCurve], values: tuple[float, ...]) ->
         return False
     rows = np.empty((count, len(values)))
     for component, curve in curves.items():
-        points = np.empty((len(curve.keyframe_points), 2), dtype=np.float32)
-        curve.keyframe_points.foreach_get("co", points.ravel())
-        rows[:, component] = points[:count, 1]
+        rows[:, component] = key_points(curve)[:count, 1]
     start = rows[:-1] if count > 1 else rows
     along = rows[1:] - start if count > 1 else np.zeros_like(rows)
     away = np.array(values) - start

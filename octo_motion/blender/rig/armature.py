@@ -114,7 +114,7 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
             f"'{armature.name}' has bones at undefined positions.", "Repair its rest pose."
         )
     driven = _driven_bones(armature)
-    weighted = _vertex_group_names(armature)
+    weighted = {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}
     skeleton = Skeleton(
         names=tuple(bone.name for bone in bones),
         parents=tuple(index[bone.parent.name] if bone.parent else -1 for bone in bones),
@@ -201,11 +201,6 @@ def is_driven_object(obj: bpy.types.Object) -> bool:
     return data is not None and any(
         not curve.mute and curve.data_path.startswith(moved) for curve in data.drivers
     )
-
-
-def _vertex_group_names(armature: bpy.types.Object) -> set[str]:
-    """Names of the vertex groups of all meshes that the armature deforms."""
-    return {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}
 
 
 def carrying_axes(bone: bpy.types.Bone) -> Matrix:

@@ -149,7 +149,12 @@ def _volume(ends: Floats, radius: float) -> float:
 
 def skin_key(armature: bpy.types.Object) -> bytes:
     """What the radii hang on, as far as it can be read at once: not which bones points follow."""
-    return content_key([(names, points) for names, points in _skins(armature)])
+    return content_key(
+        [
+            (tuple(group.name for group in item.vertex_groups), points)
+            for item, points, _ in _meshes(armature)
+        ]
+    )
 
 
 def _of_chain(
@@ -173,12 +178,6 @@ def _of_chain(
         result = np.maximum(result, 0.3 * radii[-1])
     # Thicker further out are webs, fins and what few vertices do not tell.
     return np.minimum.accumulate(result)
-
-
-def _skins(armature: bpy.types.Object) -> Iterator[tuple[tuple[str, ...], Floats]]:
-    """Names of the vertex groups and some points (n, 3) at rest of each mesh, armature space."""
-    for item, points, _ in _meshes(armature):
-        yield tuple(group.name for group in item.vertex_groups), points
 
 
 def _meshes(

@@ -4,13 +4,12 @@
 from .contact_markers import Contact, markers, read_markers, remove_markers, write_markers
 from .curves import add_route_curve, read_route, suggested_control_points
 from .grasp_target import (
+    CARRIED,
     WITH_SURFACE,
     can_be_carried,
-    carrying_note,
     hangs_on,
     home_of,
     is_carried,
-    left_behind,
     put_back,
     read_form,
     read_places,
@@ -20,6 +19,7 @@ from .octopus import add_octopus
 from .surfaces import is_enabled, read_obstacle, read_triangles
 
 __all__ = [
+    "CARRIED",
     "NOTE",
     "WITH_SURFACE",
     "Contact",
@@ -28,13 +28,11 @@ __all__ = [
     "add_octopus",
     "add_route_curve",
     "can_be_carried",
-    "carrying_note",
     "hangs_on",
     "home_of",
     "import_clip",
     "is_carried",
     "is_enabled",
-    "left_behind",
     "markers",
     "put_back",
     "read_form",

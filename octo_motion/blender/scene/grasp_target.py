@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Final
 
 import bpy
@@ -11,12 +10,14 @@ import numpy as np
 
 from ...core.errors import RigError
 from ...core.rotations import Floats, continuous, from_matrix
-from ..animation import curves_of, is_generated, may_replace, note_of, time_kept
+from ..animation import curves_of, is_generated, note_of, time_kept
 from ..rig import vertex_positions
 from .surfaces import world_of
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that can have faces."""
+CARRIED: Final = "carried by {}"
+"""What is noted with the keys of an object that an armature of this name carries."""
 _SAME: Final = 1e-4
 """Metres or radians by which an object may be off its keys, and not have been moved."""
 
@@ -32,14 +33,12 @@ def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     evaluated = target.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh() if target.type in WITH_SURFACE else None
-    if mesh is None or len(mesh.polygons) == 0:
-        if mesh is not None:
-            evaluated.to_mesh_clear()
-        raise RigError(
-            f"'{target.name}' has no faces to grasp.", "Choose an object with a surface."
-        )
     try:
+        mesh = evaluated.to_mesh() if target.type in WITH_SURFACE else None
+        if mesh is None or len(mesh.polygons) == 0:
+            raise RigError(
+                f"'{target.name}' has no faces to grasp.", "Choose an object with a surface."
+            )
         vertices = vertex_positions(mesh)
         mesh.calc_loop_triangles()
         triangles = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
@@ -112,28 +111,6 @@ def home_of(target: bpy.types.Object) -> tuple[Floats, Floats]:
     return positions[0], rotations[0]
 
 
-def left_behind(carrier: str, carried: Collection[str]) -> list[bpy.types.Object]:
-    """Objects that an armature has carried, which are not among those that it carries now.
-
-    What an artist has edited since is not among them: it is theirs.
-    """
-    found: list[bpy.types.Object] = []
-    for action in bpy.data.actions:
-        if note_of(action) != carrying_note(carrier):
-            continue
-        users = (each for each in bpy.data.user_map(subset=[action])[action])
-        found += [
-            each
-            for each in users
-            if isinstance(each, bpy.types.Object)
-            and each.name not in carried
-            and each.is_editable
-            and _generated(each) == action
-            and may_replace(action, each)
-        ]
-    return found
-
-
 def put_back(target: bpy.types.Object) -> None:
     """Take an object's keys away that carried it, and let it stand where it stood before."""
     action, data = _generated(target), target.animation_data
@@ -147,15 +124,10 @@ def put_back(target: bpy.types.Object) -> None:
     bpy.data.actions.remove(action)
 
 
-def carrying_note(carrier: str) -> str:
-    """What is noted with the keys of an object that an armature carries."""
-    return f"carried by {carrier}"
-
-
 def is_carried(target: bpy.types.Object, carrier: str) -> bool:
     """Whether keys that an armature's motion gave an object carry it."""
     action = _generated(target)
-    return action is not None and note_of(action) == carrying_note(carrier)
+    return action is not None and note_of(action) == CARRIED.format(carrier)
 
 
 def _generated(target: bpy.types.Object) -> bpy.types.Action | None:

@@ -22,7 +22,7 @@ from ...core.errors import ClipError, WriteError
 from ...core.rotations import normalized
 from ...core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ...core.splicing.humanoid import map_skeleton
-from ..animation import curves_of, read_clip, time_kept
+from ..animation import curves_of, key_points, read_clip, time_kept
 from ..rig import read_skeleton
 
 NOTE: Final = "octo_motion_clip"
@@ -344,16 +344,9 @@ def _motion(
             "Its armature has no motion.", "Use Blender's own importer for a rig without any."
         )
     for action in moving:
-        if not all(np.isfinite(_points(curve)).all() for curve in curves_of(action)):
+        if not all(np.isfinite(key_points(curve)).all() for curve in curves_of(action)):
             raise ClipError("Some of its keys are no finite numbers.", "Export it again.")
     return armatures, moving
-
-
-def _points(curve: bpy.types.FCurve, name: str = "co") -> np.ndarray:
-    """(keys, 2) frames and values of keys or of their handles."""
-    points = np.empty((len(curve.keyframe_points), 2), dtype=np.float32)
-    curve.keyframe_points.foreach_get(name, points.ravel())
-    return points
 
 
 def _take_off_tracks(owner: bpy.types.ID) -> None:
@@ -374,7 +367,7 @@ def _rate_of_keys(actions: Iterable[bpy.types.Action], placed_by: float) -> floa
     """Frames per second that the distances of keys tell, else those they were placed by."""
     steps = []
     for action in actions:
-        times = [_points(curve)[:, 0] for curve in curves_of(action)]
+        times = [key_points(curve)[:, 0] for curve in curves_of(action)]
         longest = max(times, key=len)
         steps += list(np.diff(longest))
     usual = float(np.median(steps)) if steps else 0.0
@@ -387,7 +380,7 @@ def _starts(actions: Iterable[bpy.types.Action], *, takes: bool) -> dict[str, fl
     shared: dict[str, float] = {}
     for action in actions:
         curves = (curve for curve in curves_of(action) if len(curve.keyframe_points))
-        own[action.name] = min(float(_points(curve)[:, 0].min()) for curve in curves)
+        own[action.name] = min(float(key_points(curve)[:, 0].min()) for curve in curves)
         take = _take(action.name)
         shared[take] = min(own[action.name], shared.get(take, np.inf))
     return {name: shared[_take(name)] for name in own} if takes else own
@@ -404,7 +397,7 @@ def _place_keys(action: bpy.types.Action, factor: float, start: float, frame_sta
     first, last = np.inf, -np.inf
     for curve in curves:
         for name in ("co", "handle_left", "handle_right"):
-            points = _points(curve, name).astype(np.float64)
+            points = key_points(curve, name).astype(np.float64)
             points[:, 0] = frame_start + (points[:, 0] - start) * factor
             curve.keyframe_points.foreach_set(name, points.astype(np.float32).ravel())
             if name == "co":

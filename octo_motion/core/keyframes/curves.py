@@ -74,7 +74,7 @@ class Curves:
         """Span in which each element is; keys are in the one that they begin."""
         ahead = np.tile(times, len(keyed)) - times[self.frames[self.begun]][self.span]
         length = self.lengths[self.span]
-        self._basis = _hermite(ahead / length, length)
+        self._basis = hermite(ahead / length, length)
         self._singles = self._basis.astype(np.float32)
         self._givers = self._contributing()
         pins = pinned.ravel()[self.keys]
@@ -101,7 +101,7 @@ class Curves:
         ends = []
         for at in (self.heads, self.tails):
             share = (times[at % count] - start) / length
-            ends.append(np.einsum("kn,ckn->cn", _hermite(share, length), own))
+            ends.append(np.einsum("kn,ckn->cn", hermite(share, length), own))
             ends.append(np.einsum("kn,ckn->cn", _slopes(share, length), own))
         return self._chosen(ends[0], ends[1], ends[3], ends[2])
 
@@ -232,7 +232,7 @@ def _single(values: Floats) -> Floats:
     return values.astype(np.float32).astype(np.float64)
 
 
-def _hermite(share: Floats, length: Floats) -> Floats:
+def hermite(share: Floats, length: Floats) -> Floats:
     """What value and slope, slope and value at the ends of a span are to a share of it: (4, …)."""
     rest = 1.0 - share
     return np.stack(

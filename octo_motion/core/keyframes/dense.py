@@ -15,6 +15,7 @@ import numpy as np
 
 from ..rotations import Floats
 from .channels import BezierKeys, bezier_keys
+from .curves import hermite
 from .residuals import LinearModel, Residuals
 from .tracks import Integers, Limb
 
@@ -81,12 +82,10 @@ class _Spans:
         )
         length = np.diff(times[at])[self._span]
         share = (times - times[at][self._span]) / length
-        rest = 1.0 - share
-        straight = rest**2 * (1.0 + 2.0 * share) * targets[..., at[self._span]]
-        straight += share**2 * (1.0 + 2.0 * rest) * targets[..., at[self._span + 1]]
-        self._straight = straight
-        self._left = targets - straight
-        self._out, self._into = length * share * rest**2, -length * share**2 * rest
+        first, self._out, self._into, last = hermite(share, length)
+        self._straight = first * targets[..., at[self._span]]
+        self._straight += last * targets[..., at[self._span + 1]]
+        self._left = targets - self._straight
 
     def played(self, out: Floats, into: Floats) -> Floats:
         """Values (4, tracks, moments) of slopes (4, tracks, spans) after keys and before."""

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from ..rotations import Floats, from_axis_angle, from_euler, normalized
+from ..rotations import Floats, from_mode_values, normalized
 from .channels import Booleans
 from .tracks import LOCATION, Integers, Limb
 
@@ -253,12 +253,8 @@ class Choice:
             own = values[..., columns]
             if kind == LOCATION:
                 locations.append(own)
-            elif kind == "QUATERNION":
-                rotations.append(normalized(own))
-            elif kind == "AXIS_ANGLE":
-                rotations.append(from_axis_angle(normalized(own[..., 1:]), own[..., 0]))
             else:
-                rotations.append(from_euler(own, kind))
+                rotations.append(from_mode_values(own, kind))
         return (
             np.stack(rotations, axis=-2) if rotations else np.zeros((*ahead, 0, 4)),
             np.stack(locations, axis=-2) if locations else np.zeros((*ahead, 0, 3)),

@@ -16,18 +16,12 @@ from ....blender.animation import (
     key_counts,
     read_object_channels,
     rest_bones,
+    unedited_with_note,
     writable_armature,
     write_action,
 )
 from ....blender.rig import world_matrix
-from ....blender.scene import (
-    Contact,
-    carrying_note,
-    left_behind,
-    put_back,
-    read_route,
-    write_markers,
-)
+from ....blender.scene import CARRIED, Contact, put_back, read_route, write_markers
 from ....core.errors import RouteError, WriteError
 from ....core.locomotion.metrics import Figure
 from ....core.locomotion.motion import (
@@ -118,8 +112,11 @@ def write_carried(armature: bpy.types.Object, carried: Sequence[Carried]) -> Non
     Raises:
         WriteError: an object has become read-only.
     """
-    for target in left_behind(armature.name, {each.target for each in carried}):
-        put_back(target)
+    note = CARRIED.format(armature.name)
+    still = {each.target for each in carried}
+    for target in unedited_with_note(note):
+        if target.name not in still:
+            put_back(target)
     for each in carried:
         target = bpy.data.objects.get(each.target)
         if target is None:
@@ -131,7 +128,7 @@ def write_carried(armature: bpy.types.Object, carried: Sequence[Carried]) -> Non
             each.frames,
             read_object_channels(target).channels(each.positions, each.rotations),
             previous=data.action if data is not None else None,
-            settings_note=carrying_note(armature.name),
+            settings_note=note,
         )
 
 
