@@ -69,12 +69,11 @@ class Coupling:
         )
 
 
-@dataclass(eq=False)
-class HandSpring:
-    """A bone in a hand, from ``World.grab`` until ``World.release``."""
+@dataclass(eq=False, kw_only=True)
+class Hold:
+    """A point of a body that is held at a place, and the body's turn where asked to; a pin."""
 
     body: int
-    coupling: Coupling
     point: Floats
     """(3,) where it is held, in the body's frame."""
     grip: Floats
@@ -85,6 +84,18 @@ class HandSpring:
     """(4,) of the hand, world; None lets the bone turn freely about the point."""
     target_velocity: Floats = field(default_factory=lambda: np.zeros(6))
     """(6,) linear, angular."""
+
+    @property
+    def turns(self) -> bool:
+        """Whether the body's turn is held as well as its point."""
+        return self.target_orientation is not None
+
+
+@dataclass(eq=False, kw_only=True)
+class HandSpring(Hold):
+    """A bone in a hand, from ``World.grab`` until ``World.release``."""
+
+    coupling: Coupling
     wrench: Floats = field(default_factory=lambda: np.zeros(6))
     """(6,) force N and torque N·m on the bone in the last step, about the point held, world axes.
     The hand feels the opposite."""
@@ -122,17 +133,8 @@ _PIN_GAIN = 1e5
 """Of pins, in masses of the figure: they give way by h·g/10⁵ a second before they are put right."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pin:
-    """A joint that is held where it is."""
-
-    body: int
-    position: Floats
-    """(3,) world."""
-    orientation: Floats
-    """(4,) world."""
-    firm: bool
-    """Whether the orientation is held as well."""
+_Law = tuple[float, float, float]
+"""Gain, stiffness and bound of a row."""
 
 
 class HoldBuilder:
@@ -140,50 +142,35 @@ class HoldBuilder:
 
     def __init__(self, mass: float, size: float, step: float) -> None:
         """For a figure of a mass, kg, and a typical length, m, in steps of h."""
-        self._pin_gains = (_PIN_GAIN * mass, _PIN_GAIN * mass * size**2)
+        gain = _PIN_GAIN * mass
+        self._pin_laws: tuple[_Law, _Law] = ((gain, 0.0, np.inf), (gain * size**2, 0.0, np.inf))
         self._step = step
         self._key: tuple[object, ...] = ()
 
-    def rows(
-        self, bodies: Bodies, pins: Sequence[Pin], springs: Sequence[HandSpring]
-    ) -> Holds | None:
+    def rows(self, bodies: Bodies, holds: Sequence[Hold]) -> Holds | None:
         """What holds the bodies where they are now; None where nothing does."""
-        if not (pins or springs):
+        if not holds:
             return None
-        key: tuple[object, ...] = (
-            tuple((pin.body, pin.firm) for pin in pins),
-            tuple(
-                (spring.body, spring.coupling, spring.target_orientation is None)
-                for spring in springs
-            ),
-        )
+        key = tuple((hold.body, hold.turns, getattr(hold, "coupling", None)) for hold in holds)
         if key != self._key:
-            self._arrange(pins, springs)
+            self._arrange(holds)
             self._key = key
         # Points: where they are, where they are wanted, and how fast that moves.
         locals_, targets, speeds = [], [], []
-        for pin in pins:
-            locals_.append(_NOTHING)
-            targets.append(pin.position)
-            speeds.append(_NOTHING)
-            if pin.firm:
+        for hold in holds:
+            locals_.append(hold.point)
+            targets.append(hold.target_position)
+            speeds.append(hold.target_velocity[:3])
+            if hold.turns:
                 locals_.append(_NOTHING)
                 targets.append(_NOTHING)
-                speeds.append(_NOTHING)
-        for spring in springs:
-            locals_.append(spring.point)
-            targets.append(spring.target_position)
-            speeds.append(spring.target_velocity[:3])
-            if spring.target_orientation is not None:
-                locals_.append(_NOTHING)
-                targets.append(_NOTHING)
-                speeds.append(spring.target_velocity[3:])
+                speeds.append(hold.target_velocity[3:])
         held = self._bodies
         arms = (bodies.matrices.take(held, 0) @ np.array(locals_)[:, :, None])[:, :, 0]
         points = bodies.positions.take(held, 0) + arms
         ways = np.array(targets) - points
         if len(self._turning):
-            ways[self._turning] = self._turns(bodies, pins, springs)
+            ways[self._turning] = self._turns(bodies, holds)
         return Holds(
             held,
             points,
@@ -194,15 +181,9 @@ class HoldBuilder:
             self._pinned * ways,
         )
 
-    def _turns(self, bodies: Bodies, pins: Sequence[Pin], springs: Sequence[HandSpring]) -> Floats:
+    def _turns(self, bodies: Bodies, holds: Sequence[Hold]) -> Floats:
         """(turns, 3) rotation vectors from where bodies are to where they are wanted."""
-        firm = [(pin.orientation, _UNTURNED) for pin in pins if pin.firm]
-        hands = [
-            (spring.target_orientation, spring.grip)
-            for spring in springs
-            if spring.target_orientation is not None
-        ]
-        pairs = np.array(firm + hands)
+        pairs = np.array([(hold.target_orientation, hold.grip) for hold in holds if hold.turns])
         wanted = small_batches.multiply(pairs[:, 0], pairs[:, 1])
         now = bodies.orientations.take(self._bodies[self._turning], 0)
         return small_batches.to_rotation_vector(small_batches.multiply_conjugate(wanted, now))
@@ -211,32 +192,23 @@ class HoldBuilder:
         """Let hands feel the impulses (rows, 3) of the last ``rows``."""
         if not springs:
             return
-        hands = impulses[len(self._bodies) - sum(map(_rows_of, springs)) :] / self._step
+        counts = [1 + spring.turns for spring in springs]
+        hands = impulses[len(self._bodies) - sum(counts) :] / self._step
         row = 0
-        for spring in springs:
-            count = _rows_of(spring)
+        for spring, count in zip(springs, counts, strict=True):
             spring.wrench = np.zeros(6)
             spring.wrench[: 3 * count] = hands[row : row + count].ravel()
             row += count
 
-    def _arrange(self, pins: Sequence[Pin], springs: Sequence[HandSpring]) -> None:
+    def _arrange(self, holds: Sequence[Hold]) -> None:
         """What stays the same as long as the same bodies are held."""
-        h = self._step
         # Body, whether a turn, gain, stiffness, bound, whether a pin.
         rows: list[tuple[int, bool, float, float, float, bool]] = []
-        for pin in pins:
-            rows.append((pin.body, False, self._pin_gains[0], 0.0, np.inf, True))
-            if pin.firm:
-                rows.append((pin.body, True, self._pin_gains[1], 0.0, np.inf, True))
-        for spring in springs:
-            coupling = spring.coupling
-            stiffness, damping = h * coupling.stiffness, coupling.damping
-            gain = h * (stiffness + damping)
-            rows.append((spring.body, False, gain, stiffness, h * coupling.force_limit, False))
-            if spring.target_orientation is not None:
-                stiffness, damping = h * coupling.turning_stiffness, coupling.turning_damping
-                gain = h * (stiffness + damping)
-                rows.append((spring.body, True, gain, stiffness, h * coupling.torque_limit, False))
+        for hold in holds:
+            coupling = hold.coupling if isinstance(hold, HandSpring) else None
+            laws = self._pin_laws if coupling is None else self._laws(coupling)
+            for turn, law in zip((False, True) if hold.turns else (False,), laws, strict=False):
+                rows.append((hold.body, turn, *law, coupling is None))
         held, turns, gains, stiff, bounds, pinned = zip(*rows, strict=True)
         self._bodies = np.array(held)
         self._turns_held = np.array(turns)
@@ -246,10 +218,14 @@ class HoldBuilder:
         self._bounds = np.array(bounds)
         self._pinned = np.array(pinned, dtype=np.float64)[:, None]
 
-
-def _rows_of(spring: HandSpring) -> int:
-    return 1 if spring.target_orientation is None else 2
+    def _laws(self, coupling: Coupling) -> tuple[_Law, _Law]:
+        """Of a hand's point and of its turn."""
+        h = self._step
+        stiffness, turning = h * coupling.stiffness, h * coupling.turning_stiffness
+        return (
+            (h * (stiffness + coupling.damping), stiffness, h * coupling.force_limit),
+            (h * (turning + coupling.turning_damping), turning, h * coupling.torque_limit),
+        )
 
 
 _NOTHING = np.zeros(3)
-_UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])

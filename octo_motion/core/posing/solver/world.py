@@ -26,7 +26,7 @@ from ..puppet import Elements, Figure, Integers, PlasticLaw, Pose
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
 from .contact_detection import Contacts, Detector
-from .holds import Coupling, HandSpring, HoldBuilder, Pin
+from .holds import Coupling, HandSpring, Hold, HoldBuilder
 from .newton import InitialGuess, Newton, Solution
 from .obstacle_shapes import Obstacle
 from .problem import Problem, ProblemBuilder, typical_size
@@ -105,7 +105,7 @@ class World:
         """What touched, or nearly, in the last step."""
         self._size = typical_size(figure)
         self._springs: list[HandSpring] = []
-        self._pins: dict[int, Pin] = {}
+        self._pins: dict[int, Hold] = {}
         settings = settings or WorldSettings()
         settings.check(figure)
         self._tree = Tree(figure)
@@ -205,11 +205,16 @@ class World:
         self._pins[body] = self._pin(body, firm=bool(firm))
         self._use_elements()
 
-    def _pin(self, body: int, *, firm: bool) -> Pin:
+    def _pin(self, body: int, *, firm: bool) -> Hold:
         """One that holds where a body is now."""
         bodies = self._bodies
-        place, turn = bodies.positions[body].copy(), bodies.orientations[body].copy()
-        return Pin(body, place, turn, firm=firm)
+        return Hold(
+            body=body,
+            point=np.zeros(3),
+            grip=IDENTITY,
+            target_position=bodies.positions[body].copy(),
+            target_orientation=bodies.orientations[body].copy() if firm else None,
+        )
 
     def unpin(self, body: int) -> None:
         """Let a pinned body go; one that is not pinned stays as it is."""
@@ -219,12 +224,12 @@ class World:
     def pin_here(self) -> None:
         """Let the pins hold where their bodies are now: they were put elsewhere."""
         for body, pin in self._pins.items():
-            self._pins[body] = self._pin(body, firm=pin.firm)
+            self._pins[body] = self._pin(body, firm=pin.turns)
 
     @property
     def pins(self) -> dict[int, bool]:
         """The bodies that are pinned now, and whether their orientations are held as well."""
-        return {body: self._pins[body].firm for body in sorted(self._pins)}
+        return {body: self._pins[body].turns for body in sorted(self._pins)}
 
     def grab(
         self,
@@ -246,12 +251,12 @@ class World:
         hand = IDENTITY if orientation is None else normalized(orientation)
         at = np.array(point, dtype=np.float64)
         spring = HandSpring(
-            body,
-            coupling or Coupling.for_figure(self.figure),
-            rotate(conjugate(own), at - self._bodies.positions[body]),
-            multiply(conjugate(hand), own),
-            at,
-            None if orientation is None else hand,
+            body=body,
+            coupling=coupling or Coupling.for_figure(self.figure),
+            point=rotate(conjugate(own), at - self._bodies.positions[body]),
+            grip=multiply(conjugate(hand), own),
+            target_position=at,
+            target_orientation=None if orientation is None else hand,
         )
         self._springs.append(spring)
         return spring
@@ -299,7 +304,7 @@ class World:
         contacts = self._find()
         rows = Rows(
             contacts,
-            self._hold_builder.rows(bodies, tuple(self._pins.values()), self._springs),
+            self._hold_builder.rows(bodies, (*self._pins.values(), *self._springs)),
             bodies.roots[0],
             self.figure.masses,
             self.settings.step,
@@ -358,7 +363,7 @@ class World:
     def _use_elements(self) -> None:
         works = ~self._bodies.is_root
         for body, pin in self._pins.items():
-            works[body] |= not pin.firm
+            works[body] |= not pin.turns
         self._law = PlasticLaw(self.figure.elements.where(works), self.settings.step)
         self._warm.use_law(self._law)
 
