@@ -30,9 +30,7 @@ from .settings import OCTO_MOTION_PG_locomotion, locomotion_settings, used
 class _Panel(ArmaturePanel):
     """A panel of the armature's locomotion."""
 
-    @staticmethod
-    def settings_of(armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion:
-        return locomotion_settings(armature)
+    settings_of = staticmethod(locomotion_settings)
 
 
 class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
@@ -40,8 +38,7 @@ class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
     bl_order = 0
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        assert layout is not None
+        layout = cast("Any", self).layout
         armature = armature_in(context)
         if armature is None:
             column = layout.column(align=True)
@@ -167,10 +164,8 @@ class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
             layout.template_curve_mapping(group.nodes[NODE], "mapping")
         else:
             layout.label(text="The curve is gone: switch it off and on.", icon="ERROR")
-        layout.prop(settings, "softness")
-        layout.prop(settings, "give")
-        layout.prop(settings, "steady")
-        layout.prop(settings, "sway")
+        for name in ("softness", "give", "steady", "sway"):
+            layout.prop(settings, name)
 
 
 class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
@@ -211,17 +206,13 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             row = layout.row()
             row.alert = True
             draw_sentence(row, bpy.context, settings.live_error, "ERROR")
-        _draw_result(layout, bpy.context, settings)
+        if settings.result is not None:
+            _draw_result(layout, settings.result)
 
 
-def _draw_result(
-    layout: Any, context: bpy.types.Context, settings: OCTO_MOTION_PG_locomotion
-) -> None:
-    action = settings.result
-    if action is None:
-        return
-    scene = cast("bpy.types.Scene", context.scene)
-    length = (action.frame_end - action.frame_start) / scene.render.fps * scene.render.fps_base
+def _draw_result(layout: Any, action: bpy.types.Action) -> None:
+    render = cast("bpy.types.Scene", bpy.context.scene).render
+    length = (action.frame_end - action.frame_start) / render.fps * render.fps_base
     column = layout.column(align=True)
     column.label(text=action.name, icon="ACTION")
     frames = action.frame_end - action.frame_start + 1.0

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import Final
+from functools import partial
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
@@ -19,6 +20,7 @@ from ...operator_base import OctoOperator, show_in_local_view
 from ...panel_base import armature_in
 from ..settings import locomotion_settings
 
+_Distance: Final = partial(FloatProperty, subtype="DISTANCE", precision=3, step=1)
 _DEFAULT: Final = OctopusShape()
 _SHAPE: Final = ("arms", "joints", "arm_length", "first_diameter", "taper")
 _PLACE: Final = ("align", "location", "rotation")
@@ -50,27 +52,21 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         max=JOINTS[1],
         soft_max=48,
     )
-    arm_length: FloatProperty(
+    arm_length: _Distance(
         name="Arm Length",
         description="Length of an arm from its root to its tip",
-        subtype="DISTANCE",
         default=_DEFAULT.arm_length,
         min=0.01,
         soft_min=0.1,
         soft_max=10.0,
-        precision=3,
-        step=1,
     )
-    first_diameter: FloatProperty(
+    first_diameter: _Distance(
         name="First Diameter",
         description="Thickness of an arm at its root. Head and mantle grow with it",
-        subtype="DISTANCE",
         default=_DEFAULT.first_diameter,
         min=0.001,
         soft_min=0.01,
         soft_max=1.0,
-        precision=3,
-        step=1,
     )
     taper: FloatProperty(
         name="Taper",
@@ -90,8 +86,7 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
     )
 
     def draw(self, context: bpy.types.Context) -> None:  # noqa: ARG002 - Blender's signature
-        layout = self.layout
-        assert layout is not None
+        layout = cast("Any", self).layout
         layout.use_property_split = True
         # What it is first, where it is last, as in Blender's own Add operators.
         for names in ((*_SHAPE, "with_mesh"), _PLACE):
@@ -121,9 +116,9 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
 
 def draw_octopus_entry(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Entry for Add › Armature."""
-    layout = self.layout
-    assert layout is not None
-    layout.operator(OCTO_MOTION_OT_add_octopus.bl_idname, icon="OUTLINER_OB_ARMATURE")
+    cast("Any", self).layout.operator(
+        OCTO_MOTION_OT_add_octopus.bl_idname, icon="OUTLINER_OB_ARMATURE"
+    )
 
 
 # --- Add › Curve › Octopus Route: the route of [Octopus] §3.5, given by four control points -------
@@ -178,9 +173,7 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
 
 def draw_route_entry(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     """Entry for Add › Curve."""
-    layout = self.layout
-    assert layout is not None
-    layout.operator(OCTO_MOTION_OT_add_route.bl_idname, icon="CURVE_BEZCURVE")
+    cast("Any", self).layout.operator(OCTO_MOTION_OT_add_route.bl_idname, icon="CURVE_BEZCURVE")
 
 
 def _collection(context: bpy.types.Context) -> bpy.types.Collection:

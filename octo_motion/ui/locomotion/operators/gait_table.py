@@ -55,12 +55,17 @@ class _GaitOperator(ArmatureOperator):
         raise NotImplementedError
 
 
-def _editable(settings: OCTO_MOTION_PG_locomotion) -> Any:
+def _editable_table(settings: OCTO_MOTION_PG_locomotion) -> Any:
     """The table, filled from its preset if it was not yet."""
-    table = read_gait(settings)
     if not used(settings.table.curves):
-        set_gait(settings, table)
+        set_gait(settings, read_gait(settings))
     return settings.table
+
+
+def _editable_curve(settings: OCTO_MOTION_PG_locomotion, pair: int) -> Any:
+    """The table's item with the angles of a pair."""
+    listed = used(_editable_table(settings).curves)
+    return next(curve for curve in listed if curve.pair == pair)
 
 
 def _row(name: str, description: str) -> Any:
@@ -85,11 +90,6 @@ def _chosen_curve(settings: OCTO_MOTION_PG_locomotion) -> tuple[int, GaitCurve]:
     if listed := used(settings.table.curves):
         pair = _active(listed, settings.table.active_curve, "pair").pair
     return pair, read_gait(settings).curves[pair]
-
-
-def _curve_of(table: Any, pair: int) -> Any:
-    """The table's item with the angles of a pair."""
-    return next(curve for curve in used(table.curves) if curve.pair == pair)
 
 
 # --- Presets -------------------------------------------------------------------------------------
@@ -247,7 +247,7 @@ class OCTO_MOTION_OT_gait_curve_add(_GaitOperator, bpy.types.Operator):
         if pair in taken:
             raise GaitError(f"Pair {pair} has angles of its own already.", "Choose another pair.")
         curves = {**table.curves, pair: table.curves[0]}
-        fill_table(_editable(settings), replace(table, curves=curves))
+        fill_table(_editable_table(settings), replace(table, curves=curves))
         settings.table.active_curve = sorted(curves).index(pair)
 
 
@@ -293,7 +293,7 @@ class OCTO_MOTION_OT_gait_knot_add(_GaitOperator, bpy.types.Operator):
         if shape.phases[gap + 1] - shape.phases[gap] < np.radians(1.0):
             raise GaitError("There is no room for a knot.", "Move the next knot further away.")
         angles = shape.evaluate(np.array([middle]))[0]
-        curve = _curve_of(_editable(settings), pair)
+        curve = _editable_curve(settings, pair)
         # Sorted, and with a knot at 0 if there was none: the same motion, in good order.
         fill_curve(
             curve,
@@ -324,7 +324,7 @@ class OCTO_MOTION_OT_gait_knot_remove(_GaitOperator, bpy.types.Operator):
         shape = GaitCurve(
             np.delete(shape.phases, knot), np.delete(shape.angles, knot, axis=0), free=shape.free
         )
-        fill_curve(_curve_of(_editable(settings), pair), shape)
+        fill_curve(_editable_curve(settings, pair), shape)
 
 
 class OCTO_MOTION_OT_gait_offset_add(_GaitOperator, bpy.types.Operator):
@@ -343,7 +343,7 @@ class OCTO_MOTION_OT_gait_offset_add(_GaitOperator, bpy.types.Operator):
                 "Change that one, or choose another arm.",
             )
         offsets = {**table.offsets, (self.pair, self.side): 0.0}
-        fill_offsets(_editable(settings), offsets)
+        fill_offsets(_editable_table(settings), offsets)
         settings.table.active_offset = sorted(offsets).index((self.pair, self.side))
 
 
@@ -359,7 +359,7 @@ class OCTO_MOTION_OT_gait_offset_remove(_GaitOperator, bpy.types.Operator):
         number = self.offset if self.offset >= 0 else len(offsets) - 1
         _active(offsets, number, "offset")
         del offsets[number]
-        fill_offsets(_editable(settings), dict(offsets))
+        fill_offsets(_editable_table(settings), dict(offsets))
 
 
 class OCTO_MOTION_MT_gait_offset(bpy.types.Menu):

@@ -2,7 +2,6 @@
 """From settings and scene to what core works on."""
 
 from .motion import (
-    gait_settings,
     read_changes,
     read_gaits,
     read_ground,
@@ -10,14 +9,11 @@ from .motion import (
     read_timing,
     resting,
     tolerances_of,
-    travel_settings,
 )
 from .rig import (
-    RigRead,
     add_item,
     body_axes,
     bones_of,
-    keyed_anew,
     placed_arms,
     playing_action,
     previous_action,
@@ -29,12 +25,9 @@ from .rig import (
 )
 
 __all__ = [
-    "RigRead",
     "add_item",
     "body_axes",
     "bones_of",
-    "gait_settings",
-    "keyed_anew",
     "placed_arms",
     "playing_action",
     "previous_action",
@@ -47,7 +40,6 @@ __all__ = [
     "read_volume",
     "resting",
     "tolerances_of",
-    "travel_settings",
     "warnings_for_display",
     "write_arms",
     "write_body",

@@ -296,11 +296,7 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
     positions, rotations = still
     if carry or is_carried(item.target, armature.name):
         # Keys that it got before are made anew, or taken away.
-        position, rotation = home_of(item.target)
-        positions, rotations = (
-            np.tile(position, (len(frames), 1)),
-            np.tile(rotation, (len(frames), 1)),
-        )
+        positions, rotations = (np.tile(each, (len(frames), 1)) for each in home_of(item.target))
     elif np.any(asked):
         positions[asked], rotations[asked] = read_places(item.target, frames[asked])
         # Before and after, nothing asks where it is.

@@ -31,17 +31,8 @@ from ....core.locomotion.gait import (
     gait_to_json,
 )
 from ....core.rotations import Floats
-from ...declared_settings import (
-    AngleProperty,
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    StringProperty,
-    assign,
-)
+from ... import declared_settings as props
+from ...declared_settings import assign
 
 DEFAULT_GAIT: Final = "walk"
 _DEFAULT: Final = gait_presets()[DEFAULT_GAIT]
@@ -62,12 +53,12 @@ def _gait_names(_owner: Any, _context: Any, _text: str) -> list[str]:
     return gait_names()
 
 
-GaitName: Final = partial(StringProperty, search=_gait_names, search_options=set())
+GaitName: Final = partial(props.StringProperty, search=_gait_names, search_options=set())
 """A property that names a gait, and offers those that there are."""
 
 
 def _unused() -> Any:
-    return BoolProperty(
+    return props.BoolProperty(
         name="Unused",
         description="Left out. Items of a linked file can be changed here, but not removed",
         options={"HIDDEN"},
@@ -93,7 +84,7 @@ def _set_text(group: OCTO_MOTION_PG_gait_table, text: str) -> None:
 
 
 def _link_angles(name: str, description: str) -> Any:
-    return FloatVectorProperty(
+    return props.FloatVectorProperty(
         name=name,
         description=f"{description}. One angle for each third of the arm, from root to tip",
         size=LINKS,
@@ -108,7 +99,7 @@ def _link_angles(name: str, description: str) -> Any:
 class OCTO_MOTION_PG_gait_knot(bpy.types.PropertyGroup):
     """Angles of the three links at one phase."""
 
-    phase: AngleProperty(
+    phase: props.AngleProperty(
         name="Phase",
         description="Where in the cycle these angles are reached; between them they run evenly",
         min=0.0,
@@ -123,37 +114,37 @@ class OCTO_MOTION_PG_gait_knot(bpy.types.PropertyGroup):
 class OCTO_MOTION_PG_gait_curve(bpy.types.PropertyGroup):
     """The angles of one pair of arms over a cycle."""
 
-    pair: IntProperty(
+    pair: props.IntProperty(
         name="Pair",
         description="Pair of arms that these angles are for, 1 in front; 0 is for all others",
         min=-50,
         soft_min=0,
     )
-    knots: CollectionProperty(
+    knots: props.CollectionProperty(
         name="Knots",
         description="Angles at some phases; the last runs on to the first",
         type=OCTO_MOTION_PG_gait_knot,
     )
-    free: BoolProperty(
+    free: props.BoolProperty(
         name="Off the Ground",
         description="These arms never hold on to the ground: they move as the table says",
     )
-    active_knot: IntProperty(name="Active Knot", options={"HIDDEN"})
+    active_knot: props.IntProperty(name="Active Knot", options={"HIDDEN"})
     unused: _unused()
 
 
 class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
     """How far one arm is ahead, in place of the spread."""
 
-    pair: IntProperty(
+    pair: props.IntProperty(
         name="Pair",
         description="Pair of the arm, 1 in front",
         min=-50,
         soft_min=1,
         default=1,
     )
-    side: EnumProperty(name="Side", description="Side of the arm", items=SIDES)
-    phase: AngleProperty(
+    side: props.EnumProperty(name="Side", description="Side of the arm", items=SIDES)
+    phase: props.AngleProperty(
         name="Ahead",
         description="How far this arm is ahead of the body's cycle, whatever the spread says",
         soft_min=-2.0 * np.pi,
@@ -165,17 +156,17 @@ class OCTO_MOTION_PG_gait_offset(bpy.types.PropertyGroup):
 class OCTO_MOTION_PG_gait_note(bpy.types.PropertyGroup):
     """A remark that travels with the table."""
 
-    subject: StringProperty(name="Subject", description="What the remark is about")
-    text: StringProperty(name="Text", description="The remark itself")
+    subject: props.StringProperty(name="Subject", description="What the remark is about")
+    text: props.StringProperty(name="Text", description="The remark itself")
     unused: _unused()
 
 
 class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
     """A gait table."""
 
-    name: StringProperty(name="Name", description="Name of the gait that was loaded")
-    description: StringProperty(name="Description", description="What this gait is for")
-    manner: EnumProperty(
+    name: props.StringProperty(name="Name", description="Name of the gait that was loaded")
+    description: props.StringProperty(name="Description", description="What this gait is for")
+    manner: props.EnumProperty(
         name="Manner",
         description="How the body travels with this gait",
         items=(
@@ -190,7 +181,7 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         ),
         default=_DEFAULT.manner,
     )
-    stride: FloatProperty(
+    stride: props.FloatProperty(
         name="Stride",
         description="How far the body travels in one cycle, in arm lengths. A longer stride "
         "covers the route in fewer cycles",
@@ -200,7 +191,7 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         soft_max=3.0,
         step=5,
     )
-    spread_pairs: FloatProperty(
+    spread_pairs: props.FloatProperty(
         name="Pairs",
         description="How the pairs follow one another: cycles from the first pair to the last. "
         "At 1 a wave runs over the arms, at 0 all pairs move together",
@@ -209,7 +200,7 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         soft_max=2.0,
         step=5,
     )
-    spread_sides: FloatProperty(
+    spread_sides: props.FloatProperty(
         name="Sides",
         description="Cycles that the right side is ahead of the left. At 0.5 the sides take "
         "turns, at 0 they move together",
@@ -218,33 +209,33 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         soft_max=1.0,
         step=5,
     )
-    spread_halves: FloatProperty(
+    spread_halves: props.FloatProperty(
         name="Halves",
         description="Cycles that the rear half of the arms is ahead of the front half",
         default=_DEFAULT.spread_halves,
         options={"HIDDEN"},
     )
-    offsets: CollectionProperty(
+    offsets: props.CollectionProperty(
         name="Offsets",
         description="Arms that keep a phase of their own, whatever the spread says",
         type=OCTO_MOTION_PG_gait_offset,
     )
-    active_offset: IntProperty(name="Active Offset", options={"HIDDEN"})
-    power_phase: AngleProperty(
+    active_offset: props.IntProperty(name="Active Offset", options={"HIDDEN"})
+    power_phase: props.AngleProperty(
         name="Power Stroke",
         description="Phase at the middle of the power stroke: a swimming body shoots ahead there",
         default=_DEFAULT.power_phase,
         min=0.0,
         max=2.0 * np.pi,
     )
-    curves: CollectionProperty(
+    curves: props.CollectionProperty(
         name="Curves",
         description="Angles of the arms over one cycle: one curve for all pairs, others for "
         "single pairs. Without any, the preset's",
         type=OCTO_MOTION_PG_gait_curve,
     )
-    active_curve: IntProperty(name="Active Curve", options={"HIDDEN"})
-    shown_angle: EnumProperty(
+    active_curve: props.IntProperty(name="Active Curve", options={"HIDDEN"})
+    shown_angle: props.EnumProperty(
         name="Angle",
         description="Which of the three angles the table shows",
         items=(
@@ -253,7 +244,7 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
             ("BANK", "Bank", "Twist about the arm", 2),
         ),
     )
-    notes: CollectionProperty(name="Notes", type=OCTO_MOTION_PG_gait_note, options={"HIDDEN"})
+    notes: props.CollectionProperty(name="Notes", type=OCTO_MOTION_PG_gait_note, options={"HIDDEN"})
     as_text: bpy.props.StringProperty(
         name="Text",
         description="The whole table as in a gait's file (JSON), to read and to set",

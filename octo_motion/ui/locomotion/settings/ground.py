@@ -16,17 +16,8 @@ from ....blender.scene import Contact, markers, read_markers
 from ....core.locomotion.gait import Arm
 from ....core.locomotion.ground import ContactOverride, StanceSettings
 from ....core.rotations import Floats
-from ...declared_settings import (
-    BoolProperty,
-    CollectionProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-    declared,
-    emptied,
-)
+from ... import declared_settings as props
+from ...declared_settings import declared, emptied
 
 
 def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
@@ -35,7 +26,7 @@ def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
 
 
 def _shift() -> Any:
-    return FloatProperty(
+    return props.FloatProperty(
         name="Shift",
         description="Share of a cycle by which the contact is later, negative if it is earlier",
         min=-0.3,
@@ -48,22 +39,24 @@ def _shift() -> Any:
 class ContactItem(bpy.types.PropertyGroup):
     """What an artist wants of one contact: it stays when the motion is generated again."""
 
-    arm: StringProperty(name="Arm", description="Name of the arm in the list")
-    cycle: IntProperty(name="Cycle", description="Number of the arm's cycle along the route")
-    removed: BoolProperty(name="Removed", description="The arm does not touch the ground here")
+    arm: props.StringProperty(name="Arm", description="Name of the arm in the list")
+    cycle: props.IntProperty(name="Cycle", description="Number of the arm's cycle along the route")
+    removed: props.BoolProperty(
+        name="Removed", description="The arm does not touch the ground here"
+    )
     shift: _shift()
-    locked: BoolProperty(
+    locked: props.BoolProperty(
         name="Locked",
         description="The contact stays where it is in the world, however the route or the gait "
         "are changed",
     )
-    position: FloatVectorProperty(
+    position: props.FloatVectorProperty(
         name="Position",
         description="Where the arm touches the ground, if the contact is locked",
         subtype="TRANSLATION",
         size=3,
     )
-    heading: FloatProperty(
+    heading: props.FloatProperty(
         name="Heading",
         description="Which way the arm lies from there, about the world's Z axis, if the contact "
         "is locked",
@@ -74,13 +67,13 @@ class ContactItem(bpy.types.PropertyGroup):
 class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
     """How a walking creature stands on the ground."""
 
-    use: BoolProperty(
+    use: props.BoolProperty(
         name="Hold the Ground",
         description="Walking, each arm takes hold of the ground and does not slide over it, while "
         "the body moves on. Off, the arms move as the gait alone has them",
         default=True,
     )
-    object: PointerProperty(
+    object: props.PointerProperty(
         name="Ground",
         description="Mesh to walk on, as it is seen: with its modifiers, moved and scaled. Without "
         "one, the ground is where the route is",
@@ -93,19 +86,19 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
     lift: declared(StanceSettings, "lift")
     lean: declared(StanceSettings, "lean")
     smoothing: declared(StanceSettings, "smoothing")
-    start_at_rest: BoolProperty(
+    start_at_rest: props.BoolProperty(
         name="Start at Rest",
         description="All arms lie on the ground at the start, and leave it as the body gets going. "
         "Only with an Ease In: without one the creature comes walking",
         default=True,
     )
-    come_to_rest: BoolProperty(
+    come_to_rest: props.BoolProperty(
         name="Come to Rest",
         description="All arms lie on the ground at the end: each takes its last step in time. Only "
         "with an Ease Out: without one the creature walks on",
         default=True,
     )
-    rest_within: FloatProperty(
+    rest_within: props.FloatProperty(
         name="Within",
         description="Cycles of the gait that the body takes at least to get going from its rest, "
         "and to come to it, if that is more than Ease In and Out give it",
@@ -115,20 +108,20 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
         max=100.0,
         step=10,
     )
-    shown: StringProperty(
+    shown: props.StringProperty(
         name="Shown",
         description="Which contacts have markers",
         options={"HIDDEN"},
     )
-    contacts: CollectionProperty(
+    contacts: props.CollectionProperty(
         name="Contacts",
         description="Contacts that were moved, locked, shifted or removed by hand",
         type=ContactItem,
     )
 
 
-_HiddenFloat: Final = partial(FloatProperty, options={"HIDDEN"})
-_HiddenText: Final = partial(StringProperty, options={"HIDDEN"})
+_HiddenFloat: Final = partial(props.FloatProperty, options={"HIDDEN"})
+_HiddenText: Final = partial(props.StringProperty, options={"HIDDEN"})
 
 
 class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
@@ -136,18 +129,18 @@ class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
 
     armature: _HiddenText(name="Armature", description="Object whose arm touches here")
     arm: _HiddenText(name="Arm", description="Name of the arm")
-    cycle: IntProperty(
+    cycle: props.IntProperty(
         name="Cycle",
         description="Number of the arm's cycle along the route",
         options={"HIDDEN"},
     )
-    locked: BoolProperty(
+    locked: props.BoolProperty(
         name="Locked",
         description="The contact stays here, however the route or the gait are changed. One that "
         "was dragged or turned is locked; free it to have it where the gait wants it",
     )
     shift: _shift()
-    position: FloatVectorProperty(
+    position: props.FloatVectorProperty(
         name="Position",
         description="Where the marker was put",
         size=3,
@@ -200,20 +193,19 @@ def read_overrides(
         )
         for item in settings.contacts
     }
-    wanted = {place: each for place, each in wanted.items() if each.matters}
-    if not settings.shown:
-        return wanted
     once, places = _shown(settings)
-    found = read_markers(armature, once)
-    if once != armature.name and not found:
-        # A copy of the armature that has markers: nobody has taken any of its own away.
-        return wanted
-    for place in places:
-        if place not in found:
-            wanted[place] = replace(wanted.get(place, ContactEdit()), removed=True)
+    found = read_markers(armature, once) if settings.shown else {}
+    # Of a copy of an armature that has markers, nobody has taken any away.
+    if found or once == armature.name:
+        for place in places:
+            if place not in found:
+                wanted[place] = replace(wanted.get(place, ContactEdit()), removed=True)
     for place, contact in found.items():
-        position = contact.position if contact.locked else None
-        wanted[place] = ContactEdit(shift=contact.shift, position=position, heading=contact.heading)
+        wanted[place] = ContactEdit(
+            shift=contact.shift,
+            position=contact.position if contact.locked else None,
+            heading=contact.heading,
+        )
     return {place: each for place, each in wanted.items() if each.matters}
 
 

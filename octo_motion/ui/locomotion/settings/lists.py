@@ -14,17 +14,7 @@ from typing import Any, Final
 import bpy
 
 from ....blender.scene import WITH_SURFACE
-from ...declared_settings import (
-    AngleProperty,
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FactorProperty,
-    FloatProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from ... import declared_settings as props
 from .gait import SIDES, GaitName
 from .ground import rename_arm
 
@@ -62,35 +52,35 @@ class ArmItem(bpy.types.PropertyGroup):
         description="What it was called until its name was changed",
         options={"HIDDEN"},
     )
-    bones: CollectionProperty(
+    bones: props.CollectionProperty(
         name="Bones",
         description="The arm's bones, from its root to its tip",
         type=ArmBoneItem,
     )
-    side: EnumProperty(
+    side: props.EnumProperty(
         name="Side",
         description="Side of the body. Gaits mirror forward and backward between left and right",
         items=SIDES,
     )
-    pair: IntProperty(
+    pair: props.IntProperty(
         name="Pair",
         description="Which pair it belongs to, counted from 1 in front. Gaits can give each pair "
         "its own motion, and shift the pairs against one another",
         default=1,
         min=1,
     )
-    phase: AngleProperty(
+    phase: props.AngleProperty(
         name="Phase",
         description="How far this arm is ahead of its place in the gait: 360° is a whole cycle",
         soft_min=-math.tau,
         soft_max=math.tau,
     )
-    flip: BoolProperty(
+    flip: props.BoolProperty(
         name="Flip",
         description="Mirror this arm's motion: forward and twist turn the other way, for an arm "
         "that moves backward where others move forward",
     )
-    enabled: BoolProperty(
+    enabled: props.BoolProperty(
         name="Enabled",
         description="Move this arm. Switched off, it gets no keys and keeps its pose",
         default=True,
@@ -100,25 +90,25 @@ class ArmItem(bpy.types.PropertyGroup):
 class ArmList:
     """What ``Object.octo_motion.locomotion`` has of the rig."""
 
-    arms: CollectionProperty(
+    arms: props.CollectionProperty(
         name="Arms",
         description="The arms that are moved; without any, they are detected when generating",
         type=ArmItem,
     )
-    active_arm: IntProperty(name="Active Arm", options={"HIDDEN"})
-    body_front: EnumProperty(
+    active_arm: props.IntProperty(name="Active Arm", options={"HIDDEN"})
+    body_front: props.EnumProperty(
         name="Front",
         description="Which way the body faces, as an axis of the armature",
         items=AXES,
         default="-Y",
     )
-    body_up: EnumProperty(
+    body_up: props.EnumProperty(
         name="Up",
         description="Where the body's top is, as an axis of the armature",
         items=AXES,
         default="Z",
     )
-    root_bone: StringProperty(
+    root_bone: props.StringProperty(
         name="Root Bone",
         description="Bone that carries the whole body; it can take the travel along the route",
     )
@@ -142,19 +132,19 @@ class ReachItem(bpy.types.PropertyGroup):
     """An arm reaches for an object while it moves, and goes back to its gait."""
 
     name: bpy.props.StringProperty(name="Name", description="What this reach is called in the list")
-    mute: BoolProperty(name="Mute", description="Leave this reach out")
-    arm: StringProperty(
+    mute: props.BoolProperty(name="Mute", description="Leave this reach out")
+    arm: props.StringProperty(
         name="Arm",
         description="The arm of the list that reaches; empty takes the one nearest to the object",
     )
-    target: PointerProperty(
+    target: props.PointerProperty(
         name="Object",
         description="What is reached for. It may move; only if it is carried is it changed",
         type=bpy.types.Object,
         poll=_has_surface,
     )
-    mode: EnumProperty(name="Mode", description="What the arm does", items=MODES)
-    turns: FloatProperty(
+    mode: props.EnumProperty(name="Mode", description="What the arm does", items=MODES)
+    turns: props.FloatProperty(
         name="Turns",
         description="Winds about the object at most so often, as far as the arm is long enough",
         default=2.0,
@@ -163,12 +153,12 @@ class ReachItem(bpy.types.PropertyGroup):
         step=10,
         precision=2,
     )
-    carry: BoolProperty(
+    carry: props.BoolProperty(
         name="Carry",
         description="Take the object along, from when the arm is wound until it lets go. The "
         "object gets keys for that; it must have none of its own",
     )
-    axis: EnumProperty(
+    axis: props.EnumProperty(
         name="Axis",
         description="What of the object is wound about",
         items=(
@@ -183,26 +173,28 @@ class ReachItem(bpy.types.PropertyGroup):
             ("Z", "Z", "The object's own Z", 3),
         ),
     )
-    frame_start: IntProperty(name="Start", description="Frame at which the arm sets out", default=1)
-    frame_contact: IntProperty(
+    frame_start: props.IntProperty(
+        name="Start", description="Frame at which the arm sets out", default=1
+    )
+    frame_contact: props.IntProperty(
         name="Contact",
         description="Frame at which the arm touches the object; a curl is closed then",
         default=30,
     )
-    coil_frames: IntProperty(
+    coil_frames: props.IntProperty(
         name="Coil",
         description="Frames from the touch until the arm is wound all the way",
         default=20,
         min=1,
         soft_max=100,
     )
-    frame_release: IntProperty(
+    frame_release: props.IntProperty(
         name="Release",
         description="Frame at which the arm begins to let go; after the end of the motion, it "
         "holds on",
         default=80,
     )
-    back_frames: IntProperty(
+    back_frames: props.IntProperty(
         name="Back",
         description="Frames from letting go until the arm does what its gait says",
         default=40,
@@ -214,19 +206,19 @@ class ReachItem(bpy.types.PropertyGroup):
 class Reaches:
     """What ``Object.octo_motion.locomotion`` has of reaches."""
 
-    reaches: CollectionProperty(
+    reaches: props.CollectionProperty(
         name="Reaches",
         description="What single arms reach for while the body moves",
         type=ReachItem,
     )
-    active_reach: IntProperty(name="Active Reach", options={"HIDDEN"})
+    active_reach: props.IntProperty(name="Active Reach", options={"HIDDEN"})
 
 
 # --- Where along the route the gait changes: ``octo_motion.locomotion.change`` --------------------
 
 
 def _length() -> Any:
-    return FloatProperty(
+    return props.FloatProperty(
         name="Length",
         description="How long the change takes along the route, in arm lengths. The body goes over "
         "all the while; each arm as soon as it holds on to nothing",
@@ -248,7 +240,7 @@ class ChangeItem(bpy.types.PropertyGroup):
         description="The gait from here on. Its own strides, the other settings of this armature",
         default="swim",
     )
-    position: FactorProperty(
+    position: props.FactorProperty(
         name="Position",
         description="Where along the route the change is half done: 0 at its start, 1 at its end",
         default=0.5,
@@ -260,7 +252,7 @@ class ChangeItem(bpy.types.PropertyGroup):
 class OCTO_MOTION_PG_change(bpy.types.PropertyGroup):
     """Changes of gait along the route."""
 
-    by: EnumProperty(
+    by: props.EnumProperty(
         name="Change Gait",
         description="Whether the gait changes along the route, and what decides where",
         items=(
@@ -279,7 +271,7 @@ class OCTO_MOTION_PG_change(bpy.types.PropertyGroup):
         description="The gait that goes where the route is high over the ground",
         default="swim",
     )
-    height: FloatProperty(
+    height: props.FloatProperty(
         name="Height",
         description="Height of the route over the ground at which the change is half done, in arm "
         "lengths",
@@ -289,12 +281,12 @@ class OCTO_MOTION_PG_change(bpy.types.PropertyGroup):
         step=5,
     )
     length: _length()
-    places: CollectionProperty(
+    places: props.CollectionProperty(
         name="Places",
         description="Places of the route where the gait changes, in any order",
         type=ChangeItem,
     )
-    active_place: IntProperty(name="Active Place", options={"HIDDEN"})
+    active_place: props.IntProperty(name="Active Place", options={"HIDDEN"})
 
 
 CLASSES: Final = (ArmBoneItem, ArmItem, ReachItem, ChangeItem, OCTO_MOTION_PG_change)

@@ -20,20 +20,8 @@ from ....core.errors import GaitError
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.metrics import Figure
 from ....core.locomotion.path import TravelSettings
-from ...declared_settings import (
-    AngleProperty,
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FactorProperty,
-    FloatProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-    declared,
-    emptied,
-    make_overridable,
-)
+from ... import declared_settings as props
+from ...declared_settings import declared, emptied, make_overridable
 from .gait import DEFAULT_GAIT, GaitName, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
 from .ground import OCTO_MOTION_PG_ground
 from .lists import ArmList, OCTO_MOTION_PG_change, Reaches
@@ -53,19 +41,19 @@ KIND_NAMES: Final = {kind: name for kind, name, _, _ in KINDS}
 class FigureItem(bpy.types.PropertyGroup):
     """The worst of one kind, as it is kept with the settings."""
 
-    kind: EnumProperty(name="Kind", description="What was measured", items=KINDS)
-    value: FloatProperty(
+    kind: props.EnumProperty(name="Kind", description="What was measured", items=KINDS)
+    value: props.FloatProperty(
         name="Value",
         description="Slip, depth and miss in arm lengths, strain as a share, turn in radians per "
         "frame, overlap in radii",
         precision=5,
     )
-    frame: IntProperty(
+    frame: props.IntProperty(
         name="Frame",
         description="Where it is worst; between two frames the first of them",
     )
-    arm: StringProperty(name="Arm", description="Of which arm; of an overlap both")
-    known: BoolProperty(
+    arm: props.StringProperty(name="Arm", description="Of which arm; of an overlap both")
+    known: props.BoolProperty(
         name="Known",
         description="Whether it was measured in this motion. Off for what a linked file tells of "
         "another one",
@@ -124,7 +112,7 @@ class Movement:
         default=DEFAULT_GAIT,
         update=_load_gait,
     )
-    table: PointerProperty(
+    table: props.PointerProperty(
         name="Gait Table",
         description="The gait itself: angles of the arms over one cycle",
         type=OCTO_MOTION_PG_gait_table,
@@ -137,7 +125,7 @@ class Movement:
     stand: declared(GaitSettings, "raise_to_floor")
     phase_spread: declared(GaitSettings, "phase_spread")
     turning: declared(GaitSettings, "turning")
-    variation_min: AngleProperty(
+    variation_min: props.AngleProperty(
         name="Variation Min",
         description="Least random addition to the gait's angles, drawn anew for each cycle",
         default=GaitSettings.variation[0],
@@ -147,7 +135,7 @@ class Movement:
         max=np.pi,
         step=100,
     )
-    variation_max: AngleProperty(
+    variation_max: props.AngleProperty(
         name="Max",
         description="Greatest random addition to the gait's angles, drawn anew for each cycle",
         default=GaitSettings.variation[1],
@@ -158,26 +146,26 @@ class Movement:
         step=100,
     )
     seed: declared(GaitSettings, "seed")
-    weight_root: FactorProperty(
+    weight_root: props.FactorProperty(
         name="Weight Root",
         description="How readily joints at the arm's root bend. Lower weights spread a bend over "
         "more joints",
         default=GaitSettings.weights[0],
         min=0.01,
     )
-    weight_tip: FactorProperty(
+    weight_tip: props.FactorProperty(
         name="Tip",
         description="How readily joints at the arm's tip bend. Lower than at the root, the bend "
         "moves to the root",
         default=GaitSettings.weights[-1],
         min=0.01,
     )
-    use_weight_curve: BoolProperty(
+    use_weight_curve: props.BoolProperty(
         name="Curve",
         description="Draw the weights as a curve from the arm's root, left, to its tip, right",
         update=_make_weight_curve,
     )
-    weight_curve: PointerProperty(
+    weight_curve: props.PointerProperty(
         name="Weight Curve",
         description="Node group that keeps the curve of joint weights",
         type=bpy.types.NodeTree,
@@ -228,13 +216,13 @@ def _is_curve(_settings: Any, candidate: bpy.types.Object) -> bool:
 class RouteSettings:
     """What ``Object.octo_motion.locomotion`` has of the route."""
 
-    route: PointerProperty(
+    route: props.PointerProperty(
         name="Route",
         description="Curve to travel along. For a walk it lies on the ground",
         type=bpy.types.Object,
         poll=_is_curve,
     )
-    spline: IntProperty(
+    spline: props.IntProperty(
         name="Spline",
         description="Which of the curve's splines to follow, counted from 0; -1 takes the longest",
         default=-1,
@@ -250,13 +238,13 @@ class RouteSettings:
     corner: declared(TravelSettings, "corner")
     burst: declared(TravelSettings, "burst")
     bank_in_turns: declared(TravelSettings, "bank")
-    streamline: FactorProperty(
+    streamline: props.FactorProperty(
         name="Streamline",
         description="Swimming: how far head and mantle stretch out along the way. At 0 they lean "
         "back as they do at rest. A body whose mantle lies flat behind it swims as it lies instead",
         default=1.0,
     )
-    height_mode: EnumProperty(
+    height_mode: props.EnumProperty(
         name="Height",
         description="How high above the route the body's center travels",
         items=(
@@ -269,7 +257,7 @@ class RouteSettings:
             ("MANUAL", "Manual", "As high as given", 1),
         ),
     )
-    height: FloatProperty(
+    height: props.FloatProperty(
         name="Height",
         description="Distance of the body's center above the route",
         subtype="DISTANCE",
@@ -282,7 +270,7 @@ class RouteSettings:
 
 
 _Seconds: Final = partial(
-    FloatProperty, subtype="TIME_ABSOLUTE", unit="TIME_ABSOLUTE", soft_max=20.0, step=10
+    props.FloatProperty, subtype="TIME_ABSOLUTE", unit="TIME_ABSOLUTE", soft_max=20.0, step=10
 )
 _IN_PLACE: Final = (
     "Nothing travels: whole cycles on the spot, whose last frame meets the first, for games and "
@@ -294,7 +282,7 @@ _IN_PLACE: Final = (
 class Timing:
     """What ``Object.octo_motion.locomotion`` has of time, of the body's travel and breath."""
 
-    timing: EnumProperty(
+    timing: props.EnumProperty(
         name="Timing",
         description="What decides how long the journey takes",
         items=(
@@ -310,7 +298,7 @@ class Timing:
         min=0.01,
         soft_min=0.2,
     )
-    speed: FloatProperty(
+    speed: props.FloatProperty(
         name="Speed",
         description="Full speed of the body along the route",
         unit="VELOCITY",
@@ -319,9 +307,9 @@ class Timing:
         soft_max=10.0,
         step=10,
     )
-    frame_start: IntProperty(name="Start", description="First frame of the motion", default=1)
-    frame_end: IntProperty(name="End", description="Last frame of the motion", default=250)
-    travel_on: EnumProperty(
+    frame_start: props.IntProperty(name="Start", description="First frame of the motion", default=1)
+    frame_end: props.IntProperty(name="End", description="Last frame of the motion", default=250)
+    travel_on: props.EnumProperty(
         name="Travel on",
         description="What carries the body along the route",
         items=(
@@ -330,14 +318,14 @@ class Timing:
             ("NONE", "In Place", _IN_PLACE, 2),
         ),
     )
-    extend_scene_range: BoolProperty(
+    extend_scene_range: props.BoolProperty(
         name="Extend Scene Range",
         description="Move the scene's end frame if the motion lasts longer, so that playback and "
         "rendering show all of it. The range is never shortened, and the message says so when it "
         "is extended. Switch it off where a shot has its length",
         default=True,
     )
-    cycles: IntProperty(
+    cycles: props.IntProperty(
         name="Cycles",
         description="In place: how many cycles of the gait the loop has. Random additions repeat "
         "with the loop, so more cycles look less even",
@@ -346,13 +334,13 @@ class Timing:
         soft_max=12,
         max=10_000,
     )
-    repeat: BoolProperty(
+    repeat: props.BoolProperty(
         name="Repeat",
         description="In place: curves repeat before and after the loop, by Cycles modifiers. "
         "Exporters take the loop alone",
         default=True,
     )
-    breathing: FactorProperty(
+    breathing: props.FactorProperty(
         name="Breathing",
         description="How much wider the mantle gets with each breath; 0 gives it no keys",
         soft_max=0.3,
@@ -379,7 +367,7 @@ def _tell(settings: Any, _context: bpy.types.Context) -> None:
 class Outcome:
     """What ``Object.octo_motion.locomotion`` has of what is made: keys, quality, live."""
 
-    keys: EnumProperty(
+    keys: props.EnumProperty(
         name="Keys",
         description="How many keys the motion gets",
         items=(
@@ -392,7 +380,7 @@ class Outcome:
             ),
         ),
     )
-    key_angle: FloatProperty(
+    key_angle: props.FloatProperty(
         name="Angle",
         description="How far any bone may be turned away, at any frame, where there are few keys",
         subtype="ANGLE",
@@ -403,7 +391,7 @@ class Outcome:
         step=10,
         precision=2,
     )
-    key_distance: FloatProperty(
+    key_distance: props.FloatProperty(
         name="Distance",
         description="How far any arm's tip may be away, at any frame, where there are few keys. "
         "In arm lengths",
@@ -413,7 +401,7 @@ class Outcome:
         step=0.1,
         precision=4,
     )
-    key_columns: EnumProperty(
+    key_columns: props.EnumProperty(
         name="Columns",
         description="Which channels have their keys at the same frames, where there are few keys",
         items=(
@@ -432,37 +420,37 @@ class Outcome:
         ),
         default="BONE",
     )
-    result: PointerProperty(
+    result: props.PointerProperty(
         name="Result",
         description="The action that was generated last. It is made anew in place until you edit "
         "it; then it is yours, and the next one is a new action",
         type=bpy.types.Action,
     )
-    keep_apart: BoolProperty(
+    keep_apart: props.BoolProperty(
         name="Keep Apart",
         description="Arms that would pass through each other or through the body make way: those "
         "in the air, and what does not lie on the ground of those that hold on",
         default=True,
     )
-    tell_overlaps: BoolProperty(
+    tell_overlaps: props.BoolProperty(
         name="Tell Overlaps",
         description="After generating, say at which frame an arm passes deepest through another "
         "or through the body, if by more than a tenth of its thickness",
         default=True,
     )
-    figures: CollectionProperty(
+    figures: props.CollectionProperty(
         name="Quality",
         description="The worst of each kind in the motion that was generated last",
         type=FigureItem,
     )
-    live: BoolProperty(
+    live: props.BoolProperty(
         name="Live",
         description="Make the motion anew by itself whenever its route, its ground or a setting "
         "changes, with a key on every frame. Generate measures it and leaves out keys. Switches "
         "itself off when you edit the action",
         update=_tell,
     )
-    live_error: StringProperty(
+    live_error: props.StringProperty(
         name="Live Error",
         description="Why the motion does not follow at the moment; the last one that could be "
         "made is still there",
@@ -475,12 +463,12 @@ class OCTO_MOTION_PG_locomotion(
 ):
     """How an armature walks or swims along a route."""
 
-    ground: PointerProperty(
+    ground: props.PointerProperty(
         name="Ground",
         description="What a walking creature stands on, and how",
         type=OCTO_MOTION_PG_ground,
     )
-    change: PointerProperty(
+    change: props.PointerProperty(
         name="Change of Gait",
         description="Where along the route the gait changes",
         type=OCTO_MOTION_PG_change,

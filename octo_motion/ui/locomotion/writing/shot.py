@@ -282,19 +282,8 @@ def show_contacts(
     contacts = []
     for each in shown_contacts(plan):
         edit = edits.get((each.arm, each.cycle), ContactEdit())
-        contacts.append(
-            Contact(
-                each.arm,
-                each.cycle,
-                each.position,
-                each.heading,
-                locked=edit.position is not None,
-                shift=edit.shift,
-                frame_on=each.frame_on,
-                frame_off=each.frame_off,
-                cycle_frames=each.cycle_frames,
-            )
-        )
+        locked = edit.position is not None
+        contacts.append(Contact(**vars(each), locked=locked, shift=edit.shift))
     length = plan.first.poser.arm_length * plan.job.creature.scale
     write_markers(armature, contacts, length, once_called(settings))
     note_shown(settings, armature, contacts)
