@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Container
 from functools import partial
 from itertools import chain, count
 from typing import Any, Final, TypeVar
@@ -27,6 +28,11 @@ StringProperty: Final = partial(props.StringProperty, override={"LIBRARY_OVERRID
 CollectionProperty: Final = partial(
     props.CollectionProperty, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
 )
+
+
+def is_of(types: Container[str]) -> Callable[[Any, Any], bool]:
+    """What lets a pointer offer objects of these types alone."""
+    return lambda _owner, candidate: candidate.type in types
 
 
 # --- Groups of properties in a library override ---------------------------------------------------

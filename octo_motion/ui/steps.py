@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Steps that are taken one after the other, and taken back in reverse."""
+"""Classes to register, and steps that are taken one after the other and taken back in reverse."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Final
+
+import bpy
 
 _logger: Final = logging.getLogger(__name__)
 
@@ -40,3 +43,17 @@ def undo_all(steps: Sequence[Step]) -> None:
 
 def nothing() -> None:
     """What is done where there is only something to undo."""
+
+
+def own_classes(*modules: ModuleType) -> tuple[type, ...]:
+    """What Blender is to know of these modules, in the order in which it stands there.
+
+    Panels are left out: their order is told where they are shown.
+    """
+    kinds = bpy.types.Operator, bpy.types.Menu, bpy.types.UIList, bpy.types.PropertyGroup
+    return tuple(
+        each
+        for module in modules
+        for each in vars(module).values()
+        if isinstance(each, type) and issubclass(each, kinds) and each.__module__ == module.__name__
+    )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The buttons, and what of the panel belongs to each."""
 
-from ...steps import Step
-from . import arms, contacts, gait_table, generate, quality, reaches, setups
+from ...steps import Step, own_classes
+from . import adding, arms, contacts, gait_table, generate, quality, reaches, setups
 from .adding import (
     OCTO_MOTION_OT_add_octopus,
     OCTO_MOTION_OT_add_route,
@@ -10,7 +10,7 @@ from .adding import (
     draw_route_entry,
 )
 from .arms import OCTO_MOTION_PT_arms
-from .contacts import OCTO_MOTION_PT_ground, draw_rest
+from .contacts import OCTO_MOTION_PT_contact, OCTO_MOTION_PT_ground, draw_rest
 from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_PT_table
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .quality import OCTO_MOTION_PT_quality
@@ -18,15 +18,9 @@ from .reaches import OCTO_MOTION_PT_change, OCTO_MOTION_PT_reaches
 from .setups import OCTO_MOTION_PT_setups
 
 CLASSES = (
-    *arms.CLASSES,
-    OCTO_MOTION_OT_add_octopus,
-    OCTO_MOTION_OT_add_route,
-    *gait_table.CLASSES,
-    OCTO_MOTION_OT_generate_locomotion,
-    *contacts.CLASSES,
-    *setups.CLASSES,
-    *quality.CLASSES,
-    *reaches.CLASSES,
+    *own_classes(arms, adding, gait_table, generate, contacts, setups, quality, reaches),
+    OCTO_MOTION_PT_contact,
+    OCTO_MOTION_PT_setups,
 )
 STEPS = (
     Step(generate.listen, generate.listen_no_more),

@@ -166,8 +166,14 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
         route = add_route_curve("Octopus Route", points, _collection(context))
         show_in_local_view(context, route)
         if armature is None:
-            _make_active(context, route)
-        elif not _assign(armature, route):
+            # As other Add operators do, where there is no armature to go on with.
+            for each in context.selected_objects:
+                each.select_set(state=False)
+            route.select_set(state=True)
+            context.view_layer.objects.active = route
+        elif armature.is_editable:
+            locomotion_settings(armature).route = route
+        else:
             self.report({"WARNING"}, f"'{armature.name}' is linked: it keeps its own route.")
 
 
@@ -181,19 +187,3 @@ def _collection(context: bpy.types.Context) -> bpy.types.Collection:
         if collection is not None and collection.is_editable:
             return collection
     raise WriteError("The scene is linked from another file.", "Work in a scene of this file.")
-
-
-def _assign(armature: bpy.types.Object, route: bpy.types.Object) -> bool:
-    """Make the curve the armature's route; False if the armature cannot be written."""
-    if not armature.is_editable:
-        return False
-    locomotion_settings(armature).route = route
-    return True
-
-
-def _make_active(context: bpy.types.Context, route: bpy.types.Object) -> None:
-    """As other Add operators do, where there is no armature to go on with."""
-    for each in context.selected_objects:
-        each.select_set(state=False)
-    route.select_set(state=True)
-    context.view_layer.objects.active = route

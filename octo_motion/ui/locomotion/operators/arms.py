@@ -287,14 +287,3 @@ def _summary(arms: Sequence[ArmChain]) -> str:
     }
     told = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     return f"{len(arms)} {'arm' if len(arms) == 1 else 'arms'} found: {told}."
-
-
-CLASSES: Final[tuple[type, ...]] = (
-    OCTO_MOTION_UL_arms,
-    OCTO_MOTION_OT_detect_arms,
-    OCTO_MOTION_OT_arm_add,
-    OCTO_MOTION_OT_arm_remove,
-    OCTO_MOTION_OT_arm_move,
-    OCTO_MOTION_OT_arm_flip,
-    OCTO_MOTION_OT_arm_select,
-)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, cast
+from typing import Any, cast
 
 import bpy
 from bpy.props import FloatProperty
@@ -195,12 +195,3 @@ class OCTO_MOTION_PT_contact(TabPanel, bpy.types.Panel):
         layout.prop(own, "locked")
         layout.prop(own, "shift")
         layout.operator(OCTO_MOTION_OT_contacts_shift.bl_idname)
-
-
-CLASSES: Final = (
-    OCTO_MOTION_OT_contacts_show,
-    OCTO_MOTION_OT_contacts_hide,
-    OCTO_MOTION_OT_contacts_clear,
-    OCTO_MOTION_OT_contacts_shift,
-    OCTO_MOTION_PT_contact,
-)

@@ -42,13 +42,22 @@ from ..settings import (
 )
 
 
+def _writable(context: bpy.types.Context) -> OCTO_MOTION_PG_locomotion:
+    """Settings that can be written.
+
+    Raises:
+        WriteError: the armature is linked.
+    """
+    armature = active_armature(context)
+    writable_armature(armature)
+    return locomotion_settings(armature)
+
+
 class _GaitOperator(ArmatureOperator):
     """An operator on the gait of an armature whose settings can be written."""
 
     def run(self, context: bpy.types.Context) -> None:
-        armature = active_armature(context)
-        writable_armature(armature)
-        self.edit(locomotion_settings(armature))
+        self.edit(_writable(context))
 
     def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
         """Do the work."""
@@ -140,7 +149,7 @@ class OCTO_MOTION_OT_gait_save(_GaitOperator, bpy.types.Operator):
         self.report({"INFO"}, f"Saved the gait '{table.name}'.")
 
 
-class OCTO_MOTION_OT_gait_remove(_GaitOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.gait_remove"
     bl_label = "Remove Gait Preset"
     bl_description = (
@@ -159,8 +168,8 @@ class OCTO_MOTION_OT_gait_remove(_GaitOperator, bpy.types.Operator):
         """Ask first."""
         return window_manager(context).invoke_confirm(self, event)
 
-    def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
-        name = self.name or settings.gait
+    def run(self, context: bpy.types.Context) -> None:
+        name = self.name or _writable(context).gait
         remove_gait(name)
         self.report({"INFO"}, f"Removed the gait '{name}'.")
 
@@ -480,21 +489,3 @@ class OCTO_MOTION_UL_gait_curves(ItemRows, bpy.types.UIList):
             row = layout.row()
             row.label(text="Only Pair", icon="FCURVE")
             row.prop(item, "pair", text="", emboss=False)
-
-
-CLASSES: Final = (
-    OCTO_MOTION_OT_gait_load,
-    OCTO_MOTION_OT_gait_save,
-    OCTO_MOTION_OT_gait_remove,
-    OCTO_MOTION_OT_gait_export,
-    OCTO_MOTION_OT_gait_import,
-    OCTO_MOTION_OT_gait_curve_add,
-    OCTO_MOTION_OT_gait_curve_remove,
-    OCTO_MOTION_OT_gait_knot_add,
-    OCTO_MOTION_OT_gait_knot_remove,
-    OCTO_MOTION_OT_gait_offset_add,
-    OCTO_MOTION_OT_gait_offset_remove,
-    OCTO_MOTION_MT_gait_offset,
-    OCTO_MOTION_MT_gait,
-    OCTO_MOTION_UL_gait_curves,
-)

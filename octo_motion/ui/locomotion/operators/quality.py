@@ -103,6 +103,3 @@ class OCTO_MOTION_PT_quality(ArmaturePanel, bpy.types.Panel):
                 OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
             )
             jump.kind = item.kind
-
-
-CLASSES: Final = (OCTO_MOTION_OT_quality_jump,)

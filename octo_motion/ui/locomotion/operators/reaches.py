@@ -283,13 +283,3 @@ class OCTO_MOTION_PT_change(ArmaturePanel, bpy.types.Panel):
                 column = layout.column(align=True)
                 for name in ("gait", "position", "length"):
                     column.prop(item, name)
-
-
-CLASSES: Final = (
-    OCTO_MOTION_UL_reaches,
-    OCTO_MOTION_OT_reach_add,
-    OCTO_MOTION_OT_reach_remove,
-    OCTO_MOTION_UL_changes,
-    OCTO_MOTION_OT_change_add,
-    OCTO_MOTION_OT_change_remove,
-)

@@ -257,14 +257,6 @@ def _icons() -> Iterator[tuple[str, int]]:
         yield name, image.icon_id
 
 
-CLASSES: Final = (
-    OCTO_MOTION_OT_setup_load,
-    OCTO_MOTION_MT_setups,
-    OCTO_MOTION_OT_setup_add,
-    OCTO_MOTION_PT_setups,
-)
-
-
 def register() -> None:
     """Make the add-on's set-ups known to Blender, and a place for their pictures."""
     bpy.utils.register_preset_path(str(PACKAGE))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist sets, kept with the armature object."""
 
+from ...steps import own_classes
 from . import gait, ground, lists, properties
 from .gait import (
     DEFAULT_GAIT,
@@ -39,12 +40,7 @@ from .properties import (
     write_figures,
 )
 
-CLASSES = (
-    *gait.CLASSES,
-    *ground.CLASSES,
-    *lists.CLASSES,
-    *properties.CLASSES,
-)
+CLASSES = own_classes(gait, ground, lists, properties)
 
 __all__ = [
     "AXES",

@@ -254,15 +254,6 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
     )
 
 
-CLASSES: Final = (
-    OCTO_MOTION_PG_gait_knot,
-    OCTO_MOTION_PG_gait_curve,
-    OCTO_MOTION_PG_gait_offset,
-    OCTO_MOTION_PG_gait_note,
-    OCTO_MOTION_PG_gait_table,
-)
-
-
 def used(collection: Any) -> list[Any]:
     """The items of one of the table's lists that count."""
     return [item for item in collection if not item.unused]

@@ -154,9 +154,6 @@ class OCTO_MOTION_PG_contact(bpy.types.PropertyGroup):
     )
 
 
-CLASSES: Final = (OCTO_MOTION_PG_contact, ContactItem, OCTO_MOTION_PG_ground)
-
-
 # --- What an artist wants of single contacts: kept in the settings, changed on markers ------------
 
 

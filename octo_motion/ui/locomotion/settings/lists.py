@@ -124,10 +124,6 @@ MODES: Final = (
 )
 
 
-def _has_surface(_item: Any, candidate: bpy.types.Object) -> bool:
-    return candidate.type in WITH_SURFACE
-
-
 class ReachItem(bpy.types.PropertyGroup):
     """An arm reaches for an object while it moves, and goes back to its gait."""
 
@@ -141,7 +137,7 @@ class ReachItem(bpy.types.PropertyGroup):
         name="Object",
         description="What is reached for. It may move; only if it is carried is it changed",
         type=bpy.types.Object,
-        poll=_has_surface,
+        poll=props.is_of(WITH_SURFACE),
     )
     mode: props.EnumProperty(name="Mode", description="What the arm does", items=MODES)
     turns: props.FloatProperty(
@@ -287,6 +283,3 @@ class OCTO_MOTION_PG_change(bpy.types.PropertyGroup):
         type=ChangeItem,
     )
     active_place: props.IntProperty(name="Active Place", options={"HIDDEN"})
-
-
-CLASSES: Final = (ArmBoneItem, ArmItem, ReachItem, ChangeItem, OCTO_MOTION_PG_change)

@@ -82,7 +82,7 @@ def write_figures(settings: Any, found: Sequence[Figure]) -> None:
         item.known = True
 
 
-def _is_weight_curve(_settings: Any, candidate: bpy.types.NodeTree) -> bool:
+def _is_weight_curve(_settings: Any, candidate: Any) -> bool:
     return curve_node(candidate) is not None
 
 
@@ -209,10 +209,6 @@ def read_gait(settings: Movement) -> GaitTable:
 # --- The route, and how it is travelled -----------------------------------------------------------
 
 
-def _is_curve(_settings: Any, candidate: bpy.types.Object) -> bool:
-    return candidate.type == "CURVE"
-
-
 class RouteSettings:
     """What ``Object.octo_motion.locomotion`` has of the route."""
 
@@ -220,7 +216,7 @@ class RouteSettings:
         name="Route",
         description="Curve to travel along. For a walk it lies on the ground",
         type=bpy.types.Object,
-        poll=_is_curve,
+        poll=props.is_of({"CURVE"}),
     )
     spline: props.IntProperty(
         name="Spline",
@@ -473,9 +469,6 @@ class OCTO_MOTION_PG_locomotion(
         description="Where along the route the gait changes",
         type=OCTO_MOTION_PG_change,
     )
-
-
-CLASSES: Final = (FigureItem, OCTO_MOTION_PG_locomotion)
 
 
 def locomotion_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion:
