@@ -149,15 +149,15 @@ def _watch(sources: Sources, seconds: float) -> int:
     discovery = Discovery(sources)
     drivers: list[Driver] = []
     end = time.monotonic() + seconds
-    told = 0.0
+    shown = 0.0
     try:
         while time.monotonic() < end:
             drivers.extend(discovery.look())
             for problem in discovery.problems:
                 print(problem, file=sys.stderr)
             discovery.problems.clear()
-            tell = time.monotonic() - told > 0.1
-            told = time.monotonic() if tell else told
+            due = time.monotonic() - shown > 0.1
+            shown = time.monotonic() if due else shown
             for driver in list(drivers):
                 try:
                     sample = driver.read()
@@ -167,11 +167,11 @@ def _watch(sources: Sources, seconds: float) -> int:
                     drivers.remove(driver)
                     discovery.lost(driver.description.identity)
                     continue
-                if sample is not None and tell:
+                if sample is not None and due:
                     sample = corrected(sample, driver.description.kind, NONE, Response())
                     numbers = (*sample.position, *sample.velocity, *sample.angular_velocity)
-                    shown = " ".join(f"{each:8.4f}" for each in numbers)
-                    print(f"{driver.description.name}: {shown} buttons {sample.buttons:b}")
+                    columns = " ".join(f"{each:8.4f}" for each in numbers)
+                    print(f"{driver.description.name}: {columns} buttons {sample.buttons:b}")
             time.sleep(0.002)
     except KeyboardInterrupt:
         pass

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The bridge: the process between Blender and the devices, in which the puppet is simulated.
 
-It starts the process at the devices, steps the puppet, tells Blender poses sixty times a second
+It starts the process at the devices, steps the puppet, sends Blender poses sixty times a second
 and the devices, at each step, where the held bodies are. When Blender is gone it ends, and with it
 the process at the devices, which takes all force away.
 """
@@ -69,7 +69,7 @@ class Bridge:
         return _IDLE_PERIOD if self.simulation is None else self.simulation.step_seconds
 
     def turn(self, now: float) -> None:
-        """Hear both sides, go on by a step, tell both sides.
+        """Receive from both sides, go on by a step, send to both.
 
         Raises:
             ChannelClosedError: Blender is gone.
@@ -277,7 +277,7 @@ class Bridge:
         log.warning("The process at the devices ended")
 
     def _start_hands(self) -> None:
-        """Start the process at the devices, and tell it what it needs to know.
+        """Start the process at the devices, and send it what it needs to know.
 
         Where that fails it is tried again at the next turns, a few times.
         """

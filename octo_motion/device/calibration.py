@@ -87,7 +87,7 @@ _FARTHEST_REST: Final = 0.5
 _LEAST_PUSH: Final = 0.2
 """Of the full push: an axis that got less far was not meant to be calibrated."""
 _LEAST_WAY: Final = 0.01
-"""m, likewise of a device that tells where the hand is."""
+"""m, likewise of a pose device."""
 _EVERY: Final = 0.01
 """s between two values that are kept while the device is left alone."""
 
@@ -132,7 +132,7 @@ class Calibration:
 
     @property
     def width(self) -> float:
-        """The longest way, in metres, of a device that tells where the hand is."""
+        """The longest way, in metres, of a pose device."""
         return max(most - least for least, most in zip(self.least[:3], self.most[:3], strict=True))
 
 
@@ -159,8 +159,7 @@ def _share(raw: float, rest: float, least: float, most: float) -> float:
 class Calibrator:
     """Learns a device's zero and range from what it says.
 
-    A rate device must first be left alone; of a device that tells where the hand is, the middle of
-    its way is the zero.
+    A rate device must first be left alone; of a pose device the middle of its way is the zero.
     """
 
     def __init__(self, kind: Kind) -> None:

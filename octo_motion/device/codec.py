@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fixed layouts of bytes for the fields of messages; whatever is read is checked.
 
-Little endian, no padding. A field is told how it is laid out by an annotation:
+Little endian, no padding. An annotation gives a field its layout:
 ``mass: Annotated[float, F64]``. Nothing is ever evaluated, imported or unpickled.
 """
 
@@ -36,9 +36,10 @@ class Number:
     """As in ``struct``."""
     count: int = 1
 
-    def layout(self) -> struct.Struct:
-        """Of these numbers alone."""
-        return struct.Struct(f"<{self.count}{self.code}")
+    @property
+    def layout(self) -> str:
+        """As ``struct`` has it."""
+        return f"{self.count}{self.code}"
 
     def check(self, values: tuple[Any, ...]) -> Any:
         """The field's value from its numbers."""
@@ -48,12 +49,12 @@ class Number:
 
     def put(self, value: Any, out: bytearray) -> None:
         """Append the value's bytes."""
-        out += self.layout().pack(*(value if self.count > 1 else (value,)))
+        out += struct.pack("<" + self.layout, *(value if self.count > 1 else (value,)))
 
     def take(self, data: BytesIO) -> Any:
         """Read the value."""
-        layout = self.layout()
-        return self.check(layout.unpack(_take(data, layout.size)))
+        layout = "<" + self.layout
+        return self.check(struct.unpack(layout, _take(data, struct.calcsize(layout))))
 
 
 U8: Final = Number("B")
@@ -160,8 +161,7 @@ class Record:
         self._numbers = [each for each in self.codecs.values() if isinstance(each, Number)]
         self._struct: struct.Struct | None = None
         if len(self._numbers) == len(self.codecs):
-            numbers = (f"{each.count}{each.code}" for each in self._numbers)
-            self._struct = struct.Struct("<" + "".join(numbers))
+            self._struct = struct.Struct("<" + "".join(each.layout for each in self._numbers))
 
     def pack(self, message: object) -> bytes:
         """Bytes of a message's fields."""

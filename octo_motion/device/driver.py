@@ -31,7 +31,7 @@ class DeviceLostError(Exception):
 
 
 class Kind(IntEnum):
-    """What a device tells of the hand."""
+    """What a device measures."""
 
     RATE = 0
     """How far a cap is pushed: the pointer moves with that speed (space mice)."""

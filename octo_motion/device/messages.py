@@ -192,7 +192,7 @@ class Settings(Message):
     toggle: Annotated[bool, FLAG] = False
     """One press grabs and another lets go; else the button is held."""
     dead_man: Annotated[bool, FLAG] = True
-    """Without a hand on a device that can tell, there is no force."""
+    """Without a hand on a device that has a sensor for it, there is no force."""
     reach: Annotated[float, F64] = 0.1
     """m, how near to a body the pointer must be to grab it."""
     speed: Annotated[float, F64] = Response.speed
@@ -305,7 +305,7 @@ class Times(LoopTimesMessage):
 
 @dataclass(frozen=True)
 class Notice(Message):
-    """Bridge to Blender: something to tell the user."""
+    """Bridge to Blender: something for the user to read."""
 
     KIND = 13
     problem: Annotated[str, Text(1000)]

@@ -19,7 +19,7 @@ sees (a slow simulation, a scaled-up device) is the passivity controller's busin
 
 *Passivity observer and controller*: the hand never gets more energy than it gave. After Hannaford
 and Ryu, "Time-domain passivity control of haptic interfaces" (2002), in impedance form: the device
-tells how it moved, and is given a force. The observer sums the work that the hand did against the
+reports its motion, and is given a force. The observer sums the work that the hand did against the
 force of each period; this is exact, since the force is held while the hand moves. Where the sum
 would fall below zero, the controller adds damping, as much as brings it back.
 

@@ -74,8 +74,7 @@ class Pointer:
         who = self.driver.description
         self.has_force = who.dynamics is not None
         """Whether the device has motors."""
-        device = who.dynamics or Dynamics(0.0, damping=0.0, angular_damping=0.0)
-        self.dynamics = device
+        device = self.dynamics = who.dynamics or Dynamics(0.0, damping=0.0, angular_damping=0.0)
         """All zeros where it has none."""
         self._kind = who.kind
         self._response = self.settings.response()

@@ -38,7 +38,6 @@ _EDGES: Final = (
 """Upper edges of bins, in s: a hundredth of what they count, or finer. Few enough of them that
 looking through all takes no tick's time."""
 _AWAKE: Final = 0.002 if sys.platform == "win32" else 0.00015
-"""s before a deadline from which on the loop does not sleep."""
 
 
 class Histogram:
@@ -69,13 +68,9 @@ class Histogram:
 
 
 class Schedule:
-    """A loop of fixed period.
+    """A loop of fixed period (s), which does not sleep for the last ``awake`` s before a deadline.
 
-    Args:
-        period: s
-        clock: Seconds.
-        sleep: Waits for so many seconds, or somewhat longer.
-        awake: s before a deadline from which on the loop does not sleep.
+    ``sleep`` waits for so many seconds, or somewhat longer.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""HID report descriptors: what each bit of a report means, as the device itself tells it.
+"""HID report descriptors: what each bit of a report means, as the device itself states it.
 
 Source: USB Device Class Definition for Human Interface Devices 1.11, section 6.2.2. Read with the
 suspicion due to a device: every count is bounded, and what makes no sense raises.

@@ -2,7 +2,7 @@
 """The open HID profile of force devices: three reports of fixed layout, and their driver.
 
 Written so that a microcontroller without floating point can speak it: integers alone, little
-endian, each report within one packet of full-speed USB. docs/device.md tells it to makers.
+endian, each report within one packet of full-speed USB. docs/device.md describes it to makers.
 
 One table of fields makes descriptor, packer and parser, so that they cannot differ. What firmware
 does, writing states and reading commands, is in tests/device/firmware.py.
@@ -226,7 +226,7 @@ def parse_features(report: bytes) -> ForceFeatures:
 
 
 def scaled(steps: list[int], step: float) -> Vector:
-    """The vector that a report tells by its numbers of steps."""
+    """The vector of a report's numbers of steps."""
     a, b, c = steps
     return (a * step, b * step, c * step)
 

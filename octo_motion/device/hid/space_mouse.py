@@ -114,7 +114,7 @@ def model_of(vendor: int, product: int) -> DeviceModel | None:
 
 
 def classic_layout(*, combined: bool) -> ReportLayout:
-    """Layout of the 3Dconnexion family, for systems that do not tell a device's descriptor.
+    """Layout of the 3Dconnexion family, for systems that hand over no descriptor.
 
     Report 1 pushes and report 2 turns, or report 1 does both; 16 bits an axis. Report 3: buttons.
     """
@@ -208,7 +208,7 @@ class SpaceMouse(HidDriver):
     def drives(cls, found: Found) -> bool:
         """Whether an interface says that it is a multi-axis controller.
 
-        Where the system tells no usage (usage page 0), the table of products decides.
+        Where the system gives no usage (usage page 0), the table of products decides.
         """
         if found.page == 0:
             return model_of(found.vendor, found.product) is not None
@@ -225,7 +225,7 @@ class SpaceMouse(HidDriver):
         layout = None
         descriptor = descriptor_of(handle)
         if descriptor:
-            with suppress(DescriptorError):  # as if the system had not told it
+            with suppress(DescriptorError):  # as if the system had given none
                 layout = parse_descriptor(descriptor)
         if layout is None or not MultiAxis(layout).useful:
             model = model_of(found.vendor, found.product)

@@ -38,7 +38,7 @@ _MIDDLE: Final[Vector] = (0.0, -0.14, 0.15)
 """m: about the middle of the reach, where a service before 3.5 cannot be asked to count from it."""
 
 INVERSE3: Final = Dynamics(force=8.0, damping=0.3, delay=0.001, resolution=1e-5)
-"""Cautious guesses: the service tells none of these. What they leave open is the passivity
+"""Cautious guesses: the service states none of these. What they leave open is the passivity
 controller's business."""
 
 
