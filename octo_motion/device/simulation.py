@@ -44,7 +44,7 @@ _AT_ONCE: Final = 5
 _LATE: Final = 1.5
 """Times the expected turn, before the next one counts as late."""
 _STALE: Final = 0.25
-"""s without a word from a hand: it has let go."""
+"""s without a message from a hand: it has let go."""
 _PAUSE: Final = 0.05
 """s: a longer turn means that the whole machine was busy, and the hand could not speak either."""
 
@@ -66,7 +66,7 @@ class SimulatedPointer:
     """The grab that found nothing near."""
     pull: Pull = field(default_factory=Pull)
     silence: float = 0.0
-    """s that this process has run without a word from the hand."""
+    """s that this process has run without a message from the hand."""
 
     def sample(self) -> HandSample:
         """Where the hand is."""

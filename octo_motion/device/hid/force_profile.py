@@ -193,11 +193,7 @@ def parse_state(report: bytes, time: float) -> Sample:
 
 
 def pack_command(sequence: int, force: Vector, torque: Vector) -> bytes:
-    """Write an output report; what is beyond the numbers' range is cut to it.
-
-    Raises:
-        ReportError: force or torque is not finite.
-    """
+    """Write an output report, its numbers as ``in_steps`` has them."""
     enabled = force != ZERO or torque != ZERO
     return LAYOUTS[COMMAND].pack(
         *(COMMAND, sequence & 0xFFFF, WATCHDOG_MILLISECONDS, enabled),

@@ -83,11 +83,7 @@ def pack_force(sequence: int, answered: int, force: Vector, torque: Vector, key:
 
 
 def size_of(data: bytes | bytearray, key: bytes) -> int:
-    """Bytes of the packet that begins here, by its head of 24 bytes.
-
-    Raises:
-        PacketError: no head of ours, another version, or another key.
-    """
+    """Bytes of the packet that begins here, by its head; ``PacketError`` where it is no packet."""
     if len(data) < HEAD.size:
         raise PacketError("cut off")
     magic, version, kind, theirs = HEAD.unpack_from(data)
