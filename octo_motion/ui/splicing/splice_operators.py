@@ -318,7 +318,7 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
         stack = prepare_splices(armature)
         found = suggestions(stack, number, MOST_SUGGESTIONS)
         chosen = found[min(self.choice, len(found)) - 1]
-        starts = chosen.base_start, chosen.splice_start
+        starts = chosen.base_start, settings.splices[number].splice_start
         made = build_retimed(armature, settings, number, starts, stack)
         lines = [
             f"{rank}: frame {each.base_start:g} ({each.cost:.2f} leg lengths apart)"

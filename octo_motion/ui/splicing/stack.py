@@ -316,20 +316,13 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
     splice = stack.splices[number]
     if splice is None:
         raise ClipError("The splice is muted.", "Unmute it, then ask for its timing.")
-    ours = stack.base.landmarks
-    if ours is None or splice.landmarks is None:
+    if stack.base.landmarks is None or splice.landmarks is None:
         raise ClipError(
             "Timing is suggested from what the legs do, and one of the two has no landmarks.",
             "Drag the timing instead, or fill the table in the panel Splicing > Landmarks.",
         )
-    found = suggest_timings(
-        (stack.base.clip, ours),
-        (splice.clip, splice.landmarks),
-        splice_start=splice.timing.splice_start,
-        rate=splice.timing.rate,
-        length=splice.timing.length,
-        count=count,
-    )
+    mapped = MappedClip(splice.clip, splice.landmarks)
+    found = suggest_timings(stack.base, mapped, splice.timing, count)
     if not found:
         raise ClipError(
             "There is no moment at which enough of the two motions overlaps.",

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, conjugate, rotate
-from ..clip import Clip, sample_clip
-from ..humanoid import Landmarks, chain_length
+from ..clip import Timing, sample_clip
+from ..humanoid import chain_length
 from .body_frames import laid_over, pelvis_frame
 from .parts import LEG
 from .retarget import MappedClip
@@ -45,60 +45,45 @@ class Suggestion:
 
     base_start: float
     """Frame of the base."""
-    splice_start: float
-    """Frame of the splice clip."""
     cost: float
     """How unlike the legs are from then on, on average, in leg lengths; 0 is the same."""
 
 
 def suggest_timings(
-    base: tuple[Clip, Landmarks],
-    splice: tuple[Clip, Landmarks],
-    *,
-    splice_start: float | None = None,
-    rate: float = 1.0,
-    length: float | None = None,
-    count: int = 3,
+    base: MappedClip, splice: MappedClip, timing: Timing, count: int = 3
 ) -> list[Suggestion]:
-    """The best moments for a splice to begin, best first, none close to another.
+    """The best moments for a splice to begin, at most so many, best first, none close to another.
 
-    Args:
-        base: the base and its landmarks.
-        splice: the splice clip and its landmarks.
-        splice_start: frame of the splice clip to begin with, its first if none is given.
-        rate: speed of the splice clip.
-        length: frames of the base that the splice lasts; none: as long as there is motion.
-        count: at most how many.
+    Where it begins in its clip, its rate and its length are as the timing says.
 
     Raises:
         ClipError: a landmark is missing.
     """
-    ours, theirs = MappedClip(*base), MappedClip(*splice)
-    start = splice[0].frames[0] if splice_start is None else splice_start
-    end = splice[0].frames[-1]
-    if length is not None:
-        end = min(end, start + length / base[0].rate * splice[0].rate * rate)
-    seconds = max((end - start) / splice[0].rate / rate, 1e-3)
+    ours, theirs = base.clip, splice.clip
+    start, end = timing.splice_start, theirs.frames[-1]
+    if timing.length is not None:
+        end = min(end, start + timing.length / ours.rate * theirs.rate * timing.rate)
+    seconds = max((end - start) / theirs.rate / timing.rate, 1e-3)
     pace = min(_RATE, _LONGEST / seconds)
-    splice_frames = np.arange(start, end + 1e-6, splice[0].rate * rate / pace)
-    theirs_seen = _legs(theirs, ours, splice_frames, pace)
-    step = base[0].rate / pace
-    first, last = base[0].frames[0], base[0].frames[-1]
+    splice_frames = np.arange(start, end + 1e-6, theirs.rate * timing.rate / pace)
+    seen = _legs(splice, base, splice_frames, pace)
+    step = ours.rate / pace
+    first, last = ours.frames[0], ours.frames[-1]
     # Samples may be several frames apart; every frame may be the one to begin with.
     grids = [np.arange(first + phase, last + 1e-6, step) for phase in range(max(1, round(step)))]
     grids = [grid for grid in grids if len(grid)]
     costs = np.concatenate(
-        [_warped(_distances(_legs(ours, ours, grid, pace), theirs_seen)) for grid in grids]
+        [_warped(_distances(_legs(base, base, grid, pace), seen)) for grid in grids]
     )
     frames = np.round(np.concatenate(grids))
-    apart = _APART * base[0].rate
+    apart = _APART * ours.rate
     found: list[Suggestion] = []
     for number in np.argsort(costs, kind="stable"):
         if len(found) == count or not np.isfinite(costs[number]):
             break
         frame = float(frames[number])
         if all(abs(frame - other.base_start) >= apart for other in found):
-            found.append(Suggestion(frame, float(start), float(costs[number])))
+            found.append(Suggestion(frame, float(costs[number])))
     return found
 
 
