@@ -14,7 +14,7 @@ import bpy
 from ..core.errors import OctoMotionError, SettingsError, WriteError
 from ..ui.locomotion import Summary
 from .command_line import parse
-from .job import STOPPED, BakeOptions, bake
+from .job import STOPPED, bake
 from .job_report import figures_in_words
 from .outputs import commit, staged
 from .shot_runner import perform
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
         with stoppable():
             if options.command == "bake":
                 said = {name: value for name, value in vars(options).items() if name != "command"}
-                return bake(BakeOptions(**said))
+                return bake(**said)
             return _make(_requested(options))
     except OctoMotionError as error:
         return _complain(error, _WRONG)

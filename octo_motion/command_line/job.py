@@ -176,18 +176,6 @@ STOPPED = 130
 
 
 @dataclass(frozen=True)
-class BakeOptions:
-    """What the command line asks for."""
-
-    job: Path
-    report: Path | None = None
-    jobs: int | None = None
-    force: bool = False
-    check: bool = False
-    only: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class _Plan:
     """A shot that was looked at."""
 
@@ -196,8 +184,16 @@ class _Plan:
     verdict: Verdict
 
 
-def bake(options: BakeOptions) -> int:
-    """Run a job, and print how far it has come.
+def bake(
+    job: Path,
+    *,
+    report: Path | None,
+    jobs: int | None,
+    force: bool,
+    check: bool,
+    only: Sequence[str],
+) -> int:
+    """Run a job as the command line asks for it, and print how far it has come.
 
     Returns:
         The exit status: 0 all is done, 1 a shot failed, 130 stopped.
@@ -205,16 +201,15 @@ def bake(options: BakeOptions) -> int:
     Raises:
         OctoMotionError: the job, its report or the options are wrong. Nothing has been run.
     """
-    path = options.job.resolve()
-    report = options.report.resolve() if options.report else path.with_suffix(".report.json")
-    job = read_job(path, known(), report)
-    chosen = _chosen(job, options.only)
-    records = read_report(report)
-    run = _Run(job, records, report, len(chosen))
+    path = job.resolve()
+    report = report.resolve() if report else path.with_suffix(".report.json")
+    file = read_job(path, known(), report)
+    chosen = _chosen(file, only)
+    run = _Run(file, read_report(report), report, len(chosen))
     problems = _problems(chosen)
-    plans = [_plan(shot, run, problems, force=options.force) for shot in chosen]
-    jobs = check_jobs(options.jobs, sum(plan.verdict.must_bake for plan in plans))
-    if options.check:
+    plans = [_plan(shot, run, problems, force=force) for shot in chosen]
+    jobs = check_jobs(jobs, sum(plan.verdict.must_bake for plan in plans))
+    if check:
         for plan in plans:
             state = plan.verdict.reason or ("unchanged" if plan.verdict.skip else "ready")
             _say(f"{plan.shot.name}: {state}")

@@ -162,12 +162,15 @@ class ClipReader:
         Raises:
             OctoMotionError: it is gone, or cannot be read.
         """
-        for each, what in ((item.source, "source armature"), (item.action, "action")):
-            if each is None:
-                raise ClipError(
-                    f"The {what} of splice '{item.name}' is gone, or was never chosen.",
-                    "Choose it in the panel Splicing, mute the splice or remove it.",
-                )
+        remedy = "Choose it in the panel Splicing, mute the splice or remove it."
+        if item.source is None:
+            raise ClipError(
+                f"The source armature of splice '{item.name}' is gone, or was never chosen.", remedy
+            )
+        if item.action is None:
+            raise ClipError(
+                f"The action of splice '{item.name}' is gone, or was never chosen.", remedy
+            )
         # Slowed down, what a clip does between its frames is seen. To play the scene takes longer.
         between = item.rate < 1.0 and not item.visual
         return self.source(item.source, item.action, item.slot, visual=item.visual, between=between)
