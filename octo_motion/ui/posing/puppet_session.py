@@ -160,6 +160,28 @@ class PosedPuppet:
         """The body that a ray of the world meets; the hit's point is in the puppet's metres."""
         return pick(self.figure, self.shown_pose, origin * self.unit, direction, margin=margin)
 
+    def grab(self, body: int, point: Floats) -> None:
+        """Take hold of a body at a point (3,) in the puppet's metres; what was held is let go."""
+        self.core.release()
+        self.core.grab(body, point)
+
+    def grab_bone(self, bone: str, share: float) -> Floats:
+        """Take hold of a bone by name, at a share of its length; the point (3,) in the world.
+
+        Raises:
+            RigError: there is no such bone.
+        """
+        body = self.body(bone)
+        point, end = capsules_in_world(self.figure, self.core.pose)[body]
+        way = end - point
+        size = float(np.linalg.norm(way))
+        if size > 1e-9:
+            # Capsules end a radius before the limb does.
+            radius = self.figure.radii[body] * (way / size)
+            point = (point - radius) + share * (way + 2.0 * radius)
+        self.grab(body, point)
+        return point / self.unit
+
     # --- Settings -------------------------------------------------------------------------------
 
     def apply_settings(self, armature: bpy.types.Object) -> None:
@@ -299,28 +321,6 @@ class PuppetSession(PosedPuppet):
         _active.append(self)
 
     # --- The hand -------------------------------------------------------------------------------
-
-    def grab(self, body: int, point: Floats) -> None:
-        """Take hold of a body at a point (3,) in the puppet's metres; what was held is let go."""
-        self.core.release()
-        self.core.grab(body, point)
-
-    def grab_bone(self, bone: str, share: float) -> Floats:
-        """Take hold of a bone by name, at a share of its length; the point (3,) in the world.
-
-        Raises:
-            RigError: there is no such bone.
-        """
-        body = self.body(bone)
-        point, end = capsules_in_world(self.figure, self.core.pose)[body]
-        way = end - point
-        size = float(np.linalg.norm(way))
-        if size > 1e-9:
-            # Capsules end a radius before the limb does.
-            radius = self.figure.radii[body] * (way / size)
-            point = (point - radius) + share * (way + 2.0 * radius)
-        self.grab(body, point)
-        return point / self.unit
 
     def release(self) -> list[str]:
         """Let go; with auto keying, what the hand has moved gets keys. The keyed bones."""
