@@ -424,7 +424,7 @@ def _filled(heights: Floats) -> Floats:
     return padded[1:-1, 1:-1].copy()
 
 
-# --- Arms that hold the ground, in the world's measure, and how they do ---------------------------
+# --- Arms in stance on the ground, in the world's measure, and how they are -----------------------
 
 
 @dataclass(frozen=True)
@@ -603,5 +603,3 @@ class Foothold:
     """… and at which it lets go."""
     lasts: float
     """Cycles of the arm in between, which a body at rest is slow to come through."""
-    short: float
-    """Arm lengths by which it is out of reach."""

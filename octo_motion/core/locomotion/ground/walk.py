@@ -29,7 +29,8 @@ from .stance_swing import (
 from .surface import Foothold, Ground, GroundedPoses, Limbs, Raise, StanceSettings
 
 _PASSES: Final = 4
-"""Means in a row: what comes of them falls off like a bell."""
+"""Means in a row: what comes of them falls off like a bell. With two Settle has a jerk of 0.051
+instead of 0.045."""
 _TINY: Final = 1e-12
 
 
@@ -125,11 +126,14 @@ def frames_around(part: slice, reach: int, count: int, *, cyclic: bool) -> tuple
 
 
 _ASKEW: Final = np.radians(35.0)
-"""How far from straight outward a foothold may lie, and an arm from there."""
+"""How far from straight outward a foothold may lie, and an arm from there. On bumps Tiptoe slips by
+0.0085 arm lengths instead of 0.0023 at 17°, and its arms overlap by 0.145 radii instead of 0.019
+at 70°."""
 _TURN: Final = 6.0
-"""Radians that the suckers of an arm are turned at most from root to tip."""
+"""Radians that the suckers of an arm are turned at most from root to tip. A choice of looks: at 12
+bones of Settle turn by 0.18 radians from frame to frame instead of 0.15."""
 _MOST_TURN: Final = 0.6
-"""The same from one bone to the next."""
+"""The same from one bone to the next, of arms of less than ten bones."""
 _FIRST_TURN: Final = 0.3
 """Share of it at the root, which the body's skin surrounds."""
 
@@ -542,16 +546,6 @@ class GroundedWalk:
         )
 
     @property
-    def radii(self) -> list[Floats]:
-        """For each arm (joints,) metres from each joint to the skin below it."""
-        places = {
-            arm: part.limbs.radii[:, place]
-            for part in self._parts
-            for place, arm in enumerate(part.build.arms)
-        }
-        return [places[arm] for arm in sorted(places)]
-
-    @property
     def builds(self) -> tuple[tuple[int, ...], ...]:
         """Numbers of the arms of each build, in the order of ``GroundedPoses.joints``."""
         return tuple(part.build.arms for part in self._parts)
@@ -577,7 +571,7 @@ class GroundedWalk:
         found: list[Foothold] = []
         first, last = self._last
         for part in self._parts:
-            laid, reach = part.footholds, part.limbs.reach[-1]
+            laid = part.footholds
             for place, arm in enumerate(part.build.arms):
                 for cycle in range(int(first[arm]), int(last[arm]) + 1):
                     at = place, cycle - laid.first
@@ -595,7 +589,6 @@ class GroundedWalk:
                             float(ends[0]),
                             float(ends[1]),
                             float(since[1] - since[0]),
-                            float(laid.short[at] / reach[place]),
                         )
                     )
         return sorted(found, key=lambda each: (each.arm, each.cycle))

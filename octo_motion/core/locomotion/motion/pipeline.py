@@ -38,8 +38,6 @@ class MotionResult:
     """Whether keys without handles of their own have automatic ones."""
     arms: ArmMotion
     """The arms at all moments at which they were worked out: frames, or those and half frames."""
-    swimming: Floats | None
-    """(frames,) how far the body swims, 0…1, where the gait changes."""
     carried: tuple[Carried, ...] = ()
     """Where arms that reach take objects."""
     measured: Measured | None = None
@@ -139,7 +137,6 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
         channels=[*(few if few is not None else motion.all()), *plan.breath],
         automatic=few is None,
         arms=arms,
-        swimming=swimming[::every] if swimming is not None else None,
         carried=carried,
         measured=measured,
         figures=figures(measured) if measured is not None else (),

@@ -16,7 +16,7 @@ from ...errors import SettingsError
 from ...keyframes import Channel
 from ...rotations import Floats
 from ...skeleton import Skeleton
-from ..gait import CYCLE, Arm, GaitPoser, GaitSettings
+from ..gait import CYCLE, Arm, GaitPoser
 from ..ground import ContactOverride, GroundedWalk
 from ..path import (
     Course,
@@ -64,14 +64,6 @@ def frames_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -
         content_key(skeleton, bones, body),
         lambda: [frames_of_arm(skeleton, each, body) for each in bones],
     )
-
-
-def poser_of(
-    skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame, settings: GaitSettings
-) -> GaitPoser:
-    """What moves these arms, the same as before while nothing of it has changed."""
-    key = content_key(skeleton, arms, body, settings)
-    return _posers.get(key, lambda: GaitPoser(skeleton, arms, body, settings))
 
 
 # --- Whether a gait has frames enough to be seen, and what to change if not -----------------------
@@ -137,7 +129,7 @@ def too_few_frames(timing: Timing, pace: Pace) -> list[str]:
     ]
 
 
-# --- From what was read to what is to be computed: gaits on this rig, the way, when, and footholds
+# --- The plan -------------------------------------------------------------------------------------
 
 
 MOST_FRAMES: Final = 100_000
@@ -321,10 +313,10 @@ def _arm_length(job: MotionJob) -> float:
 
 
 def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
-    """What moves the arms in a gait, the cycle of it included."""
-    creature = job.creature
+    """What moves the arms in a gait, the same as before while nothing of it has changed."""
     settings = replace(gait.settings, swim_lean=0.0 if gait.settings.gait.on_ground else lean)
-    return poser_of(creature.skeleton, creature.arms, creature.body, settings)
+    moved = job.creature.skeleton, job.creature.arms, job.creature.body, settings
+    return _posers.get(content_key(*moved), lambda: GaitPoser(*moved))
 
 
 def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:
