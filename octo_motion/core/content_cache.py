@@ -96,7 +96,7 @@ def _add(digest: hashlib.blake2b, value: Any) -> None:
         digest.update(f"bytes {len(value)};".encode() + value)
     elif isinstance(value, (tuple, list)):
         if _PLAIN.issuperset(map(type, value)):
-            # What it reads as tells all there is to it, and is quickly told.
+            # Its text is all there is to it, and quickly made.
             text = repr(tuple(value)).encode()
             digest.update(f"plain row {len(text)};".encode() + text)
             return
@@ -111,7 +111,7 @@ def _add(digest: hashlib.blake2b, value: Any) -> None:
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
         known = getattr(value, "content", None)
         if isinstance(known, bytes):
-            # It has told its content before.
+            # Its content is known from before.
             digest.update(b"content;" + known)
             return
         fields = dataclasses.fields(value)

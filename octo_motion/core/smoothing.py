@@ -20,7 +20,7 @@ def least_jerk(share: Floats) -> Floats:
     """``10t³ − 15t⁴ + 6t⁵``: no acceleration at its ends either.
 
     Of all movements from rest to rest in a time it has the least jerk (Flash and Hogan, "The
-    coordination of arm movements", Journal of Neuroscience 5, 1985). Next to a hold nothing moves
+    coordination of arm movements", Journal of Neuroscience 5, 1985). Next to a rest nothing moves
     at first.
     """
     t = np.clip(share, 0.0, 1.0)

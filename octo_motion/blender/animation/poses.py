@@ -32,6 +32,7 @@ _UNSCALED: Final = 1e-3
 _UNSHEARED: Final = 1e-3
 """Factors that are no scale, and cosines that are no shear."""
 _TINY: Final = 1e-6
+"""Factor below which a bone is scaled to nothing, and has no orientation."""
 _STILL: Final = 0.01
 """Bone lengths, radians and factors by which a bone may be off its rest pose unnoticed."""
 

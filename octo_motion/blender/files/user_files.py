@@ -73,6 +73,8 @@ def unwritable(what: str, error: OSError) -> WriteError:
 
 SUFFIX: Final = ".json"
 LONGEST_NAME: Final = 60
+"""Letters, each at most four bytes, escaped or not: with the ending within the 255 bytes that file
+systems take."""
 
 # What some file system refuses, and the escape itself.
 _UNSAFE: Final = re.compile(r'[\x00-\x1f<>:"/\\|?*%\x7f]|^[. ]|[. ]$')

@@ -298,6 +298,7 @@ def _is_shown(bone: bpy.types.PoseBone) -> bool:
 
 ALIGNED: Final = "ALIGNED"
 _APART: Final = {"NONE", "NONE_LEGACY"}
+"""Ways of a bone not to inherit its parent's scale."""
 _CLOSE: Final = 1e-4
 """Bone lengths that a bone's head may be off its parent's tail."""
 

@@ -19,6 +19,7 @@ from .armature import carrying_axes
 from .puppet_reading import PuppetRig, even_scale, posed_bones, read_rig
 
 _NOTHING = 1e-9
+"""Factor below which a bone is scaled to nothing."""
 _STILL = 1e-6
 """Quaternion components and puppet metres by which a body may be off its bone unnoticed."""
 

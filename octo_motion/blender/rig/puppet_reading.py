@@ -48,11 +48,14 @@ MOST_LIMBS: Final = 300
 _TOLERANT: Final = frozenset({"LIMIT_ROTATION", "LIMIT_LOCATION", "LIMIT_SCALE", "MAINTAIN_VOLUME"})
 """Constraints under which a bone still turns as its keys say."""
 _ANGLE_LIMIT: Final = 2.0 * np.pi - 1e-4
+"""A range as wide as a whole turn limits nothing; less what single precision loses of it."""
 _MOST_VERTICES: Final = 6000
 """Of each mesh that are looked at: more make no better radius."""
 _LEAST_WEIGHT: Final = 0.35
 """A vertex counts for the bone that has at least this share of it, and the most."""
 _EVEN: Final = 1e-3
+"""Share by which scales of the three axes may differ, and cosine by which axes may be off a right
+angle."""
 
 
 @dataclass(frozen=True, eq=False)

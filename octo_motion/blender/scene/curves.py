@@ -32,6 +32,7 @@ _ADD_POINTS: Final = "Give the curve at least two points that lie apart."
 _MOVES_CONTROL_POINTS: Final = {"HOOK", "SOFT_BODY", "MESH_DEFORM"}
 """Modifiers that move control points without being asked to."""
 _DISPLAY_RESOLUTION: Final = 32
+"""Pieces in which Blender draws a new route's one segment, for the eye alone: routes are exact."""
 _REACH: Final = 1.0
 """Metres from the middle of a creature to its arms' tips where there is none to measure."""
 

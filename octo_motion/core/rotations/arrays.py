@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 IDENTITY: Final[Floats] = np.array([1.0, 0.0, 0.0, 0.0])
 
 _TINY: Final = 1e-12
+"""Length below which a vector has no direction: far below what single precision tells of 1."""
 
 
 def normalized(vectors: ArrayLike) -> Floats:

@@ -17,6 +17,7 @@ ZERO: Final[Vector] = (0.0, 0.0, 0.0)
 IDENTITY: Final[Quaternion] = (1.0, 0.0, 0.0, 0.0)
 
 _SMALL: Final = 1e-9
+"""Length without a direction; in double precision the sine of such an angle is the angle."""
 
 
 def add(a: Vector, b: Vector) -> Vector:
