@@ -9,7 +9,7 @@ WITH_LINT = python=$$(.ci/venv lint) && bin=$${python%/*} &&
 # The Blender with a window that takes pictures of itself; options may follow it.
 BLENDER ?= blender
 
-.PHONY: help test lint demo bench build pictures diagram window experiment setups clean
+.PHONY: help test lint demo bench referee build pictures diagram window experiment setups clean
 
 help: ## list what can be made
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
@@ -28,6 +28,9 @@ demo: ## build an octopus that walks and one that swims, render both into build/
 
 bench: ## measure speed, precision and memory against Blender's own inverse kinematics
 	@$(WITH_BPY) $$python -m tests.bench $(ARGS)
+
+referee: ## measure what Blender plays of set-ups, splices and drags, against their limits
+	@$(WITH_BPY) $$python -m tests.referee $(ARGS)
 
 build: ## make the extension's zip in dist with Blender's own packer, and validate it
 	@$(WITH_BPY) $$python .ci/build.py

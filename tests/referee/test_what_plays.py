@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender plays is within its limits, in a few scenes; ``make referee`` looks at all."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.referee.__main__ import LIMITS, SHORT, beyond_limits, measured
+
+
+@pytest.mark.parametrize("scene", SHORT)
+def test_what_plays_is_within_the_limits(scene: str) -> None:
+    row = measured(scene)
+    limits = json.loads(LIMITS.read_text())
+    assert row.keys() <= limits[scene].keys()
+    assert {key: row[key] for key in beyond_limits(scene, row, limits)} == {}
