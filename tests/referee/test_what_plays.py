@@ -9,6 +9,12 @@ import pytest
 
 from tests.referee.__main__ import LIMITS, SHORT, beyond_limits, measured
 
+# Blender's importer leaves its files open.
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
 
 @pytest.mark.parametrize("scene", SHORT)
 def test_what_plays_is_within_the_limits(scene: str) -> None:
