@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Posing by hand, as an artist sees it."""
 
-from ..steps import Step, nothing
+from ..steps import Step, nothing, own_classes
 from . import (
     device_pose,
     device_settings,
@@ -15,12 +15,7 @@ from .properties import OCTO_MOTION_PG_posing
 from .script_player import play_file
 
 CLASSES = (
-    *properties.CLASSES,
-    *device_settings.CLASSES,
-    *pose_operator.CLASSES,
-    *script_player.CLASSES,
-    *operators.CLASSES,
-    *device_pose.CLASSES,
+    *own_classes(properties, device_settings, pose_operator, script_player, operators, device_pose),
     *panels.CLASSES,
 )
 STEPS = (

@@ -296,11 +296,8 @@ class DeviceOperator(OctoOperator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:  # noqa: ARG003
-        if active_hands() is None:
-            cls.poll_message_set("Start Pose with Device first")  # type: ignore[attr-defined]
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:  # noqa: ARG003
+        return "Start Pose with Device first" if active_hands() is None else ""
 
 
 class OCTO_MOTION_OT_device_test(DeviceOperator, bpy.types.Operator):
@@ -338,11 +335,10 @@ class OCTO_MOTION_OT_device_calibrate(DeviceOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def obstacle(cls, context: bpy.types.Context) -> str:
         if isinstance(active_hands(), NdofHands):
-            cls.poll_message_set("Blender has the space mouse: calibrate it with its own driver")
-            return False
-        return super().poll(context)
+            return "Blender has the space mouse: calibrate it with its own driver"
+        return super().obstacle(context)
 
     def run(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         hands = active_hands()
@@ -375,10 +371,3 @@ def unregister() -> None:
         with suppress(OctoMotionError):
             session.finish()
     take_down_all()
-
-
-CLASSES: Final[tuple[type, ...]] = (
-    OCTO_MOTION_OT_pose_device,
-    OCTO_MOTION_OT_device_test,
-    OCTO_MOTION_OT_device_calibrate,
-)

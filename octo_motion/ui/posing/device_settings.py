@@ -90,9 +90,6 @@ def message(settings: Any, size: float) -> Settings:
     )
 
 
-CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PG_device,)
-
-
 _kept: Final[dict[str, Any]] = {}
 """What holds while another file is opened: Blender then begins with settings as made."""
 

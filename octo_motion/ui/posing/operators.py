@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any
 
 import bpy
 import numpy as np
@@ -26,9 +26,6 @@ from .properties import OBSTACLES, posing_settings
 from .puppet_session import PuppetSession, active_session
 from .session_settings import keep_material
 
-if TYPE_CHECKING:
-    from bpy.stub_internal.rna_enums import OperatorReturnItems
-
 
 class OCTO_MOTION_OT_pose_mark_bones(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.pose_mark_bones"
@@ -37,7 +34,6 @@ class OCTO_MOTION_OT_pose_mark_bones(ArmatureOperator, bpy.types.Operator):
         "Decide for the selected bones whether they are limbs of the puppet or only follow the "
         "bone they hang on, where it was told wrongly by itself"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     mark: EnumProperty(
         name="Mark",
@@ -70,18 +66,16 @@ class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
     bl_idname = "octo_motion.pose_obstacle"
     bl_label = "Mark Obstacle"
     bl_description = "Let the selected objects stop puppets, as a shape of your choice"
-    bl_options = {"REGISTER", "UNDO"}
 
     kind: EnumProperty(
         name="Shape", description="What puppets take them for", items=OBSTACLES, default="BOX"
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode not in {"OBJECT", "POSE"}:
-            cls.poll_message_set("Go to object mode or pose mode first")
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        return (
+            "Go to object mode or pose mode first" if context.mode not in {"OBJECT", "POSE"} else ""
+        )
 
     def run(self, context: bpy.types.Context) -> None:
         chosen = [each for each in context.selected_objects if each.type != "ARMATURE"]
@@ -110,7 +104,6 @@ class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
         "Say how the joint of the active bone is to give way: so far under this pull, so much of "
         "it to stay. The figure gets the material that does so"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     bone: StringProperty(
         name="Bone", description="The limb whose joint is bent; empty for the active bone"
@@ -169,11 +162,7 @@ class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
         description="Let this joint alone be of the material, and the others stay as they are",
     )
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """For the bone that is active now, whatever it was for before."""
         self.bone = ""
         return self.execute(context)
@@ -216,7 +205,6 @@ class OCTO_MOTION_OT_pose_forget_measured(ArmatureOperator, bpy.types.Operator):
         "Let bones that have a material of their own be of the figure's again: the selected ones "
         "in pose mode, or all"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     def run(self, context: bpy.types.Context) -> None:
         armature = active_armature(context)
@@ -237,11 +225,3 @@ class OCTO_MOTION_OT_pose_forget_measured(ArmatureOperator, bpy.types.Operator):
 def _session_of(armature: bpy.types.Object) -> PuppetSession | None:
     session = active_session()
     return session if session is not None and session.puppet.name == armature.name else None
-
-
-CLASSES: Final[tuple[type, ...]] = (
-    OCTO_MOTION_OT_pose_mark_bones,
-    OCTO_MOTION_OT_pose_obstacle,
-    OCTO_MOTION_OT_pose_measure,
-    OCTO_MOTION_OT_pose_forget_measured,
-)

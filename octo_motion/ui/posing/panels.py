@@ -10,6 +10,7 @@ import bpy
 from ...device.calibration import Phase, reached
 from ...device.driver import Kind
 from ...device.messages import DeviceMessage
+from ..operator_base import window_manager
 from ..panel_base import ArmaturePanel
 from .device_hands import NDOF_NAME, DeviceHands, NdofHands
 from .device_pose import (
@@ -38,13 +39,10 @@ class PosePanel(ArmaturePanel):
 
     bl_options = {"DEFAULT_CLOSED"}
 
-    @staticmethod
-    def settings_of(armature: bpy.types.Object) -> Any:
-        return posing_settings(armature)
+    settings_of = staticmethod(posing_settings)
 
 
 class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_posing"
     bl_label = "Pose"
     bl_order = 7
 
@@ -70,9 +68,8 @@ class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_posing_world"
     bl_label = "World"
-    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_posing"
 
     def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "gravity")
@@ -93,9 +90,8 @@ class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_posing_bones"
     bl_label = "Limbs"
-    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_posing"
 
     def show(self, layout: Any, settings: Any) -> None:
         row = layout.row(align=True)
@@ -110,9 +106,8 @@ class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_posing_keys(PosePanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_posing_keys"
     bl_label = "Keys"
-    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_posing"
 
     def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "keys_to")
@@ -137,13 +132,11 @@ _LAGS: Final = 0.05
 
 
 class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_posing_device"
     bl_label = "Device"
-    bl_parent_id = OCTO_MOTION_PT_posing.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_posing"
 
     def show(self, layout: Any, settings: Any) -> None:  # noqa: ARG002
-        assert bpy.context.window_manager is not None
-        own = device_settings(bpy.context.window_manager)
+        own = device_settings(window_manager(bpy.context))
         row = layout.row()
         row.operator_context = "INVOKE_DEFAULT"
         row.operator(OCTO_MOTION_OT_pose_device.bl_idname, icon="ORIENTATION_GIMBAL")

@@ -29,8 +29,6 @@ _RATE: Final = 1.0 / 60.0
 class SessionOperator(ArmatureOperator):
     """Mix-in: write ``take_up``, ``turn`` and ``put_down``. One session is one undo step."""
 
-    bl_options = {"REGISTER", "UNDO"}
-
     _session = cast("PuppetSession | None", None)
     _overlay = cast("Overlay | None", None)
     _timer = cast("Any", None)
@@ -48,18 +46,13 @@ class SessionOperator(ArmatureOperator):
         raise NotImplementedError
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
+    def obstacle(cls, context: bpy.types.Context) -> str:
         going_on = active_session()
         if going_on is not None:
-            cls.poll_message_set(f"{going_on.puppet.name} is being posed already")  # type: ignore[attr-defined]
-            return False
-        return super().poll(context)
+            return f"{going_on.puppet.name} is being posed already"
+        return super().obstacle(context)
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Take the armature into the hand."""
         window_manager, scene, window = context.window_manager, context.scene, context.window
         if window is None or bpy.app.background:
@@ -241,6 +234,3 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
             return False
         go_to(controls.session.scene(), frame)
         return True
-
-
-CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_OT_pose_start,)

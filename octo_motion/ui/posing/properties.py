@@ -10,13 +10,8 @@ import numpy as np
 
 from ...blender.rig import armature_data
 from ...core.posing.puppet import SMALLEST
-from ..declared_settings import (
-    BoolProperty,
-    EnumProperty,
-    FloatProperty,
-    PointerProperty,
-    make_overridable,
-)
+from .. import declared_settings as props
+from ..declared_settings import make_overridable
 
 MATERIALS: Final = (
     ("CLAY", "Clay", "Gives way slowly and stays: as soft as it is pulled", 0),
@@ -65,13 +60,13 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
 
     # --- The puppet ----------------------------------------------------------------------------
 
-    material: EnumProperty(
+    material: props.EnumProperty(
         name="Material",
         description="What the joints are made of",
         items=MATERIALS,
         default="CLAY",
     )
-    strength: FloatProperty(
+    strength: props.FloatProperty(
         name="Strength",
         description="How hard it is to bend: 1 lets each joint just bear what hangs on it",
         default=1.0,
@@ -81,12 +76,12 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_max=10.0,
         step=10,
     )
-    custom_yields: BoolProperty(
+    custom_yields: props.BoolProperty(
         name="Gives Way",
         description="Keep a bend, instead of springing back always",
         default=True,
     )
-    custom_bears: FloatProperty(
+    custom_bears: props.FloatProperty(
         name="Bears",
         description="What a joint bears before it gives way, in the weight of what hangs on it",
         default=1.25,
@@ -95,7 +90,7 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_max=10.0,
         step=10,
     )
-    custom_springs: FloatProperty(
+    custom_springs: props.FloatProperty(
         name="Springs Back",
         description="How far a joint springs back that was pulled as hard as it bears",
         subtype="ANGLE",
@@ -106,7 +101,7 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         step=50,
         precision=2,
     )
-    custom_settles: FloatProperty(
+    custom_settles: props.FloatProperty(
         name="Settles",
         description="How long springing back takes",
         subtype="TIME_ABSOLUTE",
@@ -117,7 +112,7 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         step=1,
         precision=3,
     )
-    custom_gives: FloatProperty(
+    custom_gives: props.FloatProperty(
         name="Gives",
         description="How far a joint gives way in a second, pulled twice as hard as it bears",
         subtype="ANGLE",
@@ -128,7 +123,7 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         step=500,
         precision=1,
     )
-    root: EnumProperty(
+    root: props.EnumProperty(
         name="Root",
         description="Whether the body stays in its place while its limbs are pulled",
         items=(
@@ -137,7 +132,7 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
             ("FREE", "Free", "The whole figure can be carried about", 2),
         ),
     )
-    smallest: FloatProperty(
+    smallest: props.FloatProperty(
         name="Smallest Bone",
         description="Bones shorter than this share of the figure are no limbs of their own and "
         "follow the bone they hang on. Raise it to pose a hand without its fingers",
@@ -152,13 +147,15 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
 
     # --- The world -----------------------------------------------------------------------------
 
-    gravity: BoolProperty(name="Gravity", description="Let the figure have weight", default=False)
-    floor: BoolProperty(
+    gravity: props.BoolProperty(
+        name="Gravity", description="Let the figure have weight", default=False
+    )
+    floor: props.BoolProperty(
         name="Floor",
         description="A solid floor through the whole scene",
         default=False,
     )
-    floor_height: FloatProperty(
+    floor_height: props.FloatProperty(
         name="Height",
         description="Height of the floor",
         subtype="DISTANCE",
@@ -166,17 +163,17 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_min=-10.0,
         soft_max=10.0,
     )
-    use_obstacles: BoolProperty(
+    use_obstacles: props.BoolProperty(
         name="Obstacles",
         description="Objects that are marked as solid stop the figure",
         default=True,
     )
-    self_collision: BoolProperty(
+    self_collision: props.BoolProperty(
         name="Self Collision",
         description="Limbs stop each other. Takes longer to compute",
         default=False,
     )
-    friction: FloatProperty(
+    friction: props.FloatProperty(
         name="Friction",
         description="How hard the figure slides on what it touches",
         default=0.6,
@@ -188,18 +185,18 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
 
     # --- Keys ------------------------------------------------------------------------------------
 
-    keys_to: EnumProperty(
+    keys_to: props.EnumProperty(
         name="Keys",
         description="Which action gets the keys",
         items=TARGETS,
         default="CURRENT",
     )
-    action: PointerProperty(
+    action: props.PointerProperty(
         name="Action",
         description="The action that gets the keys",
         type=bpy.types.Action,
     )
-    record_angle: FloatProperty(
+    record_angle: props.FloatProperty(
         name="Tolerance Angle",
         description="How far a recorded motion's keys may be off the motion of the hand, per bone",
         subtype="ANGLE",
@@ -212,7 +209,7 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
 
     # --- What is shown ------------------------------------------------------------------------
 
-    show_loads: BoolProperty(
+    show_loads: props.BoolProperty(
         name="Loads",
         description="Show the limbs as capsules, redder where a joint bears more",
         default=True,
@@ -220,15 +217,12 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
 
     # --- For other objects ---------------------------------------------------------------------
 
-    obstacle: EnumProperty(
+    obstacle: props.EnumProperty(
         name="Obstacle",
         description="What puppets take this object for",
         items=OBSTACLES,
         default="NONE",
     )
-
-
-CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_PG_posing,)
 
 
 def posing_settings(armature: bpy.types.Object) -> OCTO_MOTION_PG_posing:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -14,12 +14,9 @@ from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
 from ...core.posing.pose_script import PoseScript, ScriptStep, parse_script
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
-from ..operator_base import ArmatureOperator
+from ..operator_base import ArmatureOperator, FileOperator
 from .properties import posing_settings
 from .puppet_session import PuppetSession
-
-if TYPE_CHECKING:
-    from bpy.stub_internal.rna_enums import OperatorReturnItems
 
 TICK: Final = 1.0 / 60.0
 """Seconds: a script moves the hand as often as the mouse does."""
@@ -181,14 +178,13 @@ def play_file(armature: bpy.types.Object, scene: bpy.types.Scene, path: Path) ->
     return player
 
 
-class OCTO_MOTION_OT_pose_script(ArmatureOperator, bpy.types.Operator):
+class OCTO_MOTION_OT_pose_script(FileOperator, ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.pose_script"
     bl_label = "Play Pose Script"
     bl_description = (
         "Pose the figure by a file of grabs, pulls, pins and keys (JSON), as by hand and the same "
         "each time"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     filepath: StringProperty(
         name="File Path",
@@ -198,16 +194,6 @@ class OCTO_MOTION_OT_pose_script(ArmatureOperator, bpy.types.Operator):
     )
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
-        """Ask for the file."""
-        assert context.window_manager is not None
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
     def run(self, context: bpy.types.Context) -> None:
         if not self.filepath:
             raise SettingsError("No file is given.", "Choose a script of posing.")
@@ -215,6 +201,3 @@ class OCTO_MOTION_OT_pose_script(ArmatureOperator, bpy.types.Operator):
         path = Path(bpy.path.abspath(self.filepath))
         player = play_file(active_armature(context), context.scene, path)
         self.report({"INFO"}, f"Played '{path.name}': {player.keys} bones keyed.")
-
-
-CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_OT_pose_script,)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from ..steps import own_classes
 from . import import_clips, landmark_table, properties, splice_operators, splice_panels, timing_drag
 from .import_clips import draw_in_import_menu
 from .properties import (
@@ -17,14 +18,11 @@ from .properties import (
 from .splice_operators import add_splice, name_splice, own_action
 from .stack import ClipReader, prepare_splices, write_splices
 
-SETTINGS: Final[tuple[type, ...]] = properties.CLASSES
+SETTINGS: Final = own_classes(properties)
 """What ``Object.octo_motion`` holds of splicing."""
 
-CLASSES: Final[tuple[type, ...]] = (
-    *landmark_table.CLASSES,
-    *import_clips.CLASSES,
-    *splice_operators.CLASSES,
-    *timing_drag.CLASSES,
+CLASSES: Final = (
+    *own_classes(landmark_table, import_clips, splice_operators, timing_drag),
     *splice_panels.CLASSES,
 )
 """Operators and panels."""

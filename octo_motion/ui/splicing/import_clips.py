@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringProperty
@@ -15,6 +15,7 @@ from ...blender.scene import ImportedClip, Up, import_clip, remove_clips
 from ...core.errors import ClipError, OctoMotionError
 from ...core.splicing.clip import MOTION_SUFFIXES
 from ..modal_job import ModalJob
+from ..operator_base import window_manager
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -122,7 +123,6 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
         "frame rate puts their seconds, and the scene stays as it is. A file that is damaged is "
         "left out, and the message says why"
     )
-    bl_options = {"REGISTER", "UNDO"}
 
     filepath: StringProperty(
         name="File", description="One file", subtype="FILE_PATH", options={"SKIP_SAVE"}
@@ -162,23 +162,15 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
     _stopped = "Cancelled: nothing was imported."
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Go to object mode first")
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        return "Go to object mode first" if context.mode != "OBJECT" else ""
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Open the file browser; files that were dropped need none."""
         if self.files:
             return self._import(context)
         self._browsing = True
-        assert context.window_manager is not None
-        context.window_manager.fileselect_add(self)
+        window_manager(context).fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
@@ -199,14 +191,13 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
 
     def run(self, context: bpy.types.Context) -> None:
         session = self._new_session(context)
-        window_manager = context.window_manager
-        assert window_manager is not None
-        window_manager.progress_begin(0.0, 1.0)
+        manager = window_manager(context)
+        manager.progress_begin(0.0, 1.0)
         try:
-            for _ in session.steps(window_manager.progress_update):
+            for _ in session.steps(manager.progress_update):
                 pass
         finally:
-            window_manager.progress_end()
+            manager.progress_end()
         self._report(session.end())
 
     def _new_session(self, context: bpy.types.Context) -> ImportSession:
@@ -217,14 +208,13 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
         return ImportSession(named, self.frame_start, context, up=self.up)
 
     def _import(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
-        window_manager = context.window_manager
-        assert window_manager is not None
+        manager = window_manager(context)
         try:
             self._session = self._new_session(context)
         except OctoMotionError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        return self.begin(context, self._session.steps(window_manager.progress_update))
+        return self.begin(context, self._session.steps(manager.progress_update))
 
     def conclude(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         assert self._session is not None
@@ -259,6 +249,3 @@ def draw_in_import_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> Non
     menu.layout.operator(
         OCTO_MOTION_OT_import_clips.bl_idname, text="Motion Clips (BVH, FBX, glTF)"
     )
-
-
-CLASSES: Final[tuple[type[Any], ...]] = (OCTO_MOTION_OT_import_clips,)

@@ -74,13 +74,14 @@ class OCTO_MOTION_OT_landmark_pick(StackOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not super().poll(context):
-            return False
-        if context.mode != "POSE" or context.active_pose_bone is None:
-            cls.poll_message_set("Click the bone in pose mode first")
-            return False
-        return True
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        if found := super().obstacle(context):
+            return found
+        return (
+            "Click the bone in pose mode first"
+            if context.mode != "POSE" or context.active_pose_bone is None
+            else ""
+        )
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:
         bone = context.active_pose_bone
@@ -228,13 +229,3 @@ def _draw_rows(
         if can_pick:
             pick = row.operator(OCTO_MOTION_OT_landmark_pick.bl_idname, text="", icon="EYEDROPPER")
             cast("Any", pick).landmark = name
-
-
-CLASSES: Final[tuple[type, ...]] = (
-    OCTO_MOTION_OT_map_skeleton,
-    OCTO_MOTION_OT_landmark_pick,
-    OCTO_MOTION_OT_landmarks_mirror,
-    OCTO_MOTION_OT_landmarks_clear,
-    OCTO_MOTION_MT_landmark_presets,
-    OCTO_MOTION_OT_landmark_preset_add,
-)

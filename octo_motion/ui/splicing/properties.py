@@ -15,20 +15,12 @@ import bpy
 from ...blender.rig import armature_data
 from ...core.splicing.humanoid import LANDMARKS, Landmarks
 from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
-from ..declared_settings import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-    make_overridable,
-)
+from .. import declared_settings as props
+from ..declared_settings import make_overridable
 
 
 def _bone(name: str, description: str) -> Any:
-    return StringProperty(name=name, description=description)
+    return props.StringProperty(name=name, description=description)
 
 
 _MIDDLE: Final = {
@@ -127,15 +119,15 @@ def _is_armature(_: Any, candidate: bpy.types.Object) -> bool:
 
 
 def _slot(description: str) -> Any:
-    return StringProperty(name="Slot", description=description)
+    return props.StringProperty(name="Slot", description=description)
 
 
 def _action(name: str, description: str) -> Any:
-    return PointerProperty(name=name, description=description, type=bpy.types.Action)
+    return props.PointerProperty(name=name, description=description, type=bpy.types.Action)
 
 
 def _as_shown(name: str, what: str) -> Any:
-    return BoolProperty(
+    return props.BoolProperty(
         name=name,
         description=f"Take the {what} as the scene shows it, with constraints, drivers and NLA. "
         "That plays the scene, so it takes longer",
@@ -144,7 +136,7 @@ def _as_shown(name: str, what: str) -> Any:
 
 def _frame(name: str, description: str, **options: Any) -> Any:
     """A moment, or how long something takes, in frames."""
-    return FloatProperty(name=name, description=description, step=100, precision=1, **options)
+    return props.FloatProperty(name=name, description=description, step=100, precision=1, **options)
 
 
 class SpliceItem(bpy.types.PropertyGroup):
@@ -153,20 +145,20 @@ class SpliceItem(bpy.types.PropertyGroup):
     name: bpy.props.StringProperty(
         name="Name", description="What this splice is called in the list"
     )
-    part: EnumProperty(
+    part: props.EnumProperty(
         name="Part",
         description="Which part of the body is taken from the source",
         items=PARTS,
     )
-    bone: StringProperty(
+    bone: props.StringProperty(
         name="First Bone",
         description="With the part Chain: its first bone on this armature",
     )
-    source_bone: StringProperty(
+    source_bone: props.StringProperty(
         name="Source Bone",
         description="With the part Chain: its first bone on the source, if it is called otherwise",
     )
-    source: PointerProperty(
+    source: props.PointerProperty(
         name="Source",
         description="The armature that the clip is for. It may have other proportions, bones and "
         "axes, and may be this armature itself",
@@ -178,7 +170,7 @@ class SpliceItem(bpy.types.PropertyGroup):
     visual: _as_shown("As Shown", "clip")
     splice_start: _frame("Clip Start", "Frame of the clip that is shown first", default=1.0)
     base_start: _frame("Base Start", "Frame of the base at which the splice begins", default=1.0)
-    rate: FloatProperty(
+    rate: props.FloatProperty(
         name="Rate",
         description="Speed of the clip, 1 as it is",
         default=1.0,
@@ -205,34 +197,34 @@ class SpliceItem(bpy.types.PropertyGroup):
         default=6.0,
         min=0.0,
     )
-    after: EnumProperty(
+    after: props.EnumProperty(
         name="After",
         description="What happens when the clip runs out",
         items=AFTER,
     )
-    mode: EnumProperty(
+    mode: props.EnumProperty(
         name="Reach",
         description="Where hands and feet go on a body of other proportions",
         items=MODES,
     )
-    with_clavicle: BoolProperty(
+    with_clavicle: props.BoolProperty(
         name="With Collar Bone",
         description="An arm takes its collar bone along, where both armatures have one: the hand "
         "is then where it was seen. Without, the shoulder stays the base's",
         default=True,
     )
-    seen_from: EnumProperty(
+    seen_from: props.EnumProperty(
         name="Seen From",
         description="From where the clip's legs are seen, so that they lie alike on the base. Legs "
         "with travel are always seen from the pelvis",
         items=SEEN_FROM,
     )
-    with_travel: BoolProperty(
+    with_travel: props.BoolProperty(
         name="With Travel",
         description="Legs bring the clip's way through the world with them, so that feet do not "
         "skate",
     )
-    mute: BoolProperty(name="Mute", description="Leave this splice out")
+    mute: props.BoolProperty(name="Mute", description="Leave this splice out")
 
 
 class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
@@ -241,29 +233,22 @@ class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
     base: _action("Base", "The action onto which parts are spliced. It is never changed")
     base_slot: _slot("Slot of the base; empty takes the one that fits the armature")
     visual: _as_shown("Base As Shown", "base")
-    splices: CollectionProperty(
+    splices: props.CollectionProperty(
         name="Splices",
         description="What is spliced onto the base, each onto the result of those above it",
         type=SpliceItem,
     )
-    active_splice: IntProperty(name="Active Splice", options={"HIDDEN"})
+    active_splice: props.IntProperty(name="Active Splice", options={"HIDDEN"})
     result: _action(
         "Result",
         "The action that was built last. It is made anew in place until you edit it; then it is "
         "yours, and the next one is a new action",
     )
-    landmarks: PointerProperty(
+    landmarks: props.PointerProperty(
         name="Landmarks",
         description="Which bone is which part of the body",
         type=OCTO_MOTION_PG_landmarks,
     )
-
-
-CLASSES: Final[tuple[type, ...]] = (
-    OCTO_MOTION_PG_landmarks,
-    SpliceItem,
-    OCTO_MOTION_PG_splicing,
-)
 
 
 def splicing_settings(armature: bpy.types.Object) -> Any:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from itertools import chain, count
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, cast
 
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
@@ -14,13 +14,17 @@ from ...blender.rig import active_armature
 from ...core.errors import ClipError
 from ...core.rotations import Floats
 from ..declared_settings import assign
-from ..operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
+from ..operator_base import (
+    ItemOperator,
+    ListKind,
+    ListOperator,
+    MoveOperator,
+    RemoveOperator,
+    window_manager,
+)
 from ..panel_base import ItemRows
 from .properties import PARTS, splicing_settings
 from .stack import ClipReader, SpliceSummary, Stack, prepare_splices, suggestions, write_splices
-
-if TYPE_CHECKING:
-    from bpy.stub_internal.rna_enums import OperatorReturnItems
 
 _SPARE_EASE: Final = 0.25
 """Of a clip's length: longer easing would leave little of a short clip."""
@@ -98,14 +102,12 @@ class StackOperator(ListOperator):
     """An operator on the stack of the active armature, and what else it has of splicing."""
 
     KIND = _SPLICES
-    bl_options = {"REGISTER", "UNDO"}
 
 
 class SpliceOperator(ItemOperator):
     """An operator on the active splice."""
 
     KIND = _SPLICES
-    bl_options = {"REGISTER", "UNDO"}
 
 
 class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
@@ -137,20 +139,14 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    def invoke(
-        self,
-        context: bpy.types.Context,
-        event: bpy.types.Event,  # noqa: ARG002
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Ask for a source if the selection names none."""
         if self.action or self.source or _other_armatures(context):
             return self.execute(context)
-        assert context.window_manager is not None
-        return context.window_manager.invoke_props_dialog(self)
+        return window_manager(context).invoke_props_dialog(self)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        assert layout is not None
+        layout = cast("Any", self).layout
         layout.use_property_split = True
         layout.prop(self, "part")
         if self.part == "CHAIN":
@@ -307,8 +303,7 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
     found: str = ""
 
     def draw(self, context: bpy.types.Context) -> None:  # noqa: ARG002
-        layout = self.layout
-        assert layout is not None
+        layout = cast("Any", self).layout
         layout.prop(self, "choice")
         for line in self.found.splitlines():
             layout.label(text=line)
@@ -353,13 +348,3 @@ def report_built(operator: bpy.types.Operator, made: SpliceSummary, message: str
     operator.report({"INFO"}, message or made.message)
     for each in made.warnings:
         operator.report({"WARNING"}, each)
-
-
-CLASSES: Final[tuple[type, ...]] = (
-    OCTO_MOTION_UL_splices,
-    OCTO_MOTION_OT_splice_add,
-    OCTO_MOTION_OT_splice_remove,
-    OCTO_MOTION_OT_splice_move,
-    OCTO_MOTION_OT_splice_build,
-    OCTO_MOTION_OT_splice_suggest_timing,
-)

@@ -27,9 +27,7 @@ class _Panel(ArmaturePanel):
 
     bl_options = {"DEFAULT_CLOSED"}
 
-    @staticmethod
-    def settings_of(armature: bpy.types.Object) -> Any:
-        return splicing_settings(armature)
+    settings_of = staticmethod(splicing_settings)
 
 
 class _SplicePanel(_Panel):
@@ -42,7 +40,6 @@ class _SplicePanel(_Panel):
 
 
 class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_splicing"
     bl_label = "Splicing"
     bl_order = 5
 
@@ -80,9 +77,8 @@ class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_splice"
     bl_label = "Splice"
-    bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_splicing"
 
     def show(self, layout: Any, settings: Any) -> None:
         item = active_splice(settings)
@@ -115,9 +111,8 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_splice_timing"
     bl_label = "Timing of the Splice"
-    bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_splicing"
 
     def show(self, layout: Any, settings: Any) -> None:
         item = active_splice(settings)
@@ -133,9 +128,8 @@ class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_landmarks(_Panel, bpy.types.Panel):
-    bl_idname = "OCTO_MOTION_PT_landmarks"
     bl_label = "Landmarks"
-    bl_parent_id = OCTO_MOTION_PT_splicing.bl_idname
+    bl_parent_id = "OCTO_MOTION_PT_splicing"
 
     def show(self, layout: Any, settings: Any) -> None:
         layout.use_property_split = False

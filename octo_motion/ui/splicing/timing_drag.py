@@ -224,9 +224,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         )
         report_built(self, build_retimed(armature, settings, settings.active_splice, starts))
 
-    def invoke(
-        self, context: bpy.types.Context, event: bpy.types.Event
-    ) -> set[OperatorReturnItems]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:
         """Read all that is needed, and follow the mouse."""
         window_manager, scene = context.window_manager, context.scene
         assert window_manager is not None
@@ -324,6 +322,3 @@ def _write(context: bpy.types.Context, header: str | None, status: str | None) -
 def _check_shown(item: Any) -> None:
     if item.mute:
         raise ClipError(f"Splice '{item.name}' is muted.", "Unmute it, then drag its timing.")
-
-
-CLASSES: Final[tuple[type, ...]] = (OCTO_MOTION_OT_splice_drag_timing,)
