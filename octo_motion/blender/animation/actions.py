@@ -187,6 +187,19 @@ def write_action(
     data.action_slot = slot
     if assigned is not None and assigned.library is None and assigned.users == 0:
         assigned.use_fake_user = True
+    _mark(action, obj, settings_note, digests, handles)
+    action[MARK]["frames"] = len(times)
+    action[MARK]["curves"] = sum(channel.values.shape[1] for channel in channels)
+    return action
+
+
+def _mark(
+    action: bpy.types.Action,
+    obj: bpy.types.Object,
+    settings_note: str,
+    digests: Mapping[tuple[str, int], bytes],
+    handles: Mapping[tuple[str, int], np.ndarray],
+) -> None:
     action[MARK] = {
         "owner": obj.name,
         "name": action.name,
@@ -194,13 +207,10 @@ def write_action(
         "fingerprint": _fingerprint(action, digests),
         "note": settings_note,
         "keys": key_count(action),
-        "frames": len(times),
-        "curves": sum(channel.values.shape[1] for channel in channels),
     }
     if handles:
         ordered = [handles[place] for place in sorted(handles)]
         action[MARK]["handles"] = np.concatenate(ordered).tobytes()
-    return action
 
 
 def is_generated(action: bpy.types.Action) -> bool:
