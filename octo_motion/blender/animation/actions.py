@@ -189,7 +189,6 @@ def write_action(
         assigned.use_fake_user = True
     _mark(action, obj, settings_note, digests, handles)
     action[MARK]["frames"] = len(times)
-    action[MARK]["curves"] = sum(channel.values.shape[1] for channel in channels)
     return action
 
 
@@ -207,6 +206,7 @@ def _mark(
         "fingerprint": _fingerprint(action, digests),
         "note": settings_note,
         "keys": key_count(action),
+        "curves": len(digests),
     }
     if handles:
         ordered = [handles[place] for place in sorted(handles)]
