@@ -219,9 +219,7 @@ def near(
 def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Floats:
     """Overlap (pairs,) as a share of the smaller radius, negative for those that are apart.
 
-    Args:
-        parts: the capsules.
-        chosen: frame, one capsule and the other of each pair.
+    Of each pair it is asked at a frame, of one capsule and another.
     """
     frame, one, other = chosen
     capsules = len(parts.owner)

@@ -7,6 +7,10 @@ asked is spread over the frames before and after, so that arms make room in time
 turn, as little and as evenly as it takes, and an arm that holds on is drawn back to where it does.
 A few rounds of that, each beginning where the one before has ended. Arms that are still in each
 other after these could not be parted, and move as if nobody had asked.
+
+Where a constant says what was seen when it was other, that is the default octopus with the ten
+set-ups on bumps of 0.3 arm lengths, arms overlapping by 0.02 to 0.07 radii; "jerk" as in
+``ground/stance_swing``.
 """
 
 from __future__ import annotations
@@ -28,9 +32,10 @@ from .capsule_overlap import Capsules, Crowd, Touches, Touching, aside
 _DAMPED: Final = 0.02
 """Stiffness of a segment, in squares of its length …"""
 _EVEN: Final = 0.1
-"""… and of each joint between two, likewise."""
+"""… and of each joint between two, likewise. At 0.05 Curl has a jerk of 0.085 instead of 0.067; of
+either twice or half as much changes overlaps by less than 0.02 radii."""
 _BOLD: Final = 0.5
-"""Radians that a segment turns at most."""
+"""Radians that a segment turns at most. At 1 Curl has a jerk of 0.077 instead of 0.067."""
 _TINY: Final = 1e-12
 
 
@@ -82,18 +87,25 @@ def joints_of(roots: Floats, directions: Floats, lengths: Floats) -> Floats:
 
 
 _ROUNDS: Final = 8
+"""With four arms of Prowl overlap by 0.12 radii instead of 0.07; sixteen help by 0.03 at most."""
 _BOLDLY: Final = 1.3
-"""How much further arms are asked to go than they have to: they never get all the way."""
+"""How much further arms are asked to go than they have to: they never get all the way. At 0.65 arms
+of Curl overlap by 0.22 radii instead of 0.065, at 2.6 Walk has a jerk of 0.124 instead of 0.088."""
 _DONE: Final = 0.08
-"""Share of the thinner radius: arms that overlap no deeper have made way."""
+"""Share of the thinner radius: arms that overlap no deeper have made way. That is as deep as they
+stay: at 0.16 arms of Curl overlap by 0.13 radii, at 0.04 by 0.035."""
 _AROUND: Final = 4
-"""Reaches of the means, before and after arms touch, within which others may have to make way."""
+"""Reaches of the means, before and after arms touch, within which others may have to make way. Two
+or eight change no figure by a tenth."""
 _BRIEF: Final = 0.34
-"""How much shorter than the rest the means are over which an arm becomes free when it lets go."""
+"""How much shorter than the rest the means are over which an arm becomes free when it lets go. At
+0.68 arms of Hurry overlap by 0.054 radii instead of 0.045."""
 _BORDER: Final = 1.6
-"""Segments from where an arm lies over which it is less and less free to move."""
+"""Segments from where an arm lies over which it is less and less free to move. At 3.2 arms of Walk
+overlap by 0.28 radii instead of 0.06."""
 _STEADY: Final = 0.7
-"""Share by which an arm that holds on makes less way."""
+"""Share by which an arm in stance makes less way. At 0.35 arms of Hurry overlap by 0.060 radii
+instead of 0.045."""
 _PINNED: Final = 30.0
 """How much more the place where an arm holds on counts than that it makes way."""
 _STEPS: Final = 4
@@ -139,7 +151,7 @@ def parted(
         crowd: the arms.
         still: parts of the body, one frame each.
         floor: what is below, or nothing.
-        width: of the means over frames that make it smooth (``over_time.blurred``).
+        width: of the means over frames that make it smooth (``smoothing.blurred``).
         cyclic: whether the last frame is the first again.
     """
     every = np.arange(len(crowd.joints))
@@ -314,11 +326,9 @@ class _Parting:
         return result
 
     def _move(self, chosen: tuple[np.ndarray, ...], wanted: Floats) -> None:
-        """Turn the segments of some arms at some frames.
+        """Turn the segments of arms at some frames (items,).
 
-        Args:
-            chosen: frames and arms (items,).
-            wanted: (items, joints, 3) by how much their joints are to move.
+        Their joints are to move by what is wanted (items, joints, 3).
         """
         lengths, free = self._lengths[chosen], self._free[chosen]
         size = _length(wanted[:, 1:])
@@ -415,11 +425,8 @@ class _Parting:
 
 
 def _turns(first: Floats, second: Floats) -> Floats:
-    """How far (…) a segment turns at most against the one before it, radians.
-
-    Args:
-        first: (…, segments, 3) directions at a frame.
-        second: (…, segments, 3) at the next.
+    """How far (…) a segment turns at most against the one before it, radians, from directions
+    (…, segments, 3) at a frame to those at the next.
     """
     one, other = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
     # The one before, turned the shortest way to where it is a frame later, takes the next along.

@@ -373,7 +373,7 @@ class GaitPoser:
 
         At phases of the arms' own: arms that are built alike and have one curve go through the
         same heights, whichever side they are on, so one of them is looked at. The shapes
-        (segments, 3) are those of each arm half way through its hold.
+        (segments, 3) are those of each arm half way through its stance.
         """
         gait = self.settings.gait
         phases = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
@@ -407,7 +407,7 @@ class GaitPoser:
         return depths, middles
 
     def middle_shapes(self, arms: Sequence[int]) -> Floats:
-        """Directions (segments, 3, arms) half way through the hold, of arms that are built alike.
+        """Directions (segments, 3, arms) half way through the stance, of arms that are built alike.
 
         In the arms' frames, as the gait alone has them.
         """
@@ -587,11 +587,8 @@ def _instead(azimuths: Floats, heading: float) -> list[int]:
     """For each arm the one that stands where it does, seen from the way that the body goes.
 
     Of a body that goes sideways other arms are in front. In their own order neighbours that go
-    across the way would step on each other.
-
-    Args:
-        azimuths: (arms,) radians from the front, anticlockwise.
-        heading: radians from the way to the front, anticlockwise.
+    across the way would step on each other. Azimuths (arms,) are radians from the front, and the
+    heading is that from the way to the front, both anticlockwise.
     """
     apart = azimuths + heading - azimuths[:, None]
     nearest = np.abs(less_whole_turns(apart))

@@ -4,6 +4,9 @@
 A shape is the directions of an arm's segments, (segments, 3, batch), unit vectors; the batch comes
 last, components first. Every function is smooth in what it is given, so that what it makes of a
 motion that is continuous is continuous.
+
+Where a constant says what was seen when it was other, that is the default octopus with the ten
+set-ups on bumps of 0.3 arm lengths.
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ from ..rig import ArmSkin, JointRoom
 from .surface import Ground, Limbs
 
 _ROUNDS: Final = 4
-"""How often it is looked at how far level a segment leads, where the ground rises or falls."""
+"""How often it is looked at how far level a segment leads, where the ground rises or falls. With
+two bones are off by 0.5°, with eight by no more than 0.005°."""
 _APART: Final = 0.02
 """Share of its length by which a segment may still be too long or too short then …"""
 _STEP_HALVINGS: Final = 14
@@ -224,16 +228,20 @@ def _lowered(ends: Floats, reach: Floats, upward: Floats, ground: Ground) -> Flo
 
 
 _WEAK: Final = 0.02
-"""Least lever that joints are raised with, in squares of the first segment's length."""
+"""Least lever that joints are raised with, in squares of the first segment's length. Half or twice
+as much changes no figure by a tenth."""
 _SHORTEST: Final = 0.2
 _LONGEST: Final = 4.0
-"""Handles of a curve, in its lengths."""
+"""Handles of a curve, in its lengths: at 2 arms of Hurry overlap by 0.058 radii instead of 0.045,
+and longer ones are not asked for."""
 _OPEN: Final = 0.36
-"""Share of the angle between a circle's arc and its chord that there is at a curve's ends at
-least."""
+"""Share of the angle between a circle's arc and its chord that there is at a curve's ends at least.
+At 0.72 arms of Settle overlap by 0.068 radii instead of 0.019."""
 _OPENING: Final = 0.06
-"""Radians over which that comes."""
+"""Radians over which that comes …"""
 _NO_CORNER: Final = 0.05
+"""… and within which an angle of nothing has no corner. Half or twice as much of either changes
+figures by an eighth at most."""
 _HALVINGS: Final = 7
 """Steps in which they are found. With 4 arms of the default octopus overlap by 0.064 radii instead
 of 0.057."""
@@ -434,12 +442,8 @@ def _bent(bend: Floats) -> Floats:
 
 
 def _carry(frames: Floats, ways: Floats, seen: Floats) -> None:
-    """Turn frames (…, axes, 3, batch) in place as little as it takes for x to point another way.
-
-    Args:
-        frames: unit vectors x, y, z.
-        ways: (…, 3, batch) unit vectors.
-        seen: (…, 3, batch) the same as they are seen from the frames.
+    """Turn frames (…, axes, 3, batch) in place as little as it takes for x to point another way:
+    along unit vectors (…, 3, batch), given in the world and as they are seen from the frames.
     """
     lost = seen[..., 1:, :] / np.maximum(1.0 + seen[..., :1, :], _TINY)
     frames[..., 1:, :, :] -= lost[..., None, :] * (frames[..., :1, :, :] + ways[..., None, :, :])

@@ -205,8 +205,8 @@ def _highest(values: Floats, reach: int) -> Floats:
 # --- When each arm is where in its cycle, as a function of how far the body has come --------------
 #
 # A gait with a rhythm has the same cycle for all arms, a stride long, each arm ahead by its own
-# offset. A crawl has none: each arm's cycle begins and ends with its own holds. Both are functions
-# of the distance travelled alone, so that any frame can be computed without those before it.
+# offset. A crawl has none: each arm's cycle begins and ends with its own stances. Both depend on
+# the distance travelled alone, so that any frame can be computed without those before it.
 
 
 _PER_REACH: Final = 32
@@ -223,13 +223,13 @@ _FINE: Final = 16
 """Steps of the table of distances between two knots of an arm's cycle. Half or twice as many change
 no figure by a fiftieth."""
 _STARTS: Final = (-0.1, 0.3)
-"""Where in its hold an arm may be as the body gets going, from the hold's middle, in holds: all of
-it lies down, and little of it is peeled off yet. With half of that range arms of Walk overlap by
-0.065 radii instead of 0.057 …"""
+"""Where in its stance an arm may be as the body gets going, from the stance's middle, in stances:
+all of it lies down, and little of it is peeled off yet. With half of that range arms of Walk
+overlap by 0.065 radii instead of 0.057 …"""
 _STOPS: Final = (-0.15, 0.15)
 """… and as the body comes to rest: with half of it Walk has a jerk of 0.094 instead of 0.088."""
 _AT_ONCE: Final = 0.4
-"""Cycles since the middle of its last hold up to which an arm swings as the body gets going; one
+"""Cycles since the middle of its last stance up to which an arm swings as the body gets going; one
 that would be further lies on the ground already. As the body comes to rest it is the other way. At
 0.2 arms of Walk pass through each other as it gets going."""
 _HASTE: Final = 2.0
@@ -258,7 +258,7 @@ class ContactTiming(Protocol):
 
         Returns:
             Radians (arms, cycles) anticlockwise from an arm's own direction, and metres (arms,
-            cycles) from its root half way through the hold, nan for where it holds on with ease.
+            cycles) from its root half way through the stance, nan for where it holds on with ease.
         """
         ...
 
@@ -294,7 +294,7 @@ class TabledTiming:
 
     tables: Sequence[ContactTable]
     middle: float
-    """Phase of the gait, radians, half way through a hold."""
+    """Phase of the gait, radians, half way through a stance."""
     cycle_period: Sequence[int] | None = None
     """Each arm's cycles in a loop, if it is one."""
 
@@ -317,13 +317,13 @@ class TabledTiming:
 
 
 def crawl_timing(stances: CrawlStances, arms: int, *, middle: float, duty: float) -> TabledTiming:
-    """The rhythm of arms whose cycles begin and end with their own holds.
+    """The rhythm of arms whose cycles begin and end with their own stances.
 
     Args:
         stances: of all arms.
         arms: how many there are.
-        middle: phase of the gait half way through a hold, radians.
-        duty: share of a cycle that a hold takes in the gait.
+        middle: phase of the gait half way through a stance, radians.
+        duty: share of a cycle that a stance takes in the gait.
     """
     return TabledTiming([_table(stances, arm, duty) for arm in range(arms)], middle)
 
@@ -347,8 +347,8 @@ def timing_at_rest(
         length: metres of the route.
         start: whether the body stands at the start.
         end: whether it stands at the end.
-        middle: phase of the gait half way through a hold, radians.
-        duty: share of a cycle that a hold takes.
+        middle: phase of the gait half way through a stance, radians.
+        duty: share of a cycle that a stance takes.
     """
     if isinstance(timing, EvenTiming):
         ends = (timing.phases(np.array([0.0, length])) - middle) / CYCLE
@@ -458,7 +458,7 @@ def _cut(
 
 
 def _aims(stances: CrawlStances, chosen: NDArray[Any]) -> Floats:
-    """Angles and distances of some holds (…, 2)."""
+    """Angles and distances of some stances (…, 2)."""
     return np.stack([stances.turn[chosen], stances.away[chosen]], axis=-1)
 
 
@@ -473,7 +473,7 @@ def _support(arms: Sequence[tuple[Floats, Floats, Floats]], loop: float) -> tupl
 
 
 def _looped(start: Floats, end: Floats, aims: Floats, loop: float, duty: float) -> ContactTable:
-    """The table of an arm whose holds come again after a loop."""
+    """The table of an arm whose stances come again after a loop."""
     many = len(start)
     turns = np.arange(-_LOOPS, _LOOPS + 2)
     at = (loop * turns[:, None, None] + np.stack([start, end], axis=1)).ravel()
@@ -489,7 +489,7 @@ class ContactTable:
     at: Floats
     """(knots,) distances"""
     values: Floats
-    """(knots,) cycles from the middle of hold 0"""
+    """(knots,) cycles from the middle of stance 0"""
     slopes: Floats
     """(knots,)"""
     starts: bool = False
@@ -497,7 +497,8 @@ class ContactTable:
     stops: bool = False
     """… and nothing after its last one."""
     aims: Floats = field(default_factory=lambda: np.zeros((0, 2)))
-    """(holds, 2) where the arm is to take hold, as of :meth:`Rhythm.aims`, from hold 0 on …"""
+    """(stances, 2) where the arm is to take hold, as of :meth:`ContactTiming.aims`, from stance 0
+    on …"""
     repeats: bool = False
     """… and whether it does so again after that."""
 
@@ -559,13 +560,7 @@ def _even_table(first: float, last: float, stride: float, duty: float) -> Contac
     """The table of an arm that has the same cycle all the way, its knots where holds begin and end.
 
     Two knots would do for it. But what is changed next to one of them changes all that lies between
-    the two.
-
-    Args:
-        first: cycles from the middle of hold 0 where the route begins …
-        last: … and where it ends.
-        stride: metres in a cycle.
-        duty: share of a cycle that a hold takes.
+    the two. The route begins and ends so many cycles from the middle of stance 0.
     """
     stances = np.arange(np.floor(first) - 1.0, np.ceil(last) + 2.0)
     values = (stances[:, None] + 0.5 * duty * np.array([-1.0, 1.0])).ravel()
@@ -655,13 +650,10 @@ def _stopping(table: ContactTable, length: float, duty: float) -> tuple[float, f
 def _nearest(
     cycles: float, around: tuple[float, float], duty: float, late: float
 ) -> tuple[float, float]:
-    """Cycles nearby at which an arm lies on the ground, and the middle of that hold.
+    """Cycles nearby at which an arm lies on the ground, and the middle of that stance.
 
-    Args:
-        cycles: where the arm would be.
-        around: between which places in a hold it lies.
-        duty: share of a cycle that a hold takes.
-        late: cycles from a hold's middle from which on it is the next one's.
+    It lies between two places around the middle of a stance, in stances; so many cycles late, it
+    is the next one's.
     """
     middle = np.floor(cycles - late) + 1.0
     low, high = duty * np.array(around)

@@ -8,7 +8,7 @@ chosen by choosing which arms push; the way to face is free of it; and the arms 
 
 So there is no gait here that the arms are slaves of. Arms whose push points along the way take
 hold again as soon as they can. The others hold on only now and then, to support, and else are left
-to search. How long each hold and each pause lasts is drawn from a seeded stream of the arm's own.
+to search. How long each stance and each pause lasts is drawn from a seeded stream of the arm's own.
 
 Where a constant says what was seen when it was other, that is eight arms on 24 ways, straight on or
 round a corner, facing ahead, aside or back: three arms are in stance at any time, 3.6 in the mean,
@@ -93,17 +93,17 @@ _BEFORE: Final = 1.5
 """Arm lengths before the start at which the crawl begins, so that arms hold when it is seen. At 0.3
 there are but two at times."""
 _TRIED: Final = 16
-"""Lengths of a hold from which the longest is taken that the arm can keep: with 6 they are so
+"""Lengths of a stance from which the longest is taken that the arm can keep: with 6 they are so
 coarse that arms come as near as 0.08 …"""
 _LOOKED_AT: Final = (0.0, 0.25, 0.75, 1.0)
 """… which is looked at when such a share of it is over."""
 _SLACK: Final = 0.02
-"""Arm lengths by which a hold may be nearer or farther than it should."""
+"""Arm lengths by which a stance may be nearer or farther than it should."""
 _OVERLAP: Final = 0.03
 """Arm lengths before the last arms let go at which another takes hold in their place: without, arms
 in stance are 3.3 in the mean instead of 3.6."""
 _LYING: Final = (0.4, 0.65)
-"""Shares of a hold that are over where an arm of a body that stands may be: it lies unrolled, and
+"""Shares of a stance that are over where an arm of a body that stands may be: it lies unrolled, and
 is hardly peeled off yet. The first is where it is before the body gets going, the other where it
 is once it has come to rest."""
 _LET_GO: Final = (0.04, 0.30)
@@ -112,7 +112,7 @@ _LAST: Final = (0.14, 0.10)
 """Arm lengths that an arm takes at least, before the body comes to rest, to swing and to lie down:
 the body is slow there."""
 _LONGER: Final = 0.06
-"""Arm lengths by which a hold may be too long where the body comes to rest in it."""
+"""Arm lengths by which a stance may be too long where the body comes to rest in it."""
 _TURNS: Final = np.array([0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0])
 """Shares of the most that an arm turns aside, which it tries."""
 _WORTH: Final = 0.15
@@ -163,32 +163,33 @@ class CrawlPath:
 
 @dataclass(frozen=True, eq=False)
 class CrawlStances:
-    """Holds of all arms, sorted by arm and start."""
+    """Stances of all arms, sorted by arm and start."""
 
     arm: NDArray[np.intp]
-    """(holds,)"""
+    """(stances,)"""
     start: Floats
-    """(holds,) distance at which the arm has taken hold."""
+    """(stances,) distance at which the arm has taken hold."""
     end: Floats
-    """(holds,) and at which it lets go."""
+    """(stances,) and at which it lets go."""
     place: Floats
-    """(holds, 2) world XY."""
+    """(stances, 2) world XY."""
     turn: Floats
-    """(holds,) radians anticlockwise from the arm's own direction, half way through, to there …"""
+    """(stances,) radians anticlockwise from the arm's own direction, half way through, to there
+    …"""
     away: Floats
-    """(holds,) … and metres from its root."""
+    """(stances,) … and metres from its root."""
     pushes: NDArray[np.bool_]
-    """(holds,) whether the arm pushes, or only supports."""
+    """(stances,) whether the arm pushes, or only supports."""
 
     def __len__(self) -> int:
-        """Number of holds."""
+        """Number of stances."""
         return len(self.arm)
 
 
 def plan_crawl(journey: CrawlPath, settings: CrawlSettings) -> CrawlStances:
     """Where the arms hold on along a journey.
 
-    An arm's next hold depends on the holds before it, but all of them on the journey alone: any
+    An arm's next stance depends on the stances before it, but all of them on the journey alone: any
     frame can be computed from the result without those before it.
 
     Raises:
@@ -201,7 +202,7 @@ def plan_crawl(journey: CrawlPath, settings: CrawlSettings) -> CrawlStances:
 
 @dataclass(frozen=True, eq=False)
 class _Stance:
-    """One hold, metres."""
+    """One stance, metres."""
 
     arm: int
     start: float
@@ -216,7 +217,7 @@ class _Stance:
 
 
 class _Crawl:
-    """One journey, hold by hold in the order in which they begin."""
+    """One journey, stance by stance in the order in which they begin."""
 
     def __init__(self, journey: CrawlPath, settings: CrawlSettings) -> None:
         self._journey = journey
@@ -306,8 +307,8 @@ class _Crawl:
         return self._add(arm, *self._in_time(at, lasts, longest))
 
     def _in_time(self, at: float, lasts: float, longest: float) -> tuple[float, float]:
-        """Where a hold begins and ends that leaves time for another one before the body stands, or
-        lasts beyond that.
+        """Where a stance begins and ends that leaves time for another one before the body stands,
+        or lasts beyond that.
         """
         in_time = self._last - sum(_LAST) * self._unit
         if at + lasts <= in_time:
@@ -315,12 +316,12 @@ class _Crawl:
         if at + longest + _LONGER * self._unit < self._last:
             if in_time - at >= min(_SHORTEST * self._unit, longest):
                 return at, in_time
-            # Too late for two holds, and too early for one: it waits.
+            # Too late for two stances, and too early for one: it waits.
             at = self._last - longest
         return at, at + max(self._last - at, 1e-3 * self._unit) / _LYING[1]
 
     def _add(self, arm: int, start: float, end: float) -> float:
-        """Note a hold, at a place that is clear of the other arms' where there is one."""
+        """Note a stance, at a place that is clear of the other arms' where there is one."""
         seen = max(start, self._first), min(end, self._last)
         turn, places = 0.0, self._places(arm, sum(seen) / 2.0, np.zeros(1))
         others = [each for each in self._latest.values() if each.arm != arm and each.end > seen[0]]
@@ -380,7 +381,7 @@ class _Crawl:
         return place, place + settings.planted * unit * way
 
     def _longest(self, arm: int, at: float) -> float:
-        """How far the body can go while an arm keeps a hold that begins at a distance."""
+        """How far the body can go while an arm keeps a stance that begins at a distance."""
         settings, unit = self._settings, self._unit
         most = settings.far - settings.near
         lasts = unit * np.linspace(min(_SHORTEST, most), most, _TRIED)

@@ -3,7 +3,7 @@
 
 An arm holds on once in each cycle of its gait. A foothold belongs to an arm and the number of its
 cycle and hangs on nothing else: not on frames, nor on footholds before it. It is laid where the
-gait wants it as the body passes, half way through the hold, and near enough for the arm to keep
+gait wants it as the body passes, half way through the stance, and near enough for the arm to keep
 it while the body moves on.
 
 Where a constant says what was seen when it was other, that is the default octopus with the ten
@@ -60,7 +60,7 @@ to frame instead of 0.58."""
 _CLOSEST: Final = 0.05
 """The same where there is no other way: in none of the ten."""
 _SHORTENED: Final = (1.0, 0.85, 0.7, 0.55, 0.4, 0.25)
-"""Shares of its time that a hold may be cut down to where the body moves on too far."""
+"""Shares of its time that a stance may be cut down to where the body moves on too far."""
 _NEAR, _NEARER = 0.60, 0.28
 _FAR, _FARTHER = 0.94, 0.47
 """Shares of the free part of an arm between which a place may be that it pushes away from, and by
@@ -78,7 +78,7 @@ class _Reach:
     """Length up to where they touch."""
     whole: Floats
     peeled: Floats
-    """How much of what lies is peeled off as the hold ends."""
+    """How much of what lies is peeled off as the stance ends."""
     longer: float
     """Factor that they may stretch by."""
     slackest: Floats
@@ -86,13 +86,13 @@ class _Reach:
 
 
 class Passing:
-    """Where the body carries the arms' roots, at times since the middle of each hold."""
+    """Where the body carries the arms' roots, at times since the middle of each stance."""
 
     def __init__(self, roots: Floats, seen: Sequence[Floats]) -> None:
         self.middle = roots
         """(arms, cycles, 3) half way through, world."""
         self.touch_down, self.peeling, self.lift_off = seen
-        """The same as the hold begins, as peeling begins, and as the hold ends."""
+        """The same as the stance begins, as peeling begins, and as the stance ends."""
 
 
 def span(settings: StanceSettings, *, may_stretch: bool) -> tuple[float, float]:
@@ -355,7 +355,7 @@ class Footholds:
     touching: int
     """The joint c that touches first."""
     touch_down: Floats
-    """(arms, cycles) when the hold begins, in cycles from the middle that the gait gives it."""
+    """(arms, cycles) when the stance begins, in cycles from the middle that the gait gives it."""
     lift_off: Floats
     """(arms, cycles) when it ends."""
     middle: Floats
@@ -373,9 +373,9 @@ class Footholds:
     curls: Floats
     """(arms, cycles) radians by which they are bent to one side on the way to the tip."""
     peeled_to: Floats
-    """(arms, cycles) metres along the arm up to which it is peeled off as the hold ends."""
+    """(arms, cycles) metres along the arm up to which it is peeled off as the stance ends."""
     roots_at_touch_down: Floats
-    """(arms, cycles, 3) where the arm's root is as the hold begins, world …"""
+    """(arms, cycles, 3) where the arm's root is as the stance begins, world …"""
     roots_at_lift_off: Floats
     """(arms, cycles, 3) … and as it ends."""
 
@@ -385,7 +385,7 @@ class Footholds:
 
 
 def cycles_at(phases: Floats, middle: float) -> tuple[np.ndarray, Floats]:
-    """The cycle (…) that arms' phases (…) belong to, and cycles (…) from its hold's middle.
+    """The cycle (…) that arms' phases (…) belong to, and cycles (…) from its stance's middle.
 
     From half way through one swing to half way through the next it is one cycle.
     """
@@ -415,7 +415,7 @@ def lay(
         ground: what it walks on.
         settings: how arms hold on.
         timing: when they do.
-        middle: phase of the gait, radians, half way through the hold.
+        middle: phase of the gait, radians, half way through the stance.
         cycles: the first and the last that are wanted.
         contact_overrides: the artist's; of arms by their number in the body.
         seed: of the small differences from step to step.
@@ -490,13 +490,7 @@ def _places(
     path: _RootPath, shift: Floats, ground: Ground, settings: StanceSettings
 ) -> tuple[Floats, Floats, Floats]:
     """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), and half of how
-    long they do (arms, cycles), in cycles.
-
-    Args:
-        path: of the arms' roots.
-        shift: (arms, cycles) by how much stances are later than the gait has them.
-        ground: what they touch.
-        settings: how arms hold on.
+    long they do (arms, cycles), in cycles; stances (arms, cycles) are shifted by so many cycles.
     """
     limbs = path.limbs
     turns, away = path.timing.aims(limbs.arms, path.numbers)

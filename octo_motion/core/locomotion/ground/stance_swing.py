@@ -207,7 +207,7 @@ def stance_at(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Flo
         batch: the arms.
         footholds: of their limbs.
         cycles: (batch,) number of each one's cycle.
-        since: (batch,) cycles since the middle of the hold that the gait gives it.
+        since: (batch,) cycles since the middle of the stance that the gait gives it.
     """
     roots = batch.roots
     at = batch.arms, cycles - footholds.first
@@ -275,7 +275,7 @@ def kept_over_ground(
 
     Args:
         batch: the arms.
-        pose: strains and directions, as :func:`pulled` returns them.
+        pose: strains and directions, as :func:`pulled_to_footholds` returns them.
         stance: how each one holds on.
         ground: what it must not pass through.
         settings: how arms hold on.
@@ -440,13 +440,8 @@ def _knee(batch: Batch, stance: Stance, chord: Floats, longer: Floats) -> Floats
     """Directions (segments, 3, batch) of arms with a single knee, as two sides of a triangle.
 
     It stands over the way to the ground, up and out: whichever way the body goes, its plane turns
-    no faster than that way does.
-
-    Args:
-        batch: the arms.
-        stance: how each holds on.
-        chord: (3, batch) from each one's root to where it meets the ground.
-        longer: (batch,) factor by which it is stretched.
+    no faster than that way does. The chord (3, batch) is the way from each one's root to where it
+    meets the ground; each is longer (batch,) than at rest by a factor.
     """
     reach = batch.reach
     inner = reach[1 : stance.touching]
@@ -507,12 +502,8 @@ def _asked(batch: Batch, stance: Stance, settings: StanceSettings) -> tuple[Floa
 
 
 def _met(batch: Batch, stance: Stance, lying: Floats) -> tuple[Floats, Floats]:
-    """Where arms meet the ground, and which way they run into it, (3, batch) both.
-
-    Args:
-        batch: the arms.
-        stance: how each holds on.
-        lying: (segments − c, 3, batch) unit vectors along the segments that lie.
+    """Where arms meet the ground, and which way they run into it, (3, batch) both, from unit
+    vectors (segments − c, 3, batch) along the segments that lie.
     """
     lengths, reach, first, last = batch.lengths, batch.reach, stance.touching, len(lying) - 1
     # Directions at the joints that lie.
@@ -589,11 +580,7 @@ def _arch(batch: Batch, stance: Stance, chord: Floats, arriving: Floats, strain:
 def _rolled(batch: Batch, stance: Stance, lying: Floats, before: Floats) -> Floats:
     """Directions (segments − c, 3, batch) of what is not unrolled yet: it stands up.
 
-    Args:
-        batch: the arms.
-        stance: how each holds on.
-        lying: (segments − c, 3, batch) unit: how it will lie.
-        before: (3, batch) unit: the direction of the segment before.
+    It will lie along others of that shape, and comes after a segment with a direction (3, batch).
     """
     first, reach = stance.touching, batch.reach
     span = reach[-1] - reach[first]

@@ -269,12 +269,8 @@ class WalkPart:
     def _batch(
         self, moments: Moments, chosen: list[int], higher: Raise | None
     ) -> tuple[Batch, Floats]:
-        """Some arms at the frames, and what turns each one's own frame to the world's (4, batch).
-
-        Args:
-            moments: the frames.
-            chosen: places of the arms in the build.
-            higher: by how much they are to be higher.
+        """Arms of some places in the build at the frames, and what turns each one's own frame to
+        the world's (4, batch).
         """
         columns = [self.build.arms[place] for place in chosen]
         turn = moments.orientations[:, None]
@@ -301,14 +297,10 @@ class WalkPart:
         to_armature: Floats,
         bank: Floats,
     ) -> Floats:
-        """Rotations (frames, arms, bones, 4) of arms that stand, their suckers to the ground.
+        """Rotations (frames, arms, bones, 4) of some arms that stand, their suckers to the ground.
 
-        Args:
-            columns: which arms.
-            pose: how they stand.
-            stance: how they hold on.
-            to_armature: (frames, 4) from the world to the armature.
-            bank: (bones, frames, arms) radians that the gait twists them by.
+        Quaternions (frames, 4) lead to the armature from the world; the gait twists bones by angles
+        (bones, frames, arms).
         """
         segments, many = len(pose.directions), len(columns)
         shape = segments, 3, len(to_armature), many
@@ -460,10 +452,6 @@ class GroundedWalk:
         """For each build (arms, cycles, segments + 1 − c) metres from joints to the skin below.
 
         Which side of a bone is below is what the arms show as they would lie if they were round.
-
-        Args:
-            skins: of all arms.
-            phases: the first and the last of the body's, radians.
         """
         looks = int(np.ceil((phases[1] - phases[0]) / CYCLE * _LOOKS)) + 1
         phase = np.linspace(*phases, looks)

@@ -514,7 +514,7 @@ def _walks(
 def _holds(
     walk: GroundedWalk | None, gait: Gait, arms: int, first: float, last: float
 ) -> list[tuple[tuple[Floats, Floats], np.ndarray]]:
-    """For each arm, where its holds begin and end between two places, and their cycles."""
+    """For each arm, where its stances begin and end between two places, and their cycles."""
     found: list[list[tuple[float, float, int]]] = [[] for _ in range(arms)]
     unit = gait.travel.stride / CYCLE
     for each in walk.footholds() if walk is not None else ():

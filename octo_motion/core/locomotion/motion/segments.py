@@ -2,7 +2,7 @@
 """A motion's segments: one for each gait along its way, and how arms go over from one to the next.
 
 A motion with one gait all the way is one segment. Where the gait changes, each arm is worked out in
-both, goes over between two of its holds, and comes to rest in either meanwhile.
+both, goes over between two of its stances, and comes to rest in either meanwhile.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ from .surface import (
 
 
 def build_mesh(shape: OctopusShape) -> OctopusMesh:
-    """The skin of an octopus at rest, in the space of its bones (see ``octopus_rig``)."""
+    """The skin of an octopus at rest, in the space of its bones (see :func:`build_bones`)."""
     surface = Surface()
     layout = ArmLayout(shape)
     form = body_form(shape)

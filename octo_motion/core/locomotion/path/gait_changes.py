@@ -56,9 +56,9 @@ class Windows:
     end: Floats
     """(arms,)"""
     dropped_before: tuple[NDArray[np.bool_], ...]
-    """For each arm, which holds of the way before are left out."""
+    """For each arm, which stances of the way before are left out."""
     dropped_after: tuple[NDArray[np.bool_], ...]
-    """For each arm, which holds of the way after."""
+    """For each arm, which stances of the way after."""
 
 
 def check_transitions(
@@ -134,7 +134,7 @@ def transition_windows(
 
     Args:
         change: where.
-        before: for each arm, where its holds (holds,) of the way before begin and end, ascending.
+        before: for each arm, where its stances (stances,) in the way before begin and end.
         after: the same of the way after.
     """
     held = _HELD * (change.end - change.start)

@@ -208,13 +208,8 @@ def rotate_bones(
 
 
 def _swing(rests: Sequence[ArmRest], bone: int, carried: Floats, wanted: Floats) -> Floats:
-    """Quaternions (4, batch), in the bone's rest frame, that bring its segment where it is wanted.
-
-    Args:
-        rests: the arms.
-        bone: which bone of theirs.
-        carried: (4, batch) where it is carried, armature space.
-        wanted: (3, batch) unit, armature space.
+    """Quaternions (4, batch), in a bone's rest frame, that bring its segment where it is wanted
+    (3, batch) from where it is carried (4, batch), armature space both.
     """
     frames = wanted.shape[-1] // len(rests)
     segment = _tiled([rest.segments[bone] for rest in rests], frames)
@@ -438,12 +433,9 @@ class ArmBatch:
         return result
 
     def _carried(self, bone: int, arm: np.ndarray, before: Floats | None) -> Floats:
-        """Where a bone (4, batch) is when it is not turned, in armature space.
+        """Where a bone of arms (batch,) is when it is not turned (4, batch), in armature space.
 
-        Args:
-            bone: its number.
-            arm: (batch,) which of the arms each one is.
-            before: (4, batch) the orientation of the bone before.
+        That hangs on the orientation of the bone before (4, batch).
         """
         carried = self.carried[bone][:, arm]
         follows = self.follows[bone]

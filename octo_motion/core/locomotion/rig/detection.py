@@ -3,11 +3,11 @@
 
 1. Bones that move the mesh are looked at: those with the deform flag and a vertex group; without
    vertex groups the deform flag alone, without that all bones. They form a tree, other bones
-   between them skipped; chains are its branches that end in a tip (``bone_tree``).
+   between them skipped; chains are its branches that end in a tip.
 2. Arms are a family of such chains: alike in bones and length, long compared with the rest of the
-   rig, springing from one place (``arm_family``).
+   rig, springing from one place.
 3. Where constraints move those, the control bones at the same joints take their place.
-4. Names and symmetry tell which way the body faces; sides and pairs follow (``chains``).
+4. Names and symmetry tell which way the body faces; sides and pairs follow.
 """
 
 from __future__ import annotations
@@ -450,8 +450,6 @@ def _typical_length(family: tuple[BoneChain, ...]) -> float:
 _SYMMETRIC: Final = 0.05
 # Arm lengths: how far an arm may lean out and still count as upright.
 _UPRIGHT: Final = 1e-3
-
-__all__ = ["ArmChain", "BodyFrame", "Detection", "control_chain", "detect_arms"]
 
 
 @dataclass(frozen=True)
