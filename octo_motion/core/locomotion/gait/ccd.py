@@ -153,9 +153,15 @@ def pseudo_targets(rotations: Floats, widths: Floats) -> Floats:
 
 
 SWEEPS: Final = 4
+"""Sweeps of CCD over a group. Two or eight change slip, overlap and turns of the ten set-ups on
+bumps by less than a tenth."""
 SOFTENINGS: Final = 4
+"""How often bends are spread and the groups closed again. With two Swim has a jerk (as in
+``ground/stance_swing``) of 0.085 instead of 0.073, with eight it turns by 0.28 radians from frame
+to frame instead of 0.23."""
 _SPREADS: Final = 2
-"""How often bends are spread before the groups are closed again."""
+"""How often bends are spread before the groups are closed again. With one Swim has a jerk of 0.083
+instead of 0.073, with four of 0.100."""
 
 # Stretching a group to its full length is the singular point of any inverse kinematics: its bend
 # grows like the square root of what is left. Rounding the corner off costs half of this at most,

@@ -259,11 +259,7 @@ def variation(
 def _draws(seed: int, numbers: np.ndarray, arms: np.ndarray, knots: int) -> Floats:
     """Uniform in [0, 1), one cycle after the other (cycles × knots, arms, links, 2).
 
-    Args:
-        seed: of the numbers.
-        numbers: (cycles, arms) of the cycles whose draws count.
-        arms: (arms,) their numbers in the body.
-        knots: of their curve.
+    Of arms, by their numbers in the body, the draws of cycles of some numbers (cycles, arms) count.
     """
     drawn = {int(each): _draw_cycle(seed, int(each), arms, knots) for each in np.unique(numbers)}
     values = np.array(

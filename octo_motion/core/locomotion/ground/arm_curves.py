@@ -248,11 +248,13 @@ of 0.057."""
 _BACKWARDS: Final = 1e-4
 """Least of one and the cosine of an angle whose half has a tangent."""
 _BENDINGS: Final = 6
-"""Newton's steps in which it is found how much more a curve is bent."""
+"""Newton's steps in which it is found how much more a curve is bent: three leave 5e-8 of it."""
 _BOLD: Final = 0.6
-"""Radians that a segment turns at a step of Newton's at most."""
+"""Radians that a segment turns at a step of Newton's at most. At 0.3 arms of Hurry overlap by 0.065
+radii instead of 0.045."""
 _FIRM: Final = 1e-4
-"""What keeps the steps finite where an arm is straight, as a share of its own stiffness."""
+"""What keeps the steps finite where an arm is straight, as a share of its own stiffness. Half or
+twice as much turns bones by 0.002° at most."""
 _MANY: Final = 0.5
 """Share of a batch from which on all of it is raised, rather than those that are too low."""
 _TINY: Final = 1e-12
