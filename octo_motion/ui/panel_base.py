@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from textwrap import wrap
 from typing import Any, Final, cast
 
@@ -44,25 +45,30 @@ def draw_list(
     row_type: type,
     settings: Any,
     names: tuple[str, str],
-    buttons: tuple[Any, Any],
+    buttons: Sequence[Any],
     **size: int,
 ) -> Any:
-    """A list with the buttons that add and remove; the column of the buttons, for more.
+    """A list with its buttons; the column of the buttons, for more.
 
     Args:
         layout: where it goes.
         row_type: what draws its rows.
         settings: the group that has the list.
         names: of the list, and of the number of its active item.
-        buttons: operators that add and that remove.
+        buttons: operators that add, that remove, and, if there is one, that move.
         size: how many rows it shows, as Blender calls it.
     """
     items, active = names
     row = layout.row()
     row.template_list(row_type.__name__, "", settings, items, settings, active, **size)
     column = row.column(align=True)
-    for operator, icon in zip(buttons, ("ADD", "REMOVE"), strict=True):
+    for operator, icon in zip(buttons, ("ADD", "REMOVE"), strict=False):
         column.operator(operator.bl_idname, text="", icon=icon)
+    for operator in buttons[2:]:
+        column.separator()
+        for direction in ("UP", "DOWN"):
+            button = column.operator(operator.bl_idname, text="", icon=f"TRIA_{direction}")
+            button.direction = direction
     return column
 
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import bpy
 
-from ..panel_base import ArmaturePanel, armature_in
+from ..panel_base import ArmaturePanel, armature_in, draw_list
 from .landmark_table import draw_landmarks
 from .properties import part_kind, splicing_settings
 from .splice_operators import (
@@ -46,25 +46,13 @@ class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
     def show(self, layout: Any, settings: Any) -> None:
         _draw_action(layout, settings, "base", "base_slot")
         layout.prop(settings, "visual")
-        row = layout.row()
-        row.template_list(
-            OCTO_MOTION_UL_splices.__name__,
-            "",
-            settings,
-            "splices",
-            settings,
-            "active_splice",
-            rows=4,
-            maxrows=8,
+        buttons = (
+            OCTO_MOTION_OT_splice_add,
+            OCTO_MOTION_OT_splice_remove,
+            OCTO_MOTION_OT_splice_move,
         )
-        column = row.column(align=True)
-        column.operator(OCTO_MOTION_OT_splice_add.bl_idname, text="", icon="ADD")
-        column.operator(OCTO_MOTION_OT_splice_remove.bl_idname, text="", icon="REMOVE")
-        column.separator()
-        up = column.operator(OCTO_MOTION_OT_splice_move.bl_idname, text="", icon="TRIA_UP")
-        up.direction = "UP"
-        down = column.operator(OCTO_MOTION_OT_splice_move.bl_idname, text="", icon="TRIA_DOWN")
-        down.direction = "DOWN"
+        names = "splices", "active_splice"
+        draw_list(layout, OCTO_MOTION_UL_splices, settings, names, buttons, rows=4, maxrows=8)
         column = layout.column(align=True)
         column.operator_context = "INVOKE_DEFAULT"
         column.operator(OCTO_MOTION_OT_splice_drag_timing.bl_idname, icon="ARROW_LEFTRIGHT")

@@ -243,30 +243,27 @@ class OCTO_MOTION_PT_arms(ArmaturePanel, bpy.types.Panel):
         layout.operator(OCTO_MOTION_OT_detect_arms.bl_idname, icon="VIEWZOOM")
         buttons = draw_list(
             *(layout, OCTO_MOTION_UL_arms, settings, ("arms", "active_arm")),
-            (OCTO_MOTION_OT_arm_add, OCTO_MOTION_OT_arm_remove),
+            (OCTO_MOTION_OT_arm_add, OCTO_MOTION_OT_arm_remove, OCTO_MOTION_OT_arm_move),
             # As high as the buttons beside it, or as an octopus needs.
             rows=7,
             maxrows=8,
         )
         buttons.separator()
-        for direction in ("UP", "DOWN"):
-            move = buttons.operator(
-                OCTO_MOTION_OT_arm_move.bl_idname, text="", icon=f"TRIA_{direction}"
-            )
-            move.direction = direction
-        buttons.separator()
         buttons.operator(OCTO_MOTION_OT_arm_select.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
         buttons.operator(OCTO_MOTION_OT_arm_flip.bl_idname, text="", icon="ARROW_LEFTRIGHT")
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
         arm = _ARMS.active_item(settings)
         if arm is not None:
-            _draw_details(column, arm)
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
+            _draw_details(_split_column(layout), arm)
+        column = _split_column(layout)
         column.prop(settings, "body_front")
         column.prop(settings, "body_up")
         column.prop_search(settings, "root_bone", settings.id_data.data, "bones")
+
+
+def _split_column(layout: Any) -> Any:
+    column = layout.column()
+    column.use_property_split, column.use_property_decorate = True, False
+    return column
 
 
 def _draw_details(column: Any, arm: Any) -> None:

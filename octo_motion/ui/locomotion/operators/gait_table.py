@@ -430,11 +430,8 @@ class OCTO_MOTION_PT_table(ArmaturePanel, bpy.types.Panel):
             )
             return
         buttons = OCTO_MOTION_OT_gait_curve_add, OCTO_MOTION_OT_gait_curve_remove
-        draw_list(
-            *(layout, OCTO_MOTION_UL_gait_curves, table, ("curves", "active_curve")),
-            buttons,
-            rows=2,
-        )
+        names = "curves", "active_curve"
+        draw_list(layout, OCTO_MOTION_UL_gait_curves, table, names, buttons, rows=2)
         if 0 <= table.active_curve < len(curves):
             _draw_knots(layout, table, curves[table.active_curve])
 

@@ -270,14 +270,8 @@ class OCTO_MOTION_PT_change(ArmaturePanel, bpy.types.Panel):
                 column.prop(settings, name)
         elif settings.by == "MARKERS":
             buttons = OCTO_MOTION_OT_change_add, OCTO_MOTION_OT_change_remove
-            draw_list(
-                layout,
-                OCTO_MOTION_UL_changes,
-                settings,
-                ("places", "active_place"),
-                buttons,
-                rows=3,
-            )
+            names = "places", "active_place"
+            draw_list(layout, OCTO_MOTION_UL_changes, settings, names, buttons, rows=3)
             item = _PLACES.active_item(settings)
             if item is not None:
                 column = layout.column(align=True)
