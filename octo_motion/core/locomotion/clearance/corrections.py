@@ -105,12 +105,8 @@ def separate_arms(
         opened: where arms stand round a body that swims as it lies, none for others.
         cyclic: whether the last frame is the first again.
     """
-    ends = np.cumsum([0, *(len(arm.bones) for arm in volume.arms)])
     some, chosen = _joints_chosen(volume.arms)
-    posed = [
-        _Posed.of(numbers, together, ends, rotations)
-        for numbers, together in batches_by_bones(volume.arms)
-    ]
+    posed = _Posed.of_all(volume.arms, rotations)
     joints = np.empty((len(rotations), len(volume.arms), len(chosen[0]), 3))
     for each in posed:
         joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
@@ -164,18 +160,17 @@ class _Posed:
     """(bones, 4, frames × arms)"""
 
     @classmethod
-    def of(
-        cls, numbers: list[int], together: ArmBatch, ends: np.ndarray, rotations: Floats
-    ) -> _Posed:
-        """Some arms, as the rotations (frames, bones, 4) of all have them.
-
-        Each arm's bones begin at one of the ends (all arms + 1,).
-        """
-        columns = ends[numbers][:, None] + np.arange(len(together.lengths))
-        own = np.moveaxis(rotations[:, columns], (2, 3), (0, 1))
-        arm = np.tile(np.arange(len(numbers)), len(rotations))
-        turned = together.orientations(own.reshape(*own.shape[:2], -1), arm)
-        return cls(numbers, together, columns, turned)
+    def of_all(cls, arms: Sequence[ArmFrames], rotations: Floats) -> list[_Posed]:
+        """All arms, as rotations (frames, bones, 4) have them, by how many bones they have."""
+        ends = np.cumsum([0, *(len(arm.bones) for arm in arms)])
+        found: list[_Posed] = []
+        for numbers, together in batches_by_bones(arms):
+            columns = ends[numbers][:, None] + np.arange(len(together.lengths))
+            own = np.moveaxis(rotations[:, columns], (2, 3), (0, 1))
+            arm = np.tile(np.arange(len(numbers)), len(rotations))
+            turned = together.orientations(own.reshape(*own.shape[:2], -1), arm)
+            found.append(cls(numbers, together, columns, turned))
+        return found
 
     def joints(self, strains: Floats) -> Floats:
         """(frames, arms, bones + 1, 3) for strains (frames, all bones)."""
