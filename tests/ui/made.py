@@ -14,10 +14,10 @@ import numpy as np
 from octo_motion.core.locomotion.gait import Arm, GaitPoser, GaitTable
 from octo_motion.core.locomotion.ground import GroundedPoses, GroundedWalk
 from octo_motion.core.locomotion.motion import MotionPlan, MotionResult
-from octo_motion.core.locomotion.motion.pipeline import pose
+from octo_motion.core.locomotion.motion.pipeline import pose, with_half_frames
 from octo_motion.core.locomotion.motion.segments import Transitions
 from octo_motion.core.locomotion.motion.standing import Standing
-from octo_motion.core.locomotion.path import Route, Travel, TravelSettings
+from octo_motion.core.locomotion.path import Route, Travel, TravelSettings, plan_travel
 from octo_motion.core.locomotion.rig import BodyFrame
 from octo_motion.core.skeleton import Skeleton
 from octo_motion.ui.locomotion.writing import Shot, Summary
@@ -149,6 +149,17 @@ class Made:
     @property
     def warnings(self) -> tuple[str, ...]:
         return self.plan.warnings if self.shot.result is None else self.shot.result.warnings
+
+    @property
+    def swimming(self) -> np.ndarray:
+        """(moments,) how far the body has gone over from a walk to a swim."""
+        schedule, standing = self.plan.schedule, self.plan.first.standing
+        times = with_half_frames(schedule.times) if self.every == 2 else schedule.times
+        bearings = standing.bearings if standing is not None else None
+        travel = plan_travel(schedule.route, schedule.travel, times, bearings)
+        swimming = self.plan.segments.swimming(travel.distance)
+        assert swimming is not None
+        return swimming
 
     @property
     def every(self) -> int:

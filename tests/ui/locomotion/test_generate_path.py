@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From the button to the keys: a way short enough to be followed by one who reads it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import bpy
+
+import octo_motion
+
+PACKAGE = Path(octo_motion.__file__).parent
+MODULES = 45
+CLIMBS = 4
+LAYERS = ("core", "device", "blender", "ui", "command_line")
+
+
+def test_generate_passes_few_modules_and_hardly_climbs_back_up() -> None:
+    bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    bpy.ops.octo_motion.add_route()
+    passed: set[str] = set()
+    climbs: set[tuple[str, str]] = set()
+
+    def layer(file: str) -> int:
+        return LAYERS.index(file.split("/", maxsplit=1)[0])
+
+    def watch(frame: FrameType, event: str, _: Any) -> None:
+        file = frame.f_code.co_filename
+        if event != "call" or not file.startswith(f"{PACKAGE}/"):
+            return
+        here = file.removeprefix(f"{PACKAGE}/")
+        passed.add(here)
+        caller = frame.f_back.f_code.co_filename if frame.f_back is not None else ""
+        if caller.startswith(f"{PACKAGE}/"):
+            there = caller.removeprefix(f"{PACKAGE}/")
+            if layer(here) > layer(there):
+                climbs.add((there, here))
+
+    sys.setprofile(watch)
+    try:
+        bpy.ops.octo_motion.generate_locomotion()
+    finally:
+        sys.setprofile(None)
+    assert bpy.context.object.animation_data.action is not None
+    assert len(passed) <= MODULES, sorted(passed)
+    assert len(climbs) <= CLIMBS, sorted(climbs)
