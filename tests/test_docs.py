@@ -204,8 +204,8 @@ def described(group: str) -> dict[str, list[str]]:
 
 def group_class(group: str) -> Any:
     from octo_motion.ui.locomotion.settings import gait as gait_properties
-    from octo_motion.ui.locomotion.settings import ground as ground_properties
     from octo_motion.ui.locomotion.settings import lists, properties
+    from octo_motion.ui.locomotion.settings import lists as ground_properties
     from octo_motion.ui.locomotion.settings import properties as quality_report
     from octo_motion.ui.posing.properties import OCTO_MOTION_PG_posing
     from octo_motion.ui.splicing.properties import (

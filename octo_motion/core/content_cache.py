@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Results that are kept for the next time, by the content of what they were made from.
-
-For functions whose result depends on nothing but their arguments. The key is a hash of all of
-these, arrays included: a changed number is another key, so what is kept can be old, but not wrong.
-"""
+"""Dataclasses of arrays: parts of them, and results that are kept by what they were made from."""
 
 from __future__ import annotations
 
@@ -12,9 +8,43 @@ import hashlib
 import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from typing import Any, Final, Generic, TypeVar
+from dataclasses import fields, replace
+from typing import Any, Final, Generic, Literal, TypeVar
 
 import numpy as np
+
+_Record = TypeVar("_Record")
+
+
+def part_of(record: _Record, chosen: np.ndarray | slice, axis: Literal[0, -1] = -1) -> _Record:
+    """The same record, of whose arrays only some items are there; what is no array stays.
+
+    Args:
+        record: a dataclass of arrays, and of rows of arrays.
+        chosen: numbers of the items, or a slice of them.
+        axis: along which they are, the same for all of its arrays.
+    """
+    place = (..., chosen) if axis else chosen
+
+    def part(value: Any) -> Any:
+        if isinstance(value, np.ndarray):
+            return value[place]
+        if isinstance(value, list):
+            return [part(each) for each in value]
+        if isinstance(value, tuple):
+            return tuple(part(each) for each in value)
+        return value
+
+    whole: Any = record
+    return replace(whole, **{each.name: part(getattr(whole, each.name)) for each in fields(whole)})
+
+
+# --- Results that are kept for the next time, by the content of what they were made from ----------
+#
+# For functions whose result depends on nothing but their arguments. The key is a hash of all of
+# these, arrays included: a changed number is another key, so what is kept can be old, but not
+# wrong.
+
 
 _Result = TypeVar("_Result")
 

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.rig.skin import radii_of_skin
+from octo_motion.blender.rig.armature import radii_of_skin
 from octo_motion.blender.scene.grasp_target import hangs_on, may_move, read_form, read_places
 from octo_motion.core.errors import RigError
 from octo_motion.core.locomotion.octopus.shape import OctopusShape

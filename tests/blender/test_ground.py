@@ -10,8 +10,7 @@ import pytest
 
 from octo_motion.blender.animation import read_channels
 from octo_motion.blender.rig import may_stretch
-from octo_motion.blender.rig.armature import read_skeleton
-from octo_motion.blender.rig.skin import arm_skins
+from octo_motion.blender.rig.armature import arm_skins, read_skeleton
 from octo_motion.blender.scene.contact_markers import (
     Contact,
     markers,

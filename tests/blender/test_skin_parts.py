@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.blender.rig.skin import skin_parts
+from octo_motion.blender.rig.armature import skin_parts
 
 
 def head(tail: tuple[float, float, float]) -> Any:

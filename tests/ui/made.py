@@ -15,8 +15,7 @@ from octo_motion.core.locomotion.gait import Arm, GaitPoser, GaitTable
 from octo_motion.core.locomotion.ground import GroundedPoses, GroundedWalk
 from octo_motion.core.locomotion.motion import MotionPlan, MotionResult
 from octo_motion.core.locomotion.motion.pipeline import pose, with_half_frames
-from octo_motion.core.locomotion.motion.segments import Transitions
-from octo_motion.core.locomotion.motion.standing import Standing
+from octo_motion.core.locomotion.motion.segments import Standing, Transitions
 from octo_motion.core.locomotion.path import Route, Travel, TravelSettings, plan_travel
 from octo_motion.core.locomotion.rig import BodyFrame
 from octo_motion.core.skeleton import Skeleton

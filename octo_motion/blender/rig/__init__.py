@@ -5,6 +5,7 @@ from .armature import (
     ALIGNED,
     SUCKER_PROPERTY,
     active_armature,
+    arm_skins,
     armature_data,
     bone_and_property,
     carrying_axes,
@@ -14,16 +15,20 @@ from .armature import (
     linked_names,
     may_stretch,
     pose_of,
+    radii_of_skin,
     read_skeleton,
     require_editable,
     select_pose_bones,
     selected_bones,
+    skin_key,
+    skin_parts,
+    vertex_positions,
     world_directions,
     world_matrix,
+    world_of,
 )
 from .puppet import Puppet
 from .puppet_reading import bone_materials, is_part_of, mark_bones, read_rig, set_bone_material
-from .skin import arm_skins, radii_of_skin, skin_key, skin_parts, vertex_positions
 
 __all__ = [
     "ALIGNED",
@@ -55,4 +60,5 @@ __all__ = [
     "vertex_positions",
     "world_directions",
     "world_matrix",
+    "world_of",
 ]

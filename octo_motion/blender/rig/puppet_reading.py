@@ -31,8 +31,7 @@ from ...core.posing.puppet import (
 )
 from ...core.rotations import Floats, from_matrix
 from ...core.skeleton import Skeleton
-from .armature import armature_data, driven_channels, pose_of, read_skeleton
-from .skin import vertex_positions
+from .armature import armature_data, driven_channels, pose_of, read_skeleton, vertex_positions
 
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""

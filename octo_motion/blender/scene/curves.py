@@ -21,8 +21,7 @@ from numpy.typing import ArrayLike
 from ...core.errors import RouteError
 from ...core.locomotion.path import Route, s_bend
 from ...core.rotations import Floats, normalized
-from ..rig import armature_data
-from .surfaces import world_of
+from ..rig import armature_data, world_of
 
 LONGEST: Final = -1
 """Index that stands for the longest spline of a curve."""
@@ -165,7 +164,7 @@ def _check_type(curve: bpy.types.Object) -> None:
 
 def _longest(lines: Sequence[_Line], world: Floats, name: str) -> Route:
     best: Route | None = None
-    reason = RouteError(f"The curve '{name}' has no splines.", _ADD_POINTS)
+    reason: RouteError | None = None
     for line in lines:
         try:
             route = line.route(world)
@@ -175,7 +174,7 @@ def _longest(lines: Sequence[_Line], world: Floats, name: str) -> Route:
         if best is None or route.length > best.length:
             best = route
     if best is None:
-        raise reason
+        raise reason or RouteError(f"The curve '{name}' has no splines.", _ADD_POINTS)
     return best
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from ...core.errors import RigError
 from ...core.rotations import Floats, continuous, from_matrix
 from ..animation import curves_of, is_generated, note_of, time_kept
-from ..rig import vertex_positions
-from .surfaces import world_of
+from ..rig import vertex_positions, world_of
 
 WITH_SURFACE: Final = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 """Types of objects that can have faces."""

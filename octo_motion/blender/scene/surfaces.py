@@ -8,35 +8,13 @@ from typing import Any, Final
 import bmesh
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Vector
 
 from ...core.content_cache import ContentCache, content_key
 from ...core.errors import GroundError, RigError
 from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from ...core.rotations import Floats, from_matrix
-from ..rig import vertex_positions
-
-_SAME = 1e-5
-"""Share of its largest number by which a matrix may be off another, in single precision."""
-
-
-def world_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Matrix:
-    """World matrix of an object, which may be disabled in viewports, or excluded.
-
-    Blender leaves such an object's own world matrix as it was long ago, of a file that was opened
-    even at the origin, and does not always tell so: what a setting points at counts as evaluated.
-    So its transform and its parents' are put together here. Where something else moves it,
-    Blender's matrix is all there is.
-    """
-    evaluated = obj.evaluated_get(depsgraph)
-    if len(obj.constraints) > 0 or obj.rigid_body is not None or obj.parent_type != "OBJECT":
-        return evaluated.matrix_world
-    own = obj.matrix_basis
-    if obj.parent is not None:
-        own = world_of(obj.parent, depsgraph) @ obj.matrix_parent_inverse @ own
-    away = np.abs(np.array(evaluated.matrix_world) - np.array(own)).max()
-    # The same but for rounding: what others compute from it must not change in the last digit.
-    return evaluated.matrix_world if away <= _SAME * np.abs(np.array(own)).max() else own
+from ..rig import vertex_positions, world_of
 
 
 def is_enabled(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:

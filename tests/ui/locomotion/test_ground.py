@@ -13,8 +13,8 @@ from octo_motion.core.errors import GroundError
 from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
-from octo_motion.ui.locomotion.settings import ground as ground_properties
-from octo_motion.ui.locomotion.settings.ground import (
+from octo_motion.ui.locomotion.settings import lists as ground_properties
+from octo_motion.ui.locomotion.settings.lists import (
     ContactEdit,
     changed_by_hand,
     read_overrides,

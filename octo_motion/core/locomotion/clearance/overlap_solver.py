@@ -21,7 +21,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from ...array_parts import part_of
+from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from ...array_parts import part_of
+from ...content_cache import part_of
 from ...rotations import Floats, components_first, conjugate, rotate
 from ...rotations.components_first import cumulative_sum, dot
 from ..rig import ArmSkin, JointRoom

@@ -23,7 +23,7 @@ from typing import Final
 
 import numpy as np
 
-from ...array_parts import part_of
+from ...content_cache import part_of
 from ...rotations import Floats, components_first
 from ...rotations.components_first import dot
 from ...smoothing import least_jerk, smooth_step

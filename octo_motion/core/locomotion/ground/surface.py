@@ -14,8 +14,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from ...array_parts import part_of
-from ...content_cache import ContentCache, content_key
+from ...content_cache import ContentCache, content_key, part_of
 from ...errors import GroundError
 from ...rotations import Floats
 from ...settings import check_settings, setting

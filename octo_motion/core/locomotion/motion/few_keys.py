@@ -51,10 +51,6 @@ class Motion:
     lying: Sequence[np.ndarray] = ()
     """For each arm (moments, joints) which rest on the ground, none where nothing does."""
 
-    def all(self) -> list[Channel]:
-        """Every channel, as one key per frame."""
-        return [*self.travel, *self.arms, *self.mantle, *self.stretch]
-
 
 def reduced(
     frames: Floats,

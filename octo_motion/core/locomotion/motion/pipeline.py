@@ -125,17 +125,18 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
     measured, overlaps = _measured(plan, on_frames, framed)
-    few: list[Channel] | None = None
+    # A key at every moment, unless fewer say the same.
+    channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.stretch]
     if reducing:
         yield moving
-        few = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
+        channels = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
         if measured is not None:
             travels = not plan.job.in_place
-            measured = measure_keyed(measured, creature, few, travels=travels)
+            measured = measure_keyed(measured, creature, channels, travels=travels)
     result = MotionResult(
         plan=plan,
-        channels=[*(few if few is not None else motion.all()), *plan.breath],
-        automatic=few is None,
+        channels=[*channels, *plan.breath],
+        automatic=not reducing,
         arms=arms,
         carried=carried,
         measured=measured,

@@ -49,8 +49,7 @@ from ..rig import (
     stretch_mantle,
 )
 from .job import ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
-from .segments import Gait, Segments, Transitions
-from .standing import Standing, stand
+from .segments import Gait, Segments, Standing, Transitions, stand
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 

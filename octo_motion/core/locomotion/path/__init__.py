@@ -21,9 +21,9 @@ from .gait_changes import (
     transitions_by_height,
     way_weights,
 )
-from .heading import Bearings
 from .route import Route, s_bend
 from .travel import (
+    Bearings,
     Travel,
     TravelSettings,
     bearings_of,

@@ -22,9 +22,8 @@ from ...smoothing import least_jerk
 from ..gait import CYCLE
 from ..rig import lift_to_floor
 from .gait_changes import GaitTransition
-from .heading import Bearings
 from .route import Route
-from .travel import Travel, TravelSettings, stroke_distance, travel_at, walked_at
+from .travel import Bearings, Travel, TravelSettings, stroke_distance, travel_at, walked_at
 
 
 class Line(Protocol):

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ...array_parts import part_of
+from ...content_cache import part_of
 from ...keyframes import halfway_values
 from ...rotations import Floats, conjugate, continuous, from_matrix, multiply, normalized, rotate
 from ...skeleton import Skeleton

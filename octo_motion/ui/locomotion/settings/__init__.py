@@ -2,7 +2,7 @@
 """What an artist sets, kept with the armature object."""
 
 from ...steps import own_classes
-from . import gait, ground, lists, properties
+from . import gait, lists, properties
 from .gait import (
     DEFAULT_GAIT,
     SIDES,
@@ -14,11 +14,16 @@ from .gait import (
     matched,
     used,
 )
-from .ground import (
+from .lists import (
+    AXES,
+    MODES,
+    ChangeItem,
     ContactEdit,
     ContactItem,
+    OCTO_MOTION_PG_change,
     OCTO_MOTION_PG_contact,
     Place,
+    ReachItem,
     changed_by_hand,
     note_shown,
     once_called,
@@ -26,7 +31,6 @@ from .ground import (
     read_overrides,
     store,
 )
-from .lists import AXES, MODES, ChangeItem, OCTO_MOTION_PG_change, ReachItem
 from .properties import (
     KIND_NAMES,
     KINDS,
@@ -40,7 +44,7 @@ from .properties import (
     write_figures,
 )
 
-CLASSES = own_classes(gait, ground, lists, properties)
+CLASSES = own_classes(gait, lists, properties)
 
 __all__ = [
     "AXES",

@@ -66,8 +66,11 @@ def _unused() -> Any:
 
 
 def _text(group: OCTO_MOTION_PG_gait_table) -> str:
+    preset = gait_presets().get(group.name)
+    if preset is None and not used(group.curves):
+        return ""
     try:
-        return gait_to_json(read_table(group, gait_presets().get(group.name)))
+        return gait_to_json(read_table(group, preset))
     except GaitError:
         return ""
 

@@ -23,8 +23,7 @@ from ....core.locomotion.path import TravelSettings
 from ... import declared_settings as props
 from ...declared_settings import declared, emptied, make_overridable
 from .gait import DEFAULT_GAIT, GaitName, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
-from .ground import OCTO_MOTION_PG_ground
-from .lists import ArmList, OCTO_MOTION_PG_change, Reaches
+from .lists import ArmList, OCTO_MOTION_PG_change, OCTO_MOTION_PG_ground, Reaches
 
 KINDS: Final = (
     ("SLIP", "Slip", "How far an arm slides over the ground that it holds, in arm lengths", 0),
