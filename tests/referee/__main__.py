@@ -214,6 +214,8 @@ def _tightened(
     """Limits never rise by themselves: what got worse is to be mended, or raised by hand."""
     found = {name: dict(kept) for name, kept in limits.items()}
     for name, row in rows.items():
+        if not row:
+            continue
         kept = found.setdefault(name, {})
         for key, figure in row.items():
             limit = limit_of(max(figure["value"], 0.0))

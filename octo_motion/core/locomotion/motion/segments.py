@@ -299,7 +299,7 @@ def _ground(
     return ground, ()
 
 
-# --- Segments: one for each gait along the way, and how arms go over from one to the next ----------
+# --- Segments: one for each gait along the way, and how arms go over from one to the next ---------
 #
 # A motion with one gait all the way is one segment. Where the gait changes, each arm is worked
 # out in both, goes over between two of its stances, and comes to rest in either meanwhile.
