@@ -20,6 +20,7 @@ LAYERS = ("core", "device", "blender", "ui", "command_line")
 
 def test_generate_passes_few_modules_and_hardly_climbs_back_up() -> None:
     bpy.ops.octo_motion.add_octopus(with_mesh=False)
+    octopus: Any = bpy.context.object
     bpy.ops.octo_motion.add_route()
     passed: set[str] = set()
     climbs: set[tuple[str, str]] = set()
@@ -44,6 +45,6 @@ def test_generate_passes_few_modules_and_hardly_climbs_back_up() -> None:
         bpy.ops.octo_motion.generate_locomotion()
     finally:
         sys.setprofile(None)
-    assert bpy.context.object.animation_data.action is not None
+    assert octopus.animation_data.action is not None
     assert len(passed) <= MODULES, sorted(passed)
     assert len(climbs) <= CLIMBS, sorted(climbs)
