@@ -489,6 +489,23 @@ def anchors(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_module_that_a_page_names_is_there(page: Path) -> None:
+    sources = [each.relative_to(REPOSITORY) for each in REPOSITORY.glob("octo_motion/**/*.py")]
+    rooms = {f"/{each.with_suffix('')}" for each in sources} | {
+        f"/{each.parent}" for each in sources
+    }
+    named = re.findall(r"`([a-z_]+(?:/[a-z_]+)+(?:\.py)?)`", text_of(page))
+    missing = [
+        name
+        for name in named
+        if not any(room.endswith(f"/{name.removesuffix('.py')}") for room in rooms)
+        and not any((each / name).exists() for each in (REPOSITORY, REPOSITORY / "octo_motion"))
+        and not name.startswith("build/")
+    ]
+    assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_link_and_picture_is_in_the_repository(page: Path) -> None:
     wrong = []
     for target in re.findall(r"\]\(([^)\s]+)\)", without_code(page)):
