@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -36,9 +37,11 @@ _DEEP: Final = 0.1
 Measured = dict[str, Any]
 
 
+_KINDS: Final = (("deepest", "9.2f"), ("share", "8.1f"), ("slip", "7.2f"), ("turn", "7.1f"))
+
+
 def main(words: list[str]) -> None:
     """Measure what the command line asks for, and print a table."""
-    import octo_motion
     from octo_motion.ui.locomotion.operators import setups
 
     parser = argparse.ArgumentParser(prog="python -m tests.bench apart", description=__doc__)
@@ -46,39 +49,90 @@ def main(words: list[str]) -> None:
     parser.add_argument("--route", choices=sorted(_ROUTES), default="curved", help="which way")
     parser.add_argument("--seeds", type=int, default=1, help="how many seeds, from 0; worst of all")
     arguments = parser.parse_args(words)
+    print(text(measure(arguments.names, arguments.route, arguments.seeds)))
+
+
+def measure(names: Sequence[str] = (), route: str = "curved", seeds: int = 1) -> list[Measured]:
+    """The worst of some seeds of each set-up and ground.
+
+    Args:
+        names: of set-ups; all if there is none.
+        route: one of the routes.
+        seeds: how many, from 0.
+    """
+    import octo_motion
+    from octo_motion.ui.locomotion.operators import setups
+
     octo_motion.register()
+    rows: list[Measured] = []
     try:
-        print(f"{'':>20} │{'overlaps: deepest':^19}│{'share of frames':^19}│", end="")
-        print(f"{'slip':^15}│{'turn':^15}│ seconds")
-        columns = "".join(f"{'off':>{w}}{'on':>{w}} │" for w in (9, 9, 7, 7))
-        print(f"{'set-up and ground':>20} │{columns}{'frames':>7}{'more':>6}")
-        for name in arguments.names or setups.ORDER:
+        for name in names or setups.ORDER:
             for ground in GROUNDS:
-                rows = [
-                    _both(name, ground, arguments.route, seed) for seed in range(arguments.seeds)
-                ]
-                if rows[0]:
-                    _show(f"{name}, {ground}", rows)
+                pairs = [_both(name, ground, route, seed) for seed in range(seeds)]
+                if pairs[0]:
+                    rows.append({"name": name, "ground": ground} | _worst(pairs))
     finally:
         # Blender 4.5 does not end while an operator is registered.
         octo_motion.unregister()
-    print(
-        "\ndeepest: radii of the thinner arm; share of frames: where overlaps are deeper than"
-        f" {_DEEP:g}"
-        "\nslip: per cent of an arm's length; turn: degrees from one frame to the next"
-        "\nmore: seconds that keeping apart adds"
+    return rows
+
+
+def _worst(pairs: list[tuple[Measured, ...]]) -> Measured:
+    """Without and with keeping apart, of all seeds."""
+    more = [on["seconds"] - off["seconds"] for off, on in pairs]
+    kinds = {
+        kind: [max(pair[which][kind] for pair in pairs) for which in (0, 1)] for kind, _ in _KINDS
+    }
+    return {"frames": pairs[0][0]["frames"], "more": float(np.median(more))} | kinds
+
+
+def text(rows: Any) -> str:
+    """The table."""
+    titles = (("overlaps: deepest", 19), ("share of frames", 19), ("slip", 15), ("turn", 15))
+    columns = "".join(f"{'off':>{w}}{'on':>{w}} │" for w in (9, 9, 7, 7))
+    lines = [
+        f"{'':>20} │" + "".join(f"{title:^{w}}│" for title, w in titles) + " seconds",
+        f"{'set-up and ground':>20} │{columns}{'frames':>7}{'more':>6}",
+    ]
+    for row in rows:
+        title = f"{row['name']}, {row['ground']}"
+        cells = ""
+        for kind, form in _KINDS:
+            percent = "%" * (kind == "share")
+            cells += "".join(f"{value:{form}}{percent}" for value in row[kind]) + " │"
+        lines.append(f"{title:>20} │{cells}{row['frames']:>7}{row['more']:>6.2f}")
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"deepest: radii of the thinner arm; share of frames: where deeper than {_DEEP:g}",
+            "slip: per cent of an arm's length; turn: degrees from one frame to the next",
+            "more: seconds that keeping apart adds",
+        ]
     )
 
 
-def _show(title: str, rows: list[tuple[Measured, ...]]) -> None:
-    print(f"{title:>20} │", end="")
-    for kind, form in (("deepest", "9.2f"), ("share", "8.1f"), ("slip", "7.2f"), ("turn", "7.1f")):
-        for which in (0, 1):
-            value = max(row[which][kind] for row in rows)
-            print(f"{value:{form}}" + "%" * (kind == "share"), end="")
-        print(" │", end="")
-    more = [row[1]["seconds"] - row[0]["seconds"] for row in rows]
-    print(f"{rows[0][0]['frames']:>7}{float(np.median(more)):>6.2f}", flush=True)
+def said(rows: Any) -> list[str]:
+    """What the table shows, in words."""
+    most = {kind: [max(row[kind][which] for row in rows) for which in (0, 1)] for kind, _ in _KINDS}
+    slip, turn = (max(row[kind][1] - row[kind][0] for row in rows) for kind in ("slip", "turn"))
+    left = [f"{row['name']} on {row['ground']}" for row in rows if row["share"][1] > 0.0]
+    frames = sum(row["frames"] for row in rows)
+    return [
+        f"With **Keep Apart** arms overlap by {most['deepest'][1]:.2f} radii at most, without by "
+        f"{most['deepest'][0]:.2f}. "
+        + (
+            f"Overlaps that count are left in {', '.join(left)}, at {most['share'][1]:.1f} % of "
+            "the frames at most. **Tell Overlaps** names them."
+            if left
+            else "None that counts is left."
+        ),
+        (
+            f"Slip grows by {max(slip, 0.0):.2f} per cent of an arm's length at most, the largest "
+            f"turn of a motion by {max(turn, 0.0):.1f}°."
+        ),
+        f"Keeping apart takes {sum(row['more'] for row in rows):.1f} s for all {frames} frames.",
+    ]
 
 
 def _both(name: str, ground: str, route: str, seed: int) -> tuple[Measured, ...]:

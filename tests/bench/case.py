@@ -1,91 +1,160 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One measurement, in a process of its own so that its peak of memory is its own.
 
-python -m tests.bench.case RESULT.json generate|bake bare|skin ARMS JOINTS FRAMES GAIT
+python -m tests.bench.case RESULT.json '{"way": "generate", "skin": false, "arms": 8, …}'
 """
 
 from __future__ import annotations
 
 import importlib
 import json
+import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
-import bpy
+if TYPE_CHECKING:
+    import bpy
 
-import octo_motion
-from octo_motion.blender.animation import actions
-from octo_motion.core.locomotion.gait import gait_poser as generator
-from octo_motion.ui.locomotion.writing import shot as workflow
-from tests.bench import blender_way, scene
-from tests.bench.stopwatch import Place, Stopwatch
+    from tests.bench.scene import Quality
+    from tests.bench.stopwatch import Place
 
-# A module of the same name as the function that its package hands out.
-computing = importlib.import_module("octo_motion.core.locomotion.motion.pipeline")
+Measured = dict[str, Any]
+Way = Literal["generate", "default", "ik", "spline"]
+"""Ours with nothing but targets to meet, ours as it comes, or Blender's constraints and bake."""
 
-PARTS: dict[str, list[Place]] = {
-    "read rig, route, settings": [(workflow, "prepare")],
-    "travel along the route": [(computing, "plan_travel"), (computing, "object_transforms")],
-    "gait angles and targets": [(generator.GaitPoser, "pose"), (generator, "pseudo_targets")],
-    "solve (CCD)": [(generator, "solve_ccd"), (generator, "asked_shape")],
-    "joints to bone rotations": [(generator, "rotate_bones")],
-    "values of the channels": [(computing, "_motion")],
-    "write keys": [(actions, "_write_curves")],
-    "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
-}
+
+@dataclass(frozen=True)
+class Case:
+    """What is measured."""
+
+    way: Way
+    frames: int
+    skin: bool = False
+    """Whether with the octopus's skin; *default* always is."""
+    arms: int = 8
+    joints: int = 12
+    gait: str = "walk"
+    look: bool = True
+    """Whether to look at how good the motion is, which takes longer than making it."""
 
 
 @dataclass
 class Result:
     """What one run showed."""
 
-    method: str
-    """"generate" is ours, "bake" Blender's."""
-    skin: bool
-    arms: int
-    joints: int
     frames: int
     seconds: float
     """Of the work itself: without starting Blender and building the scene."""
     cpu_seconds: float
-    quality: scene.Quality
     megabytes: float
     """Peak of the process while it worked."""
-    megabytes_before: float
-    """Peak before the work: Blender itself and the rig."""
+    quality: Quality | None
     parts: dict[str, float] = field(default_factory=dict)
     """Seconds by what they were spent on."""
 
 
-def run(method: str, arms: int, joints: int, frames: int, gait: str, *, skin: bool) -> Result:
-    """Build the scene and measure one way to animate it."""
-    armature = scene.build(arms, joints, frames, gait, skin=skin)
-    if method == "generate":
-        before = peak_megabytes()
-        watch = Stopwatch()
-        cpu, start = time.process_time(), time.perf_counter()
-        with watch.watching(PARTS), watch.measure("all else"):
-            bpy.ops.octo_motion.generate_locomotion()
-        seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
-        after = peak_megabytes()
-        wanted = scene.groups(armature)
-        parts = dict(watch.seconds)
+def measure(case: Case) -> Measured:
+    """Run a case in a process of its own; what ``Result`` has.
+
+    Raises:
+        SystemExit: it failed.
+    """
+    with tempfile.TemporaryDirectory(prefix="octo-motion-bench-") as folder:
+        path = Path(folder) / "result.json"
+        finished = subprocess.run(
+            [sys.executable, "-m", "tests.bench.case", str(path), json.dumps(asdict(case))],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if finished.returncode != 0 or not path.exists():
+            sys.exit(f"{case} failed:\n{finished.stderr}")
+        return json.loads(path.read_text(encoding="utf-8"))
+
+
+def fastest(case: Case, repeat: int) -> Measured:
+    """The fastest of some runs: whatever disturbs a measurement adds to its time."""
+    return min((measure(case) for _ in range(repeat)), key=lambda run: run["seconds"])
+
+
+def run(case: Case) -> Result:
+    """Build the scene and measure one way to animate it, in this process."""
+    from tests.bench import scene
+
+    sizes = (case.arms, case.joints, case.frames, case.gait)
+    if case.way == "default":
+        armature = scene.build_default(*sizes)
     else:
-        wanted = scene.groups(armature)
-        blender_way.rig_with_targets(armature, wanted, frames)
-        before = peak_megabytes()
-        cpu = time.process_time()
-        # On the bare rig Blender is given every advantage; with the skin it is as it comes.
-        seconds = blender_way.bake(armature, wanted, frames, rotations_only=not skin)
-        cpu = time.process_time() - cpu
-        after = peak_megabytes()
-        parts = {}
-    shown = scene.quality(armature, wanted, frames)
-    return Result(
-        *(method, skin, arms, joints, frames, seconds, cpu, shown, after, before), parts=parts
-    )
+        armature = scene.build(*sizes, skin=case.skin)
+    result = _generated() if case.way in ("generate", "default") else _baked(armature, case)
+    if case.way == "default":
+        settings: Any = armature.octo_motion.locomotion
+        first, last = settings.result.frame_range
+        result.frames = round(last - first) + 1
+    else:
+        result.frames = case.frames
+        if case.look:
+            result.quality = scene.quality(armature, scene.groups(armature), case.frames)
+    return result
+
+
+def _generated() -> Result:
+    import bpy
+
+    from tests.bench.stopwatch import Stopwatch
+
+    operators: Any = bpy.ops.octo_motion
+    watch, places = Stopwatch(), _places()
+    cpu, start = time.process_time(), time.perf_counter()
+    with watch.watching(places), watch.measure("all else"):
+        operators.generate_locomotion()
+    seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
+    return Result(0, seconds, cpu, peak_megabytes(), None, dict(watch.seconds))
+
+
+def _baked(armature: bpy.types.Object, case: Case) -> Result:
+    from tests.bench import blender_way, scene
+
+    wanted = scene.groups(armature)
+    if case.way == "ik":
+        blender_way.rig_with_targets(armature, wanted)
+    else:
+        blender_way.rig_with_curves(armature, scene.curves(armature))
+    cpu = time.process_time()
+    # On the bare rig Blender is given every advantage; with the skin it is as it comes.
+    seconds = blender_way.bake(armature, wanted, case.frames, rotations_only=not case.skin)
+    return Result(0, seconds, time.process_time() - cpu, peak_megabytes(), None)
+
+
+def _places() -> dict[str, list[Place]]:
+    """Functions by what they do, for the stopwatch."""
+    from octo_motion.blender.animation import actions
+    from octo_motion.core.locomotion.gait import gait_poser as generator
+    from octo_motion.core.locomotion.ground import walk
+    from octo_motion.ui.locomotion.writing import shot as workflow
+
+    # A module of the same name as the function that its package hands out.
+    computing = importlib.import_module("octo_motion.core.locomotion.motion.pipeline")
+    return {
+        "read rig, route, settings": [(workflow, "prepare")],
+        "plan: gaits, footholds": [(computing, "plan_motion")],
+        "travel along the route": [(computing, "plan_travel"), (computing, "object_transforms")],
+        "gait angles and targets": [(generator.GaitPoser, "pose"), (generator, "pseudo_targets")],
+        "solve (CCD)": [(generator, "solve_ccd"), (generator, "asked_shape")],
+        "joints to bone rotations": [(generator, "rotate_bones")],
+        "lay down what holds on": [(walk.GroundedWalk, "pose")],
+        "off the ground between frames": [(computing, "_cleared")],
+        "keep arms apart": [(computing, "_separate")],
+        "measure the figures": [(computing, "_measured"), (computing, "figures")],
+        "handles, few keys": [(computing, "_reduced"), (computing, "measure_keyed")],
+        "values of the channels": [(computing, "_motion")],
+        "write keys": [(actions, "_write_curves")],
+        "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
+    }
 
 
 def peak_megabytes() -> float:
@@ -100,10 +169,12 @@ def peak_megabytes() -> float:
 
 def main() -> None:
     """Run the case of the command line."""
-    path, method, skin, arms, joints, frames, gait = sys.argv[1:]
+    import octo_motion
+
+    path, asked = sys.argv[1:]
     octo_motion.register()
     try:
-        result = run(method, int(arms), int(joints), int(frames), gait, skin=skin == "skin")
+        result = run(Case(**json.loads(asked)))
     finally:
         # Blender 4.5 does not end while an operator is registered.
         octo_motion.unregister()

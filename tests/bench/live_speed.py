@@ -27,8 +27,8 @@ _CELLS: Final = 200
 Measured = dict[str, Any]
 
 
-def tables() -> list[Measured]:
-    """Measure, print, and give the numbers."""
+def measure() -> list[Measured]:
+    """In a process of its own."""
     with tempfile.TemporaryDirectory(prefix="octo-motion-bench-") as folder:
         path = Path(folder) / "result.json"
         finished = subprocess.run(
@@ -40,15 +40,22 @@ def tables() -> list[Measured]:
         if finished.returncode != 0 or not path.exists():
             sys.exit(f"Measuring live motion failed:\n{finished.stderr}")
         results: list[Measured] = json.loads(path.read_text(encoding="utf-8"))
-    print(f"The default octopus with its skin, {FRAMES} frames")
-    print(f"{'':>44} {'seconds':>9} {'slowest':>9} {'processor':>10}")
-    for each in results:
-        print(
-            f"{each['what']:<44} {each['seconds']:>9.2f} {each['slowest']:>9.2f} "
-            f"{each['cpu_seconds']:>10.2f}"
-        )
-    print("\nmedian of all changes; processor: by the processor's time, likewise\n", flush=True)
     return results
+
+
+def text(results: Any) -> str:
+    """The table."""
+    lines = [
+        f"The default octopus with its skin, {FRAMES} frames",
+        f"{'':>44} {'seconds':>9} {'slowest':>9} {'processor':>10}",
+    ]
+    lines += [
+        f"{each['what']:<44} {each['seconds']:>9.2f} {each['slowest']:>9.2f} "
+        f"{each['cpu_seconds']:>10.2f}"
+        for each in results
+    ]
+    note = f"median of {_CHANGES} changes; processor: by the processor's time, likewise"
+    return "\n".join([*lines, "", note])
 
 
 # --- One process ----------------------------------------------------------------------------------

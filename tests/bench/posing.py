@@ -16,6 +16,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -67,19 +68,36 @@ def main(words: Sequence[str]) -> None:
     parser.add_argument("--only", default="", help="of these, figures with this word in their name")
     parser.add_argument("--json", type=Path, help="file to write all numbers to")
     arguments = parser.parse_args(words)
-    report: dict[str, Any] = {}
     if arguments.random:
-        report["random"] = _random(arguments.random, arguments.only)
+        report = {"random": measure_torn(arguments.random, arguments.only)}
+        print(text_torn(report["random"]))
     else:
-        figures = {"doll": _doll(), "octopus": _octopus()}
-        rows: list[Measured] = []
-        for name, figure in figures.items():
-            rows += _ours(name, figure, arguments.steps)
-        rows += _mujoco(figures, arguments.steps)
-        _table(rows)
-        report["rows"] = [asdict(row) for row in rows]
+        report = {"rows": _steps(arguments.steps)}
+        print(text(report["rows"]))
     if arguments.json:
         arguments.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+def measure(*words: str) -> Any:
+    """What the command line would write to its file, on one core: in a process of its own."""
+    with tempfile.TemporaryDirectory(prefix="octo-motion-bench-") as folder:
+        path = Path(folder) / "result.json"
+        command = [sys.executable, "-m", "tests.bench", "posing", *words, "--json", str(path)]
+        finished = subprocess.run(
+            command, env=os.environ | _ONE_CORE, capture_output=True, text=True, check=False
+        )
+        if finished.returncode != 0 or not path.exists():
+            sys.exit(f"Measuring the puppet failed:\n{finished.stderr}")
+        (found,) = json.loads(path.read_text(encoding="utf-8")).values()
+        return found
+
+
+def _steps(steps: int) -> list[dict[str, Any]]:
+    figures = {"doll": _doll(), "octopus": _octopus()}
+    rows: list[Measured] = []
+    for name, figure in figures.items():
+        rows += _ours(name, figure, steps)
+    return [asdict(row) for row in rows + _mujoco(figures, steps)]
 
 
 def _doll() -> Figure:
@@ -141,7 +159,7 @@ def _middle_and_worst(seconds: Floats) -> tuple[float, float]:
 def _mujoco(figures: dict[str, Figure], steps: int) -> list[Measured]:
     found = subprocess.run([".ci/venv", "mujoco"], capture_output=True, text=True, check=False)
     if found.returncode != 0:
-        print("Without MuJoCo, which could not be set up:", found.stderr.strip().splitlines()[-1:])
+        _warn("could not be set up", found.stderr)
         return []
     asked = {
         "settle": _SETTLE,
@@ -156,7 +174,7 @@ def _mujoco(figures: dict[str, Figure], steps: int) -> list[Measured]:
         check=False,
     )
     if run.returncode != 0:
-        print("Without MuJoCo, which failed:", run.stderr.strip().splitlines()[-1:])
+        _warn("failed", run.stderr)
         return []
     answer = json.loads(run.stdout)
     rows: list[Measured] = []
@@ -168,6 +186,10 @@ def _mujoco(figures: dict[str, Figure], steps: int) -> list[Measured]:
             name += " (broke)"
         rows.append(Measured(name, len(figures[row["name"]]), row["contacts"], middle, worst, 0.0))
     return rows
+
+
+def _warn(what: str, why: str) -> None:
+    print(f"Without MuJoCo, which {what}:", *why.strip().splitlines()[-1:], file=sys.stderr)
 
 
 def _described(name: str, figure: Figure) -> dict[str, Any]:
@@ -189,18 +211,35 @@ def _described(name: str, figure: Figure) -> dict[str, Any]:
     }
 
 
-def _table(rows: list[Measured]) -> None:
-    print(f"{'':<58} {'bodies':>6} {'contacts':>8} {'median':>8} {'99 %':>8} {'processor':>9}")
+def text(rows: Any) -> str:
+    """The table of steps."""
+    lines = [f"{'':<62} {'bodies':>6} {'contacts':>8} {'median':>8} {'99 %':>8} {'processor':>9}"]
     for row in rows:
-        own = f"{1e6 * row.processor:>9.0f}" if row.processor else f"{'':>9}"
-        print(
-            f"{row.name:<58} {row.bodies:>6} {row.contacts:>8.1f} {1e6 * row.median:>8.0f}"
-            f" {1e6 * row.p99:>8.0f} {own}"
+        own = f"{1e6 * row['processor']:>9.0f}" if row["processor"] else f"{'':>9}"
+        lines.append(
+            f"{row['name']:<62} {row['bodies']:>6} {row['contacts']:>8.1f} "
+            f"{1e6 * row['median']:>8.0f} {1e6 * row['p99']:>8.0f} {own}".rstrip()
         )
-    print("\nµs a step; contacts: carried, in the mean; processor: median of its time\n")
+    note = "µs a step; contacts: carried, in the mean; processor: median of its time"
+    return "\n".join([*lines, "", note])
 
 
-def _random(steps: int, only: str) -> list[dict[str, Any]]:
+def said(rows: Any) -> list[str]:
+    """What the table shows, in words."""
+    result = []
+    for row in rows:
+        figure, _, way = row["name"].partition(", lying, ")
+        if not way:
+            continue
+        lying = next(each for each in rows if each["name"] == f"{figure}, lying on the floor")
+        result.append(
+            f"{way} steps the {figure} in {row['median'] / lying['median']:.2f} times the time "
+            "that ours takes."
+        )
+    return [" ".join(result)] if result else ["MuJoCo could not be set up in this run."]
+
+
+def measure_torn(steps: int, only: str = "") -> list[dict[str, Any]]:
     """Grabs, pulls and pins at random, among a floor, a box and a ball."""
     rng = np.random.default_rng(0)
     kinds = {
@@ -230,20 +269,34 @@ def _random(steps: int, only: str) -> list[dict[str, Any]]:
                 _tell(name, found, time.perf_counter() - start)
         seconds = time.perf_counter() - start
         results.append({"name": name, "seconds": seconds, **asdict(found)})
-    print(
-        "\nfigure                      steps  opening  broken  m/s  energy J  gain J  limits °    s"
-    )
-    for row in results:
-        print(
-            f"{row['name']:<24} {row['steps']:>8} {row['widest']:>8.0e} {row['broken']:>7}"
-            f" {row['fastest']:>4.0f} {row['energy']:>9.0f} {row['gain']:>7.0e}"
-            f" {np.degrees(row['overrun']):>9.1f} {row['seconds']:>5.0f}"
-        )
-    print(
-        "\nopening: of a joint, against its bone; broken: steps with a number that is not finite;"
-        "\ngain: of energy in a step in which no hand held it; limits: how far beyond its range\n"
-    )
     return results
+
+
+def text_torn(results: Any) -> str:
+    """The table of figures that were torn at."""
+    lines = [
+        (
+            f"{'figure':<24} {'steps':>8} {'unsettled':>10} {'opening':>8} {'broken':>7} {'m/s':>5}"
+            f" {'energy J':>9} {'gain J':>7} {'limits °':>9} {'ms/step':>8}"
+        )
+    ]
+    lines += [
+        f"{row['name']:<24} {row['steps']:>8} {row['unsettled'] / row['steps']:>10.1%}"
+        f" {row['widest']:>8.0e} {row['broken']:>7} {row['fastest']:>5.0f} {row['energy']:>9.0f}"
+        f" {row['gain']:>7.0e} {np.degrees(row['overrun']):>9.1f}"
+        f" {1000.0 * row['seconds'] / row['steps']:>8.1f}"
+        for row in results
+    ]
+    return "\n".join(
+        [
+            *lines,
+            "",
+            "unsettled: steps that wanted more linear systems than are allowed",
+            "opening: of a joint, against its bone; broken: steps with a number that is not finite",
+            "gain: of energy in a step in which no hand held it; limits: how far beyond its range",
+            "ms/step: checks included",
+        ]
+    )
 
 
 def _tell(name: str, found: Torn, seconds: float) -> None:
@@ -251,6 +304,7 @@ def _tell(name: str, found: Torn, seconds: float) -> None:
         f"{seconds:>6.0f} s  {name}: {found.steps} steps, {found.unsettled} unsettled,"
         f" opening {found.widest:.0e}, {found.broken} broken, {found.fastest:.0f} m/s,"
         f" {found.energy:.0f} J, gained {found.gain:.0e} J in {found.alone} steps alone",
+        file=sys.stderr,
         flush=True,
     )
 

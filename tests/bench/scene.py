@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from octo_motion.core.locomotion.gait.ccd import (
     split_groups,
 )
 from octo_motion.core.locomotion.gait.table import gait_angles
+from octo_motion.core.locomotion.motion.planning import frames_of_arms
 from octo_motion.core.locomotion.path.travel import plan_travel
 from octo_motion.core.locomotion.rig.arm_chains import arm_azimuths, joint_positions
 from octo_motion.core.rotations import Floats, from_axis_angle, rotate
@@ -24,6 +26,9 @@ from tests.ui.made import prepare
 
 _CYCLE_FRAMES = 48
 """Two seconds at 24 frames a second: the default of the settings."""
+_METRES: Final = 0.45
+"""How far a route leads for each cycle."""
+_LENGTHS_TRIED: Final = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,30 +37,86 @@ class Group:
 
     bones: tuple[str, ...]
     """Root to end."""
+    arm: int
     arm_length: float
     targets: Floats
     """(frames, 3) in armature space."""
 
 
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """An arm as a curve."""
+
+    bones: tuple[str, ...]
+    """Root to tip."""
+    joints: Floats
+    """(frames, bones + 1, 3) in armature space."""
+
+
 def build(arms: int, joints: int, frames: int, gait: str, *, skin: bool) -> bpy.types.Object:
-    """An octopus and its settings, on a route so long that the gait has its usual tempo."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.octo_motion.add_octopus(arms=arms, joints=joints, with_mesh=skin)
-    armature = bpy.context.object
-    assert armature is not None
-    settings = armature.octo_motion.locomotion
-    settings.gait = gait
-    # Half an arm length of travel for each cycle: the stride does not matter to the cost.
-    reach = 0.3 * max(1.0, frames / _CYCLE_FRAMES)
-    controls = reach * np.array([(0, 0, 0), (0, -0.4, 0), (0.3, -0.6, 0), (0.3, -1, 0)])
-    settings.route = add_route_curve("Route", controls, bpy.context.scene.collection)
+    """An octopus that has nothing but targets to meet, from frame 1 to the last of so many."""
+    armature = _octopus(arms, joints, gait, skin=skin)
+    settings: Any = armature.octo_motion.locomotion
+    set_for_comparison(settings)
+    _lay_route(settings, frames / _CYCLE_FRAMES)
     settings.timing = "RANGE"
     settings.frame_start, settings.frame_end = 1, frames
-    # Steering would move the targets by a rule of our own; the comparison is about reaching them.
-    settings.turning = 0.0
-    settings.stand = False
-    settings.give = 0.0
     return armature
+
+
+def build_default(arms: int, joints: int, frames: int, gait: str) -> bpy.types.Object:
+    """An octopus as an artist gets it, skin and all settings, on a route for about so many frames.
+
+    How many there are follows from the route, for it starts and ends at rest.
+    """
+    armature = _octopus(arms, joints, gait, skin=True)
+    settings: Any = armature.octo_motion.locomotion
+    cycles = frames / _CYCLE_FRAMES
+    for _ in range(_LENGTHS_TRIED):
+        _lay_route(settings, cycles)
+        found = len(prepare(armature, bpy.context).frames)
+        if abs(found - frames) <= 1:
+            break
+        cycles *= frames / found
+    return armature
+
+
+def set_for_comparison(settings: Any) -> None:
+    """Leave of a walk what other ways to animate can do as well: arms that meet moving targets.
+
+    Each of these moves the arms away from the targets of the gait's formulas, or does something
+    that nothing does in the other ways: holding a ground, steering, smoothing over time, keeping
+    arms apart, spreading a bend over more joints than reach the target.
+    """
+    settings.ground.use = False
+    settings.stand = False
+    settings.keep_apart = settings.tell_overlaps = False
+    settings.steady = 0.0
+    settings.give = 0.0
+    settings.softness = 0.0
+    settings.turning = 0.0
+    settings.variation_min = settings.variation_max = 0.0
+    settings.breathing = 0.0
+
+
+def _octopus(arms: int, joints: int, gait: str, *, skin: bool) -> bpy.types.Object:
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    operators: Any = bpy.ops.octo_motion
+    operators.add_octopus(arms=arms, joints=joints, with_mesh=skin)
+    armature = bpy.context.object
+    assert armature is not None
+    settings: Any = armature.octo_motion.locomotion
+    settings.gait = gait
+    return armature
+
+
+def _lay_route(settings: Any, cycles: float) -> None:
+    """A route so long that the gait has its usual tempo for so many cycles."""
+    if settings.route is not None:
+        bpy.data.objects.remove(settings.route)
+    reach = _METRES * max(1.0, cycles)
+    controls = reach * np.array([(0, 0, 0), (0, -0.4, 0), (0.3, -0.6, 0), (0.3, -1, 0)])
+    settings.route = add_route_curve("Route", controls, bpy.context.scene.collection)
 
 
 def groups(armature: bpy.types.Object) -> list[Group]:
@@ -78,10 +139,26 @@ def groups(armature: bpy.types.Object) -> list[Group]:
         places = body.center + (joints[0] + rotate(outward, chain)) @ body.rotation.T
         ends = np.cumsum((0, *sizes))
         result += [
-            Group(arm.bones[ends[each] : ends[each + 1]], float(segments.sum()), places[:, each])
+            Group(
+                *(arm.bones[ends[each] : ends[each + 1]], number, float(segments.sum())),
+                targets=places[:, each],
+            )
             for each in range(len(sizes))
         ]
     return result
+
+
+def curves(armature: bpy.types.Object) -> list[Curve]:
+    """The arms as curves through all their joints, as ours shapes them over time."""
+    shot = prepare(armature, bpy.context)
+    for _ in shot.compute():
+        pass
+    frames = frames_of_arms(shot.skeleton, shot.arms, shot.body)
+    ends = np.cumsum([0, *(len(arm.bones) for arm in shot.arms)])
+    return [
+        Curve(arm.bones, arm.joints(arm.from_bones(np.ascontiguousarray(own))))
+        for arm, own in zip(frames, np.split(shot.rotations, ends[1:-1], axis=1), strict=True)
+    ]
 
 
 @dataclass(frozen=True)

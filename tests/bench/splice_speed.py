@@ -19,6 +19,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from tests.bench.comparison import parts_lines
+
 FRAMES: Final = (1000, 10_000)
 _PARTS: Final = ("LEGS", "RIGHT_ARM", "HEAD")
 _DRAGGED: Final = ("RIGHT_ARM", "LEFT_ARM", "LEGS", "LEGS with travel", "TRUNK", "HEAD")
@@ -49,32 +51,39 @@ class Result:
     """Milliseconds of a mouse move by part: the median, and the slowest."""
 
 
-def tables(repeat: int = 3) -> list[Measured]:
-    """Measure, print, and give the numbers."""
-    results = [
+def measure(repeat: int = 3) -> list[Measured]:
+    """The fastest of some runs of each number of frames."""
+    return [
         min((_measure(frames) for _ in range(repeat)), key=lambda each: each["seconds"])
         for frames in FRAMES
     ]
-    print(f"Splicing onto {results[0]['bones']} bones: legs with travel, an arm, the head")
-    print(
-        f"{'frames':>8} {'seconds':>9} {'processor':>10} {'anew':>9} {'ms/frame':>9} {'peak MB':>9}"
-    )
-    for each in results:
-        print(
-            f"{each['frames']:>8} {each['seconds']:>9.2f} {each['cpu_seconds']:>10.2f} "
-            f"{each['again']:>9.2f} "
-            f"{1000.0 * each['seconds'] / each['frames']:>9.2f} {each['megabytes']:>9.0f}"
-        )
-    longest = results[-1]
-    print(f"\nWhere the time of {longest['frames']} frames goes")
-    for label, seconds in sorted(longest["parts"].items(), key=lambda item: -item[1]):
-        print(f"{label:>28} {seconds:>7.2f} s {100.0 * seconds / longest['seconds']:>5.1f} %")
-    print(f"\nA move of the mouse while a timing is dragged, {results[0]['frames']} frames")
-    print(f"{'part':>20} {'median ms':>10} {'slowest':>9}")
-    for part, (median, slowest) in results[0]["drag"].items():
-        print(f"{part:>20} {median:>10.1f} {slowest:>9.1f}")
-    print(flush=True)
-    return results
+
+
+def text(results: Any) -> str:
+    """The tables."""
+    lines = [
+        f"Splicing onto {results[0]['bones']} bones: legs with travel, an arm, the head",
+        (
+            f"{'frames':>8} {'seconds':>9} {'processor':>10} {'anew':>9} "
+            f"{'ms/frame':>9} {'peak MB':>9}"
+        ),
+    ]
+    lines += [
+        f"{each['frames']:>8} {each['seconds']:>9.2f} {each['cpu_seconds']:>10.2f} "
+        f"{each['again']:>9.2f} "
+        f"{1000.0 * each['seconds'] / each['frames']:>9.2f} {each['megabytes']:>9.0f}"
+        for each in results
+    ]
+    lines += ["", *parts_lines(results[-1]), ""]
+    lines += [
+        f"A move of the mouse while a timing is dragged, {results[0]['frames']} frames",
+        f"{'part':>20} {'median ms':>10} {'slowest':>9}",
+    ]
+    lines += [
+        f"{part:>20} {median:>10.1f} {slowest:>9.1f}"
+        for part, (median, slowest) in results[0]["drag"].items()
+    ]
+    return "\n".join(lines)
 
 
 def _measure(frames: int) -> Measured:
@@ -230,7 +239,7 @@ def main() -> None:
     if len(sys.argv) != 3 or sys.argv[1].startswith("-"):
         parser = argparse.ArgumentParser(description=__doc__)
         parser.add_argument("--repeat", type=int, default=3, help="runs, the fastest counts")
-        tables(parser.parse_args().repeat)
+        print(text(measure(parser.parse_args().repeat)))
         return
     import octo_motion
 

@@ -11,10 +11,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TextIO
 
 import bpy
 import numpy as np
@@ -90,29 +92,48 @@ class Measured:
 def main(words: Sequence[str]) -> None:
     """Measure what the command line asks for, and print a table."""
     arguments = _arguments(words)
-    folders: list[Path] = arguments.folders or [EXAMPLES]
-    files = sorted({path for folder in folders for path in _files(folder, arguments.clips)})
-    # Blender tells of everything that it imports.
-    told = os.fdopen(os.dup(1), "w")
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    takes, left_out = _takes(files)
-    pairs = _pairs(takes, arguments.base)
-    print(
-        f"Blender {bpy.app.version_string}: {len(takes)} clips, {len(pairs)} pairs, "
-        f"{len(pairs) * len(PARTS_TOLD)} splices by each way\n",
-        file=told,
-    )
-    results = [each for base, other in pairs for each in measure(base, other)]
-    if arguments.each:
-        _print_each(results, told)
-    _print_table(results, told)
-    for reason in left_out:
-        print(f"Left out: {reason}", file=told)
-    told.flush()
+    with _quiet_blender() as told:
+        takes, left_out, results = _spliced(
+            arguments.folders or [EXAMPLES], arguments.base, arguments.clips
+        )
+        if arguments.each:
+            _print_each(results, told)
+        print(text(_summary(takes, left_out, results)), file=told)
     if arguments.json:
         arguments.json.parent.mkdir(parents=True, exist_ok=True)
         content = [asdict(each) for each in results]
         arguments.json.write_text(json.dumps(content) + "\n", encoding="utf-8")
+
+
+def summary(folders: Sequence[Path], bases: Sequence[str]) -> dict[str, Any]:
+    """What all clips of some folders come to on those bases whose names have one of these words."""
+    with _quiet_blender():
+        return _summary(*_spliced(folders, bases, ()))
+
+
+@contextmanager
+def _quiet_blender() -> Iterator[TextIO]:
+    """Blender tells of everything that it imports; what is printed to this is seen all the same."""
+    sys.stdout.flush()
+    shown = os.dup(1)
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    try:
+        with os.fdopen(os.dup(shown), "w") as told:
+            yield told
+    finally:
+        os.dup2(shown, 1)
+        os.close(shown)
+        os.close(silence)
+
+
+def _spliced(
+    folders: Sequence[Path], bases: Sequence[str], words: Sequence[str]
+) -> tuple[list[Take], list[str], list[Measured]]:
+    files = sorted({path for folder in folders for path in _files(folder, words)})
+    takes, left_out = _takes(files)
+    pairs = _pairs(takes, bases)
+    return takes, left_out, [each for base, other in pairs for each in measure(base, other)]
 
 
 def _arguments(words: Sequence[str]) -> argparse.Namespace:
@@ -268,66 +289,130 @@ def _lengthened(clip: Clip, seconds: float) -> Clip:
 _HEAD: Final = f"{'':>25} {'pairs':>5} │" + "│".join(f"{name:^42}" for name in METHODS) + "│"
 _COLUMNS: Final = f"{'miss: mean':>11}{'most':>7}{'seam':>7}{'slip mm':>9}{'99 %':>6}  "
 
+_LEGEND: Final = (
+    "miss: arms and legs: distance of hand or foot from where the clip has it, as seen from",
+    "  chest or pelvis, in per cent of the limb's length; trunk and head: degrees",
+    "seam: by how much a hand or foot is less smooth where the splice comes and goes than in",
+    "  the rougher clip (natural logarithm of the dimensionless jerk; median of all seams, 0 or",
+    "  less is as smooth)",
+    "slip: millimetres per frame that feet slide which stand in their own clip, on a body of",
+    "  1.7 m: median, and what 99 of 100 frames stay below",
+)
 
-def _print_table(results: Sequence[Measured], told: Any) -> None:
-    print(_HEAD, file=told)
-    print(f"{'':>25} {'':>5} │" + "│".join([_COLUMNS] * len(METHODS)) + "│", file=told)
+
+def _summary(
+    takes: Sequence[Take], left_out: Sequence[str], results: Sequence[Measured]
+) -> dict[str, Any]:
+    rows = []
     for same, title in ((True, "same skeleton"), (False, "other skeleton")):
         for part in PARTS_TOLD:
             chosen = [each for each in results if (each.part, each.same_skeleton) == (part, same)]
             if chosen:
-                _print_row(f"{title}, {part}", chosen, told)
-    print(
-        "\nmiss: arms and legs: distance of hand or foot from where the clip has it, as seen from "
-        "chest or pelvis,\n  in per cent of the limb's length; trunk and head: degrees"
-        "\nseam: by how much a hand or foot is less smooth where the splice comes and goes than in "
-        "the rougher clip\n  (natural logarithm of the dimensionless jerk; median of all seams, "
-        "0 or less is as smooth)"
-        "\nslip: millimetres per frame that feet slide which stand in their own clip, on a body of "
-        "1.7 m: median,\n  and what 99 of 100 frames stay below",
-        file=told,
-    )
+                rows.append({"title": f"{title}, {part}"} | _row(chosen))
     exact = [each for each in results if each.method == "exact"]
-    pairs = [pair for each in exact for pair in zip(each.path, each.beyond, strict=True)]
-    within = [miss for miss, beyond in pairs if beyond == 0.0]
-    if within:
-        print(
-            f"\n{100.0 * (1.0 - len(within) / len(pairs)):.1f} % of the points for hands and feet "
-            "are out of reach for the base's limbs. Of those within reach\n99 of 100 are missed by "
-            f"less than {100.0 * np.percentile(within, 99):.1f} % in exact, the mean is "
-            f"{100.0 * np.mean(within):.2f} %.",
-            file=told,
-        )
+    points = [pair for each in exact for pair in zip(each.path, each.beyond, strict=True)]
+    within = [miss for miss, beyond in points if beyond == 0.0]
+    assert within
+    return {
+        "blender": bpy.app.version_string,
+        "clips": len(takes),
+        "pairs": len({(each.base, each.splice) for each in results}),
+        "splices": len(exact),
+        "rows": rows,
+        "out_of_reach": 100.0 * (1.0 - len(within) / len(points)),
+        "within_most": 100.0 * float(np.percentile(within, 99)),
+        "within_mean": 100.0 * float(np.mean(within)),
+        "left_out": list(left_out),
+    }
 
 
-def _print_each(results: Sequence[Measured], told: Any) -> None:
-    groups: dict[tuple[str, str], list[Measured]] = {}
-    for each in results:
-        groups.setdefault((each.base, each.splice), []).append(each)
-    for (base, splice), chosen in groups.items():
-        print(f"{splice} on {base}", file=told)
-        for part in PARTS_TOLD:
-            _print_row(part, [each for each in chosen if each.part == part], told)
-    print(file=told)
-
-
-def _print_row(title: str, results: Sequence[Measured], told: Any) -> None:
-    cells = []
+def _row(results: Sequence[Measured]) -> dict[str, Any]:
+    """Figures by method; none where nothing was measured."""
+    row: dict[str, Any] = {"pairs": len({(each.base, each.splice) for each in results})}
     for method in METHODS:
         chosen = [each for each in results if each.method == method]
         misses = [100.0 * value for each in chosen for value in each.path]
         misses += [value for each in chosen for value in each.turn]
         jerks = [value for each in chosen for value in each.roughness]
         slips = [value for each in chosen for value in each.slip]
-        cells.append(
-            f"{np.mean(misses):>11.2f}{np.max(misses):>7.1f}{_quantile(jerks, 50, 7, 2)}"
-            f"{_quantile(slips, 50, 9, 1)}{_quantile(slips, 99, 6, 0)}  "
+        row[method] = {
+            "mean": float(np.mean(misses)),
+            "most": max(misses),
+            "seam": _quantile(jerks, 50),
+            "slip": _quantile(slips, 50),
+            "slip_most": _quantile(slips, 99),
+        }
+    return row
+
+
+def _quantile(values: Sequence[float], share: int) -> float | None:
+    return float(np.percentile(values, share)) if values else None
+
+
+def text(found: Any) -> str:
+    """The table of a summary."""
+    lines = [
+        f"{found['clips']} clips, {found['pairs']} pairs, {found['splices']} splices by each way",
+        "",
+        _HEAD,
+        f"{'':>25} {'':>5} │" + "│".join([_COLUMNS] * len(METHODS)) + "│",
+        *(_line(row["title"], row) for row in found["rows"]),
+        "",
+        *_LEGEND,
+        "",
+        f"{found['out_of_reach']:.1f} % of the points for hands and feet are out of reach for the",
+        (
+            f"base's limbs. Of those within reach 99 of 100 are missed by less than "
+            f"{found['within_most']:.1f} %"
+        ),
+        f"in exact, the mean is {found['within_mean']:.2f} %.",
+        *(f"Left out: {reason}" for reason in found["left_out"]),
+    ]
+    return "\n".join(lines)
+
+
+def said(found: Any) -> list[str]:
+    """What the table shows of both kinds of pairs, in words."""
+    rows = {row["title"]: row for row in found["rows"]}
+    legs, lines = rows.get("same skeleton, legs"), []
+    if legs:
+        lines.append(
+            "Between clips on one skeleton copied feet slide by "
+            f"{legs['copied']['slip']:.1f} mm a frame where they should stand, spliced ones with "
+            f"their travel by {legs['exact']['slip']:.1f} mm."
         )
-    pairs = len({(each.base, each.splice) for each in results})
-    print(f"{title:>25} {pairs:>5} │" + "│".join(cells) + "│", file=told)
+    for method in METHODS:
+        told = [
+            f"{part.replace('_', ' ')} {rows[title][method]['mean']:.1f} {unit}"
+            for part, unit in zip(PARTS_TOLD, ("%", "%", "%", "°", "°"), strict=True)
+            if (title := f"other skeleton, {part}") in rows
+        ]
+        if told:
+            lines.append(f"Between skeletons *{method}* is off in the mean: {', '.join(told)}.")
+    return lines
 
 
-def _quantile(values: Sequence[float], share: int, width: int, digits: int) -> str:
-    if not values:
-        return f"{'–':>{width}}"
-    return f"{np.percentile(values, share):>{width}.{digits}f}"
+def _print_each(results: Sequence[Measured], told: TextIO) -> None:
+    groups: dict[tuple[str, str], list[Measured]] = {}
+    for each in results:
+        groups.setdefault((each.base, each.splice), []).append(each)
+    for (base, splice), chosen in groups.items():
+        print(f"{splice} on {base}", file=told)
+        for part in PARTS_TOLD:
+            print(_line(part, _row([each for each in chosen if each.part == part])), file=told)
+    print(file=told)
+
+
+def _line(title: str, row: Any) -> str:
+    cells = []
+    for method in METHODS:
+        own = row[method]
+        cells.append(
+            f"{own['mean']:>11.2f}{own['most']:>7.1f}{_cell(own['seam'], 7, 2)}"
+            f"{_cell(own['slip'], 9, 1)}{_cell(own['slip_most'], 6, 0)}  "
+        )
+    return f"{title:>25} {row['pairs']:>5} │" + "│".join(cells) + "│"
+
+
+def _cell(value: float | None, width: int, digits: int) -> str:
+    return f"{'–':>{width}}" if value is None else f"{value:>{width}.{digits}f}"

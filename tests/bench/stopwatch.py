@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -49,9 +50,26 @@ class Stopwatch:
                 setattr(owner, name, original)
 
     def _watched(self, label: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        if inspect.isgeneratorfunction(function):
+            return self._watched_steps(label, function)
+
         @functools.wraps(function)
         def run(*arguments: Any, **named: Any) -> Any:
             with self.measure(label):
                 return function(*arguments, **named)
+
+        return run
+
+    def _watched_steps(self, label: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def run(*arguments: Any, **named: Any) -> Generator[Any, None, Any]:
+            steps = function(*arguments, **named)
+            while True:
+                with self.measure(label):
+                    try:
+                        step = next(steps)
+                    except StopIteration as finished:
+                        return finished.value
+                yield step
 
         return run
