@@ -23,7 +23,7 @@ CONTRACT_FRAMES: Final = 50
 CONTRACT_ERROR: Final = 1e-3
 """Arm lengths that any way may miss a target by at so many frames."""
 _REPEATED: Final = 2000
-"""Frames beyond which a case is run fewer times: other programs' moods even out within it."""
+"""Frames beyond which a case is run once: other programs' moods even out within it."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def _by_turns(options: Options, frames: int, *, skin: bool) -> dict[str, Measure
 
 
 def _runs(options: Options, frames: int) -> int:
-    return options.repeat if frames <= _REPEATED else max(1, options.repeat - 1)
+    return options.repeat if frames <= _REPEATED else 1
 
 
 def by_frames(options: Options) -> list[Measured]:

@@ -383,8 +383,8 @@ def said(found: Any) -> list[str]:
         )
     for method in METHODS:
         told = [
-            f"{part.replace('_', ' ')} {rows[title][method]['mean']:.1f} {unit}"
-            for part, unit in zip(PARTS_TOLD, ("%", "%", "%", "°", "°"), strict=True)
+            f"{part.replace('_', ' ')} {rows[title][method]['mean']:.1f}{unit}"
+            for part, unit in zip(PARTS_TOLD, (" %", " %", " %", "°", "°"), strict=True)
             if (title := f"other skeleton, {part}") in rows
         ]
         if told:

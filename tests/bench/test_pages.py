@@ -14,7 +14,7 @@ TEXTS = {
 }
 MEASURED = re.compile(
     r"\d[\d,]*\.\d|\d\s?(?:%|°|×|ms\b|µs\b|s\b|MB\b|mm\b|J\b)"
-    r"|\b(?:times as|(?:half|thirds?|fifths?|tenths?|twentieth|per cent) of)\b"
+    r"|\b(?:times as|(?:half|thirds?|fifths?|tenths?|twentieth) of)\b"
 )
 """What a figure looks like that somebody has measured: with a point, or with a unit."""
 
