@@ -62,6 +62,12 @@ class ModalJob(OctoOperator):
         """What is being done, for people, the share of it that is done being 0…1."""
         raise NotImplementedError
 
+    def give_up(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
+        """What Esc does."""
+        self._stop(context)
+        self.report({"INFO"}, self._stopped)  # type: ignore[attr-defined]
+        return {"CANCELLED"}
+
     def take_back(self) -> None:
         """Undo what the work has done so far."""
 
@@ -92,9 +98,7 @@ class ModalJob(OctoOperator):
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
         """One turn of the work. Everything but Esc has to wait."""
         if event.type == "ESC":
-            self._stop(context)
-            self.report({"INFO"}, self._stopped)  # type: ignore[attr-defined]
-            return {"CANCELLED"}
+            return self.give_up(context)
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         assert self._job is not None

@@ -285,7 +285,7 @@ def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
         (WALK + "limits = 3\n", "limits must be a table, such as { slip = 0.01 }, not 3."),
         (
             WALK + "limits = { slide = 0.01 }\n",
-            "limits: There is no figure 'slide'. Did you mean 'slip'? Valid: slip, depth, strain,",
+            "limits: There is no figure 'slide'. Did you mean 'slip'? Valid: slip, drift, depth,",
         ),
         (
             WALK + "limits = { slip = -0.01 }\n",

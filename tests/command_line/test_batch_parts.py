@@ -223,7 +223,7 @@ def test_limits_of_the_command_line_are_numbers_by_name() -> None:
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("slide=1", "There is no figure 'slide'. Did you mean 'slip'? Valid: slip, depth"),
+        ("slide=1", "There is no figure 'slide'. Did you mean 'slip'? Valid: slip, drift, depth"),
         ("slip=-1", "limits: slip must be a number of 0 or more, not '-1'."),
         ("slip=nan", "slip must be a number of 0 or more, not 'nan'."),
         ("turn=45°", "turn must be a number of 0 or more, not '45°'."),

@@ -32,7 +32,7 @@ from .poses import (
     show_pose,
     standing_of,
 )
-from .scene_playback import time_kept
+from .scene_playback import play_bones, time_kept
 
 __all__ = [
     "SCALE",
@@ -52,6 +52,7 @@ __all__ = [
     "lasting",
     "may_replace",
     "note_of",
+    "play_bones",
     "pose_values",
     "read_channels",
     "read_clip",

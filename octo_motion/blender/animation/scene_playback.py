@@ -9,7 +9,8 @@ one of our buttons.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -118,6 +119,44 @@ def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Flo
             bones[number] = buffer.reshape(count, 4, 4).transpose(0, 2, 1)
             world[number], own[number] = shown.matrix_world, shown.matrix_basis
     return bones, world, own
+
+
+def play_bones(
+    armature: bpy.types.Object, names: Sequence[str], moments: Floats, seconds: float
+) -> Floats:
+    """Where bones of an armature are in the world at the first of these moments.
+
+    The current scene is played through and put back to its frame; what has no keys yet survives.
+
+    Args:
+        armature: the armature object.
+        names: of its bones.
+        moments: frames, and between frames.
+        seconds: after which no further moment is begun.
+
+    Returns:
+        Matrices (moments, bones, 4, 4) of as many moments as there was time for, at least of one;
+        of none if the scene does not show the armature.
+    """
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    assert scene is not None
+    assert layer is not None
+    # What was keyed a moment ago is not yet what shows: it is to be that which is kept.
+    layer.update()
+    until = time.monotonic() + seconds
+    found: list[Floats] = []
+    with _pose_kept(armature), time_kept(scene) as go_to:
+        for moment in moments:
+            go_to(float(moment))
+            shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            if not shown.is_evaluated or shown.pose is None:
+                break
+            bones = shown.pose.bones
+            own = np.array([bones[name].matrix for name in names], dtype=np.float64)
+            found.append(np.array(shown.matrix_world, dtype=np.float64) @ own)
+            if time.monotonic() >= until:
+                break
+    return np.array(found).reshape(-1, len(names), 4, 4)
 
 
 @contextmanager

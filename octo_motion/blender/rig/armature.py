@@ -211,6 +211,39 @@ def carrying_axes(bone: bpy.types.Bone) -> Matrix:
     return axes if bone.parent is None else bone.parent.matrix_local.to_3x3().inverted() @ axes
 
 
+def may_play_otherwise(armature: bpy.types.Object, bones: Iterable[str]) -> bool:
+    """Whether bones may play otherwise than their keys and those of their object say.
+
+    Constraints or drivers of theirs and of what carries them make it so, inverse kinematics
+    anywhere, and NLA tracks. Constraints count that have no influence now: they may get one.
+    """
+    if armature.pose is None or armature_data(armature).pose_position == "REST":
+        return False
+    pose = armature.pose.bones
+    moved = {each.name for name in bones for each in (pose[name], *pose[name].parent_recursive)}
+    if any(
+        not constraint.mute and (bone.name in moved or constraint.type in {"IK", "SPLINE_IK"})
+        for bone in pose
+        for constraint in bone.constraints
+    ):
+        return True
+    if any(name in moved for name, _, _ in driven_channels(armature)):
+        return True
+    data = armature.animation_data
+    tracks = data.nla_tracks if data is not None and data.use_nla else ()
+    if any(len(track.strips) > 0 and not track.mute for track in tracks):
+        return True
+    return is_driven_object(armature) or _hangs_on_moving(armature)
+
+
+def _hangs_on_moving(obj: bpy.types.Object) -> bool:
+    """Whether constraints move an object, or anything its parents."""
+    if any(not each.mute for each in obj.constraints):
+        return True
+    parent = obj.parent
+    return parent is not None and (parent.animation_data is not None or _hangs_on_moving(parent))
+
+
 # --- What the list of arms needs of an armature object --------------------------------------------
 
 

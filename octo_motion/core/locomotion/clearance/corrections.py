@@ -298,10 +298,11 @@ class BodyVolume:
         if worst is None or worst.depth <= DEEP:
             return ()
         share = 100.0 * float(np.mean(found.depths > DEEP))
+        part = f"{share:.0f} %" if share >= 1.0 else "less than 1 %"
         told = (
             f"'{worst.first}' passes through '{worst.second}' at frame "
             f"{frames[worst.frame * every]:.0f}, by {worst.depth:.1f} of the radius; something "
-            f"overlaps at {share:.0f} % of the frames."
+            f"overlaps at {part} of the frames."
         )
         return (told,)
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The figures of a whole motion: the worst of each kind, with its frame and its arm.
 
-Arms on the ground are looked at on every frame and half way between frames: a foot that is right
-on both may slide in between, where the way from one key to the next is no arc.
+They are taken from what was computed, or from what Blender plays of it where constraints, drivers
+and the like make something else of the keys. Arms on the ground are looked at on every frame and
+half way between frames: a foot that is right on both may slide in between, where the way from one
+key to the next is no arc.
 """
 
 from __future__ import annotations
@@ -13,10 +15,10 @@ from typing import Final
 
 import numpy as np
 
-from ...rotations import Floats, angle_between, rotate
+from ...rotations import Floats, angle_between, conjugate, from_matrix, multiply, rotate
 from ..clearance import DEEP, Separation
 from ..ground import Ground
-from ..rig import ArmFrames, Poses, halfway_linear
+from ..rig import ArmFrames, ArmSkin, Poses, halfway_linear
 
 
 @dataclass(frozen=True)
@@ -49,18 +51,9 @@ def slip(joints: Floats, lying: np.ndarray, cycles: np.ndarray, lengths: Floats)
     return _worst(moved.max(axis=-1, initial=0.0) / lengths)
 
 
-def depth(joints: Floats, ground: Ground, lengths: Floats) -> Worst:
-    """How far a joint is below the ground, in arm lengths; negative if all are above.
-
-    The root is left out: it is the body's.
-
-    Args:
-        joints: (frames, arms, joints, 3) world.
-        ground: what they should be above of.
-        lengths: (arms,) in the units of the joints.
-    """
-    below = ground.height(joints[..., 1:, :]) - joints[..., 1:, 2]
-    return _worst(below.max(axis=-1) / lengths)
+def depth(below: Floats) -> Worst:
+    """How far skin is below the ground: (frames, arms, joints) arm lengths, negative above it."""
+    return _worst(below.max(axis=-1))
 
 
 def strain(strains: Floats) -> Worst:
@@ -92,14 +85,32 @@ def _worst(values: Floats) -> Worst:
     return Worst(float(values[sample, arm]), int(sample), int(arm))
 
 
-KINDS: Final = ("SLIP", "DEPTH", "STRAIN", "MISS", "TURN", "OVERLAP")
-"""What is measured: arm lengths that an arm slides over the ground that it holds, that its joints
-are below the ground, by which share a bone is longer or shorter than at rest, arm lengths that an
-arm is from its target or foothold, radians per frame that a bone turns, and radii by which arms
-pass through each other or the body."""
+KINDS: Final = ("SLIP", "DRIFT", "DEPTH", "STRAIN", "MISS", "TURN", "OVERLAP")
+"""What is measured: arm lengths that an arm slides over the ground that it holds, that what rests
+creeps over a whole hold, that skin is below the ground, by which share a bone is longer or shorter
+than at rest, arm lengths that an arm is from its target or foothold, radians per frame that a bone
+turns in the world, and radii by which arms pass through each other or the body."""
 
-TOLD: Final = {"SLIP": 0.01, "DEPTH": 0.005, "MISS": 1e-3, "OVERLAP": DEEP}
+TOLD: Final = {
+    "SLIP": 0.01,
+    "DRIFT": 0.02,
+    "DEPTH": 0.005,
+    "MISS": 1e-3,
+    "TURN": np.radians(60.0),
+    "OVERLAP": DEEP,
+}
 """From where on a figure is too bad to pass without a word."""
+
+_BREAKS: Final = {"DEPTH": 0.05, "TURN": np.radians(60.0)}
+"""From where on the motion is broken there."""
+_SAID: Final = {
+    "SLIP": "'{arm}' slips by {percent:.1f} % of its length at frame {frame}",
+    "DRIFT": "'{arm}' drifts by {percent:.1f} % of its length while it rests, at frame {frame}",
+    "DEPTH": "'{arm}' is {percent:.1f} % of its length below the ground at frame {frame}",
+    "TURN": "'{arm}' turns by {degrees:.0f}° at frame {frame}",
+}
+"""How what is too bad is told; misses and overlaps have sentences of their own."""
+_TINY: Final = 1e-12
 
 
 @dataclass(frozen=True)
@@ -114,6 +125,32 @@ class Figure:
     """Where it is worst; of what is worst between two frames the first."""
     arm: str
     """Name, of an overlap of both, "" where there is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """Arms as Blender plays them, with all that constraints and drivers make of their keys."""
+
+    joints: Sequence[Floats]
+    """For each arm (2 frames − 1, joints, 3) world: on frames and half way between them."""
+    orientations: Sequence[Floats]
+    """For each arm (2 frames − 1, bones, 4) of its bones, world."""
+
+
+def played_arm(matrices: Floats, length: float) -> tuple[Floats, Floats]:
+    """What :class:`Played` has of one arm.
+
+    Args:
+        matrices: (moments, bones, 4, 4) of its bones in the world, root to tip.
+        length: of the last one, in its own units.
+
+    Returns:
+        Joints (moments, bones + 1, 3) and orientations (moments, bones, 4).
+    """
+    heads, axes = matrices[..., :3, 3], matrices[..., :3, :3]
+    tip = heads[:, -1:] + length * axes[:, -1:, :, 1]
+    sizes = np.linalg.norm(axes, axis=-2, keepdims=True)
+    return np.concatenate([heads, tip], axis=1), from_matrix(axes / np.maximum(sizes, _TINY))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,60 +180,195 @@ class Measured:
     """At every how many frames overlaps were looked for."""
     halfway: Poses | None = None
     """Half way between frames (frames − 1); none where keys on every frame lead straight on."""
+    skins: Sequence[ArmSkin] | None = None
+    """Of each arm, none where nothing holds the ground."""
+    rate: float = 24.0
+    """Frames per second."""
+    stays: tuple[Floats, Floats] | None = None
+    """Location (3,) and orientation (4,) of an armature that plays in place; its poses are those
+    of one that goes along. None where it does."""
+    played: Played | None = None
+    """What Blender plays, none where that is what was computed."""
+
+    @property
+    def moments(self) -> Floats:
+        """(2 frames − 1,) frames, and half way between them."""
+        return _joined(self.frames, 0.5 * (self.frames[:-1] + self.frames[1:]))
 
 
 def figures(measured: Measured) -> tuple[Figure, ...]:
-    """The worst of each kind that applies, in the order of ``KINDS``."""
+    """The worst of each kind that applies, in the order of ``KINDS``.
+
+    What is played counts before what was computed, but for misses and overlaps.
+    """
     found: dict[str, Figure] = {}
 
-    def keep(kind: str, worst: Worst, names: Sequence[str], per_frame: int = 1) -> None:
+    def keep(kind: str, worst: Worst, name: str, per_frame: int = 1) -> None:
         before = found.get(kind)
         # What is no number is the worst of all.
         if before is None or worst.value > before.value or np.isnan(worst.value):
             frame = int(measured.frames[worst.sample // per_frame])
-            found[kind] = Figure(kind, max(worst.value, 0.0), frame, names[worst.arm])
+            found[kind] = Figure(kind, max(worst.value, 0.0), frame, name)
 
-    poses = measured.poses
-    if measured.ground is not None:
-        half = halfway_linear(poses) if measured.halfway is None else measured.halfway
-        for number, name in enumerate(measured.names):
-            joints, lying, cycles = _looked_at(measured, half, number)
-            length = np.array([measured.arms[number].length * measured.scale])
-            keep("SLIP", slip(joints, lying, cycles, length), [name], per_frame=2)
-            keep("DEPTH", depth(joints, measured.ground, length), [name], per_frame=2)
-        keep("STRAIN", strain(poses.strains), _owners(measured))
-    keep("MISS", miss(measured.misses), measured.names)
-    if len(measured.frames) > 1:
-        keep("TURN", change(poses.rotations, measured.frames), _owners(measured))
+    numbers = range(len(measured.names))
+    body = np.mean([_root(measured, number)[::2] for number in numbers], axis=0)
+    for number, name in enumerate(measured.names):
+        arm = _moving(measured, number)
+        if len(measured.frames) > 1:
+            keep("TURN", change(arm.orientations[::2], measured.frames), name)
+        if measured.ground is None:
+            continue
+        length = measured.arms[number].length * measured.scale
+        going = _going(measured, arm.joints)
+        lying, cycles = _lying(measured, number)
+        keep("SLIP", slip(going[:, None], lying, cycles, np.array([length])), name, per_frame=2)
+        below = measured.ground.height(going[:, 1:]) - going[:, 1:, 2]
+        if measured.skins is not None:
+            skin, scale = measured.skins[number], measured.scale
+            below = _skin_below(below, skin, arm.orientations, scale, TOLD["DEPTH"] * length)
+        below /= length
+        keep("DEPTH", depth(below[:, None]), name, per_frame=2)
+        shown = arm.joints[::2] / length
+        rests = resting(shown[:, 1:], -below[::2], body / length, measured.rate)
+        keep("DRIFT", _worst(drifts(shown[:, 1:], rests, measured.rate)), name)
+        keep("STRAIN", strain(arm.strains), name)
+    for number, name in enumerate(measured.names):
+        keep("MISS", miss(measured.misses[:, number : number + 1]), name)
     if measured.separation is not None:
         found["OVERLAP"] = _overlap(measured.separation, measured)
     return tuple(found[kind] for kind in KINDS if kind in found)
 
 
-def _looked_at(
-    measured: Measured, half: Poses, number: int
-) -> tuple[Floats, np.ndarray, np.ndarray]:
+def warnings_for_figures(found: Sequence[Figure]) -> tuple[str, ...]:
+    """A sentence on what one would see, the worst first; none if one would not.
+
+    Misses and overlaps are left to :func:`~..motion.pipeline.warnings_for_misses` and
+    :meth:`~..clearance.BodyVolume.told`.
+    """
+    # What is no number is beyond any limit.
+    beyond = [each for each in found if each.kind in _SAID and not each.value <= TOLD[each.kind]]
+    if not beyond:
+        return ()
+    beyond.sort(key=lambda each: TOLD[each.kind] / each.value)
+    broken = any(not each.value <= _BREAKS.get(each.kind, np.inf) for each in beyond)
+    told = "; ".join(
+        _SAID[each.kind].format(
+            arm=each.arm,
+            percent=100.0 * each.value,
+            degrees=np.degrees(each.value),
+            frame=each.frame,
+        )
+        for each in beyond
+    )
+    return (f"The motion breaks: {told}." if broken else f"One sees that {told}.",)
+
+
+# --- Arms as they are played ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class _ArmMoving:
+    """One arm as it is seen to move."""
+
+    joints: Floats
+    """(2 frames − 1, joints, 3) world."""
+    orientations: Floats
+    """(2 frames − 1, bones, 4) of its bones, world."""
+    strains: Floats
+    """(frames, bones)"""
+
+
+def _places(measured: Measured, *, going: bool) -> tuple[Floats, Floats]:
+    """Locations (2 frames − 1, 3) and orientations (2 frames − 1, 4) of the armature, world.
+
+    Args:
+        measured: the motion.
+        going: whether one that stays is taken to go along.
+    """
+    poses, half = measured.poses, _half(measured)
+    locations = _joined(poses.locations, half.locations)
+    orientations = _joined(poses.orientations, half.orientations)
+    if going or measured.stays is None:
+        return locations, orientations
+    stays = measured.stays
+    return np.broadcast_to(stays[0], locations.shape), np.broadcast_to(stays[1], orientations.shape)
+
+
+def _half(measured: Measured) -> Poses:
+    return halfway_linear(measured.poses) if measured.halfway is None else measured.halfway
+
+
+def _root(measured: Measured, number: int) -> Floats:
+    """(2 frames − 1, 3) where an arm begins, as it is played."""
+    if measured.played is not None:
+        return measured.played.joints[number][:, 0]
+    locations, orientations = _places(measured, going=False)
+    return locations + rotate(orientations, measured.scale * measured.arms[number].root)
+
+
+def _moving(measured: Measured, number: int) -> _ArmMoving:
+    """An arm as it is played."""
+    arm, scale = measured.arms[number], measured.scale
+    if measured.played is not None:
+        joints = measured.played.joints[number]
+        strains = np.linalg.norm(np.diff(joints[::2], axis=1), axis=-1) / (scale * arm.lengths)
+        return _ArmMoving(joints, measured.played.orientations[number], strains - 1.0)
+    poses, half = measured.poses, _half(measured)
+    ends = np.cumsum([0, *(len(each.bones) for each in measured.arms)])
+    bones = slice(int(ends[number]), int(ends[number + 1]))
+    strains = _joined(poses.strains[:, bones], half.strains[:, bones])
+    turned = arm.rest.orientations(_joined(poses.rotations[:, bones], half.rotations[:, bones]))
+    own = scale * arm.joints(multiply(turned, arm.own), strains)
+    locations, orientations = _places(measured, going=False)
+    joints = locations[:, None] + rotate(orientations[:, None], own)
+    return _ArmMoving(joints, multiply(orientations[:, None], turned), strains[::2])
+
+
+def _skin_below(
+    below: Floats, skin: ArmSkin, orientations: Floats, scale: float, seen: float
+) -> Floats:
+    """Metres (moments, joints − 1) that skin is below the ground.
+
+    Args:
+        below: (moments, joints − 1) metres that joints are, but for the root.
+        skin: of the arm.
+        orientations: (moments, bones, 4) of its bones, world.
+        scale: metres of the armature's unit.
+        seen: metres from which on it matters that the skin may not be round.
+    """
+    found = below + scale * skin.radii[1:]
+    some = np.flatnonzero(found.max(axis=1) > seen)
+    if len(some):
+        down = rotate(conjugate(orientations[some]), np.array([0.0, 0.0, -1.0]))
+        reach = skin.seen_below(down)
+        reach[:, :-1, 1] = np.minimum(reach[:, :-1, 1], reach[:, 1:, 0])
+        found[some] = below[some] + scale * reach[..., 1]
+    return found
+
+
+def _going(measured: Measured, joints: Floats) -> Floats:
+    """Joints (2 frames − 1, joints, 3) in the world over whose ground they go: in place it goes by.
+
+    There they are as if the armature, which stays, went along.
+    """
+    if measured.stays is None:
+        return joints
+    location, orientation = measured.stays
+    locations, orientations = _places(measured, going=True)
+    own = rotate(conjugate(orientation), joints - location)
+    return locations[:, None] + rotate(orientations[:, None], own)
+
+
+def _lying(measured: Measured, number: int) -> tuple[np.ndarray, np.ndarray]:
     """One arm on every frame and half way between them.
 
     Returns:
-        Its joints in the world (moments, 1, joints, 3), which of them rest on the ground
-        (moments, 1, joints), and its cycles (moments, 1).
+        Which of its joints rest on the ground (moments, 1, joints), and its cycles (moments, 1).
     """
-    ends = np.cumsum([0, *(len(arm.bones) for arm in measured.arms)])
-    bones = slice(int(ends[number]), int(ends[number + 1]))
-    poses = measured.poses
-    rotations = _joined(poses.rotations[:, bones], half.rotations[:, bones])
-    strains = _joined(poses.strains[:, bones], half.strains[:, bones])
-    locations = _joined(poses.locations, half.locations)
-    orientations = _joined(poses.orientations, half.orientations)
-    arm = measured.arms[number]
-    own = arm.joints(arm.from_bones(rotations), strains)
-    joints = locations[:, None] + rotate(orientations[:, None], measured.scale * own)
-    # Half way it rests if it does so before and after.
     rests, cycle = measured.lying[number], measured.cycles[:, number : number + 1]
+    # Half way it rests if it does so before and after.
     still = rests[:-1] & rests[1:] & (cycle[:-1] == cycle[1:])
-    lying = _joined(rests, still)
-    return joints[:, None], lying[:, None], _joined(cycle, cycle[:-1])
+    return _joined(rests, still)[:, None], _joined(cycle, cycle[:-1])
 
 
 def _joined(values: np.ndarray, half: np.ndarray) -> np.ndarray:
@@ -215,7 +387,66 @@ def _overlap(separation: Separation, measured: Measured) -> Figure:
     return Figure("OVERLAP", max(float(deepest.depth), 0.0), frame, both)
 
 
-def _owners(measured: Measured) -> list[str]:
-    """The arm of each bone."""
-    pairs = zip(measured.names, measured.arms, strict=True)
-    return [name for name, arm in pairs for _ in arm.bones]
+# --- What rests on the ground as one sees it, and how far it creeps while it does -----------------
+#
+# Nothing of that knows gaits or footholds: a joint rests where its skin lies on the ground and is
+# not carried along. So a motion in place, whose arms hold nothing, is looked at as well.
+
+
+_NEAR: Final = 0.012
+"""Arm lengths over the ground: skin that is nearer lies on it."""
+_LONG: Final = 0.3
+"""Seconds: what lies for less is passing by."""
+_CARRIED: Final = 0.5
+"""Share of the body's speed: what is faster is taken along."""
+_CREEPING: Final = 0.1
+"""Arm lengths a second: what is slower rests, however slow the body is."""
+
+
+def resting(joints: Floats, over: Floats, body: Floats, rate: float) -> np.ndarray:
+    """Which joints of an arm rest (frames, joints).
+
+    A joint rests while it and its neighbours on the arm lie on the ground and it is slow, both from
+    the frame before and to the next.
+
+    Args:
+        joints: (frames, joints, 3) as they are played, arm lengths.
+        over: (frames, joints) how high their skin is over the ground, arm lengths.
+        body: (frames, 3) where the body is, arm lengths.
+        rate: frames per second.
+    """
+    steps = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
+    going = np.linalg.norm(np.diff(body, axis=0), axis=-1)
+    carried = steps > np.maximum(_CARRIED * going, _CREEPING / rate)[:, None]
+    moved = np.zeros(over.shape, dtype=bool)
+    moved[1:] |= carried
+    moved[:-1] |= carried
+    lying = np.pad(over < _NEAR, ((0, 0), (1, 1)), constant_values=True)
+    return lying[:, :-2] & lying[:, 1:-1] & lying[:, 2:] & ~moved
+
+
+def drifts(joints: Floats, rests: np.ndarray, rate: float) -> Floats:
+    """How far joints are from where they are in the middle of their hold (frames, joints).
+
+    0 where a joint does not rest, rests for less than an eye takes for a hold, or comes to rest or
+    leaves, where skin rolls on and off.
+
+    Args:
+        joints: (frames, joints, 3) as they are played.
+        rests: (frames, joints) which rest.
+        rate: frames per second.
+    """
+    # Joint by joint, with a frame between that does not rest.
+    row = np.pad(rests, ((1, 1), (0, 0))).T.ravel()
+    edges = np.flatnonzero(np.diff(row))
+    starts, ends = edges[::2] + 1, edges[1::2] + 1
+    long = ends - starts >= _LONG * rate
+    starts, ends = starts[long] + 1, ends[long] - 1
+    counts = np.maximum(ends - starts, 0)
+    middles = np.repeat(starts + counts // 2, counts)
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    held = np.repeat(starts, counts) + within
+    places = np.pad(joints, ((1, 1), (0, 0), (0, 0))).swapaxes(0, 1).reshape(-1, 3)
+    found = np.zeros(len(row))
+    found[held] = np.linalg.norm(places[held] - places[middles], axis=-1)
+    return found.reshape(rests.shape[1], -1).T[1:-1]

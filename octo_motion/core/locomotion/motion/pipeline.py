@@ -124,7 +124,7 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     motion = _motion(plan, arms, keyed, swimming)
     on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
-    measured, overlaps = _measured(plan, on_frames, framed)
+    measured, overlaps = _measured(plan, on_frames, framed, keyed)
     # A key at every moment, unless fewer say the same.
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.stretch]
     if reducing:
@@ -283,7 +283,7 @@ def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | N
 
 
 def _measured(
-    plan: MotionPlan, arms: ArmMotion, going: Travelled
+    plan: MotionPlan, arms: ArmMotion, going: Travelled, keyed: Travelled
 ) -> tuple[Measured | None, tuple[str, ...]]:
     """What figures are taken from, where they are wanted, and what overlaps in words."""
     job, creature, separation, every = plan.job, plan.job.creature, None, 1
@@ -307,6 +307,9 @@ def _measured(
         separation=separation,
         every=every,
         halfway=halfway_automatic(poses, cyclic=job.repeats),
+        skins=plan.standing[0].job.skins if plan.standing else None,
+        rate=job.timing.rate,
+        stays=(keyed[0][0], keyed[1][0]) if job.in_place else None,
     )
     return measured, overlaps
 

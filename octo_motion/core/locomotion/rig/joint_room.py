@@ -156,6 +156,19 @@ class ArmSkin:
         ends = np.stack([self.radii[:-1], self.radii[1:]], axis=-1)
         return self.reaches / np.maximum(ends, _TINY)[..., None]
 
+    def seen_below(self, down: Floats) -> Floats:
+        """How far the skin was seen to reach down at both ends of bones (…, bones, 2).
+
+        Armature units; :meth:`below` leaves room for what is not known.
+
+        Args:
+            down: (…, bones, 3) which way is down there, in the bones' rest frames.
+        """
+        seen = np.einsum("...bc,bac->...ba", down, self.across)
+        side = np.rint(np.arctan2(seen[..., 1], seen[..., 0]) / _SIDE).astype(np.int64) % _SIDES
+        reach = self.reaches[np.arange(len(self.across)), :, side]
+        return np.clip(reach, 0.0, np.stack([self.radii[:-1], self.radii[1:]], axis=-1))
+
     def below(self, down: Floats, first: int = 0) -> Floats:
         """How far the skin reaches down at both ends of bones (…, bones, 2), armature units.
 

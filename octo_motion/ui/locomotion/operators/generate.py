@@ -64,12 +64,21 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         except OctoMotionError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        return self.begin(context, self._shot.compute(), PATIENCE)
+        return self.begin(context, self._shot.make(), PATIENCE)
 
     def conclude(self, context: bpy.types.Context) -> None:  # noqa: ARG002
         assert self._shot is not None
-        self._tell(self._shot.write())
+        assert self._shot.summary is not None
+        self._tell(self._shot.summary)
         made(bpy.data.objects[self._shot.armature, None])  # type: ignore[index]
+
+    def give_up(self, context: bpy.types.Context) -> set[Any]:
+        """Change nothing; a motion that is there and only being measured stays."""
+        if self._shot is None or self._shot.summary is None:
+            return ModalJob.give_up(self, context)
+        self._finish(context)
+        self.report({"WARNING"}, "Not measured as it plays: Quality is that of its keys alone.")
+        return {"FINISHED"}
 
     def status(self, progress: float) -> str:
         return f"Generating locomotion: {100.0 * progress:.0f} %    Esc: stop"

@@ -22,7 +22,9 @@ from ..settings import (
 )
 
 _WORDS: Final = 0.7
-"""Share of a row that a figure and its arm need beside the button."""
+"""Share of a row that a figure needs beside the button."""
+_MARK: Final = "ERROR"
+"""Icon of a figure that is beyond its limit."""
 
 
 def shown(kind: str, value: float) -> str:
@@ -34,6 +36,12 @@ def shown(kind: str, value: float) -> str:
     percent = 100.0 * value
     # The aims are hundredths of a percent; of what is large nobody wants to know so much.
     return f"{percent:.2f} %" if percent < 1.0 else f"{percent:.1f} %"
+
+
+def _is_seen(item: Any) -> bool:
+    """Whether one sees that a figure is too bad."""
+    # What is no number is so.
+    return not item.value <= TOLD.get(item.kind, np.inf)
 
 
 def _told(item: Any) -> str:
@@ -91,15 +99,33 @@ class OCTO_MOTION_PT_quality(ArmaturePanel, bpy.types.Panel):
         armature = armature_in(context)
         return armature is not None and bool(known_figures(locomotion_settings(armature)))
 
+    def draw_header(self, context: bpy.types.Context) -> None:
+        """A mark that shows while the panel is closed, too."""
+        armature = armature_in(context)
+        figures = known_figures(locomotion_settings(armature)) if armature is not None else ()
+        if any(map(_is_seen, figures)):
+            assert self.layout is not None
+            self.layout.alert = True
+            self.layout.label(text="", icon=_MARK)
+
     def show(self, layout: Any, settings: Any) -> None:
-        """A row for each figure, with a button that goes to its frame."""
+        """A row for each figure, with a button that goes to its frame; what one sees is marked.
+
+        Whose it is stands below where it matters, else in the tooltip: a sidebar is narrow.
+        """
         column = layout.column(align=True)
         for item in known_figures(settings):
+            seen = _is_seen(item)
             row = column.split(factor=_WORDS, align=True)
             words = row.row()
-            words.alert = item.value > TOLD.get(item.kind, np.inf)
-            words.label(text=_told(item))
+            words.alert = seen
+            told = f"{KIND_NAMES[item.kind]}: {shown(item.kind, item.value)}"
+            words.label(text=told, icon=_MARK if seen else "BLANK1")
             jump = row.operator(
                 OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
             )
             jump.kind = item.kind
+            for arm in item.arm.split(", ") if seen and item.arm else ():
+                whose = column.row()
+                whose.alert = True
+                whose.label(text=arm, icon="BLANK1")

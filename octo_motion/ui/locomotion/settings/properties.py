@@ -27,10 +27,11 @@ from .lists import ArmList, OCTO_MOTION_PG_change, OCTO_MOTION_PG_ground, Reache
 
 KINDS: Final = (
     ("SLIP", "Slip", "How far an arm slides over the ground that it holds, in arm lengths", 0),
-    ("DEPTH", "Depth", "How far an arm's bones are below the ground, in arm lengths", 1),
+    ("DRIFT", "Drift", "How far what rests on the ground creeps while it does, in arm lengths", 6),
+    ("DEPTH", "Depth", "How far an arm's skin is below the ground, in arm lengths", 1),
     ("STRAIN", "Strain", "By how much a bone is longer or shorter than at rest, as a share", 2),
     ("MISS", "Miss", "How far an arm is from its target or foothold, in arm lengths", 3),
-    ("TURN", "Turn", "How far a bone turns from one frame to the next", 4),
+    ("TURN", "Turn", "How far a bone turns in the world from one frame to the next", 4),
     ("OVERLAP", "Overlap", "How deep arms pass through each other or the body, in radii", 5),
 )
 
@@ -43,8 +44,8 @@ class FigureItem(bpy.types.PropertyGroup):
     kind: props.EnumProperty(name="Kind", description="What was measured", items=KINDS)
     value: props.FloatProperty(
         name="Value",
-        description="Slip, depth and miss in arm lengths, strain as a share, turn in radians per "
-        "frame, overlap in radii",
+        description="Slip, drift, depth and miss in arm lengths, strain as a share, turn in "
+        "radians per frame, overlap in radii",
         precision=5,
     )
     frame: props.IntProperty(

@@ -9,21 +9,29 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import bpy
+import numpy as np
 
 from ....blender.animation import (
     SCALE,
     animated_bones,
     key_counts,
+    play_bones,
     read_object_channels,
     rest_bones,
     unedited_with_note,
     writable_armature,
     write_action,
 )
-from ....blender.rig import world_matrix
+from ....blender.rig import armature_data, may_play_otherwise, world_matrix
 from ....blender.scene import CARRIED, Contact, put_back, read_route, write_markers
 from ....core.errors import RouteError, WriteError
-from ....core.locomotion.metrics import Figure
+from ....core.locomotion.metrics import (
+    Figure,
+    Played,
+    figures,
+    played_arm,
+    warnings_for_figures,
+)
 from ....core.locomotion.motion import (
     Breathing,
     MotionJob,
@@ -36,6 +44,7 @@ from ....core.locomotion.motion import (
 )
 from ....core.locomotion.reaching import Carried
 from ....core.locomotion.rig import Detection
+from ....core.rotations import Floats
 from ...declared_settings import plain
 from ..reading import (
     bones_of,
@@ -63,6 +72,11 @@ from ..settings import (
     store,
     write_figures,
 )
+
+_PLAYING: Final = 0.7
+"""Share of the work that it takes to play a motion through, where that has to be."""
+_AT_ONCE: Final = 0.2
+"""Seconds that it is played for before one looks whether it is to go on."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +169,21 @@ class Shot:
     """The settings as JSON, kept with the action."""
     result: MotionResult | None = None
     """What :meth:`compute` has come to."""
+    summary: Summary | None = None
+    """What :meth:`write` has made."""
+
+    def make(self) -> Iterator[float]:
+        """Compute, write, and measure what plays, yielding the share that is done: 0…1.
+
+        Raises:
+            OctoMotionError: something is wrong that the user can put right; nothing has changed.
+        """
+        computing = 1.0 - _PLAYING * self._plays_otherwise()
+        for share in self.compute():
+            yield computing * share
+        self.write()
+        for share in self.measure():
+            yield computing + (1.0 - computing) * share
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
@@ -202,7 +231,7 @@ class Shot:
         write_figures(settings, made.figures)
         notes = self._extend_range(int(made.frames[-1]))
         keys, dense_keys = key_counts(action)
-        return Summary(
+        self.summary = Summary(
             gait=made.plan.first.table.name,
             manner=made.plan.first.table.manner,
             action=action.name,
@@ -213,10 +242,61 @@ class Shot:
             miss=made.miss,
             keys=keys,
             dense_keys=dense_keys,
-            warnings=made.warnings,
+            warnings=(*made.warnings, *warnings_for_figures(made.figures)),
             figures=made.figures,
             notes=(*notes, *made.notes),
         )
+        return self.summary
+
+    def measure(self) -> Iterator[float]:
+        """Take the figures from what plays, where that may be something else than was written.
+
+        Yields the share that is done; the scene is as it was found between any two steps.
+        """
+        made = self.result
+        if made is None or made.measured is None or not self._plays_otherwise():
+            return
+        arms = self.job.creature.arms
+        names = [name for arm in arms for name in arm.bones]
+        starts = np.cumsum([len(arm.bones) for arm in arms])[:-1]
+        moments = made.measured.moments
+        parts: list[list[tuple[Floats, Floats]]] = []
+        done = 0
+        while done < len(moments):
+            armature = bpy.data.objects.get((self.armature, None))
+            if armature is None:
+                return
+            bones = armature_data(armature).bones
+            matrices = play_bones(armature, names, moments[done:], _AT_ONCE)
+            if len(matrices) == 0:
+                return
+            parts.append(
+                [
+                    played_arm(own, bones[arm.bones[-1]].length)
+                    for arm, own in zip(arms, np.split(matrices, starts, axis=1), strict=True)
+                ]
+            )
+            done += len(matrices)
+            yield done / len(moments)
+        joints, orientations = (
+            [np.concatenate([part[number][which] for part in parts]) for number in range(len(arms))]
+            for which in range(2)
+        )
+        self._measured(figures(replace(made.measured, played=Played(joints, orientations))))
+
+    def _measured(self, found: tuple[Figure, ...]) -> None:
+        """Let these be the figures of what was written."""
+        assert self.result is not None
+        assert self.summary is not None
+        write_figures(locomotion_settings(bpy.data.objects[self.armature, None]), found)  # type: ignore[index]
+        warnings = (*self.result.warnings, *warnings_for_figures(found))
+        self.summary = replace(self.summary, figures=found, warnings=warnings)
+
+    def _plays_otherwise(self) -> bool:
+        """Whether more than keys moves the arms."""
+        armature = bpy.data.objects.get((self.armature, None))
+        names = [name for arm in self.job.creature.bones for name in arm]
+        return armature is not None and may_play_otherwise(armature, names)
 
     def _write_action(
         self,
@@ -301,9 +381,10 @@ def generate_locomotion(armature: bpy.types.Object, context: bpy.types.Context) 
         OctoMotionError: something is wrong that the user can put right; nothing has changed.
     """
     shot = prepare(armature, context)
-    for _ in shot.compute():
+    for _ in shot.make():
         pass
-    return shot.write()
+    assert shot.summary is not None
+    return shot.summary
 
 
 def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Shot:

@@ -9,10 +9,19 @@ import pytest
 
 from octo_motion.core.locomotion.clearance.capsule_overlap import Overlap, Separation
 from octo_motion.core.locomotion.ground.surface import LevelGround
-from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured, figures
+from octo_motion.core.locomotion.metrics.report import (
+    KINDS,
+    Figure,
+    Measured,
+    Played,
+    figures,
+    played_arm,
+    warnings_for_figures,
+)
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, ArmRest
+from octo_motion.core.locomotion.rig.joint_room import ArmSkin
 from octo_motion.core.locomotion.rig.poses import Poses
-from octo_motion.core.rotations import IDENTITY, from_axis_angle
+from octo_motion.core.rotations import IDENTITY, from_axis_angle, to_matrix
 
 COUNT = 5
 """Frames, from 10 on."""
@@ -159,3 +168,121 @@ def test_one_frame_is_measured_too() -> None:
         cycles=motion.cycles[:1],
     )
     assert set(found(one)) == set(KINDS) - {"TURN"}
+
+
+def test_a_bone_turns_in_the_world_whatever_turns_it() -> None:
+    motion = still()
+    # The body by 0.3, the bone above by 0.4, and it itself by 0.5, all about the same axis.
+    motion.poses.orientations[2:] = from_axis_angle(Y, np.array(0.3))
+    motion.poses.rotations[2:, 2] = from_axis_angle(Y, np.array(0.4))
+    motion.poses.rotations[2:, 3] = from_axis_angle(Y, np.array(0.5))
+    assert found(motion)["TURN"] == Figure("TURN", about(1.2), 11, "right")
+
+
+def round_skin(radius: float) -> ArmSkin:
+    """A tube about a straight arm."""
+    across = np.tile(np.eye(3)[1:], (2, 1, 1))
+    return ArmSkin(np.full(3, radius), across, np.full((2, 2, 72), radius))
+
+
+def test_depth_is_that_of_the_skin() -> None:
+    motion = replace(still(), skins=[round_skin(0.05), round_skin(0.15)])
+    assert found(motion)["DEPTH"] == Figure("DEPTH", about(0.05 / 2.0), 10, "right")
+
+
+def test_skin_that_is_flat_below_is_as_deep_as_it_reaches_there() -> None:
+    flat = round_skin(0.15)
+    flat.reaches[:] = 0.02
+    motion = replace(still(), skins=[flat, flat])
+    assert found(motion)["DEPTH"].value == 0.0
+    motion.poses.locations[3, 2] = 0.0
+    assert found(motion)["DEPTH"] == Figure("DEPTH", about(0.01), 13, "left")
+
+
+def creeping(count: int = 25, step: float = 0.004) -> Measured:
+    """A second in place, in which the body stays, and both arms lie and creep to the side."""
+    angle = step * np.arange(count) / 2.0
+    turned = poses(count)
+    turned.rotations[:, [0, 2]] = from_axis_angle(np.array([0.0, 0.0, 1.0]), angle)[:, None]
+    return replace(
+        still(),
+        frames=np.arange(10.0, 10.0 + count),
+        poses=turned,
+        misses=np.zeros((count, 2)),
+        lying=[np.zeros((count, 3), dtype=bool)] * 2,
+        cycles=np.zeros((count, 2), dtype=int),
+        skins=[round_skin(0.1), round_skin(0.1)],
+        stays=(np.array([0.0, 0.0, 0.1]), IDENTITY),
+    )
+
+
+def test_what_lies_on_the_ground_and_creeps_drifts_though_the_gait_holds_nothing() -> None:
+    told = found(creeping())
+    # Its ends left out, from the middle to either side eleven steps of the tip's.
+    assert told["DRIFT"] == Figure("DRIFT", about(2.0 * np.sin(0.011)), 11, "left")
+    assert told["SLIP"].value == 0.0
+
+
+def test_what_is_in_the_air_is_taken_along_or_is_soon_gone_does_not_drift() -> None:
+    motion = creeping()
+    motion.poses.locations[:, 2] = 0.2
+    assert found(replace(motion, stays=None))["DRIFT"].value == 0.0
+    # A tenth of an arm length a second is 0.0042 a frame.
+    assert found(creeping(step=0.02))["DRIFT"].value == 0.0
+    assert found(creeping(count=7))["DRIFT"].value == 0.0
+
+
+def test_what_goes_with_the_body_does_not_rest() -> None:
+    motion = replace(creeping(step=0.0), stays=None)
+    motion.poses.locations[:, 0] = 0.02 * np.arange(25)
+    assert found(motion)["DRIFT"].value == 0.0
+
+
+def test_what_is_played_counts_before_what_was_computed() -> None:
+    motion = still()
+    moments = np.arange(10.0, 14.1, 0.5)
+    np.testing.assert_array_equal(motion.moments, moments)
+    own = np.tile(np.eye(4), (len(moments), 2, 1, 1))
+    own[:, :, :3, 3] = [[0.0, 0.0, 0.1], [1.0, 0.0, 0.1]]
+    # Blender's bones lead along their Y.
+    own[:, :, :3, :3] = to_matrix(from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(-np.pi / 2)))
+    left = played_arm(own, 1.0)
+    np.testing.assert_allclose(left[0][0, 2], [2.0, 0.0, 0.1], atol=1e-12)
+    own = own.copy()
+    own[5:, 1, 2, 3] = -0.3
+    own[6:, 1, :3, :3] = 1.5 * np.eye(3)
+    right = played_arm(own, 1.0)
+    told = found(replace(motion, played=Played(*map(list, zip(left, right, strict=True)))))
+    assert told["DEPTH"] == Figure("DEPTH", about(0.15), 12, "right")
+    assert told["TURN"] == Figure("TURN", about(np.pi / 2.0), 12, "right")
+    assert told["SLIP"].arm == told["STRAIN"].arm == "right"
+
+
+def test_what_one_would_see_is_said_in_one_sentence_the_worst_first() -> None:
+    fine = [
+        Figure("SLIP", 0.01, 3, "A"),
+        Figure("TURN", 1.0, 3, "A"),
+        Figure("STRAIN", 9.0, 3, "A"),
+    ]
+    assert warnings_for_figures(fine) == ()
+    # Misses and overlaps have sentences of their own.
+    assert warnings_for_figures([Figure("MISS", 1.0, 3, "A"), Figure("OVERLAP", 1.0, 3, "A")]) == ()
+    seen = [
+        Figure("SLIP", 0.02, 4, "A"),
+        Figure("DRIFT", 0.1, 5, "B"),
+        Figure("DEPTH", 0.04, 6, "C"),
+    ]
+    assert warnings_for_figures(seen) == (
+        (
+            "One sees that 'C' is 4.0 % of its length below the ground at frame 6; 'B' drifts by "
+            "10.0 % of its length while it rests, at frame 5; 'A' slips by 2.0 % of its length at "
+            "frame 4."
+        ),
+    )
+    (told,) = warnings_for_figures([Figure("TURN", np.radians(89.0), 7, "D"), seen[0]])
+    assert told == (
+        "The motion breaks: 'A' slips by 2.0 % of its length at frame 4; 'D' turns by 89° at "
+        "frame 7."
+    )
+    (told,) = warnings_for_figures([Figure("DEPTH", np.nan, 7, "D")])
+    assert told.startswith("The motion breaks: 'D' is nan %")

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel tells is what one sees, as the referee does, who knows nothing of the add-on."""
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.referee import creature_measures as referee
+from tests.referee.recording import moments, record
+from tests.referee.scenes import Scene, build
+from tests.referee.surface import Surface
+
+SCENES = ("walk", "idle", "constrained walk")
+
+
+def constrained(scene: Scene) -> None:
+    """Let an arm hang down through the ground."""
+    hook = bpy.data.objects.new("Hook", None)
+    bpy.context.scene.collection.objects.link(hook)
+    hook.rotation_euler = (-np.pi / 2.0, 0.0, 0.0)
+    for name in scene.arms[2]:
+        scene.armature.pose.bones[name].constraints.new("COPY_ROTATION").target = hook
+    bpy.ops.octo_motion.generate_locomotion()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_panel_and_the_referee_agree(name: str, add_on: Any) -> None:  # noqa: ARG001
+    scene = build(name.removeprefix("constrained "), "plane")
+    if name.startswith("constrained"):
+        constrained(scene)
+    told = {each.kind: each for each in scene.armature.octo_motion.locomotion.figures}
+    played = record(scene.armature, moments(scene.start, scene.end))
+    length, surface = referee.arm_length(played, scene.arms), Surface.of(scene.ground)
+    turn = referee.turns(played)
+    drift = referee.resting(played, scene.arms, surface, length).drift
+    sink = referee.sink(played, surface, length).deepest
+    assert np.degrees(told["TURN"].value) == pytest.approx(turn.value, rel=0.02)
+    # It looks at the middles of bones, the panel at joints: ends of a hold differ a little.
+    assert told["DRIFT"].value == pytest.approx(drift.value, abs=0.003)
+    assert told["DEPTH"].value == pytest.approx(sink.value, rel=0.05, abs=0.002)
+    if name.startswith("constrained"):
+        assert told["DEPTH"].value > 0.2
