@@ -980,3 +980,28 @@ def test_a_rig_that_is_gone_at_the_end_is_told(long_job: tuple[Any, Any]) -> Non
     assert result == {"CANCELLED"}
     assert operator.reports == ["'Octopus' is gone. Generate again."]
     assert window.calls[-3:] == CLEAN
+
+
+def test_esc_while_it_is_measured_leaves_the_motion_that_is_there(
+    octopus: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.octo_motion.detect_arms()
+    bone = octopus.pose.bones[settings_of(octopus).arms[0].bones[-1].name]
+    bone.constraints.new("LIMIT_ROTATION")
+    monkeypatch.setattr("octo_motion.ui.locomotion.operators.generate.PATIENCE", 0.0)
+    monkeypatch.setattr("octo_motion.ui.locomotion.writing.shot._AT_ONCE", 0.0)
+    monkeypatch.setattr(ModalJob, "_turn", 0.0)
+    bpy.context.scene.frame_set(3)
+    operator, window = Operator(), Window()
+    operator.invoke(window, Press("LEFTMOUSE"))
+    while octopus.animation_data is None or octopus.animation_data.action is None:
+        assert operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}
+    for _ in range(3):
+        assert operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}
+        # Between two turns nothing is seen of it.
+        assert bpy.context.scene.frame_current == 3
+    assert operator.modal(window, Press("ESC")) == {"FINISHED"}
+    assert window.calls[-3:] == CLEAN
+    assert operator.reports[0].startswith("Walk of ")
+    assert operator.reports[-1].startswith("Not measured as it plays")
+    assert len(settings_of(octopus).figures) > 0

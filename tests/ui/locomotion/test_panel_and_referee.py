@@ -9,7 +9,7 @@ import pytest
 
 from tests.referee import creature_measures as referee
 from tests.referee.recording import moments, record
-from tests.referee.scenes import Scene, build
+from tests.referee.scenes import GROUNDS, Scene, build
 from tests.referee.surface import Surface
 
 SCENES = ("walk", "idle", "constrained walk")
@@ -42,3 +42,25 @@ def test_the_panel_and_the_referee_agree(name: str, add_on: Any) -> None:  # noq
     assert told["DEPTH"].value == pytest.approx(sink.value, rel=0.05, abs=0.002)
     if name.startswith("constrained"):
         assert told["DEPTH"].value > 0.2
+
+
+def test_a_cliff_that_breaks_the_walk_is_told_as_the_referee_sees_it(
+    add_on: Any,  # noqa: ARG001
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(GROUNDS, "cliff", lambda x, y: 2.0 * (x > 0.0) + 0.0 * y)
+    scene = build("walk", "cliff")
+    told = {each.kind: each for each in scene.armature.octo_motion.locomotion.figures}
+    played = record(scene.armature, moments(scene.start, scene.end))
+    turn = referee.turns(played)
+    assert turn.value > 60.0
+    assert np.degrees(told["TURN"].value) == pytest.approx(turn.value, rel=0.02)
+    # The turn to a frame is told with the one before.
+    assert told["TURN"].frame == turn.frame - 1
+    sink = referee.sink(played, Surface.of(scene.ground), referee.arm_length(played, scene.arms))
+    assert told["DEPTH"].value > 0.05
+    assert told["DEPTH"].value == pytest.approx(sink.deepest.value, rel=0.5)
+    said = capfd.readouterr().out
+    assert "The motion breaks: " in said
+    assert f"'{told['TURN'].arm}' turns by {turn.value:.0f}° at frame {turn.frame - 1:.0f}" in said

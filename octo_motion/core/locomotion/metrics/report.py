@@ -110,6 +110,10 @@ _SAID: Final = {
     "TURN": "'{arm}' turns by {degrees:.0f}° at frame {frame}",
 }
 """How what is too bad is told; misses and overlaps have sentences of their own."""
+_WAYS: Final = np.arange(1, 9) / 8.0
+"""Shares of how deep skin is below the ground, at which it is looked for a way out to the side."""
+_AT_ONCE: Final = 256
+"""Joints for which that is done at once, the deepest first."""
 _TINY: Final = 1e-12
 
 
@@ -227,7 +231,8 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
             skin, scale = measured.skins[number], measured.scale
             below = _skin_below(below, skin, arm.orientations, scale, TOLD["DEPTH"] * length)
         below /= length
-        keep("DEPTH", depth(below[:, None]), name, per_frame=2)
+        deepest = _beside_walls(below, going[:, 1:] / length, measured.ground, length)
+        keep("DEPTH", deepest, name, per_frame=2)
         shown = arm.joints[::2] / length
         rests = resting(shown[:, 1:], -below[::2], body / length, measured.rate)
         keep("DRIFT", _worst(drifts(shown[:, 1:], rests, measured.rate)), name)
@@ -240,7 +245,7 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
 
 
 def warnings_for_figures(found: Sequence[Figure]) -> tuple[str, ...]:
-    """A sentence on what one would see, the worst first; none if one would not.
+    """A sentence on what one would see, the worst first; none if one would see nothing.
 
     Misses and overlaps are left to :func:`~..motion.pipeline.warnings_for_misses` and
     :meth:`~..clearance.BodyVolume.told`.
@@ -249,8 +254,10 @@ def warnings_for_figures(found: Sequence[Figure]) -> tuple[str, ...]:
     beyond = [each for each in found if each.kind in _SAID and not each.value <= TOLD[each.kind]]
     if not beyond:
         return ()
-    beyond.sort(key=lambda each: TOLD[each.kind] / each.value)
-    broken = any(not each.value <= _BREAKS.get(each.kind, np.inf) for each in beyond)
+    # What breaks first, and then what is farthest beyond its limit.
+    whole = {each: each.value <= _BREAKS.get(each.kind, np.inf) for each in beyond}
+    beyond.sort(key=lambda each: (whole[each], TOLD[each.kind] / each.value))
+    broken = not whole[beyond[0]]
     told = "; ".join(
         _SAID[each.kind].format(
             arm=each.arm,
@@ -343,6 +350,37 @@ def _skin_below(
         reach = skin.seen_below(down)
         reach[:, :-1, 1] = np.minimum(reach[:, :-1, 1], reach[:, 1:, 0])
         found[some] = below[some] + scale * reach[..., 1]
+    return found
+
+
+def _beside_walls(below: Floats, joints: Floats, ground: Ground, length: float) -> Worst:
+    """The deepest skin of an arm, beside a wall no deeper than the wall is near.
+
+    Args:
+        below: (moments, joints) arm lengths that skin is below the ground above it.
+        joints: (moments, joints, 3) arm lengths.
+        ground: what it is below of.
+        length: metres of the arm.
+    """
+    deepest = depth(below[:, None])
+    if not deepest.value > TOLD["DEPTH"]:
+        return deepest
+    found, angles = Worst(0.0, 0, 0), np.arange(8) * np.pi / 4.0
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    order = np.argsort(-below, axis=None, kind="stable")
+    for start in range(0, len(order), _AT_ONCE):
+        some = order[start : start + _AT_ONCE]
+        deep, points = below.flat[some], joints.reshape(-1, 3)[some]
+        if deep[0] <= found.value:
+            break
+        ways = deep[:, None] * _WAYS
+        aside = points[:, None, None, :2] + ways[..., None, None] * around
+        own = ground.height(length * points) / length - deep
+        free = ground.height(length * aside) / length <= own[:, None, None]
+        deep = np.minimum(deep, np.where(free.any(axis=-1), ways, np.inf).min(axis=-1))
+        if deep.max() > found.value:
+            place = int(deep.argmax())
+            found = Worst(float(deep[place]), int(some[place]) // below.shape[1], 0)
     return found
 
 

@@ -281,8 +281,24 @@ def test_what_one_would_see_is_said_in_one_sentence_the_worst_first() -> None:
     )
     (told,) = warnings_for_figures([Figure("TURN", np.radians(89.0), 7, "D"), seen[0]])
     assert told == (
-        "The motion breaks: 'A' slips by 2.0 % of its length at frame 4; 'D' turns by 89° at "
-        "frame 7."
+        "The motion breaks: 'D' turns by 89° at frame 7; 'A' slips by 2.0 % of its length at "
+        "frame 4."
     )
     (told,) = warnings_for_figures([Figure("DEPTH", np.nan, 7, "D")])
     assert told.startswith("The motion breaks: 'D' is nan %")
+
+
+class Step:
+    """Ground that is 1 higher from x = 1.9 on."""
+
+    def height(self, points: Any) -> Any:
+        return np.where(points[..., 0] < 1.9, 0.0, 1.0)
+
+    def slope(self, points: Any) -> Any:
+        return 0.0 * points[..., :2]
+
+
+def test_beside_a_wall_an_arm_is_as_deep_as_the_wall_is_near() -> None:
+    # The tips, at x = 2, are 0.9 below the step, and a tenth beside its wall: an eighth of that.
+    told = found(replace(still(), ground=Step()))["DEPTH"]
+    assert told == Figure("DEPTH", about(0.45 / 8.0), 10, "left")
