@@ -51,6 +51,9 @@ def main() -> None:
     options = Options(
         *(arguments.frames, arguments.long, arguments.arms, arguments.gait, arguments.repeat)
     )
+    if arguments.pages:
+        pages.write_pages()
+        return
     if arguments.write is not None:
         pages.write(arguments.write, options)
         return
@@ -90,6 +93,9 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--json", type=Path, help="file to write all numbers to")
     parser.add_argument("--only", nargs="+", help=f"these alone: {', '.join(pages.SECTIONS)}")
     parser.add_argument("--write", nargs="*", help="write the pages: all sections, or these")
+    parser.add_argument(
+        "--pages", action="store_true", help="write the pages from the figures that are kept"
+    )
     arguments = parser.parse_args(words)
     for name in (*(arguments.write or ()), *(arguments.only or ())):
         if name not in pages.SECTIONS:

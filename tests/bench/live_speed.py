@@ -105,45 +105,52 @@ def _timed(what: str, change: Callable[[int], None]) -> Measured:
     }
 
 
-def _run() -> list[Measured]:
+def _follow(armature: Any) -> None:
+    """Let the live motion catch up with a change."""
     import bpy
 
     from octo_motion.ui.locomotion.operators import generate as live
+
+    armature.update_tag(refresh={"OBJECT"})
+    bpy.context.view_layer.update()
+    live.run_pending()
+    assert armature.octo_motion.locomotion.live
+    assert not armature.octo_motion.locomotion.live_error
+
+
+def _route(armature: Any) -> Callable[[int], None]:
+    point = armature.octo_motion.locomotion.route.data.splines[0].bezier_points[-1]
+
+    def change(_number: int) -> None:
+        point.co.x += 0.02
+        _follow(armature)
+
+    return change
+
+
+def _slider(armature: Any) -> Callable[[int], None]:
+    def change(number: int) -> None:
+        armature.octo_motion.locomotion.softness = 0.3 + 0.02 * number
+        _follow(armature)
+
+    return change
+
+
+def _ground(armature: Any) -> Callable[[int], None]:
+    def change(_number: int) -> None:
+        armature.octo_motion.locomotion.ground.object.location.x += 0.05
+        _follow(armature)
+
+    return change
+
+
+def _run() -> list[Measured]:
+    import bpy
 
     operators: Any = bpy.ops.octo_motion
 
     def generate(_number: int) -> None:
         operators.generate_locomotion()
-
-    def follow(armature: Any) -> None:
-        armature.update_tag(refresh={"OBJECT"})
-        bpy.context.view_layer.update()
-        live.run_pending()
-        assert armature.octo_motion.locomotion.live
-        assert not armature.octo_motion.locomotion.live_error
-
-    def route(armature: Any) -> Callable[[int], None]:
-        point = armature.octo_motion.locomotion.route.data.splines[0].bezier_points[-1]
-
-        def change(_number: int) -> None:
-            point.co.x += 0.02
-            follow(armature)
-
-        return change
-
-    def slider(armature: Any) -> Callable[[int], None]:
-        def change(number: int) -> None:
-            armature.octo_motion.locomotion.softness = 0.3 + 0.02 * number
-            follow(armature)
-
-        return change
-
-    def ground(armature: Any) -> Callable[[int], None]:
-        def change(_number: int) -> None:
-            armature.octo_motion.locomotion.ground.object.location.x += 0.05
-            follow(armature)
-
-        return change
 
     results: list[Measured] = []
     armature = _octopus()
@@ -159,14 +166,14 @@ def _run() -> list[Measured]:
     results.append(_timed("generate, bumpy mesh, change by height", generate))
     armature = _octopus()
     armature.octo_motion.locomotion.live = True
-    follow(armature)
-    results.append(_timed("live, a point of the route", route(armature)))
-    results.append(_timed("live, a slider", slider(armature)))
+    _follow(armature)
+    results.append(_timed("live, a point of the route", _route(armature)))
+    results.append(_timed("live, a slider", _slider(armature)))
     armature.octo_motion.locomotion.ground.object = _bumps()
-    follow(armature)
-    results.append(_timed("live, bumpy mesh, a point of the route", route(armature)))
-    results.append(_timed("live, bumpy mesh, a slider", slider(armature)))
-    results.append(_timed("live, the bumpy mesh itself", ground(armature)))
+    _follow(armature)
+    results.append(_timed("live, bumpy mesh, a point of the route", _route(armature)))
+    results.append(_timed("live, bumpy mesh, a slider", _slider(armature)))
+    results.append(_timed("live, the bumpy mesh itself", _ground(armature)))
     return results
 
 
