@@ -36,7 +36,7 @@ class Options:
     """Of ours alone."""
     arms: Sequence[int] = (1, 2, 4, 8, 16, 32)
     gait: str = "walk"
-    repeat: int = 3
+    repeat: int = 2
 
 
 def errors(gait: str) -> dict[str, float]:

@@ -51,7 +51,7 @@ class Result:
     """Milliseconds of a mouse move by part: the median, and the slowest."""
 
 
-def measure(repeat: int = 3) -> list[Measured]:
+def measure(repeat: int = 2) -> list[Measured]:
     """The fastest of some runs of each number of frames."""
     return [
         min((_measure(frames) for _ in range(repeat)), key=lambda each: each["seconds"])
@@ -238,7 +238,7 @@ def main() -> None:
     """Run the case of the command line, or all of them."""
     if len(sys.argv) != 3 or sys.argv[1].startswith("-"):
         parser = argparse.ArgumentParser(description=__doc__)
-        parser.add_argument("--repeat", type=int, default=3, help="runs, the fastest counts")
+        parser.add_argument("--repeat", type=int, default=2, help="runs, the fastest counts")
         print(text(measure(parser.parse_args().repeat)))
         return
     import octo_motion
