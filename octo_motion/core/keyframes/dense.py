@@ -15,7 +15,7 @@ import numpy as np
 
 from ..rotations import Floats
 from .channels import BezierKeys, bezier_keys
-from .curves import hermite
+from .curves import hermite, inner_product
 from .residuals import LinearModel, Residuals
 from .tracks import Integers, Limb
 
@@ -115,16 +115,16 @@ class _Spans:
 
         result = wanted.copy()
         rest = pulled - coupled(result)
-        way, size = rest.copy(), np.vdot(rest, rest)
+        way, size = rest.copy(), inner_product(rest, rest)
         enough = _ENOUGH * size
         for _ in range(_STEPS):
             if size <= enough:
                 break
             answer = coupled(way)
-            share = size / np.vdot(way, answer)
+            share = size / inner_product(way, answer)
             result += share * way
             rest -= share * answer
-            before, size = size, np.vdot(rest, rest)
+            before, size = size, inner_product(rest, rest)
             way = rest + (size / before) * way
         return result
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..rotations import Floats
 from .channels import BezierKeys, Booleans, bezier_keys
-from .curves import Curves, Singles
+from .curves import Curves, Singles, inner_product
 from .residuals import LinearModel, Residuals
 from .tracks import Fine, Integers
 
@@ -302,17 +302,17 @@ def fitted(
     turned = eased(rest)
     way = turned.copy()
     total = np.zeros_like(rest)
-    size = float(np.vdot(rest, turned))
+    size = inner_product(rest, turned)
     for _ in range(steps):
         if size <= 1e-12:
             break
         change = curves.spread(way)
         answer = gradient(change, model.errors(change), stiff)
-        share = size / max(float(np.vdot(way, answer)), 1e-30)
+        share = size / max(inner_product(way, answer), 1e-30)
         total += share * way
         rest -= share * answer
         turned = eased(rest)
-        before, size = size, float(np.vdot(rest, turned))
+        before, size = size, inner_product(rest, turned)
         way *= np.float32(size / before)
         way += turned
     return total
