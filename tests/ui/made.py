@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from octo_motion.core.locomotion.gait import Arm, GaitPoser, GaitTable
 from octo_motion.core.locomotion.ground import GroundedPoses, GroundedWalk
+from octo_motion.core.locomotion.metrics import figures, report
 from octo_motion.core.locomotion.motion import MotionPlan, MotionResult
 from octo_motion.core.locomotion.motion.pipeline import pose, with_half_frames
 from octo_motion.core.locomotion.motion.segments import Standing, Transitions
@@ -159,6 +160,20 @@ class Made:
         swimming = self.plan.segments.swimming(travel.distance)
         assert swimming is not None
         return swimming
+
+    @property
+    def depth_of_bones(self) -> float:
+        """Arm lengths that joints are below the ground; the figure DEPTH is that of the skin."""
+        assert self.result.measured is not None
+        found = figures(replace(self.result.measured, skins=None))
+        return next(each.value for each in found if each.kind == "DEPTH")
+
+    @property
+    def turn_at_joints(self) -> float:
+        """Radians per frame against the bone above; the figure TURN is that in the world."""
+        measured = self.result.measured
+        assert measured is not None
+        return report.change(measured.poses.rotations, measured.frames).value
 
     @property
     def every(self) -> int:

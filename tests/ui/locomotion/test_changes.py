@@ -191,9 +191,11 @@ def test_at_no_change_arms_slide_or_dip_into_the_ground(
     bpy.ops.octo_motion.change_add(gait="walk", position=0.66)
     if rough:
         settings.ground.object = bumps()
-    found = figures_of(computed(settings))
+    made = computed(settings)
+    found = figures_of(made)
     assert found["SLIP"] < 0.01
-    assert found["DEPTH"] < 0.001
+    assert made.depth_of_bones < 0.001
+    assert found["DEPTH"] < 0.005
 
 
 def test_what_takes_off_by_height_leaves_the_ground_with_all_arms(settings: Any) -> None:
@@ -202,7 +204,7 @@ def test_what_takes_off_by_height_leaves_the_ground_with_all_arms(settings: Any)
         bpy.ops.octo_motion.add_route(**route)
         bpy.context.view_layer.objects.active = settings.id_data
         settings.change.by = "HEIGHT"
-        assert figures_of(computed(settings))["DEPTH"] < 0.001
+        assert computed(settings).depth_of_bones < 0.001
 
 
 def test_in_a_hurry_arms_that_would_dip_between_frames_are_raised(settings: Any) -> None:

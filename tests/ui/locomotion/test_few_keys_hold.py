@@ -7,7 +7,8 @@ from typing import Any
 import bpy
 import pytest
 
-from tests.ui.rig import click, generate, give_route
+from tests.ui.made import prepare
+from tests.ui.rig import click, give_route
 
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
 SLIP = 0.006
@@ -41,7 +42,9 @@ def test_few_keys_hold_contacts(gait: str, bump: float) -> None:
     if bump:
         settings.ground.object = bumps(bump)
         bpy.context.view_layer.objects.active = armature
-    generate(armature)
-    told = {each.kind: each.value for each in settings.figures}
+    made = prepare(armature, bpy.context)
+    for _ in made.compute():
+        pass
+    told = {each.kind: each.value for each in made.figures}
     assert told["SLIP"] <= SLIP
-    assert told["DEPTH"] <= DEPTH
+    assert made.depth_of_bones <= DEPTH

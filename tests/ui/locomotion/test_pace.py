@@ -44,7 +44,7 @@ def test_in_a_hurry_over_bumps_arms_hold_on_and_stay_off_the_ground_between_fram
     assert shot.cycle < 10.0  # frames
     found = {figure.kind: figure.value for figure in shot.figures}
     assert found["SLIP"] < 0.01
-    assert found["DEPTH"] < 0.005
+    assert shot.depth_of_bones < 0.005
 
     # And that is what Blender plays.
     shot.write()

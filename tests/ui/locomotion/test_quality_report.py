@@ -417,6 +417,16 @@ def test_what_one_would_see_is_marked_in_the_panel(small: Any) -> None:
     assert len(drawn.labels) == len(values) + 2
 
 
+def test_the_closed_panel_is_marked_too(small: Any) -> None:
+    settings = small.octo_motion.locomotion
+    panel: Any = SimpleNamespace(layout=Drawn())
+    draw: Any = quality_operators.OCTO_MOTION_PT_quality.draw_header
+    for value, marks in ((0.01, 0), (0.011, 1)):
+        quality_report.write_figures(settings, [Figure("SLIP", value, 7, "Arm")])
+        draw(panel, bpy.context)
+        assert len(panel.layout.warned) == marks
+
+
 def test_rows_are_not_cut_off_in_a_narrow_sidebar(small: Any) -> None:
     settings = small.octo_motion.locomotion
     worst = [Figure(kind, 0.1234, 12345, "Arm 1 L") for kind in KINDS if kind != "OVERLAP"]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from octo_motion.core.locomotion.clearance import BodyVolume
 from octo_motion.core.locomotion.clearance.capsule_overlap import Overlap, Separation
 from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.metrics.report import (
@@ -302,3 +303,12 @@ def test_beside_a_wall_an_arm_is_as_deep_as_the_wall_is_near() -> None:
     # The tips, at x = 2, are 0.9 below the step, and a tenth beside its wall: an eighth of that.
     told = found(replace(still(), ground=Step()))["DEPTH"]
     assert told == Figure("DEPTH", about(0.45 / 8.0), 10, "left")
+
+
+@pytest.mark.parametrize(("frames", "part"), [(1, "less than 1 %"), (40, "10 %")])
+def test_an_overlap_is_never_told_at_none_of_the_frames(frames: int, part: str) -> None:
+    depths = np.zeros(400)
+    depths[:frames] = 0.9
+    found = Separation(depths, (Overlap("left", "right", 0, 0.9),))
+    (told,) = BodyVolume.told(found, 1, np.arange(400.0))
+    assert told.endswith(f"something overlaps at {part} of the frames.")
