@@ -24,9 +24,14 @@ from octo_motion.core.splicing.clip.clip import Clip, posture_of, sample_clip, u
 from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
-from octo_motion.core.splicing.transfer.body_frames import chest_frame, pelvis_frame
+from octo_motion.core.splicing.transfer.body_frames import (
+    AnatomicalFrame,
+    chest_frame,
+    pelvis_frame,
+)
 from octo_motion.core.splicing.transfer.limb_rotation import SOFT
 from octo_motion.core.splicing.transfer.parts import LEG, PARTS, Part, part_bones
+from octo_motion.core.splicing.transfer.retarget import MappedClip
 from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices
 from tests.bench.splice_quality import feet_at_rest, limb_length
 from tests.core.splice_bodies import spliced
@@ -225,10 +230,17 @@ def in_chest(clip: Clip, landmarks: Landmarks, landmark: str) -> Floats:
 
 def in_pelvis(clip: Clip, landmarks: Landmarks, landmark: str) -> Floats:
     """The same as seen from the pelvis."""
-    frame = pelvis_frame(clip.skeleton, landmarks)
+    clip, frame = with_pelvis(clip, landmarks)
     posture = posture_of(clip.skeleton, clip.rotations, clip.locations)
     moved = posture.head(clip.skeleton.index[landmarks[landmark]]) - frame.place(posture)
     return rotate(conjugate(frame.orientation(posture)), moved)
+
+
+def with_pelvis(clip: Clip, landmarks: Landmarks) -> tuple[Clip, AnatomicalFrame]:
+    """The clip in its reference pose, and its pelvis."""
+    mapped = MappedClip(clip, landmarks).in_reference_pose()
+    assert mapped.reference is not None
+    return mapped.clip, pelvis_frame(mapped.skeleton, landmarks, mapped.reference)
 
 
 def arm_length(clip: Clip, landmarks: Landmarks) -> float:
@@ -481,9 +493,8 @@ def foot_in_pelvis(clip: Clip, landmarks: Landmarks, side: str) -> Floats:
     if landmarks.get(f"toe.{side}"):
         toe, foot = (in_pelvis(clip, landmarks, f"{name}.{side}") for name in ("toe", "foot"))
         return normalized(toe - foot)
-    frame = pelvis_frame(clip.skeleton, landmarks).orientation(
-        posture_of(clip.skeleton, clip.rotations, clip.locations)
-    )
+    clip, pelvis = with_pelvis(clip, landmarks)
+    frame = pelvis.orientation(posture_of(clip.skeleton, clip.rotations, clip.locations))
     foot = clip.skeleton.pose(clip.rotations, clip.locations)[0][
         :, clip.skeleton.index[landmarks[f"foot.{side}"]]
     ]

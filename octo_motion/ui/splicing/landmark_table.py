@@ -11,10 +11,14 @@ from collections.abc import Sequence
 from typing import Any, Final, cast
 
 import bpy
+import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 
+from ...blender.animation import read_clip
 from ...blender.rig import armature_data, read_skeleton
-from ...core.errors import RigError
+from ...core.errors import OctoMotionError, RigError
+from ...core.skeleton import Skeleton
+from ...core.splicing.clip import average_pose
 from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
 from ..operator_base import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in
@@ -27,12 +31,16 @@ _CHOICES: Final = tuple(
 )
 
 
+_LOOKS: Final = 50
+"""Frames of an action that are looked at to see how its bones lie."""
+
+
 class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
     bl_idname = "octo_motion.map_skeleton"
     bl_label = "Find Landmarks"
     bl_description = (
-        "Find out which bone is which part of the body, from the names of the bones and from the "
-        "rest pose, and fill the table. What cannot be told is left empty for you to choose"
+        "Find out which bone is which part of the body, from the names of the bones, from the rest "
+        "pose and from the action. What cannot be told is left empty for you to choose"
     )
 
     keep: BoolProperty(
@@ -42,7 +50,7 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
     )
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
-        found = map_skeleton(read_skeleton(armature))
+        found = map_skeleton(read_skeleton(armature), _in_motion(armature))
         if found.problem:
             raise RigError(
                 f"'{armature.name}' has no landmarks. {found.problem}",
@@ -59,6 +67,18 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
             self.report({"WARNING"}, f"Choose the bones of: {names}. {found.missing[asked[0]]}")
         for note in found.notes:
             self.report({"WARNING"}, note)
+
+
+def _in_motion(armature: bpy.types.Object) -> Skeleton | None:
+    """The bones as they lie in the armature's action, if it has one that moves them."""
+    data = armature.animation_data
+    if data is None or data.action is None:
+        return None
+    first, last = data.action.frame_range
+    try:
+        return average_pose(read_clip(armature, frames=np.unique(np.linspace(first, last, _LOOKS))))
+    except OctoMotionError:
+        return None
 
 
 class OCTO_MOTION_OT_landmark_pick(StackOperator, bpy.types.Operator):

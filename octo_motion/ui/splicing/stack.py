@@ -23,9 +23,9 @@ from ...blender.animation import (
     writable_armature,
     write_clip,
 )
-from ...blender.rig import armature_data, read_skeleton
+from ...blender.rig import armature_data
 from ...core.errors import ClipError, WriteError
-from ...core.splicing.clip import After, Clip, Timing, splice_window
+from ...core.splicing.clip import After, Clip, Timing, average_pose, splice_window
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL, Landmarks, map_skeleton
 from ...core.splicing.transfer import (
     CHAIN,
@@ -204,7 +204,7 @@ class ClipReader:
                 count = finer * (len(clip) - 1) + 1
                 frames = np.linspace(clip.frames[0], clip.frames[-1], count)
                 clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
-            landmarks, problem, found = known_landmarks(armature)
+            landmarks, problem, found = known_landmarks(armature, clip)
             self._sources[key] = Source(clip, landmarks, armature.name, problem, found)
         return self._sources[key]
 
@@ -225,8 +225,8 @@ def _check_mixing(armature: bpy.types.Object) -> None:
         )
 
 
-def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, bool]:
-    """Landmarks of an armature: of its table, completed by what can be found.
+def known_landmarks(armature: bpy.types.Object, clip: Clip) -> tuple[Landmarks | None, str, bool]:
+    """Landmarks of an armature with a motion: of its table, completed by what can be found.
 
     Returns:
         The landmarks, none where the table is empty and the skeleton is no humanoid; why that is
@@ -235,7 +235,7 @@ def known_landmarks(armature: bpy.types.Object) -> tuple[Landmarks | None, str, 
     bones = dict(read_landmarks(splicing_settings(armature).landmarks).bones)
     if all(each in bones for each in LANDMARKS if each not in OPTIONAL):
         return Landmarks(bones), "", False
-    found = map_skeleton(read_skeleton(armature))
+    found = map_skeleton(clip.skeleton, average_pose(clip))
     if found.problem and not bones:
         return None, found.problem, False
     return Landmarks(dict(found.landmarks.bones) | bones), "", not bones

@@ -230,7 +230,9 @@ def test_a_stack_is_rebuilt_retimed_and_reordered_as_data():
     both = build_splices(base, LANDMARKS, [right, left])
     assert np.array_equal(both.rotations, build_splices(base, LANDMARKS, [left, right]).rotations)
     step = spliced(spliced(base, LANDMARKS, right), LANDMARKS, left)
-    assert np.array_equal(both.rotations, step.rotations)
+    # A clip with another's arm has a reference pose of its own: nearly that of the base.
+    assert angle_between(both.rotations, step.rotations).max() < np.radians(0.3)
+    assert np.array_equal(both.locations, step.locations)
     later = build_splices(base, LANDMARKS, [right, replace(left, timing=Timing(6.0, 1.0))])
     assert not np.array_equal(later.rotations, both.rotations)
 

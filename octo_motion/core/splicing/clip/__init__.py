@@ -14,6 +14,13 @@ from .clip import (
     unposed,
     without_scale,
 )
+from .rest_pose import (
+    Reresting,
+    average_pose,
+    robust_direction,
+    robust_rotations,
+    with_rest_pose,
+)
 from .splice_timing import After, SpliceWindow, Timing, splice_window, window_middle
 
 __all__ = [
@@ -21,16 +28,21 @@ __all__ = [
     "After",
     "Clip",
     "Posture",
+    "Reresting",
     "SpliceWindow",
     "Timing",
+    "average_pose",
     "check_bvh",
     "orientations_of",
     "posture_of",
+    "robust_direction",
+    "robust_rotations",
     "sample_clip",
     "sample_scales",
     "sample_world",
     "splice_window",
     "unposed",
     "window_middle",
+    "with_rest_pose",
     "without_scale",
 ]

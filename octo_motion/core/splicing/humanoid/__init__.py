@@ -7,6 +7,7 @@ from .correspondence import (
     find_correspondence,
     matched_bones,
     matched_chains,
+    rest_alike,
 )
 from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks, mirrored
 from .mapping import map_skeleton
@@ -24,4 +25,5 @@ __all__ = [
     "matched_bones",
     "matched_chains",
     "mirrored",
+    "rest_alike",
 ]

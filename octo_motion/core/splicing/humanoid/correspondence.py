@@ -3,10 +3,14 @@
 
 Two skeletons differ in proportions, rest pose and bone axes. What a bone of the splice clip does
 is carried over by one constant rotation per bone: seen from the body's frame, the base's bone is
-the splice's bone times that constant. It is found at rest. Where a bone's direction matters (arms,
-legs, chains), the splice's rest pose is first laid onto the base's, joint by joint from the body
-outwards, by the smallest rotations: a rest pose with hanging arms then serves as well as one with
-arms spread, and directions are kept exactly.
+the splice's bone times that constant. It is found at rest, where humanoids rest in their reference
+poses. Where a bone's direction matters (arms, legs, necks, chains, and all bones of one body), the
+splice's rest pose is first laid onto the base's by the smallest rotations: directions are then kept
+exactly.
+
+Skeletons of which no reference pose is known, and chains, are compared as their files rest: there
+they are laid over each other joint by joint from the body outwards, so that hanging arms serve as
+well as arms spread.
 """
 
 from __future__ import annotations
@@ -17,19 +21,38 @@ from typing import Final
 
 import numpy as np
 
-from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rotate, shortest_arc
+from ...rotations import (
+    IDENTITY,
+    Floats,
+    angle_between,
+    conjugate,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+)
 from ...skeleton import Skeleton
 from .landmarks import LANDMARKS, Landmarks
 
 _SAME: Final = 0.005
 """Of a part's whole length: how much bones may differ in length and count as the same body's."""
 
+_REST: Final = 1e-3
+"""Radians, and of a body's size: what files lose of a rest pose by rounding."""
+
 _UNLIKE: Final = float(np.cos(np.radians(45.0)))
 """Cosine of the angle at which bones of two rest poses are no longer the same in the same pose.
 Some files' bones all lie along one axis at rest."""
 
-_AIMED: Final = frozenset({"upper_arm", "forearm", "thigh", "shin"})
+_ALIKE: Final = float(np.cos(np.radians(22.5)))
+"""Cosine of half the angle at which axes are no longer the same ones."""
+
+_AIMED: Final = frozenset({"upper_arm", "forearm", "thigh", "shin", "neck"})
 """Landmarks whose direction is what they show, whatever their bodies are."""
+
+_LIMBS: Final = frozenset({"upper_arm", "forearm", "hand", "thigh", "shin"})
+
+_TRUNK: Final = frozenset({"spine", "chest", "neck", "head"})
 
 _NEXT: Final = {
     "clavicle": "upper_arm",
@@ -52,8 +75,12 @@ class Correspondence:
     """(4,) by base bone: seen from the body, base bone = splice bone ∘ constant."""
     same_body: bool
     """Whether all bones are of the same lengths, up to one factor."""
-    same_rest: bool
-    """Whether rest poses, axes and sizes are the same: locations can be taken over."""
+    size: float
+    """How much larger the base's bones are: locations of the same body are taken over by it."""
+
+    def same_axes(self, bone: int) -> bool:
+        """Whether a bone's axes lie in both bodies alike, so that scales along them compare."""
+        return bool(abs(self.constants[bone][0]) > _ALIKE)
 
 
 class _Foot:
@@ -80,15 +107,12 @@ def matched_bones(
     landmarks: tuple[Landmarks | None, Landmarks | None],
 ) -> dict[int, int]:
     """Splice bone by base bone: landmarks first, then names, without prefix and case."""
-    pairs: dict[int, int] = {}
     inside, theirs = set(bones), set(splice_bones)
-    ours, others = landmarks
-    if ours is not None and others is not None:
-        for name in LANDMARKS:
-            bone = base.index.get(ours.get(name) or "", -1)
-            answer = splice.index.get(others.get(name) or "", -1)
-            if bone in inside and answer in theirs:
-                pairs[bone] = answer
+    pairs = {
+        bone: answer
+        for bone, answer in _landmark_pairs(base, splice, landmarks).items()
+        if bone in inside and answer in theirs
+    }
     taken = set(pairs.values())
     by_name = {_plain(splice.names[bone]): bone for bone in splice_bones if bone not in taken}
     for bone in bones:
@@ -120,6 +144,7 @@ def find_correspondence(
     landmarks: tuple[Landmarks | None, Landmarks | None],
     *,
     aim_all: bool = False,
+    referred: bool = False,
 ) -> Correspondence:
     """The constants of matched bones.
 
@@ -130,22 +155,34 @@ def find_correspondence(
         frames_at_rest: orientations (4,) of the body's frame at rest, base and splice.
         landmarks: the base's and the splice clip's, none for a chain.
         aim_all: whether directions matter for all bones, as in a chain.
+        referred: whether both rest in their reference poses, where each bone lies as it should
+            whatever the bones above it do.
     """
     marks, others = landmarks
     kinds = {} if marks is None else {name: key for key, name in marks.bones.items()}
     clavicles = {bone for bone in pairs if kinds.get(base.names[bone], "").startswith("clavicle")}
     # Whether a collar bone comes along says nothing of how arm and hand are built.
     limbs = {bone: other for bone, other in pairs.items() if bone not in clavicles}
-    same_body = _same_body(base, splice, limbs)
-    same_with_clavicles = same_body and _same_body(base, splice, pairs)
-    our_back, their_back = (conjugate(each) for each in frames_at_rest)
+    if any(kind in _TRUNK for bone in pairs if (kind := kinds.get(base.names[bone], ""))):
+        # The few bones of a trunk or a neck tell no body from another: all landmarks do.
+        limbs |= _landmark_pairs(base, splice, landmarks)
+    same_body, size = _same_body(base, splice, limbs)
+    same_with_clavicles = same_body and _same_body(base, splice, pairs)[0]
+    backs = tuple(conjugate(each) for each in frames_at_rest)
+    on_limbs: set[int] = set()
     laid: dict[int, Floats] = {}
     constants: dict[int, Floats] = {}
     for bone in sorted(pairs):
         other = pairs[bone]
         landmark = kinds.get(base.names[bone], "")
         kind = landmark.partition(".")[0]
-        lay = next((laid[each] for each in base.ancestors(bone) if each in laid), IDENTITY)
+        lay = IDENTITY
+        if not referred:
+            lay = next((laid[each] for each in base.ancestors(bone) if each in laid), lay)
+        elif kind in _LIMBS or (not kind and not on_limbs.isdisjoint(base.ancestors(bone))):
+            # How a limb lies along its own plane does not hang on where the body's frames are.
+            on_limbs.add(bone)
+        our_back, their_back = (IDENTITY, IDENTITY) if bone in on_limbs else backs
         follower = _follower(base, bone, pairs, marks, landmark)
         if follower is not None:
             ours = rotate(our_back, base.heads[follower] - base.heads[bone])
@@ -160,21 +197,64 @@ def find_correspondence(
         elif kind == "foot" and marks is not None and others is not None:
             side = landmark.partition(".")[2]
             feet = _Foot(base, marks, bone, side), _Foot(splice, others, other, side)
-            if any(each.toe is not None and each.pointed for each in feet) and not all(
-                each.pointed for each in feet
-            ):
-                ours, theirs = rotate(our_back, feet[0].along), rotate(their_back, feet[1].along)
+            ours, theirs = rotate(our_back, feet[0].along), rotate(their_back, feet[1].along)
+            unlike = any(each.pointed for each in feet) and not all(each.pointed for each in feet)
+            if referred:
+                # A dancer on tiptoe does not tell how a foot stands.
+                unlike = bool(np.dot(ours, theirs) < _UNLIKE)
+            if any(each.toe is not None for each in feet) and unlike:
                 lay = multiply(shortest_arc(rotate(lay, theirs), ours), lay)
         laid[bone] = lay
         rest = multiply(our_back, base.rest_rotations[bone])
         other_rest = multiply(their_back, splice.rest_rotations[other])
         constants[bone] = multiply(conjugate(multiply(lay, other_rest)), rest)
-    return Correspondence(pairs, constants, same_body, _same_rest(base, splice, pairs))
+    return Correspondence(pairs, constants, same_body, size)
 
 
 def chain_length(skeleton: Skeleton, bones: Sequence[int]) -> float:
     """Length of the line through these bones' heads, armature units."""
     return float(np.linalg.norm(np.diff(skeleton.heads[list(bones)], axis=0), axis=1).sum())
+
+
+def rest_alike(
+    base: Skeleton, splice: Skeleton, landmarks: tuple[Landmarks | None, Landmarks | None]
+) -> bool:
+    """Whether all landmarks are the same on both and rest alike, axes included, wherever the whole
+    stands, whichever way it faces and whatever its size.
+    """
+    ours, others = landmarks
+    if ours is None or others is None or ours.bones.keys() != others.bones.keys():
+        return False
+    pairs = _landmark_pairs(base, splice, landmarks)
+    if len(pairs) < len(ours.bones):
+        return False
+    first, second = list(pairs), list(pairs.values())
+    seen = []
+    for skeleton, bones in ((base, first), (splice, second)):
+        back = conjugate(skeleton.rest_rotations[bones[0]])
+        places = rotate(back, skeleton.heads[bones] - skeleton.heads[bones[0]])
+        size = max(float(np.linalg.norm(places, axis=1).max()), 1e-12)
+        seen.append((multiply(back, skeleton.rest_rotations[bones]), places / size))
+    (turns, places), (other_turns, other_places) = seen
+    return bool(
+        angle_between(turns, other_turns).max() < _REST
+        and np.abs(places - other_places).max() < _REST
+    )
+
+
+def _landmark_pairs(
+    base: Skeleton, splice: Skeleton, landmarks: tuple[Landmarks | None, Landmarks | None]
+) -> dict[int, int]:
+    """Splice bone by base bone of all landmarks that both have."""
+    found = {}
+    for name in LANDMARKS:
+        bones = [
+            skeleton.index.get((marks.get(name) if marks is not None else None) or "", -1)
+            for skeleton, marks in zip((base, splice), landmarks, strict=True)
+        ]
+        if min(bones) >= 0:
+            found[bones[0]] = bones[1]
+    return found
 
 
 def _plain(name: str) -> str:
@@ -198,25 +278,16 @@ def _follower(
     return next((child for child in base.children[bone] if child in pairs), None)
 
 
-def _same_body(base: Skeleton, splice: Skeleton, pairs: Mapping[int, int]) -> bool:
-    """Whether the bones are of the same lengths, up to one factor, and joined alike."""
+def _same_body(base: Skeleton, splice: Skeleton, pairs: Mapping[int, int]) -> tuple[bool, float]:
+    """Whether the bones are of the same lengths, up to one factor, and joined alike; the factor."""
     inner = [bone for bone in pairs if base.parents[bone] in pairs]
     if not inner or any(splice.parents[pairs[b]] != pairs[base.parents[b]] for b in inner):
-        return False
+        return False, 1.0
     parents = [base.parents[bone] for bone in inner]
     ours = np.linalg.norm(base.heads[inner] - base.heads[parents], axis=1)
     others = splice.heads[[pairs[bone] for bone in inner]]
     theirs = np.linalg.norm(others - splice.heads[[pairs[bone] for bone in parents]], axis=1)
     if theirs.sum() == 0.0:
-        return True
-    return bool(
-        np.abs(ours - theirs * (ours.sum() / theirs.sum())).max() < _SAME * max(ours.sum(), 1e-12)
-    )
-
-
-def _same_rest(base: Skeleton, splice: Skeleton, pairs: Mapping[int, int]) -> bool:
-    if not pairs:
-        return False
-    ours = base.rest_matrices[list(pairs)]
-    theirs = splice.rest_matrices[list(pairs.values())]
-    return bool(np.allclose(ours, theirs, rtol=1e-5, atol=1e-6 * np.abs(ours).max()))
+        return True, 1.0
+    size = float(ours.sum() / theirs.sum())
+    return bool(np.abs(ours - theirs * size).max() < _SAME * max(ours.sum(), 1e-12)), size

@@ -47,12 +47,26 @@ class SkeletonMapping:
         return tuple(each for each in self.missing if each not in OPTIONAL)
 
 
-def map_skeleton(skeleton: Skeleton) -> SkeletonMapping:
-    """Find the landmarks of a humanoid in any rest pose.
+def map_skeleton(skeleton: Skeleton, in_motion: Skeleton | None = None) -> SkeletonMapping:
+    """Find the landmarks of a humanoid.
 
     Never fails: what cannot be told is in ``missing``, and ``problem`` says why a skeleton has
     nothing of a humanoid.
+
+    Args:
+        skeleton: as it rests.
+        in_motion: the same bones as they lie in a motion, if there is one. A rest pose may be no
+            pose of a body (all bones along one axis); where it leaves something open, and this
+            tells more, this counts.
     """
+    found = _map_at_rest(skeleton)
+    if in_motion is None or not (found.asked or found.problem):
+        return found
+    other = _map_at_rest(in_motion)
+    return other if len(other.landmarks.bones) > len(found.landmarks.bones) else found
+
+
+def _map_at_rest(skeleton: Skeleton) -> SkeletonMapping:
     if not np.ptp(skeleton.heads, axis=0).any():
         return _result(skeleton, {}, {}, (), "All bones start at one point.")
     body = body_of(skeleton, read_names(skeleton.names))

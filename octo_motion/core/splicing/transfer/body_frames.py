@@ -3,11 +3,11 @@
 
 Each is fixed to a bone but built from landmarks, so that it does not hang on how a file lays its
 bones' axes: X to the body's left, Y to its back, Z up along the trunk, as for a figure that faces
-Blender's front. The landmarks are taken at rest, where shoulders are not shrugged.
+Blender's front. Landmarks are taken in the reference pose, which comes from the clip; a skeleton
+that has none is taken at rest.
 
-A rest pose may itself be posed (FBX files come like that). Where two skeletons carry the same
-joints at the same places of the bone, these joints are laid over each other instead: the frames
-then agree to the last digit whatever the rest poses are.
+Where two skeletons carry the same joints at the same places of the bone, these joints are laid over
+each other instead: the frames then agree to the last digit whatever the two people do.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ...skeleton import Skeleton
 from ..clip import Posture
 from ..humanoid import Landmarks
 from .parts import landmark_bone
+from .reference_pose import ReferencePose
 
 _CHEST_JOINTS: Final = (
     *("clavicle.L", "clavicle.R", "upper_arm.L", "upper_arm.R"),
@@ -70,8 +71,12 @@ class AnatomicalFrame:
         return multiply(skeleton.rest_rotations[self.bone], self.turn)
 
 
-def chest_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
+def chest_frame(
+    skeleton: Skeleton, landmarks: Landmarks, reference: ReferencePose | None = None
+) -> AnatomicalFrame:
     """The chest's frame; its origin is midway between the shoulders.
+
+    ``reference``: the skeleton's, if it rests in it.
 
     Raises:
         ClipError: a landmark is missing, or they lie in one line.
@@ -81,13 +86,19 @@ def chest_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
         skeleton.heads[landmark_bone(skeleton, landmarks, *choices)]
         for choices in (("upper_arm.L",), ("upper_arm.R",), ("neck", "head"), ("spine", "hips"))
     )
-    joints = _joints(skeleton, landmarks, chest, _CHEST_JOINTS)
     middle = 0.5 * (left + right)
+    if reference is not None:
+        return _referred(skeleton, chest, middle, reference.fixed["chest"])
+    joints = _joints(skeleton, landmarks, chest, _CHEST_JOINTS)
     return _frame(skeleton, chest, left - right, top - low, origin=middle, joints=joints)
 
 
-def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
+def pelvis_frame(
+    skeleton: Skeleton, landmarks: Landmarks, reference: ReferencePose | None = None
+) -> AnatomicalFrame:
     """The pelvis's frame; its origin is midway between the hip joints.
+
+    ``reference``: the skeleton's, if it rests in it.
 
     Raises:
         ClipError: a landmark is missing, or they lie in one line.
@@ -97,8 +108,10 @@ def pelvis_frame(skeleton: Skeleton, landmarks: Landmarks) -> AnatomicalFrame:
         skeleton.heads[landmark_bone(skeleton, landmarks, *choices)]
         for choices in (("thigh.L",), ("thigh.R",), ("neck", "head"))
     )
-    joints = _joints(skeleton, landmarks, hips, _PELVIS_JOINTS)
     middle = 0.5 * (left + right)
+    if reference is not None:
+        return _referred(skeleton, hips, middle, reference.fixed["hips"])
+    joints = _joints(skeleton, landmarks, hips, _PELVIS_JOINTS)
     return _frame(skeleton, hips, left - right, top - middle, origin=middle, joints=joints)
 
 
@@ -125,7 +138,7 @@ def chain_frame(skeleton: Skeleton, bones: Sequence[int]) -> AnatomicalFrame:
 def laid_over(splice: AnatomicalFrame, base: AnatomicalFrame) -> AnatomicalFrame:
     """The splice body's frame, made to agree with the base's where the two are the same body."""
     names = sorted(splice.joints.keys() & base.joints.keys())
-    if splice.joints.keys() != base.joints.keys() or len(names) < 2:
+    if len(names) < 2:
         return splice
     # The bone's own head is a joint as well.
     ours = np.array([np.zeros(3), *(base.joints[name] for name in names)])
@@ -145,6 +158,14 @@ def laid_over(splice: AnatomicalFrame, base: AnatomicalFrame) -> AnatomicalFrame
     back = conjugate(from_matrix(turn))
     origin = their_middle + rotate(back, base.origin - our_middle) / scale
     return AnatomicalFrame(splice.bone, multiply(back, base.turn), origin, splice.joints)
+
+
+def _referred(
+    skeleton: Skeleton, bone: int, origin: Floats, joints: dict[str, Floats]
+) -> AnatomicalFrame:
+    """The frame of a bone that rests in the reference pose, where all frames are upright."""
+    back = conjugate(skeleton.rest_rotations[bone])
+    return AnatomicalFrame(bone, back, rotate(back, origin - skeleton.heads[bone]), joints)
 
 
 def _frame(

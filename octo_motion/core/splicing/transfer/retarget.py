@@ -13,16 +13,13 @@ import numpy as np
 from ...errors import ClipError
 from ...rotations import (
     Floats,
-    angle_between,
     conjugate,
     multiply,
-    normalized,
     rotate,
-    shortest_arc,
     slerp,
 )
 from ...skeleton import Skeleton
-from ..clip import Clip, Posture, posture_of, sample_clip
+from ..clip import Clip, Posture, Reresting, posture_of, sample_clip, with_rest_pose
 from ..humanoid import (
     Correspondence,
     Landmarks,
@@ -30,6 +27,7 @@ from ..humanoid import (
     find_correspondence,
     matched_bones,
     matched_chains,
+    rest_alike,
 )
 from .body_frames import AnatomicalFrame, chain_frame, chest_frame, laid_over, pelvis_frame
 from .limb_rotation import LimbTriangle, bend_to_reach, hinge_axis, joint_turn
@@ -43,10 +41,7 @@ from .parts import (
     landmark_bone,
     sided,
 )
-
-_UPRIGHT = np.radians(30.0)
-"""Between chest and pelvis: at more than this nobody stands. Some files' bones all lie along one
-axis at rest."""
+from .reference_pose import ReferencePose, find_reference_pose, has_fingers
 
 _HINGE_SAMPLES = 200
 """Frames of a clip from which a limb's hinge is read."""
@@ -58,6 +53,21 @@ class MappedClip:
 
     clip: Clip
     landmarks: Landmarks | None
+
+    @property
+    def reference(self) -> ReferencePose | None:
+        """The pose in which the skeleton rests, if it is its reference pose."""
+        return None
+
+    def in_reference_pose(self, *, fingers: bool = True) -> MappedClip:
+        """The clip with its reference pose as its rest pose; itself where none can be found."""
+        if self.landmarks is None:
+            return self
+        found = find_reference_pose(self.clip, self.landmarks, fingers=fingers)
+        if found is None:
+            return self
+        rests = Reresting(self.skeleton, with_rest_pose(self.skeleton, found.orientations))
+        return ReferredClip(rests.into(self.clip), self.landmarks, found, rests)
 
     @property
     def skeleton(self) -> Skeleton:
@@ -92,6 +102,40 @@ class MappedClip:
 
 
 @dataclass(frozen=True, eq=False)
+class ReferredClip(MappedClip):
+    """A mapped clip that rests in its reference pose."""
+
+    found: ReferencePose
+    rests: Reresting
+    """From its own rest pose into this one, and back."""
+
+    @property
+    def reference(self) -> ReferencePose:
+        """The pose in which the skeleton rests."""
+        return self.found
+
+
+def compared(base: MappedClip, splice: MappedClip) -> tuple[MappedClip, MappedClip]:
+    """Two clips in their reference poses, or both at rest where either has none.
+
+    At rest too where both files rest alike, as two actions of one armature do: what one bone does
+    is then known to be the same on the other, how a hand is turned included, which no joint tells.
+    """
+    if base.landmarks is None or splice.landmarks is None:
+        return base, splice
+    marks = base.landmarks, splice.landmarks
+    if rest_alike(base.skeleton, splice.skeleton, marks):
+        return base, splice
+    fingers = any(
+        has_fingers(each.clip, known) for each, known in zip((base, splice), marks, strict=True)
+    )
+    referred = tuple(each.in_reference_pose(fingers=fingers) for each in (base, splice))
+    if any(each.reference is None for each in referred):
+        return base, splice
+    return referred[0], referred[1]
+
+
+@dataclass(frozen=True, eq=False)
 class _JoinedBones:
     """Bones that hang on each other alike on both skeletons.
 
@@ -121,8 +165,6 @@ class Retarget:
     """Joint, elbow and hand, on base and splice."""
     spread: tuple[tuple[int, ...], tuple[int, ...]] | None
     """Chains with unlike numbers of bones, on base and splice."""
-    bent_rest: bool = False
-    """Whether the rest pose of one of the two is none to compare the other's with."""
 
     @cached_property
     def joined(self) -> _JoinedBones | None:
@@ -217,10 +259,13 @@ def write_retargeted(
     _write_inner(retarget, between, (result, splice), rotations, locations)
     if retarget.limb is None:
         return
-    (joint, elbow, hand), (_, other_elbow, other_hand) = retarget.limb
+    (joint, elbow, hand), (other_joint, other_elbow, other_hand) = retarget.limb
     result = posture_of(base.skeleton, rotations, locations)
     limb = LimbTriangle(result.head(joint), result.head(elbow), result.head(hand))
-    our_place, their_place = ours.place(base), theirs.place(splice)
+    # On a body of other proportions the joint sits elsewhere: from there a limb keeps its way.
+    our_place, their_place = limb.joint, splice.head(other_joint)
+    if retarget.match.same_body:
+        our_place, their_place = ours.place(base), theirs.place(splice)
 
     def seen(bone: int) -> Floats:
         return our_place + retarget.ratio * rotate(between, splice.head(bone) - their_place)
@@ -265,9 +310,10 @@ def _write_inner(
     if joined is not None:
         inner = multiply(joined.before, splice.rotations(joined.splice))
         rotations[:, joined.base] = multiply(inner, joined.after)
-        if retarget.match.same_rest:
-            for bone, answer in zip(joined.base, joined.splice, strict=True):
-                locations[:, bone] = splice.location(answer)
+        if retarget.match.same_body:
+            size = retarget.match.size
+            for bone, answer, turn in zip(joined.base, joined.splice, joined.before, strict=True):
+                locations[:, bone] = size * rotate(turn, splice.location(answer))
     inside = () if joined is None else joined.base
     for bone in retarget.bones:
         if bone in retarget.match.pairs and bone not in inside:
@@ -296,24 +342,11 @@ def _write_spread(
             turn = slerp(turn, after, np.full(len(turn), place - first))
         rest = multiply(lay, base.rest_rotations[bone])
         wanted = multiply(between, multiply(turn, rest))
-        if retarget.bent_rest and bone != ours[-1]:
-            segment = base.heads[ours[ours.index(bone) + 1]] - base.heads[bone]
-            along = rotate(between, _direction(splice, theirs, first))
-            carried = result.carried(bone)
-            own = rotate(multiply(carried, conjugate(base.rest_rotations[bone])), segment)
-            own = np.broadcast_to(normalized(own), along.shape)
-            wanted = multiply(shortest_arc(own, along), carried)
         if bone == ours[-1] and bone in retarget.match.constants:
             # The chest itself: its frame is met, not just its turn from rest.
             own = splice.orientation(theirs[-1])
             wanted = multiply(multiply(between, own), retarget.match.constants[bone])
         rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
-
-
-def _direction(posture: Posture, bones: Sequence[int], place: int) -> Floats:
-    """Where a chain leads from one of its bones on (from its last: to it), (frames, 3)."""
-    first = min(place, len(bones) - 2)
-    return normalized(posture.head(bones[first + 1]) - posture.head(bones[first]))
 
 
 def _fractions(skeleton: Skeleton, bones: Sequence[int]) -> Floats:
@@ -349,9 +382,10 @@ def _side_retarget(
         skeleton, landmarks = mapped.skeleton, mapped.humanoid()
         with mapped.named_in_errors():
             bones = kind_bones(kind, side, skeleton, landmarks, clavicle=clavicle)
-            chest = chest_frame(skeleton, landmarks)
-            from_pelvis = kind.frame(seen_from) == "pelvis"
-            return bones, chest, pelvis_frame(skeleton, landmarks) if from_pelvis else chest
+            chest = chest_frame(skeleton, landmarks, mapped.reference)
+            if kind.frame(seen_from) != "pelvis":
+                return bones, chest, chest
+            return bones, chest, pelvis_frame(skeleton, landmarks, mapped.reference)
 
     (bones, chest, frame), (others, other_chest, other_frame) = map(seen, clips)
     chests = chest, laid_over(other_chest, chest)
@@ -360,7 +394,12 @@ def _side_retarget(
         return _spine_retarget(clips, (bones, others), frames, chests)
     pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, marks)
     match = find_correspondence(
-        base.skeleton, splice.skeleton, pairs, _at_rest(frames, clips), marks
+        base.skeleton,
+        splice.skeleton,
+        pairs,
+        _at_rest(frames, clips),
+        marks,
+        referred=base.reference is not None,
     )
     limb = None
     if kind.limb is not None:
@@ -388,12 +427,18 @@ def _spine_retarget(
     else:
         pairs, spread = {ours[-1]: theirs[-1]}, (tuple(ours), tuple(theirs))
     rests = _at_rest(frames, clips)
-    bent = bool((angle_between(rests, _at_rest(chests, clips)) > _UPRIGHT).any())
     marks = base.humanoid(), splice.humanoid()
-    match = find_correspondence(base.skeleton, splice.skeleton, pairs, rests, marks, aim_all=bent)
+    match = find_correspondence(
+        base.skeleton,
+        splice.skeleton,
+        pairs,
+        rests,
+        marks,
+        referred=base.reference is not None,
+    )
     top = multiply(chests[1].turn, conjugate(chests[0].turn))
     match = replace(match, constants={**match.constants, ours[-1]: top})
-    return Retarget(base, splice, tuple(ours), frames, match, None, spread, bent)
+    return Retarget(base, splice, tuple(ours), frames, match, None, spread)
 
 
 def _at_rest(

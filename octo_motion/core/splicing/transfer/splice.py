@@ -38,7 +38,14 @@ from ..clip import (
 from ..humanoid import Landmarks
 from .leg_travel import LegTravel, ground_height
 from .parts import Part, SeenFrom
-from .retarget import MappedClip, Retarget, find_retargets, write_retargeted
+from .retarget import (
+    MappedClip,
+    ReferredClip,
+    Retarget,
+    compared,
+    find_retargets,
+    write_retargeted,
+)
 
 LimbGoal = Literal["direction", "exact"]
 
@@ -63,15 +70,18 @@ class Splice:
     """From where legs are seen: the pelvis if empty, the chest in the source."""
 
     def retargets(self, base: MappedClip) -> list[Retarget]:
-        """How the part goes onto a base, one for each side.
+        """How the part goes onto a base, one for each side: both clips in their reference poses.
 
         Raises:
             ClipError: a bone or landmark is missing.
         """
+        splice = MappedClip(self.clip, self.landmarks)
+        if self.part.kind is not None:
+            base, splice = compared(base, splice)
         return find_retargets(
             self.part,
             base,
-            MappedClip(self.clip, self.landmarks),
+            splice,
             clavicle=self.clavicle,
             seen_from="pelvis" if self.travel else self.seen_from,
         )
@@ -107,6 +117,9 @@ class Splicer:
         self.splice = splice
         self._base = base
         self._retargets = splice.retargets(mapped)
+        compared_base, compared_splice = self._retargets[0].base, self._retargets[0].splice
+        self._rests = compared_base.rests if isinstance(compared_base, ReferredClip) else None
+        self._clip = compared_splice.clip
         self._bones = sorted({bone for each in self._retargets for bone in each.bones})
         self._travel = None
         if splice.travel:
@@ -131,9 +144,16 @@ class Splicer:
         """
         if span.frames.stop == span.frames.start:
             return base
+        if self._rests is None:
+            return self._onto(base, span)
+        before = self._rests.into(base)
+        return self._rests.back(self._onto(before, span), before, base)
+
+    def _onto(self, base: Clip, span: SpliceWindow) -> Clip:
+        """The same, of a clip that rests as the base does where the two were compared."""
         rotations, locations = base.rotations.copy(), base.locations.copy()
         before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
-        moment = sample_clip(self.splice.clip, span.splice_frames, span.seams)
+        moment = sample_clip(self._clip, span.splice_frames, span.seams)
         # Views: what is written here is written into the whole.
         turned, moved = rotations[span.frames], locations[span.frames]
         exact = self.splice.goal == "exact"
@@ -144,7 +164,7 @@ class Splicer:
         if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
             self._travel.move(base, span, whole, rotations, locations)
-        scales = _scaled(base, self.splice.clip, span, self._retargets)
+        scales = _scaled(base, self._clip, span, self._retargets)
         return replace(base, rotations=rotations, locations=locations, scales=scales)
 
 
@@ -160,10 +180,10 @@ def _scaled(
     acting = scales[span.frames]
     weights = span.weights[:, None, None]
     for each in retargets:
-        pairs = each.match.pairs if each.match.same_rest else {}
-        bones = [bone for bone in each.bones if bone in pairs]
+        pairs = each.match.pairs if each.match.same_body else {}
+        bones = [bone for bone in each.bones if bone in pairs and each.match.same_axes(bone)]
         others = [pairs[bone] for bone in bones]
-        rest = [bone for bone in each.bones if bone not in pairs]
+        rest = [bone for bone in each.bones if bone not in bones]
         there = sample_scales(splice, span.splice_frames, span.seams, others)
         acting[:, bones] += weights * (there - acting[:, bones])
         acting[:, rest] += weights * (1.0 - acting[:, rest])

@@ -18,7 +18,7 @@ from ..clip import Timing, sample_clip
 from ..humanoid import chain_length
 from .body_frames import laid_over, pelvis_frame
 from .parts import LEG
-from .retarget import MappedClip
+from .retarget import MappedClip, compared
 
 _RATE: Final = 20.0
 """Samples per second: more than legs need."""
@@ -59,6 +59,7 @@ def suggest_timings(
     Raises:
         ClipError: a landmark is missing.
     """
+    base, splice = compared(base, splice)
     ours, theirs = base.clip, splice.clip
     start, end = timing.splice_start, theirs.frames[-1]
     if timing.length is not None:
@@ -91,8 +92,10 @@ def _legs(mapped: MappedClip, base: MappedClip, frames: Floats, pace: float) -> 
     """Where knees and feet are in the pelvis's frame and how they swing, (frames, 24), in leg
     lengths.
     """
-    reference = pelvis_frame(base.skeleton, base.humanoid())
-    frame = laid_over(pelvis_frame(mapped.skeleton, mapped.humanoid()), reference)
+    ours, theirs = (
+        pelvis_frame(each.skeleton, each.humanoid(), each.reference) for each in (base, mapped)
+    )
+    frame = laid_over(theirs, ours)
     posture = sample_clip(mapped.clip, frames)
     back, place = conjugate(frame.orientation(posture)), frame.place(posture)
     positions = []

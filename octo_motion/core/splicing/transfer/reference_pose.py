@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pose in which two people are compared: found from where joints are while a clip plays.
+
+A file's rest pose may be a T, hanging arms, a lean, or no pose at all: it says nothing of the body.
+So each clip is given another rest pose before anything is carried over, its reference pose
+[Splice, 2.1]: upright, facing −Y, arms stretched sideways, legs straight down. It is found from
+joint positions and from how bones turn against each other, as robust means over the clip, and from
+nothing else. Give a bone another rest rotation, R(t) → R(t)·A, and its orientation Q in the
+reference pose becomes Q·A as well: whatever is worked out from there is the same.
+
+What joints do not tell is as on average over the clip. One thing alone is taken from the rest pose,
+where that is a pose of this body: how a hand without fingers is turned about its forearm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from ...rotations import (
+    Floats,
+    angle_between,
+    conjugate,
+    cross,
+    dot,
+    from_matrix,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+)
+from ...smoothing import smooth_step
+from ..clip import Clip, robust_direction, robust_rotations
+from ..humanoid import Landmarks
+
+_SAMPLES: Final = 240
+"""Frames of a clip that are looked at."""
+
+_STANDING: Final = (0.75, 0.92)
+"""Of the length of legs and trunk: how far the neck is from the feet when nobody stands, and from
+where on somebody does."""
+
+_SITTING: Final = 0.05
+"""Weight of a moment at which nobody stands."""
+
+_BENT: Final = (np.radians(10.0), np.radians(35.0))
+"""Bends of elbow and knee below which their plane says nothing, and from which it says all."""
+
+_STRAIGHT: Final = 0.03
+"""Weight, beside that of one bent moment, of the plane of a limb that swings without twisting: it
+decides where a limb is always straight."""
+
+_POSED: Final = np.radians(60.0)
+"""How far the parts of a body rest off the reference pose when a rest pose is one to stand in."""
+
+_STANCE: Final = 0.3
+"""Of all moments: for how many a foot stands at least. A foot of a walk stands for 0.6 of them."""
+
+_PLANTED: Final = (0.85, 0.98)
+"""Of the farthest that it ever is from the neck: a foot that is nearer is raised, or out in front;
+one that is farther stands."""
+
+_FEWEST: Final = 4
+"""Moments from which one sees how fast a foot moves."""
+
+_RIGID: Final = 2e-3
+"""Of the body's size: what a joint may move against a bone and count as fixed to it."""
+
+_X, _Z = np.eye(3)[[0, 2]]
+_LIMBS: Final = (
+    # root, middle and end; what they are seen from; where they hang, where they rest, and the axis
+    # about which they bend as they hang: a body that faces −Y, a side that is +1 on the left.
+    (("upper_arm", "forearm", "hand"), "chest", -_X, _X),
+    (("thigh", "shin", "foot"), "hips", _X, -_Z),
+)
+_FIXED: Final = {
+    "chest": ("neck", "head", "clavicle.L", "clavicle.R", "upper_arm.L", "upper_arm.R"),
+    "hips": ("thigh.L", "thigh.R", "spine", "chest"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ReferencePose:
+    """A clip's reference pose."""
+
+    orientations: Floats
+    """(bones, 4), armature space."""
+    fixed: dict[str, dict[str, Floats]]
+    """Joints that never move against the chest and the hips: places along the bone's axes, by
+    landmark, by "chest" and "hips"."""
+
+
+def has_fingers(clip: Clip, landmarks: Landmarks) -> bool:
+    """Whether joints tell how a hand is turned."""
+    skeleton = clip.skeleton
+    hands = (skeleton.index.get(landmarks.get(f"hand.{side}") or "", -1) for side in "LR")
+    return any(hand >= 0 and skeleton.children[hand] for hand in hands)
+
+
+def find_reference_pose(
+    clip: Clip, landmarks: Landmarks, *, fingers: bool = True
+) -> ReferencePose | None:
+    """The reference pose of a clip; none where a landmark that it needs is missing.
+
+    Fingers are joints: where they come to lie no rest pose may change. If neither of two bodies has
+    any (``fingers``), forearms and hands are as they rest, where that is a pose of this body.
+    """
+    if not len(clip) or not {
+        *("hips", "chest", "thigh.L", "thigh.R", "upper_arm.L", "upper_arm.R")
+    } <= {name for name, bone in landmarks.bones.items() if bone in clip.skeleton.index}:
+        return None
+    try:
+        return _Finder(clip, landmarks).pose(fingers=fingers)
+    except _NoFrameError:
+        return None
+
+
+class _NoFrameError(Exception):
+    """Joints from which left and up are to be told lie in one line."""
+
+
+class _Finder:
+    """What a reference pose is found from: bones at some moments, armature space."""
+
+    def __init__(self, clip: Clip, landmarks: Landmarks) -> None:
+        self._skeleton = clip.skeleton
+        count = min(len(clip), _SAMPLES)
+        rows = np.linspace(0, len(clip) - 1, count).astype(np.intp)
+        self._turns, self._heads = clip.skeleton.pose(clip.rotations[rows], clip.locations[rows])
+        index = clip.skeleton.index
+        self._bones = {name: index[bone] for name, bone in landmarks.bones.items() if bone in index}
+        self._standing = self._how_standing()
+
+    def pose(self, *, fingers: bool) -> ReferencePose:
+        """The whole."""
+        made: dict[int, Floats] = {}
+        hips, chest = self._bones["hips"], self._bones["chest"]
+        axes = {"hips": self._pelvis_axes(), "chest": self._chest_axes()}
+        for name, each in axes.items():
+            made[self._bones[name]] = conjugate(each)
+        for limb, seen_from, bends, rests in _LIMBS:
+            for side, sign in (("L", 1.0), ("R", -1.0)):
+                names = [f"{each}.{side}" for each in limb]
+                if all(each in self._bones for each in names):
+                    goal = rests * (sign, 1.0, 1.0)
+                    frame = self._bones[seen_from], axes[seen_from]
+                    made |= self._limb([self._bones[each] for each in names], frame, bends, goal)
+        if not fingers:
+            made |= self._arms_at_rest(made)
+        self._means(made, hips, chest)
+        orientations = np.array([made[bone] for bone in range(len(self._skeleton))])
+        return ReferencePose(orientations, self._fixed())
+
+    def _how_standing(self) -> Floats:
+        """(moments,) weights: how much each says of where up is."""
+        joints = self._joints
+        tops, middles = self._top(), 0.5 * (joints("thigh.L") + joints("thigh.R"))
+        full, feet = _lengths(tops - middles).max(), np.zeros_like(tops)
+        for side in "LR":
+            leg = [f"{each}.{side}" for each in ("thigh", "shin", "foot")]
+            leg = [each for each in leg if each in self._bones]
+            for upper, lower in pairwise(leg):
+                full += 0.5 * _lengths(joints(lower) - joints(upper)).mean()
+            feet += 0.5 * joints(leg[-1])
+        self._upward = tops - feet
+        reach = _lengths(self._upward) / max(full, 1e-12)
+        least, most = _STANDING
+        return np.maximum(smooth_step((reach - least) / (most - least)), _SITTING)
+
+    def _how_planted(self, foot: int) -> Floats:
+        """(moments,) weights: 1 where a foot rests under a leg that is stretched."""
+        places = self._heads[:, foot]
+        reach = _lengths(self._top() - places)
+        least, most = _PLANTED
+        full = max(float(np.quantile(reach, 0.95)), 1e-12)
+        reach = reach / full
+        weights = smooth_step((reach - least) / (most - least)) + _SITTING
+        if len(places) < _FEWEST:
+            return weights
+        speed = _lengths(np.gradient(places, axis=0))
+        usual = np.quantile(speed, _STANCE) + 1e-6 * full
+        return weights / (1.0 + (speed / usual) ** 4)
+
+    def _joints(self, landmark: str) -> Floats:
+        return self._heads[:, self._bones[landmark]]
+
+    def _top(self) -> Floats:
+        for name in ("neck", "head"):
+            if name in self._bones:
+                return self._joints(name)
+        raise _NoFrameError
+
+    def _seen(self, bone: int, vectors: Floats) -> Floats:
+        return rotate(conjugate(self._turns[:, bone]), vectors)
+
+    def _pelvis_axes(self) -> Floats:
+        """(4,) of the pelvis along the hips bone's axes: left by the thighs, up as one stands."""
+        hips = self._bones["hips"]
+        left = self._joints("thigh.L") - self._joints("thigh.R")
+        middle = 0.5 * (self._joints("thigh.L") + self._joints("thigh.R"))
+        # Who never stands has the pelvis below the trunk.
+        ways = np.concatenate([self._upward, self._top() - middle])
+        weights = np.concatenate([self._standing, _SITTING * (1.01 - self._standing)])
+        up = np.concatenate([self._seen(hips, each) for each in np.split(ways, 2)])
+        return _axes(
+            robust_direction(self._seen(hips, left), self._standing),
+            robust_direction(up, weights),
+        )
+
+    def _chest_axes(self) -> Floats:
+        """(4,) of the chest along its bone's axes: left by the shoulders, up along the trunk."""
+        chest = self._bones["chest"]
+        low = self._joints("spine" if "spine" in self._bones else "hips")
+        left = self._joints("upper_arm.L") - self._joints("upper_arm.R")
+        return _axes(
+            robust_direction(self._seen(chest, left), self._standing),
+            robust_direction(self._seen(chest, self._top() - low), self._standing),
+        )
+
+    def _limb(
+        self, bones: Sequence[int], frame: tuple[int, Floats], bends: Floats, goal: Floats
+    ) -> dict[int, Floats]:
+        """Upper and lower limb, stretched out; elbow and knee bend in the same plane."""
+        root, middle, end = bones
+        upper = self._heads[:, middle] - self._heads[:, root]
+        lower = self._heads[:, end] - self._heads[:, middle]
+        normal = cross(normalized(upper), normalized(lower))
+        bend = np.arctan2(_lengths(normal), dot(normalized(upper), normalized(lower)))
+        least, most = _BENT
+        says = smooth_step((bend - least) / (most - least))
+        says *= smooth_step((np.pi - bend) / np.radians(30.0))
+        # Straight, it is turned as if it had swung there from hanging, on the shortest way.
+        carrier = multiply(self._turns[:, frame[0]], frame[1])
+        way = rotate(conjugate(carrier), normalized(upper))
+        swung = rotate(carrier, rotate(shortest_arc(np.broadcast_to(-_Z, way.shape), way), bends))
+        made = {}
+        # The hinge as it lies when the limb is where it rests.
+        across = rotate(shortest_arc(-_Z, goal), bends)
+        rest = from_matrix(np.stack([goal, across, np.cross(goal, across)], axis=-1))
+        for bone, along in ((root, upper), (middle, lower)):
+            ways = np.concatenate([normal, swung])
+            # Straight up there is no shortest way.
+            clear = (0.5 - 0.5 * way[:, 2]) ** 2
+            weights = np.concatenate([says, _STRAIGHT / len(says) * clear])
+            hinge = robust_direction(
+                np.concatenate([self._seen(bone, each) for each in np.split(ways, 2)]), weights
+            )
+            length = robust_direction(self._seen(bone, along), np.ones(len(along)))
+            own = _axes(length, hinge, first_and_second=True)
+            made[bone] = multiply(rest, conjugate(own))
+        return made
+
+    def _arms_at_rest(self, made: dict[int, Floats]) -> dict[int, Floats]:
+        """Forearms and hands without fingers as they rest, where that is a pose of this body.
+
+        How forearm and hand are turned about the forearm no joint tells, and the average of a clip
+        is no palm of its own: a hand that waves would face as one does that hangs.
+        """
+        if not self._rests_in_a_pose(made):
+            return {}
+        rests, heads = self._skeleton.rest_rotations, self._skeleton.heads
+        chest = self._bones["chest"]
+        found = {}
+        for side in "LR":
+            names = [f"{each}.{side}" for each in ("upper_arm", "forearm", "hand")]
+            if not all(each in self._bones for each in names):
+                continue
+            root, middle, end = (self._bones[each] for each in names)
+            lay = multiply(made[chest], conjugate(rests[chest]))
+            goal = _X if side == "L" else -_X
+            for upper, lower in ((root, middle), (middle, end)):
+                way = normalized(rotate(lay, heads[lower] - heads[upper]))
+                lay = multiply(shortest_arc(way, goal), lay)
+            found[middle], found[end] = multiply(lay, rests[middle]), multiply(lay, rests[end])
+        return found
+
+    def _rests_in_a_pose(self, made: dict[int, Floats]) -> bool:
+        """Whether pelvis, chest, thighs and shins rest in each other about as in the reference
+        pose, seated and stooping people included.
+        """
+        rests = self._skeleton.rest_rotations
+        names = [f"{each}.{side}" for each in ("thigh", "shin") for side in "LR"]
+        names = ["chest", *(each for each in names if each in self._bones)]
+        hips = self._bones["hips"]
+        whole = multiply(made[hips], conjugate(rests[hips]))
+        return all(
+            angle_between(multiply(whole, rests[self._bones[each]]), made[self._bones[each]])
+            < _POSED
+            for each in names
+        )
+
+    def _means(self, made: dict[int, Floats], hips: int, chest: int) -> None:
+        """All bones that have no place of their own: as they are on average."""
+        skeleton = self._skeleton
+        parents = np.maximum(skeleton.parents, 0)
+        carriers = np.array(parents)
+        spine = skeleton.ancestors(chest)
+        # Between pelvis and chest as the chest sees them, above the pelvis as that does.
+        spine = spine[: spine.index(hips)] if hips in spine else []
+        above = skeleton.ancestors(hips)
+        # A foot that stands is flat, whatever its shin does.
+        feet = [self._bones[each] for each in ("foot.L", "foot.R") if each in self._bones]
+        carriers[spine], carriers[[*above, *feet]] = chest, hips
+        weights = np.repeat(self._standing[:, None], len(skeleton), axis=1)
+        for foot in feet:
+            weights[:, foot] *= self._how_planted(foot)
+        between = multiply(conjugate(self._turns[:, carriers]), self._turns)
+        means = robust_rotations(between, weights)
+        for bone in (*spine, *above, *feet):
+            made[bone] = multiply(made[carriers[bone]], means[bone])
+        for bone, parent in enumerate(skeleton.parents):
+            if bone not in made and parent >= 0:
+                made[bone] = multiply(made[parent], means[bone])
+            elif bone not in made:
+                made[bone] = skeleton.rest_rotations[bone]
+
+    def _fixed(self) -> dict[str, dict[str, Floats]]:
+        """What never moves against chest and hips."""
+        size = 2.0 * float(_lengths(self._heads[0] - self._heads[0].mean(axis=0)).max())
+        found: dict[str, dict[str, Floats]] = {}
+        for carrier, names in _FIXED.items():
+            bone = self._bones[carrier]
+            found[carrier] = {}
+            for name in names:
+                if name in self._bones:
+                    places = self._seen(bone, self._joints(name) - self._heads[:, bone])
+                    place = np.median(places, axis=0)
+                    if _lengths(places - place).max() < _RIGID * size:
+                        found[carrier][name] = places.mean(axis=0)
+        return found
+
+
+def _lengths(vectors: Floats) -> Floats:
+    return np.linalg.norm(vectors, axis=-1)
+
+
+def _axes(left: Floats, up: Floats, *, first_and_second: bool = False) -> Floats:
+    """(4,) X along the first and Z near the second; or X along the first and Y near the second.
+
+    Raises:
+        _NoFrameError: they lie in one line.
+    """
+    x, other = normalized(left), normalized(up)
+    other = other - np.dot(x, other) * x
+    if np.linalg.norm(x) < 0.5 or np.linalg.norm(other) < 1e-3:
+        raise _NoFrameError
+    other = normalized(other)
+    columns = [x, other, np.cross(x, other)] if first_and_second else [x, np.cross(other, x), other]
+    return from_matrix(np.stack(columns, axis=-1))
