@@ -72,10 +72,14 @@ def lean(joints: Joints) -> Floats:
 
 def tilt(joints: Joints) -> Floats:
     """(moments, 3) hips → neck, as seen by one who faces as the pelvis does: which way it leans."""
+    return _seen(level(joints), unit(joints["neck"] - joints["hips"]))
+
+
+def level(joints: Joints) -> Floats:
+    """(moments, 3, 3) axes as columns: z upright, x to the left as the thighs have it."""
     x = joints["left_thigh"] - joints["right_thigh"]
     x = unit(x * [1.0, 1.0, 0.0])
-    axes = np.stack([x, np.cross(UP, x), np.broadcast_to(UP, x.shape)], axis=-1)
-    return _seen(axes, unit(joints["neck"] - joints["hips"]))
+    return np.stack([x, np.cross(UP, x), np.broadcast_to(UP, x.shape)], axis=-1)
 
 
 def _seen(axes: Floats, vectors: Floats) -> Floats:
@@ -90,9 +94,13 @@ def arm_directions(joints: Joints, side: str) -> tuple[Floats, Floats]:
 
 
 def leg_directions(joints: Joints, side: str) -> tuple[Floats, Floats]:
-    """Thigh and shin, as seen from the pelvis."""
+    """Thigh and shin, as seen by one who faces as the pelvis does.
+
+    Not from the pelvis itself: where the spine's lower end lies beside the thighs is the file's
+    choice (33° behind them in one, 23° before them in another), and nobody sees it.
+    """
     thigh, knee, foot = (joints[f"{side}_{each}"] for each in ("thigh", "knee", "foot"))
-    axes = pelvis(joints)
+    axes = level(joints)
     return _seen(axes, unit(knee - thigh)), _seen(axes, unit(foot - knee))
 
 
