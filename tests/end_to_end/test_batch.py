@@ -186,7 +186,7 @@ def test_motion_worse_than_its_limits_fails_its_shot_and_the_report_has_the_figu
     good, bad = told["good"], told["bad"]
     assert (good["status"], bad["status"]) == ("done", "failed")
     assert names(tmp_path / "out") == {"good.blend"}
-    assert list(good["quality"]) == ["slip", "depth", "strain", "miss", "turn", "overlap"]
+    assert list(good["quality"]) == ["slip", "drift", "depth", "strain", "miss", "turn", "overlap"]
     assert good["quality"]["turn"]["value"] > 0.5
     assert 1 <= good["quality"]["turn"]["frame"] <= 6
     # Half of them, or more, are left out; 12 bones of 4 components and the travel at 6 frames.
