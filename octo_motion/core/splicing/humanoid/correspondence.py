@@ -160,26 +160,19 @@ def find_correspondence(
     """
     marks, others = landmarks
     kinds = {} if marks is None else {name: key for key, name in marks.bones.items()}
-    clavicles = {bone for bone in pairs if kinds.get(base.names[bone], "").startswith("clavicle")}
-    # Whether a collar bone comes along says nothing of how arm and hand are built.
-    limbs = {bone: other for bone, other in pairs.items() if bone not in clavicles}
-    if any(kind in _TRUNK for bone in pairs if (kind := kinds.get(base.names[bone], ""))):
-        # The few bones of a trunk or a neck tell no body from another: all landmarks do.
-        limbs |= _landmark_pairs(base, splice, landmarks)
+    clavicles, limbs = _limbs(base, splice, pairs, landmarks, kinds)
     same_body, size = _same_body(base, splice, limbs)
     same_with_clavicles = same_body and _same_body(base, splice, pairs)[0]
     backs = tuple(conjugate(each) for each in frames_at_rest)
     on_limbs: set[int] = set()
     laid: dict[int, Floats] = {}
     constants: dict[int, Floats] = {}
-    for bone in sorted(pairs):
-        other = pairs[bone]
+    for bone, other in sorted(pairs.items()):
         landmark = kinds.get(base.names[bone], "")
-        kind = landmark.partition(".")[0]
-        lay = IDENTITY
-        if not referred:
-            lay = next((laid[each] for each in base.ancestors(bone) if each in laid), lay)
-        elif kind in _LIMBS or (not kind and not on_limbs.isdisjoint(base.ancestors(bone))):
+        kind, _, side = landmark.partition(".")
+        above = base.ancestors(bone)
+        lay = next((laid[each] for each in above if each in laid and not referred), IDENTITY)
+        if referred and (kind in _LIMBS or (not kind and not on_limbs.isdisjoint(above))):
             # How a limb lies along its own plane does not hang on where the body's frames are.
             on_limbs.add(bone)
         our_back, their_back = (IDENTITY, IDENTITY) if bone in on_limbs else backs
@@ -195,20 +188,43 @@ def find_correspondence(
             if aimed and np.any(ours) and np.any(theirs):
                 lay = multiply(shortest_arc(theirs, ours), lay)
         elif kind == "foot" and marks is not None and others is not None:
-            side = landmark.partition(".")[2]
             feet = _Foot(base, marks, bone, side), _Foot(splice, others, other, side)
             ours, theirs = rotate(our_back, feet[0].along), rotate(their_back, feet[1].along)
-            unlike = any(each.pointed for each in feet) and not all(each.pointed for each in feet)
-            if referred:
-                # A dancer on tiptoe does not tell how a foot stands.
-                unlike = bool(np.dot(ours, theirs) < _UNLIKE)
-            if any(each.toe is not None for each in feet) and unlike:
+            if _stand_otherwise(feet, ours, theirs, referred=referred):
                 lay = multiply(shortest_arc(rotate(lay, theirs), ours), lay)
         laid[bone] = lay
-        rest = multiply(our_back, base.rest_rotations[bone])
-        other_rest = multiply(their_back, splice.rest_rotations[other])
-        constants[bone] = multiply(conjugate(multiply(lay, other_rest)), rest)
+        turned = multiply(lay, multiply(their_back, splice.rest_rotations[other]))
+        constants[bone] = multiply(conjugate(turned), multiply(our_back, base.rest_rotations[bone]))
     return Correspondence(pairs, constants, same_body, size)
+
+
+def _limbs(
+    base: Skeleton,
+    splice: Skeleton,
+    pairs: Mapping[int, int],
+    landmarks: tuple[Landmarks | None, Landmarks | None],
+    kinds: Mapping[str, str],
+) -> tuple[set[int], dict[int, int]]:
+    """Clavicles of the base, and the pairs of bones by which bodies are told apart."""
+    clavicles = {bone for bone in pairs if kinds.get(base.names[bone], "").startswith("clavicle")}
+    # Whether a collar bone comes along says nothing of how arm and hand are built.
+    limbs = {bone: other for bone, other in pairs.items() if bone not in clavicles}
+    if any(kind in _TRUNK for bone in pairs if (kind := kinds.get(base.names[bone], ""))):
+        # The few bones of a trunk or a neck tell no body from another: all landmarks do.
+        limbs |= _landmark_pairs(base, splice, landmarks)
+    return clavicles, limbs
+
+
+def _stand_otherwise(
+    feet: tuple[_Foot, _Foot], ours: Floats, theirs: Floats, *, referred: bool
+) -> bool:
+    """Whether feet are built so differently that their directions have to be brought together."""
+    if all(each.toe is None for each in feet):
+        return False
+    if referred:
+        # A dancer on tiptoe does not tell how a foot stands.
+        return bool(np.dot(ours, theirs) < _UNLIKE)
+    return any(each.pointed for each in feet) and not all(each.pointed for each in feet)
 
 
 def chain_length(skeleton: Skeleton, bones: Sequence[int]) -> float:
