@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
 """No rest pose changes what a splice gives: clips of others, rewritten with other rest poses."""
 
 from collections.abc import Callable

@@ -194,3 +194,12 @@ def largest_turn(rotations: Floats) -> float:
     """Radians that a bone turns at most from one of the frames to the next."""
     cosine = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1))
     return float(2.0 * np.arccos(np.clip(cosine, 0.0, 1.0)).max())
+
+
+def deepest_joint(joints: np.ndarray, ground: Ground, length: float = 1.0) -> float:
+    """How far a joint (…, joints, 3) but for the root, the body's, is below the ground.
+
+    In arms of that length; negative if all are above it.
+    """
+    below = ground.height(joints[..., 1:, :]) - joints[..., 1:, 2]
+    return float(below.max()) / length

@@ -22,6 +22,7 @@ from octo_motion.ui.locomotion.settings.lists import (
 )
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh, make_square
+from tests.core.grounds import deepest_joint
 from tests.ui.made import prepare
 from tests.ui.rig import Octopus, click, generate, give_route, joints_in_world, keys
 
@@ -72,7 +73,7 @@ def test_one_click_walks_on_a_plane_and_nothing_slides(octopus: Any) -> None:
     # Within a hundredth of the arm between frames, and what single precision leaves at them.
     assert quality.slip(joints, lying, cycles, length).value < 0.01
     assert quality.slip(joints[::2], lying[::2], cycles[::2], length).value < 1e-5
-    assert quality.depth(joints, LevelGround(0.0), length).value < 0.005
+    assert deepest_joint(joints, LevelGround(0.0), float(length[0])) < 0.005
     assert lying.any(axis=-1).sum(axis=1).min() >= 2
 
 
@@ -107,7 +108,7 @@ def test_arms_hold_the_ground_where_a_posed_body_carries_them(octopus: Any) -> N
     length = prepare(octopus, bpy.context).generator.lengths
     joints, lying, cycles = arms_in_world(octopus, np.arange(20.0, 60.0, 1.0))
     assert quality.slip(joints, lying, cycles, length).value < 1e-5
-    assert quality.depth(joints, LevelGround(0.0), length).value < 0.005
+    assert deepest_joint(joints, LevelGround(0.0), float(length[0])) < 0.005
     heights = joints[lying][:, 2]
     assert 0.0 < heights.min() < heights.max() < 0.03
 
@@ -156,7 +157,7 @@ def test_a_mesh_is_walked_on_where_it_is(octopus: Any) -> None:
     plane = LevelGround(0.4, (0.0, float(np.tan(np.radians(20.0)))))
     length = prepare(octopus, bpy.context).generator.lengths
     joints, lying, cycles = arms_in_world(octopus, np.arange(20.0, 60.0, 1.0))
-    assert quality.depth(joints, plane, length).value < 0.005
+    assert deepest_joint(joints, plane, float(length[0])) < 0.005
     assert quality.slip(joints, lying, cycles, length).value < 1e-5
     assert np.abs(joints[lying][:, 2] - plane.height(joints[lying])).max() < 0.03
 
