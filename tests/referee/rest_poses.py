@@ -67,7 +67,9 @@ class Bvh:
                 joints[-1].channels = [next(words) for _ in range(int(next(words)))]
             elif word == "Frames:":
                 frames = int(next(words))
-                next(words), next(words)
+                # Frame Time:
+                for _ in range(2):
+                    next(words)
                 frame_time = float(next(words))
                 motion = np.array([float(each) for each in words]).reshape(frames, -1)
                 return cls(joints, frame_time, motion)

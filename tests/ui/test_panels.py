@@ -18,7 +18,7 @@ from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from octo_motion.ui.panel_base import draw_sentence
 from tests.ui.rig import give_route, make_octopus
 
-PANELS = [each for each in panels.CLASSES if issubclass(each, bpy.types.Panel)]
+PANELS = list(panels.CLASSES)
 ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
 
 
