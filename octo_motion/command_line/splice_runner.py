@@ -176,7 +176,9 @@ def splice(
             try:
                 _add(armature, each, clips, base_file)
             except OctoMotionError as error:
-                raise type(error)(f"Splice {number}: {error.problem}", error.remedy) from error
+                which = f"'{each.settings['name']}' ({number})" if "name" in each.settings else ""
+                which = which or f"Splice {number}"
+                raise type(error)(f"{which}: {error.problem}", error.remedy) from error
     prepared = prepare_splices(armature)
     made = write_splices(prepared, prepared.compute())
     first, last = (round(each) for each in bpy.data.actions[made.action].frame_range)

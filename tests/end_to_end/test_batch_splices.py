@@ -161,6 +161,8 @@ def test_job_makes_its_good_shots_and_tells_of_the_bad_ones(folder: Path) -> Non
     unknown = "There is no action 'Throws'. Did you mean 'throw'? Valid: throw."
     assert errors["action"] == f"Splice 1: 'throw.bvh': {unknown}"
     assert "'Hat'" in errors["odd"]
+    # It was in the list by then, under this name.
+    assert errors["chain"].startswith("'tail: dance' (1): ")
     assert "no bone 'tail'" in errors["chain"]
     for name, each in told.items():
         assert each["status"] == ("failed" if errors[name] else "done")

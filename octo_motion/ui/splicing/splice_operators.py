@@ -24,7 +24,15 @@ from ..operator_base import (
 )
 from ..panel_base import ItemRows
 from .properties import PARTS, splicing_settings
-from .stack import ClipReader, SpliceSummary, Stack, prepare_splices, suggestions, write_splices
+from .stack import (
+    ClipReader,
+    ListedSpliceError,
+    SpliceSummary,
+    Stack,
+    prepare_splices,
+    suggestions,
+    write_splices,
+)
 
 _SPARE_EASE: Final = 0.25
 """Of a clip's length: longer easing would leave little of a short clip."""
@@ -98,16 +106,25 @@ def active_splice(settings: Any) -> Any:
     return _SPLICES.active_item(settings)
 
 
-class StackOperator(ListOperator):
+class _SelectsFailed(ListOperator):
+    """Where a splice of the list cannot be built, that one becomes the active one."""
+
+    KIND = _SPLICES
+
+    def run(self, context: bpy.types.Context) -> None:
+        try:
+            super().run(context)
+        except ListedSpliceError as error:
+            error.select()
+            raise
+
+
+class StackOperator(_SelectsFailed):
     """An operator on the stack of the active armature, and what else it has of splicing."""
 
-    KIND = _SPLICES
 
-
-class SpliceOperator(ItemOperator):
+class SpliceOperator(_SelectsFailed, ItemOperator):
     """An operator on the active splice."""
-
-    KIND = _SPLICES
 
 
 class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):

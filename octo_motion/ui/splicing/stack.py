@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
@@ -24,7 +25,7 @@ from ...blender.animation import (
     write_clip,
 )
 from ...blender.rig import armature_data
-from ...core.errors import ClipError, WriteError
+from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.splicing.clip import After, Clip, Timing, average_pose, splice_window
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL, Landmarks, map_skeleton
 from ...core.splicing.transfer import (
@@ -33,6 +34,8 @@ from ...core.splicing.transfer import (
     MappedClip,
     Part,
     Splice,
+    SpliceError,
+    SplicePreview,
     Suggestion,
     build_splices,
     chain_part,
@@ -60,6 +63,20 @@ class Source(MappedClip):
     """Whether the landmarks were found just now: the armature's table is not filled."""
 
 
+class ListedSpliceError(ClipError):
+    """A splice of an armature's list cannot be built: says which, for people and for the panel."""
+
+    def __init__(self, armature: str, number: int, name: str, error: OctoMotionError) -> None:
+        super().__init__(f"'{name}' ({number + 1}): {error.problem}", error.remedy)
+        self.armature = armature
+        self.number = number
+        """Its place in the list, counted from 0."""
+
+    def select(self) -> None:
+        """Make it the active one of the list."""
+        splicing_settings(local_object(self.armature)).active_splice = self.number
+
+
 @dataclass(frozen=True, eq=False)
 class Stack:
     """A base and all that goes onto it, as plain data; see :func:`prepare_splices`."""
@@ -69,6 +86,8 @@ class Stack:
     base: Source
     splices: tuple[Splice | None, ...]
     """In the order of the list; none for one that is muted."""
+    names: tuple[str, ...]
+    """What the splices are called in the list."""
 
     @property
     def acting(self) -> list[Splice]:
@@ -79,9 +98,30 @@ class Stack:
         """The whole result.
 
         Raises:
-            ClipError: a bone or landmark is missing, or a timing makes no sense.
+            ListedSpliceError: a bone or landmark is missing, or a timing makes no sense.
         """
-        return build_splices(self.base.clip, self.base.landmarks, self.acting)
+        with self.naming():
+            return build_splices(self.base.clip, self.base.landmarks, self.acting)
+
+    def preview(self, number: int) -> SplicePreview:
+        """The result at single frames, while this splice of the list is timed; none that is muted.
+
+        Raises:
+            ListedSpliceError: a bone or landmark is missing, or a timing makes no sense.
+        """
+        beneath = sum(each is not None for each in self.splices[:number])
+        with self.naming():
+            return SplicePreview(self.base.clip, self.base.landmarks, self.acting, beneath)
+
+    @contextmanager
+    def naming(self) -> Iterator[None]:
+        """Say of what is wrong with one of those that act which of the list it is."""
+        try:
+            yield
+        except SpliceError as error:
+            acting = [number for number, each in enumerate(self.splices) if each is not None]
+            number = acting[error.number]
+            raise ListedSpliceError(self.armature, number, self.names[number], error) from error
 
     def retimed(self, number: int, base_start: float, splice_start: float) -> Stack:
         """The same with another start of one splice."""
@@ -130,8 +170,13 @@ def prepare_splices(armature: bpy.types.Object) -> Stack:
         )
     reader = ClipReader()
     base = reader.base(armature)
-    splices = [None if item.mute else _splice(reader, item, base) for item in settings.splices]
-    return Stack(armature.name, base, tuple(splices))
+    splices: list[Splice | None] = []
+    for number, item in enumerate(settings.splices):
+        try:
+            splices.append(None if item.mute else _splice(reader, item, base))
+        except OctoMotionError as error:
+            raise ListedSpliceError(armature.name, number, item.name, error) from error
+    return Stack(armature.name, base, tuple(splices), tuple(settings.splices.keys()))
 
 
 class ClipReader:
@@ -164,13 +209,9 @@ class ClipReader:
         """
         remedy = "Choose it in the panel Splicing, mute the splice or remove it."
         if item.source is None:
-            raise ClipError(
-                f"The source armature of splice '{item.name}' is gone, or was never chosen.", remedy
-            )
+            raise ClipError("Its source armature is gone, or was never chosen.", remedy)
         if item.action is None:
-            raise ClipError(
-                f"The action of splice '{item.name}' is gone, or was never chosen.", remedy
-            )
+            raise ClipError("Its action is gone, or was never chosen.", remedy)
         # Slowed down, what a clip does between its frames is seen. To play the scene takes longer.
         between = item.rate < 1.0 and not item.visual
         return self.source(item.source, item.action, item.slot, visual=item.visual, between=between)
@@ -276,16 +317,12 @@ def _part(item: Any, base: Source, source: Source) -> Part:
     if name != CHAIN.name:
         return part_named(name)
     if not item.bone:
-        raise ClipError(
-            f"The chain of splice '{item.name}' has no first bone.",
-            "Choose it in the panel Splicing.",
-        )
+        raise ClipError("Its chain has no first bone.", "Choose it in the panel Splicing.")
     part = chain_part(item.bone, item.source_bone)
     for each, bone in ((base, part.root), (source, part.splice_root)):
         if bone not in each.clip.skeleton.index:
             raise ClipError(
-                f"'{each.armature}' has no bone '{bone}', the first of the chain of splice "
-                f"'{item.name}'.",
+                f"'{each.armature}' has no bone '{bone}', the first of its chain.",
                 "Choose the first bones in the panel Splicing.",
             )
     return part

@@ -17,11 +17,10 @@ from bpy.props import FloatProperty
 from ...blender.animation import pose_values, restore_pose, show_pose, writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError, OctoMotionError, WriteError
-from ...core.splicing.transfer import SplicePreview
 from .. import at_work
 from .properties import splicing_settings
 from .splice_operators import SpliceOperator, active_splice, build_retimed, report_built
-from .stack import Stack, local_object, prepare_splices
+from .stack import ListedSpliceError, Stack, local_object, prepare_splices
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -109,12 +108,11 @@ class DragSession:
     def __init__(self, stack: Stack, number: int, scene: bpy.types.Scene) -> None:
         splice = stack.splices[number]
         assert splice is not None
-        beneath = sum(each is not None for each in stack.splices[:number])
         self.number = number
         self.stack = stack
         self.drag = TimingDrag(splice.timing.base_start, splice.timing.splice_start)
         self._timing = splice.timing
-        self._live = SplicePreview(stack.base.clip, stack.base.landmarks, stack.acting, beneath)
+        self._live = stack.preview(number)
         self._pose = pose_values(local_object(stack.armature))
         self._scene = scene.name
         self._frame = scene.frame_current_final
@@ -134,7 +132,8 @@ class DragSession:
         armature = local_object(self.stack.armature)
         base_start, splice_start = self.drag.starts
         timing = replace(self._timing, base_start=base_start, splice_start=splice_start)
-        clip = self._live.at(scene.frame_current_final, timing)
+        with self.stack.naming():
+            clip = self._live.at(scene.frame_current_final, timing)
         scales = None if clip.scales is None else clip.scales[0]
         show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0], scales)
 
@@ -298,6 +297,8 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
         self._tear_down(context)
+        if isinstance(error, ListedSpliceError):
+            error.select()
         self.report({"ERROR"}, str(error))
         return {"CANCELLED"}
 

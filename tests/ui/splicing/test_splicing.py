@@ -2,6 +2,7 @@
 """What an artist does with splices: add, time, mute, reorder, build, take back."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -887,12 +888,86 @@ def test_building_says_what_is_missing() -> None:
     assert_refused("muted", "splice_drag_timing")
     item.mute = False
     item.action = None
-    assert_refused("The action of splice .* is gone", "splice_build")
+    assert_refused("'Right Arm: .*: Its action is gone", "splice_build")
     item.action = source.animation_data.action
     bpy.data.objects.remove(source)
-    assert_refused("The source armature of splice .* is gone", "splice_build")
+    assert_refused("'Right Arm: .*: Its source armature is gone", "splice_build")
     item.mute = True
     assert OPERATORS.splice_build() == {"FINISHED"}
+
+
+def _without_action(item: Any, _source: Any) -> None:
+    item.action = None
+
+
+def _of_another_time(item: Any, _source: Any) -> None:
+    item.length = float("nan")
+
+
+def _without_landmark(_item: Any, source: Any) -> None:
+    stack_of(source).landmarks.hand_l = "claw"
+
+
+def _a_chain_of_nothing(item: Any, _source: Any) -> None:
+    item.part = "CHAIN"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (_without_action, "Its action is gone"),
+        (lambda item, _: setattr(item, "source", None), "Its source armature is gone"),
+        (_of_another_time, "The timing has values that are no numbers"),
+        (_without_landmark, "'Source': There is no bone 'claw'"),
+        (_a_chain_of_nothing, "Its chain has no first bone"),
+    ],
+)
+@pytest.mark.parametrize(
+    "button", ["splice_build", "splice_drag_timing", "splice_suggest_timing", "drag"]
+)
+def test_what_cannot_be_built_is_named_by_the_splice_of_the_list_which_is_selected(
+    button: str, spoil: Callable[[Any, Any], None], reason: str
+) -> None:
+    """Beside a muted splice and a sound one, the one that is spoilt: it is called Throw."""
+    hero, source = hero_and_source()
+    for part in ("HEAD", "RIGHT_ARM", "LEFT_ARM"):
+        OPERATORS.splice_add(part=part)
+    select(source)
+    OPERATORS.map_skeleton()
+    select(hero)
+    stack = stack_of(hero)
+    stack.splices[0].mute = True
+    stack.splices[2].name = "Throw"
+    stack.active_splice = 1
+    spoil(stack.splices[2], source)
+    expected = rf"'Throw' \(3\): {reason}"
+    if button == "drag":
+        operator = DragOperator()
+        event: Any = SimpleNamespace(mouse_x=0)
+        assert operator.invoke(bpy.context, event) == {"CANCELLED"}
+        assert re.match(expected, operator.reports[0])
+    else:
+        with pytest.raises(RuntimeError, match=expected):
+            getattr(OPERATORS, button)()
+    assert stack.active_splice == 2
+    assert hero.animation_data.action == stack.base
+    assert stack.result is None
+
+
+class DragOperator:
+    """The operator's methods on a plain object: Blender makes real ones only with a window."""
+
+    _session = None
+
+    def __init__(self) -> None:
+        self.reports: list[str] = []
+
+    def report(self, _kind: set[str], text: str) -> None:
+        self.reports.append(text)
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(OCTO_MOTION_OT_splice_drag_timing, name)
+        return found.__get__(self) if callable(found) else found
 
 
 def test_a_source_that_is_deleted_from_the_scene_serves_all_the_same() -> None:

@@ -12,7 +12,7 @@ from .parts import (
     part_named,
 )
 from .retarget import MappedClip
-from .splice import LimbGoal, Splice, SplicePreview, build_splices
+from .splice import LimbGoal, Splice, SpliceError, SplicePreview, build_splices, numbered
 from .timing_suggestions import Suggestion, suggest_timings
 
 __all__ = [
@@ -23,11 +23,13 @@ __all__ = [
     "Part",
     "PartKind",
     "Splice",
+    "SpliceError",
     "SplicePreview",
     "Suggestion",
     "bones_beneath",
     "build_splices",
     "chain_part",
+    "numbered",
     "part_bones",
     "part_named",
     "suggest_timings",

@@ -10,13 +10,14 @@ the exact point; clavicles may belong to the arm.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from ...errors import ClipError
+from ...errors import ClipError, OctoMotionError
 from ...rotations import (
     Floats,
     conjugate,
@@ -87,17 +88,48 @@ class Splice:
         )
 
 
+class SpliceError(ClipError):
+    """One splice of several cannot be done."""
+
+    def __init__(self, number: int, error: OctoMotionError) -> None:
+        super().__init__(error.problem, error.remedy)
+        self.number = number
+        """Which of those that were given, counted from 0."""
+
+
+@contextmanager
+def numbered(number: int) -> Iterator[None]:
+    """Say of what is wrong with a splice which one it is."""
+    try:
+        yield
+    except OctoMotionError as error:
+        raise SpliceError(number, error) from error
+
+
 def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice]) -> Clip:
     """All splices of a stack, each onto the result of those before. Nothing given is changed.
 
     Raises:
-        ClipError: a bone or landmark is missing, or a timing makes no sense.
+        SpliceError: a bone or landmark is missing, or a timing makes no sense.
     """
-    result = base
     # All on the same base: the ground is where it stands, whatever is done to its legs on the way.
-    for each in [Splicer(base, landmarks, splice) for splice in splices]:
-        result = each.onto(result, each.window(each.splice.timing))
+    ready = _made_ready(base, landmarks, splices)
+    result = base
+    for number, each in enumerate(ready):
+        with numbered(number):
+            result = each.onto(result, each.window(each.splice.timing))
     return result
+
+
+def _made_ready(
+    base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], first: int = 0
+) -> list[Splicer]:
+    """Splices of which the first has this number."""
+    ready: list[Splicer] = []
+    for number, splice in enumerate(splices, first):
+        with numbered(number):
+            ready.append(Splicer(base, landmarks, splice))
+    return ready
 
 
 class Splicer:
@@ -236,24 +268,29 @@ class SplicePreview:
     it hangs on.
 
     Raises:
-        ClipError: a bone or landmark is missing, or a timing makes no sense.
+        SpliceError: a bone or landmark is missing, or a timing makes no sense.
     """
 
     def __init__(
         self, base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], number: int
     ) -> None:
+        self._number = number
         self._base = build_splices(base, landmarks, splices[:number])
         # Made ready on the stack's own base: it tells the ground.
-        self._levels = [Splicer(base, landmarks, each) for each in splices[number:]]
-        self._above = [each.window(each.splice.timing) for each in self._levels[1:]]
+        self._levels = _made_ready(base, landmarks, splices[number:], number)
+        self._above: list[SpliceWindow] = []
+        for above, each in enumerate(self._levels[1:], number + 1):
+            with numbered(above):
+                self._above.append(each.window(each.splice.timing))
 
     def at(self, frame: float, timing: Timing) -> Clip:
         """The result at the base's frame nearest to this one, in a clip that has no other.
 
         Raises:
-            ClipError: the timing makes no sense.
+            SpliceError: the timing makes no sense.
         """
-        spans = [self._levels[0].window(timing), *self._above]
+        with numbered(self._number):
+            spans = [self._levels[0].window(timing), *self._above]
         row = int(np.abs(self._base.frames - frame).argmin())
         needed = [row]
         for level, span in zip(self._levels[::-1], spans[::-1], strict=True):
