@@ -60,6 +60,8 @@ SAME_MOTION: dict[str, Callable[[str], bytes]] = {
     "mark of UTF-8": lambda text: codecs.BOM_UTF8 + text.encode(),
     "UTF-16, little end first": lambda text: codecs.BOM_UTF16_LE + text.encode("utf-16-le"),
     "UTF-16, big end first": lambda text: codecs.BOM_UTF16_BE + text.encode("utf-16-be"),
+    "UTF-16 without a mark": lambda text: text.encode("utf-16-le"),
+    "UTF-16 without a mark, big end first": lambda text: text.encode("utf-16-be"),
     "line ends of Windows": lambda text: text.replace("\n", "\r\n").encode(),
     "line ends of old Macs": lambda text: text.replace("\n", "\r").encode(),
     "blank lines": lambda text: text.replace("\n", "\n\n \n").encode(),
@@ -136,6 +138,89 @@ def test_names_in_an_old_encoding_are_told() -> None:
     checked = check_bvh(SOUND.replace("chest", "poitrine_é").encode("latin-1"))
     assert "poitrine_é" in checked.text
     assert "not in UTF-8" in checked.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("encoding", "note"),
+    [
+        ("utf-8", ()),
+        ("utf-8-sig", ()),
+        ("utf-16", ("Its text was UTF-16-LE.",)),
+        ("cp932", ("Its names are not in UTF-8: they were read as Shift-JIS.",)),
+        ("euc_jp", ("Its names are not in UTF-8: they were read as EUC-JP.",)),
+    ],
+)
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("右腕", "左ひじ"),
+        ("センター", "上半身"),
+        ("頭", "首"),
+        ("足首", "左手首"),
+        ("右ひざ", "下半身"),
+        ("RightArm_腕", "つま先"),
+    ],
+)
+def test_japanese_names_are_read_right(
+    encoding: str, note: tuple[str, ...], names: tuple[str, str]
+) -> None:
+    text = SOUND.replace("hip", names[0]).replace("chest", names[1])
+    checked = check_bvh(text.encode(encoding))
+    assert f"ROOT {names[0]}\n" in checked.text
+    assert f"JOINT {names[1]}\n" in checked.text
+    assert checked.notes == note
+
+
+@pytest.mark.parametrize("name", ["poitrine_é", "épaule", "Hüfte", "Señor", "bröst"])
+def test_names_in_latin_letters_are_not_taken_for_japanese(name: str) -> None:
+    assert f"JOINT {name}\n" in check_bvh(SOUND.replace("chest", name).encode("latin-1")).text
+
+
+def hierarchy_and_rows(text: str) -> tuple[list[str], list[list[str]]]:
+    """Lines that name channels, and the values of all frames."""
+    hierarchy, _, motion = text.partition("MOTION\n")
+    lines = [line for line in hierarchy.splitlines() if line.startswith("CHANNELS")]
+    return lines, [row.split() for row in motion.splitlines()[2:]]
+
+
+@pytest.mark.parametrize(
+    ("channels", "row", "plain", "values"),
+    [
+        ("1 Xrotation", "7", "3 Xrotation Yrotation Zrotation", ["7", "0", "0"]),
+        ("1 Zrotation", "7", "3 Zrotation Xrotation Yrotation", ["7", "0", "0"]),
+        ("2 Zrotation Xrotation", "7 8", "3 Zrotation Xrotation Yrotation", ["7", "8", "0"]),
+        ("0", "", "0", []),
+        (
+            "2 Yposition Xrotation",
+            "7 8",
+            "6 Yposition Xrotation Xposition Zposition Yrotation Zrotation",
+            ["7", "8", "1.5", "2.5", "0", "0"],
+        ),
+    ],
+)
+def test_a_joint_of_fewer_axes_gets_the_others_standing_still(
+    channels: str, row: str, plain: str, values: list[str]
+) -> None:
+    """What does not turn is at 0, and what does not move stays as far off as the file says."""
+    text = SOUND.replace("OFFSET 0.0 10.0 0.0", "OFFSET 1.5 10.0 2.5")
+    text = text.replace("3 Zrotation Xrotation Yrotation", channels)
+    root = "1 2 3 4 5 6"
+    text = text[: text.index("1.0 2.0")] + f"{root} {row}\n{root} {row}\n"
+    checked = check_bvh(text.encode())
+    lines, rows = hierarchy_and_rows(checked.text)
+    assert lines[1] == f"CHANNELS {plain}"
+    assert rows == [[*root.split(), *values]] * 2
+    assert checked.notes == ()
+
+
+def test_only_joints_of_fewer_axes_get_more() -> None:
+    """The root between has all of its own, and what follows keeps its columns."""
+    text = SOUND.replace("CHANNELS 6 Xposition Yposition Zposition ", "CHANNELS 3 ")
+    text = text.replace("CHANNELS 3 Zrotation Xrotation", "CHANNELS 2 Zrotation Xrotation", 1)
+    text = text.replace("Xrotation Yrotation\n\tJOINT", "Xrotation\n\tJOINT")
+    text = text[: text.index("1.0 2.0")] + "1 2 3 4 5\n6 7 8 9 10\n"
+    _, rows = hierarchy_and_rows(check_bvh(text.encode()).text)
+    assert rows == [["1", "2", "0", "3", "4", "5"], ["6", "7", "0", "8", "9", "10"]]
 
 
 PIECES = ["{", "}", "\n", "MOTION\n", "JOINT x\n", "End Site\n", "nan", " ", "\0", ",", "é", "#"]

@@ -357,3 +357,82 @@ def test_helpers_beside_the_bones_change_nothing(name: str) -> None:
 
     assert dict(found.landmarks.bones) == names
     assert found.notes == ()
+
+
+MMD = {
+    # bone: parent, and the landmark whose place it has
+    "全ての親": ("", "hips"),
+    "センター": ("全ての親", "hips"),
+    "グルーブ": ("センター", "hips"),
+    "腰": ("グルーブ", "hips"),
+    "上半身": ("腰", "spine"),
+    "上半身2": ("上半身", "chest"),
+    "首": ("上半身2", "neck"),
+    "頭": ("首", "head"),
+    "両目": ("頭", "head"),
+    "下半身": ("腰", "hips"),
+    **{
+        name.replace("?", side): (parent.replace("?", side), f"{landmark}.{letter}")
+        for side, letter in (("左", "L"), ("右", "R"))
+        for name, parent, landmark in (
+            *(("?肩P", "上半身2", "clavicle"), ("?肩", "?肩P", "clavicle")),
+            *(("?肩C", "?肩", "upper_arm"), ("?腕", "?肩C", "upper_arm")),
+            *(("?腕捩", "?腕", "middle of upper_arm"), ("?ひじ", "?腕捩", "forearm")),
+            *(("?手捩", "?ひじ", "middle of forearm"), ("?手首", "?手捩", "hand")),
+            *(("?親指０", "?手首", "end of hand"), ("?人指１", "?手首", "end of hand")),
+            *(("腰キャンセル?", "下半身", "thigh"), ("?足", "腰キャンセル?", "thigh")),
+            *(("?ひざ", "?足", "shin"), ("?足首", "?ひざ", "foot"), ("?つま先", "?足首", "toe")),
+            *(("?足D", "腰キャンセル?", "thigh"), ("?ひざD", "?足D", "shin")),
+            *(("?足首D", "?ひざD", "foot"), ("?足先EX", "?足首D", "toe")),
+            *(("?足IK親", "全ての親", "foot"), ("?足ＩＫ", "?足IK親", "foot")),
+            ("?つま先ＩＫ", "?足ＩＫ", "toe"),
+        )
+    },
+}
+"""The usual skeleton of a dancer, with all that moves it."""
+
+
+def test_the_usual_dancer_is_known_among_all_that_moves_it() -> None:
+    body = humanoid({each: each for each in LANDMARKS})
+    places = [MMD[name][1] for name in MMD]
+    rows = [body.index[place.split()[-1]] for place in places]
+    matrices = [body.rest_matrices[row].copy() for row in rows]
+    for matrix, place, row in zip(matrices, places, rows, strict=True):
+        share = {"middle": 0.5, "end": 1.0}.get(place.split()[0], 0.0)
+        matrix[:3, 3] += share * body.lengths[row] * matrix[:3, 1]
+    index = {name: number for number, name in enumerate(MMD)}
+    parents = [index.get(parent, -1) for parent, _ in MMD.values()]
+    lengths = [float(body.lengths[row]) for row in rows]
+
+    found = map_skeleton(skeleton_of(list(MMD), parents, matrices, lengths))
+
+    names = dict(SCHEMES["japanese"], hips="腰")
+    assert dict(found.landmarks.bones) == names
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "side", "landmark"),
+    [
+        *(("腕.R", "R", "upper_arm"), ("ひじ_左", "L", "forearm"), ("足左", "L", "thigh")),
+        *(("右ヒジ", "R", "forearm"), ("右ﾋｻﾞ", "R", "shin"), ("左ツマ先", "L", "toe")),
+        *(("右大腿部", "R", "thigh"), ("左股関節", "L", "thigh"), ("右足先", "R", "toe")),
+        *(("みぎひじ", "R", "forearm"), ("左鎖骨", "L", "clavicle"), ("骨盤", "", "hips")),
+        *(("胸部", "", "chest"), ("頭部", "", "head"), ("右太腿", "R", "thigh")),
+    ],
+)
+def test_japanese_names_are_known_in_any_kana_and_with_the_side_at_either_end(
+    name: str, side: str, landmark: str
+) -> None:
+    (found,) = read_names([name])
+    assert found.side == side
+    assert max(found.weights, key=lambda each: found.weights[each]) == landmark
+
+
+@pytest.mark.parametrize(
+    "name", ["右腕捩", "左手捩", "右親指０", "左人指１", "右ダミー", "全ての親"]
+)
+def test_japanese_twist_bones_and_fingers_are_no_landmarks(name: str) -> None:
+    (found,) = read_names([name])
+    assert found.machinery
+    assert found.weights == {}

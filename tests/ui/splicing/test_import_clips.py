@@ -398,6 +398,88 @@ def test_first_frame_and_collection_are_as_asked(shared_data: Data) -> None:
     assert {each.name for each in bpy.context.selected_objects} == {"avatar_walk.001"}
 
 
+HINGES = """HIERARCHY
+ROOT 下半身
+{
+OFFSET 0 90 0
+CHANNELS 4 Yposition Zrotation Xrotation Yrotation
+JOINT 右足
+{
+OFFSET -10 -5 0
+CHANNELS 2 Zrotation Xrotation
+JOINT 右ひざ
+{
+OFFSET 0 -40 0
+CHANNELS 1 Xrotation
+JOINT 右足首
+{
+OFFSET 0 -40 0
+CHANNELS 0
+JOINT 右つま先
+{
+OFFSET 0 -5 12
+CHANNELS 1 Zrotation
+End Site
+{
+OFFSET 0 0 5
+}
+}
+}
+}
+}
+}
+MOTION
+Frames: 3
+Frame Time: 0.041666666666666664
+90 0 0 0 0 0 0 0
+95 0 0 30 10 20 60 5
+92 5 -10 -30 -10 -35 75 -15
+"""
+
+
+def turned(axis: str, degrees: float) -> np.ndarray:
+    """(3, 3) of an axis of the file."""
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    first, second = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}[axis]
+    matrix = np.eye(3)
+    matrix[[first, first, second, second], [first, second, first, second]] = (
+        *(cosine, -sine),
+        *(sine, cosine),
+    )
+    return matrix
+
+
+def test_joints_that_turn_about_one_axis_are_where_the_file_says(tmp_path: Path) -> None:
+    """Worked out here from the file's own numbers; BVH's Y is Blender's Z."""
+    path = tmp_path / "hinges.bvh"
+    path.write_bytes(HINGES.encode("cp932"))
+    before = path.read_bytes()
+    import_files(path)
+
+    assert path.read_bytes() == before
+    armature: Any = bpy.data.objects["hinges"]
+    names = ["下半身", "右足", "右ひざ", "右足首", "右つま先"]
+    assert [bone.name for bone in armature.data.bones] == names
+    rows = [[float(word) for word in row.split()] for row in HINGES.splitlines()[-3:]]
+    for frame, row in enumerate(rows, 1):
+        height, z, x, y, thigh_z, thigh_x, knee, _ = row
+        turn = turned("Z", z) @ turned("X", x) @ turned("Y", y)
+        place = np.array([0.0, height, 0.0])
+        expected = [place]
+        joints = (
+            ((-10.0, -5.0, 0.0), turned("Z", thigh_z) @ turned("X", thigh_x)),
+            ((0.0, -40.0, 0.0), turned("X", knee)),
+            ((0.0, -40.0, 0.0), np.eye(3)),
+            ((0.0, -5.0, 12.0), np.eye(3)),
+        )
+        for offset, own in joints:
+            place = place + turn @ np.array(offset)
+            turn = turn @ own
+            expected.append(place)
+        in_blender = np.array(expected) @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+        np.testing.assert_allclose(heads_at(armature, frame), in_blender, atol=1e-4)
+
+
 # --- File by file, in a window --------------------------------------------------------------------
 
 

@@ -2,9 +2,10 @@
 """BVH files looked at before anything imports them: what is wrong, and in which line.
 
 Sound files are told from damaged ones, and written anew in the plainest form: UTF-8, one keyword a
-line, decimal points, one line a frame. The numbers keep their digits. What can be read in one way
-only is repaired and noted (byte order marks, UTF-16, line ends of any kind, decimal commas, braces
-anywhere, remarks behind the last frame); everything else is refused.
+line, decimal points, one line a frame, all three axes of what a joint does. The numbers keep their
+digits. What can be read in one way only is repaired and noted (byte order marks, UTF-16, names in
+Shift-JIS, line ends of any kind, decimal commas, braces anywhere, remarks behind the last frame);
+everything else is refused.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import codecs
 import math
 import re
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Final, NoReturn
 
 from ...errors import ClipError
@@ -27,7 +29,10 @@ _MARKS: Final = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-_CHANNELS: Final = frozenset(f"{axis}{kind}" for axis in "xyz" for kind in ("position", "rotation"))
+_SHIFT_JIS: Final = re.compile(rb"[\x81-\x9f]")
+"""Its kana and usual kanji begin with one of these, which are no letters in Latin-1."""
+_KINDS: Final = ("position", "rotation")
+_CHANNELS: Final = frozenset(f"{axis}{kind}" for axis in "xyz" for kind in _KINDS)
 _NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?$")
 _DECIMAL_COMMA: Final = re.compile(r"(?<=\d),(?=\d)")
 _REMEDY: Final = "Export it again, or repair that line in a text editor."
@@ -76,17 +81,41 @@ def _decoded(content: bytes) -> tuple[str, list[str]]:
                 notes.append(f"Its text was {encoding.upper()}.")
             break
     else:
-        try:
-            text = content.decode("utf-8")
-        except UnicodeDecodeError:
-            text = content.decode("latin-1")
-            notes.append("Its names are not in UTF-8: some letters may look wrong.")
+        text, note = _unmarked(content)
+        notes += [note] if note else []
     text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\0 \t\n")
     if not text:
         _refuse("the file is empty")
     if "\0" in text:
         _refuse("there are zero bytes in the text", text[: text.index("\0")].count("\n") + 1)
     return text, notes
+
+
+def _unmarked(content: bytes) -> tuple[str, str]:
+    """Text without a mark that says how it is encoded, and a sentence if that had to be guessed."""
+    if b"\0" in content[:2]:
+        # It begins with a letter, of which UTF-16 makes two bytes.
+        wide = "utf-16-le" if content[1:2] == b"\0" else "utf-16-be"
+        text = _strictly(content, wide)
+        if text is not None:
+            return text, f"Its text was {wide.upper()}."
+    text = _strictly(content, "utf-8")
+    if text is not None:
+        return text, ""
+    # Names in Shift-JIS break the rules of EUC-JP, not so the other way round.
+    for encoding, title in (("euc_jp", "EUC-JP"), ("cp932", "Shift-JIS")):
+        text = _strictly(content, encoding)
+        if text is not None and (encoding == "euc_jp" or _SHIFT_JIS.search(content)):
+            return text, f"Its names are not in UTF-8: they were read as {title}."
+    return content.decode("latin-1"), "Its names are not in UTF-8: some letters may look wrong."
+
+
+def _strictly(content: bytes, encoding: str) -> str | None:
+    """The text, or none if it breaks the rules of the encoding."""
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError:
+        return None
 
 
 class _File:
@@ -96,6 +125,8 @@ class _File:
         self.notes = notes
         self.plain = ["HIERARCHY"]
         self.channels = 0
+        self.added: list[tuple[int, str]] = []
+        """Values that stay the same, each behind so many of the channels of the file."""
         lines = [(number, line.strip()) for number, line in enumerate(text.split("\n"), 1)]
         self.lines = [(number, line) for number, line in lines if line]
         number, first = self.lines[0]
@@ -178,12 +209,17 @@ class _File:
         if not name:
             self.refuse("a joint has no name")
         self.after("{", "an opening brace")
-        self.plain += [f"{keyword} {name}", "{", self._offset(), self._channels()]
+        offset = self._offset()
+        channels = self._channels(offset.split()[1:])
+        self.plain += [f"{keyword} {name}", "{", offset, channels]
 
     def _offset(self) -> str:
         return " ".join(["OFFSET", *self._numbers(self.after("OFFSET"), 3)])
 
-    def _channels(self) -> str:
+    def _channels(self, offset: list[str]) -> str:
+        """Channels of a joint, which is so far from its parent. Joints that turn about one axis or
+        two, or move along them, get the others as well, for Blender's importer has no other joints.
+        """
         count, *names = self.after("CHANNELS") or [""]
         if not count.isdigit() or int(count) != len(names):
             self.refuse(f"CHANNELS does not say how many of them there are: {len(names)}")
@@ -193,7 +229,13 @@ class _File:
         if len({name.lower() for name in names}) != len(names):
             self.refuse("a channel is there twice")
         self.channels += len(names)
-        return " ".join(["CHANNELS", count, *(f"{n[0].upper()}{n[1:].lower()}" for n in names)])
+        plain = [f"{name[0].upper()}{name[1:].lower()}" for name in names]
+        for kind, still in zip(_KINDS, (offset, ["0"] * 3), strict=True):
+            if any(name.endswith(kind) for name in plain):
+                lacking = [axis for axis in range(3) if f"{'XYZ'[axis]}{kind}" not in plain]
+                plain += [f"{'XYZ'[axis]}{kind}" for axis in lacking]
+                self.added += [(self.channels, still[axis]) for axis in lacking]
+        return " ".join(["CHANNELS", str(len(plain)), *plain])
 
     def read_motion(self) -> float:
         """All frames; the time of one, seconds."""
@@ -237,7 +279,17 @@ class _File:
             rows.append(" ".join(self._numbers(words, self.channels)))
         if commas:
             self.notes.append("Its numbers were written with commas.")
-        return rows
+        return self._completed(rows)
+
+    def _completed(self, rows: list[str]) -> list[str]:
+        """The frames with what was added to the channels of the file."""
+        if not self.added:
+            return rows
+        order = list(range(self.channels))
+        for number, (place, _) in reversed(list(enumerate(self.added))):
+            order.insert(place, self.channels + number)
+        arrange, values = itemgetter(*order), [value for _, value in self.added]
+        return [" ".join(arrange(row.split() + values)) for row in rows]
 
     def _numbers(self, words: list[str], count: int) -> list[str]:
         """So many finite numbers, each as it is written."""

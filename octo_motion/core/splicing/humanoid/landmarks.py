@@ -54,32 +54,42 @@ class Landmarks:
 
 
 _WORDS: Final[dict[str, str]] = {
-    "hips": "hips hip pelvis cog=.5 center=.6 torso=.5 センター=.7 腰=.9 下半身=.8",
+    "hips": "hips hip pelvis cog=.5 center=.6 torso=.5 センター=.7 腰=.9 腰部=.9 下半身=.8 骨盤 "
+    "ヒップ",
     "spine": "spine abdomen ab lowerback lowback lowerspine spinelower waist=.6 torso=.5 back=.5 "
-    "belly=.7 stomach=.7 lumbar 上半身",
-    "chest": "chest upperchest thorax ribcage torso=.6 spineupper upperspine 上半身=.5 胸",
-    "neck": "neck lowerneck necklower neckbase upperneck=.8 neckupper=.8 首",
-    "head": "head skull=.7 cranium=.7 頭",
-    "clavicle": "clavicle collar collarbone clav shoulder=.7 shldr=.4 scapula=.5 肩",
-    "upper_arm": "upperarm uparm arm=.85 shldr=.8 shldrbend shoulder=.6 humerus 腕 上腕",
-    "forearm": "forearm lowerarm lowarm loarm forearmbend elbow=.95 ulna=.8 ひじ 肘 前腕",
-    "hand": "hand wrist palm=.5 手首 手=.9",
-    "thigh": "thigh upleg upperleg thighbend femur hip=.65 leg=.5 足=.9 脚=.9 もも 太もも 大腿",
-    "shin": "shin calf lowerleg lowleg loleg knee=.95 leg=.75 tibia ひざ 膝 すね 下腿",
-    "foot": "foot ankle 足首 足=.3",
-    "toe": "toe toes toebase ball forefoot foot=.3 つま先 つまさき 爪先",
+    "belly=.7 stomach=.7 lumbar 上半身 背骨 脊椎 脊柱 腹=.7 腹部=.7 胴=.5 体幹=.5",
+    "chest": "chest upperchest thorax ribcage torso=.6 spineupper upperspine 上半身=.5 胸 胸部",
+    "neck": "neck lowerneck necklower neckbase upperneck=.8 neckupper=.8 首 頸 頸部",
+    "head": "head skull=.7 cranium=.7 頭 頭部",
+    "clavicle": "clavicle collar collarbone clav shoulder=.7 shldr=.4 scapula=.5 肩 鎖骨",
+    "upper_arm": "upperarm uparm arm=.85 shldr=.8 shldrbend shoulder=.6 humerus 腕 上腕 上腕部 "
+    "肩関節",
+    "forearm": "forearm lowerarm lowarm loarm forearmbend elbow=.95 ulna=.8 ひじ 肘 肘関節 "
+    "前腕 前腕部",
+    "hand": "hand wrist palm=.5 手首 手=.9 手関節 手のひら=.5 掌=.5",
+    "thigh": "thigh upleg upperleg thighbend femur hip=.65 leg=.5 足=.9 脚=.9 もも 太もも 太腿 "
+    "大腿 大腿部 股関節",
+    "shin": "shin calf lowerleg lowleg loleg knee=.95 leg=.75 tibia ひざ 膝 膝関節 すね 脛 "
+    "下腿 下腿部",
+    "foot": "foot ankle 足首 足関節 足=.3",
+    "toe": "toe toes toebase ball forefoot foot=.3 つま先 つまさき 爪先 足先=.8",
 }
 """What each landmark is called, words of a name written together; with a weight where a word means
-it only in some rigs."""
+it only in some rigs. Japanese ones in whichever kana."""
 
-_FINGERS: Final = "thumb index mid middle ring pinky little finger fingers fingerbase metacarpal"
+_FINGERS: Final = (
+    "thumb index mid middle ring pinky little finger fingers fingerbase metacarpal "
+    "指 親指 人指 人指し指 人差指 人差し指 中指 薬指 小指"
+)
 _FACE: Final = "eye eyes jaw tongue teeth brow lip ear ears nose cheek hair breast chin lid 目 両目"
 _ENDS: Final = "end nub tip top leaf site effector dummy"
 _RIG: Final = (
     "ik ikp pole target twist roll spin rock tweak mch wgt vis parent socket helper master "
-    "widget prop weapon buttock 捩 親 補助"
+    "widget prop weapon buttock 捩 捩り 腕捩 腕捩り 手捩 手捩り 親 全ての親 操作中心 補助 ダミー"
 )
-_NO_PART: Final = frozenset(f"{_FINGERS} {_FACE} {_ENDS} {_RIG}".split())
+_HIRAGANA: Final = {code: code - 0x60 for code in range(ord("ァ"), ord("ヶ") + 1)}
+"""Katakana, which one writes as well for the same word."""
+_NO_PART: Final = frozenset(f"{_FINGERS} {_FACE} {_ENDS} {_RIG}".translate(_HIRAGANA).split())
 """A name with one of these is no landmark, whatever else it says."""
 
 _CHARACTER: Final = "mixamorig bip biped valvebiped armature metarig character genesis j c cc m b"
@@ -90,12 +100,12 @@ _FILLING: Final = frozenset(f"{_CHARACTER} jnt joint jt bone bn bind rig skeleto
 
 _SIDES: Final = MappingProxyType(
     {
-        **dict.fromkeys(("l", "left", "lft", "左"), "L"),
-        **dict.fromkeys(("r", "right", "rgt", "右"), "R"),
+        **dict.fromkeys(("l", "left", "lft", "左", "ひだり"), "L"),
+        **dict.fromkeys(("r", "right", "rgt", "右", "みぎ"), "R"),
     }
 )
-_SIDE_PREFIX: Final = re.compile(r"^(left|right|左|右|l|r)(?=.)")
-_SIDE_SUFFIX: Final = re.compile(r"(?<=.)(left|right)$")
+_SIDE_PREFIX: Final = re.compile(r"^(left|right|左|右|ひだり|みぎ|l|r)(?=.)")
+_SIDE_SUFFIX: Final = re.compile(r"(?<=.)(left|right|左|右|ひだり|みぎ)$")
 _WORD: Final = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_a-zA-Z]+|\d+")
 _VERTEBRA: Final = re.compile(r"^[TL]\d{1,2}$")
 _NAMESPACE: Final = re.compile(r"^.*[:|](?=.)")
@@ -110,7 +120,7 @@ _STRANGE_WORD: Final = 0.3
 def _meanings() -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     for landmark, words in _WORDS.items():
-        for word in words.split():
+        for word in words.translate(_HIRAGANA).split():
             text, _, weight = word.partition("=")
             found.setdefault(text, {})[landmark] = float(weight or 1.0)
     return found
@@ -170,7 +180,7 @@ def _known(word: str) -> bool:
 
 
 def _words(name: str) -> tuple[str, ...]:
-    plain = unicodedata.normalize("NFKC", name)
+    plain = unicodedata.normalize("NFKC", name).translate(_HIRAGANA)
     plain = _NAMESPACE.sub("", plain)
     found: list[str] = []
     for part in re.split(r"[\W_]+", plain):
@@ -214,7 +224,8 @@ def _side_within(words: list[str]) -> tuple[str, list[str]]:
         for pattern in (_SIDE_PREFIX, _SIDE_SUFFIX):
             found = pattern.search(word)
             rest = pattern.sub("", word)
-            if found and (_known(rest) or len(found[1]) > 1):
+            # A letter may begin any word; "left" and "右" say it.
+            if found and (_known(rest) or found[1] not in {"l", "r"}):
                 return _SIDES[found[1]], [*words[:place], rest, *words[place + 1 :]]
     return "", words
 
