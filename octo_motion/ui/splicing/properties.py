@@ -168,6 +168,12 @@ class SpliceItem(bpy.types.PropertyGroup):
     action: _action("Action", "The clip. It is never changed")
     slot: _slot("Slot of the clip's action; empty takes the one that fits the source")
     visual: _as_shown("As Shown", "clip")
+    mirror: props.BoolProperty(
+        name="Mirror",
+        description="Take the clip as in a mirror: a throw with the right arm is spliced onto the "
+        "left one; legs, trunk, head and travel are mirrored as well. Of a chain its mirror image "
+        "is taken, unless Source Bone names another",
+    )
     splice_start: _frame("Clip Start", "Frame of the clip that is shown first", default=1.0)
     base_start: _frame("Base Start", "Frame of the base at which the splice begins", default=1.0)
     rate: props.FloatProperty(

@@ -85,6 +85,7 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
         elif not item.source.users_scene:
             layout.label(text="Deleted, kept for this splice", icon="INFO")
         layout.prop(item, "visual")
+        layout.prop(item, "mirror")
         if kind is None:
             return
         layout.row().prop(item, "mode", expand=True)

@@ -39,6 +39,7 @@ from ...core.splicing.transfer import (
     Suggestion,
     build_splices,
     chain_part,
+    opposite_part,
     part_bones,
     part_named,
     suggest_timings,
@@ -303,6 +304,7 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
         travel=item.with_travel and part.kind is not None and part.kind.travels,
         clavicle=item.with_clavicle,
         seen_from=item.seen_from.lower(),
+        mirror=item.mirror,
     )
     if part.kind is not None:
         for each in (base, source):
@@ -336,8 +338,13 @@ def _check_landmarks(splice: Splice, source: Source) -> None:
     )
     if source.landmarks is None:
         raise ClipError(f"'{source.armature}' has no landmarks. {source.problem}", remedy)
+    part = splice.part
+    if splice.mirror and source.clip is splice.clip:
+        # What the clip has to have is on its other side.
+        part = opposite_part(part)
+    own = replace(splice, part=part, clip=source.clip, landmarks=source.landmarks, mirror=False)
     try:
-        replace(splice, clip=source.clip, landmarks=source.landmarks).retargets(source)
+        own.retargets(source)
     except ClipError as error:
         known = source.landmarks.bones
         bones = source.clip.skeleton.index
@@ -361,8 +368,7 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
             "Timing is suggested from what the legs do, and one of the two has no landmarks.",
             "Drag the timing instead, or fill the table in the panel Splicing > Landmarks.",
         )
-    mapped = MappedClip(splice.clip, splice.landmarks)
-    found = suggest_timings(stack.base, mapped, splice.timing, count)
+    found = suggest_timings(stack.base, splice.mapped, splice.timing, count)
     if not found:
         raise ClipError(
             "There is no moment at which enough of the two motions overlaps.",

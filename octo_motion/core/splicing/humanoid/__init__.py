@@ -9,6 +9,7 @@ from .correspondence import (
     matched_chains,
     rest_alike,
 )
+from .counterparts import mirror_images, opposite
 from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks, mirrored
 from .mapping import map_skeleton
 
@@ -24,6 +25,8 @@ __all__ = [
     "map_skeleton",
     "matched_bones",
     "matched_chains",
+    "mirror_images",
     "mirrored",
+    "opposite",
     "rest_alike",
 ]

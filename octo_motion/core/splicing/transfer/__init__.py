@@ -8,6 +8,7 @@ from .parts import (
     PartKind,
     bones_beneath,
     chain_part,
+    opposite_part,
     part_bones,
     part_named,
 )
@@ -30,6 +31,7 @@ __all__ = [
     "build_splices",
     "chain_part",
     "numbered",
+    "opposite_part",
     "part_bones",
     "part_named",
     "suggest_timings",

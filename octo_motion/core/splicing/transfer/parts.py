@@ -132,6 +132,14 @@ def part_named(name: str) -> Part:
     return PARTS[name]
 
 
+def opposite_part(part: Part) -> Part:
+    """The part on the other side of the body: of the left arm the right one, of the head itself."""
+    sides = tuple(sorted({"L": "R", "R": "L"}.get(side, side) for side in part.sides))
+    if part.kind is None or sides == part.sides:
+        return part
+    return next(each for each in PARTS.values() if each.kind == part.kind and each.sides == sides)
+
+
 def sided(landmark: str, side: str) -> str:
     """A landmark on a side ("L", "R"), or on the mid plane ("")."""
     return f"{landmark}.{side}" if side else landmark

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -38,6 +39,7 @@ from ..clip import (
 )
 from ..humanoid import Landmarks
 from .leg_travel import LegTravel, ground_height
+from .mirror import mirror_name, mirrored_clip
 from .parts import Part, SeenFrom
 from .retarget import (
     MappedClip,
@@ -69,6 +71,25 @@ class Splice:
     is the shoulder."""
     seen_from: SeenFrom = ""
     """From where legs are seen: the pelvis if empty, the chest in the source."""
+    mirror: bool = False
+    """Whether the clip is seen in a mirror: its right arm is then the part's left one. Of a chain
+    the mirror image is taken, unless its bone on the splice clip is named."""
+
+    @cached_property
+    def mapped(self) -> MappedClip:
+        """The splice clip as it is spliced, with its landmarks."""
+        if self.mirror:
+            return MappedClip(*mirrored_clip(self.clip, self.landmarks))
+        return MappedClip(self.clip, self.landmarks)
+
+    @cached_property
+    def _part(self) -> Part:
+        """The part, with the names that bones have in the mapped clip."""
+        part = self.part
+        if not self.mirror or part.splice_root in ("", part.root):
+            return part
+        root = mirror_name(self.clip.skeleton, self.landmarks, part.splice_root)
+        return replace(part, splice_root=root)
 
     def retargets(self, base: MappedClip) -> list[Retarget]:
         """How the part goes onto a base, one for each side: both clips in their reference poses.
@@ -76,11 +97,11 @@ class Splice:
         Raises:
             ClipError: a bone or landmark is missing.
         """
-        splice = MappedClip(self.clip, self.landmarks)
+        splice = self.mapped
         if self.part.kind is not None:
             base, splice = compared(base, splice)
         return find_retargets(
-            self.part,
+            self._part,
             base,
             splice,
             clavicle=self.clavicle,
