@@ -39,7 +39,7 @@ from .codec import (
 )
 from .driver import Axes
 
-VERSION: Final = 2
+VERSION: Final = 3
 MAGIC: Final = b"OMDV"
 HEADER: Final = struct.Struct("<4sHHI")
 MOST_BYTES: Final = 4_000_000
@@ -88,9 +88,9 @@ class FigureMessage(Message):
     capsules: Annotated[Floats, Table((2, 3))]
     radii: Annotated[Floats, Table()]
     limits: Annotated[Floats, Table((3, 2))]
-    stiffness: Annotated[Floats, Table((3,))]
-    damping: Annotated[Floats, Table((3,))]
-    flow: Annotated[Floats, Table((3,))]
+    stiffness: Annotated[Floats, Table()]
+    damping: Annotated[Floats, Table()]
+    flow: Annotated[Floats, Table()]
     yield_torque: Annotated[Floats, Table(endless=True)]
 
     @classmethod
@@ -381,10 +381,6 @@ class ObstacleMessage(Message):
     """0: gone; else as in ``_SHAPES``."""
     position: Annotated[Vector, VECTOR] = ZERO
     orientation: Annotated[Quaternion, QUATERNION] = IDENTITY
-    velocity: Annotated[Vector, VECTOR] = ZERO
-    angular_velocity: Annotated[Vector, VECTOR] = ZERO
-    friction: Annotated[float, F64] = -1.0
-    """−1: the world's."""
     size: Annotated[float, F64] = 0.0
     """Radius of sphere and capsule, thickness of a mesh."""
     points: Annotated[Floats, Table((3,), MOST_POINTS)] = field(default_factory=_no_points)
@@ -402,8 +398,6 @@ class ObstacleMessage(Message):
         shape = _SHAPES[kind]
         return cls(
             *(number, kind, tuple(obstacle.position), tuple(obstacle.orientation)),
-            *(tuple(obstacle.velocity), tuple(obstacle.angular_velocity)),
-            friction=-1.0 if obstacle.friction is None else obstacle.friction,
             size=getattr(obstacle, shape.size, 0.0),
             points=getattr(obstacle, shape.points, _no_points()).reshape(-1, 3),
         )
@@ -422,9 +416,6 @@ class ObstacleMessage(Message):
             return shape.kind(
                 position=np.array(self.position),
                 orientation=np.array(turn),
-                velocity=np.array(self.velocity),
-                angular_velocity=np.array(self.angular_velocity),
-                friction=None if self.friction < 0.0 else self.friction,
                 **{name: value for name, value in own.items() if name},
             )
         except ValueError as error:

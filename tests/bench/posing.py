@@ -205,9 +205,9 @@ def _described(name: str, figure: Figure) -> dict[str, Any]:
         "capsules": figure.capsules.tolist(),
         "radii": figure.radii.tolist(),
         "root": [0.0, 0.0, _HIGH],
-        "stiffness": float(elements.stiffness[0, 0]),
-        "damping": float(elements.damping[0, 0]),
-        "flow": float(elements.flow[0, 0]),
+        "stiffness": float(elements.stiffness[0]),
+        "damping": float(elements.damping[0]),
+        "flow": float(elements.flow[0]),
     }
 
 

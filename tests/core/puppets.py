@@ -13,7 +13,7 @@ from octo_motion.core.posing.puppet.joint_limits import bends
 from octo_motion.core.posing.solver.holds import Coupling
 from octo_motion.core.posing.solver.world import World
 from octo_motion.core.rotations import Floats, from_rotation_vector, multiply, normalized, rotate
-from tests.core.world_probes import energy_of
+from tests.core.world_probes import energy_of, joint_turns
 
 DENSITY = 1000.0
 HANDS = 2
@@ -33,7 +33,7 @@ def capsule_inertia(length: float, radius: float) -> tuple[float, Floats]:
 
 def soft(count: int, stiffness: float, damping: float, flow: float, limit: float) -> Elements:
     """The same element at every joint."""
-    ones = np.ones((count, 3))
+    ones = np.ones(count)
     return Elements(stiffness * ones, damping * ones, flow * ones, np.full(count, limit))
 
 
@@ -216,7 +216,7 @@ def torn(
         pose, velocities = world.pose(), world.velocities()
         before, energy = energy, energy_of(world).total
         assert world.last is not None
-        bent = bends(multiply(unrest, world.joint_turns()))
+        bent = bends(multiply(unrest, joint_turns(world)))
         over = np.maximum(least - bent, bent - most)[limited]
         found.steps += 1
         found.widest = max(found.widest, opening(figure, pose))

@@ -9,7 +9,7 @@ import numpy as np
 
 from octo_motion.core.posing.puppet import Pose
 from octo_motion.core.posing.solver.world import World
-from octo_motion.core.rotations import Floats
+from octo_motion.core.rotations import Floats, conjugate, multiply, to_rotation_vector
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,20 @@ def energy_of(world: World) -> Energy:
     kinetic = 0.5 * float(
         (masses[:, None] * bodies.linear**2).sum() + (bodies.angular * bodies.spin).sum()
     )
-    springs = world.joint_springs()
-    elastic = 0.5 * float((world._law.stiffness * springs * springs).sum())
+    springs = joint_springs(world)
+    elastic = 0.5 * float((world._law.stiffness[:, None] * springs * springs).sum())
     weight = -float(masses @ (_centres(world) @ world.settings.gravity))
     return Energy(kinetic, elastic, weight)
+
+
+def joint_turns(world: World) -> Floats:
+    """(bodies, 4) orientation of each body in its parent's frame (a root's in the world's)."""
+    return world._bodies.turns()
+
+
+def joint_springs(world: World) -> Floats:
+    """(bodies, 3) q_f of the elements: rotation vectors in the parent's frame, radians."""
+    return to_rotation_vector(multiply(joint_turns(world), conjugate(world._bodies.rest)))
 
 
 def set_velocities(world: World, velocities: Floats) -> None:

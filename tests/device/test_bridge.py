@@ -120,7 +120,7 @@ def test_meshes_of_a_whole_scene_wait_for_a_bridge_that_is_still_starting(client
     far, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     # As large as the largest, and each of them refused, which takes no time: a corner is missing.
     corners = np.zeros((149_999, 3))
-    meshes = [say.ObstacleMessage(n, 5, far, turn, far, far, -1.0, 0.0, corners) for n in range(6)]
+    meshes = [say.ObstacleMessage(n, 5, far, turn, 0.0, corners) for n in range(6)]
     for mesh in meshes:
         client.send(mesh)
     wait_for(client, lambda: client.devices, "the hand is there")

@@ -120,7 +120,7 @@ def test_figure_that_is_none_is_refused(change: dict[str, Any]) -> None:
     "obstacle",
     [
         Plane(position=np.array([0.0, 0.0, -1.0])),
-        Sphere(radius=0.5, friction=0.3),
+        Sphere(radius=0.5),
         Capsule(ends=np.array([[0.0, 0, 0], [0, 0, 1]]), radius=0.1),
         Box(half=np.array([1.0, 2.0, 3.0])),
         Hull(corners=np.concatenate([CORNERS, CORNERS[:, ::-1] + 0.3])),
@@ -137,7 +137,6 @@ def test_obstacle_arrives_as_it_is(obstacle: Obstacle) -> None:
     points = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.9]])
     for a, b in zip(got.closest(points, 1.0), obstacle.closest(points, 1.0), strict=True):
         assert np.allclose(a, b)
-    assert got.friction == obstacle.friction
 
 
 def test_obstacle_that_is_gone_is_told() -> None:

@@ -135,11 +135,11 @@ def _elements(problem: Problem, parents: Sequence[int]) -> list[_Block]:
     blocks: list[_Block] = []
     law, h = problem.law, problem.step
     for body, parent in enumerate(parents):
-        if not law.backward[body].any():
+        if not law.backward[body]:
             continue
-        axes = np.eye(3) if problem.frames is None else problem.frames[body].T
-        turn = axes @ _TURN
-        bodies, jacobians = ((body,), (turn,)) if parent < 0 else ((body, parent), (turn, -turn))
+        bodies, jacobians = ((body,), (_TURN,))
+        if parent >= 0:
+            bodies, jacobians = (body, parent), (_TURN, -_TURN)
 
         def bears(w: Floats, own: Floats, impulse: Floats, *, body: int = body) -> Floats:
             stiffness, backward = law.stiffness[body], law.backward[body]
@@ -149,15 +149,15 @@ def _elements(problem: Problem, parents: Sequence[int]) -> list[_Block]:
             load = -stiffness * spring - backward * w
             size = float(np.sqrt(load @ load))
             flows = limit == 0.0 or size > limit
-            kept = law.kept[body] if flows else np.ones(3)
+            kept = law.kept[body] if flows else 1.0
             held = np.zeros(3)
             if flows and limit > 0.0:
                 held = law.share[body] * limit * load / size
             for axis in range(3):
                 # λ = held + kept (−K q − G w) and w = w₀ + A P with P = h λ.
                 without = w[axis] + own[axis] @ (result - impulse) - own[axis, axis] * result[axis]
-                slope = kept[axis] * backward[axis]
-                rest = held[axis] - kept[axis] * stiffness[axis] * spring[axis]
+                slope = kept * backward
+                rest = held[axis] - kept * stiffness * spring[axis]
                 result[axis] = h * (rest - slope * without) / (1.0 + h * slope * own[axis, axis])
             return result
 
@@ -193,7 +193,7 @@ def _contacts(problem: Problem) -> list[_Block]:
     for number in range(len(contacts)):
         normal, gain = contacts.normals[number], rows.gains[number]
         before = np.zeros(3) if rows.grips is None else rows.grips[number]
-        friction, rate = contacts.friction[number], rows.rates[number]
+        friction, rate = rows.pattern.friction, rows.rates[number]
 
         def presses(
             w: Floats,
@@ -220,7 +220,7 @@ def _contacts(problem: Problem) -> list[_Block]:
         bodies, jacobians = (body,), (_point(problem, body, place),)
         if other >= 0:
             bodies, jacobians = (body, other), (*jacobians, -_point(problem, other, place))
-        blocks.append(_Block(bodies, jacobians, presses, rows.targets[number], np.zeros(3)))
+        blocks.append(_Block(bodies, jacobians, presses, np.zeros(3), np.zeros(3)))
     return blocks
 
 

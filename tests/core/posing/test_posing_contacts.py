@@ -150,7 +150,7 @@ def test_a_turned_and_shifted_scene_has_turned_and_shifted_contacts(seed: int):
         )
         for one in obstacles
     ]
-    detector = Detector(figure, self_collision=False, friction=0.5)
+    detector = Detector(figure, self_collision=False)
     here = detector.find(pose.positions, to_matrix(pose.orientations), obstacles, 0.1)
     there = detector.find(
         rotate(turn, pose.positions) + shift,
@@ -167,7 +167,7 @@ def test_a_rod_across_an_edge_is_touched_between_its_ends():
     figure = chain(1, length=1.0, radius=0.05)
     pose = posed(figure, at=(0.0, -0.5, 0.15))
     post = Box(half=np.array([0.02, 0.02, 0.1]))
-    detector = Detector(figure, self_collision=False, friction=0.5)
+    detector = Detector(figure, self_collision=False)
     found = detector.find(pose.positions, to_matrix(pose.orientations), [post], 0.01)
     assert len(found) == 1
     np.testing.assert_allclose(found.normals, [[0.0, 0.0, 1.0]], atol=1e-6)
@@ -190,17 +190,17 @@ def sled() -> Figure:
     )
 
 
-def slope(kind: str, angle: float, friction: float) -> Obstacle:
+def slope(kind: str, angle: float) -> Obstacle:
     turn = from_axis_angle([1.0, 0.0, 0.0], angle)
     if kind == "plane":
-        return Plane(orientation=turn, friction=friction)
+        return Plane(orientation=turn)
     below = rotate(turn, [0.0, 0.0, -0.5])
     half = np.array([6.0, 6.0, 0.5])
     if kind == "box":
-        return Box(half=half, orientation=turn, position=below, friction=friction)
+        return Box(half=half, orientation=turn, position=below)
     if kind == "hull":
-        return Hull(corners=block(half), orientation=turn, position=below, friction=friction)
-    return Mesh(corners=sheet(12, 6.0), orientation=turn, friction=friction)
+        return Hull(corners=block(half), orientation=turn, position=below)
+    return Mesh(corners=sheet(12, 6.0), orientation=turn)
 
 
 @pytest.mark.parametrize("kind", ["plane", "box", "hull", "mesh"])
@@ -221,7 +221,10 @@ def test_a_sled_sticks_below_its_friction_angle_and_slides_above_as_coulomb_says
             orientations=multiply(turn, pose.orientations),
         )
         world = World(
-            figure, pose, WorldSettings(step=2e-3, gravity=WEIGHT), [slope(kind, angle, friction)]
+            figure,
+            pose,
+            WorldSettings(step=2e-3, gravity=WEIGHT, friction=friction),
+            [slope(kind, angle)],
         )
         for _ in range(125):
             world.step()
@@ -331,15 +334,6 @@ def test_what_starts_inside_is_brought_out_slowly():
     assert world.contacts.gaps.min(initial=0.0) > -1e-3
 
 
-def test_a_moving_floor_takes_along_what_lies_on_it():
-    figure = sled()
-    belt = Plane(velocity=np.array([0.0, 0.5, 0.0]))
-    world = World(figure, posed(figure, at=(0.0, 0.0, 0.05)), WorldSettings(gravity=WEIGHT), [belt])
-    for _ in range(300):
-        world.step()
-    np.testing.assert_allclose(world.velocities()[:, :3], [[0.0, 0.5, 0.0]] * 2, atol=2e-3)
-
-
 def test_a_rising_box_lifts_a_limb():
     figure = chain(2)
     figure = replace(figure, elements=elements_for(figure, "clay"))
@@ -348,13 +342,7 @@ def test_a_rising_box_lifts_a_limb():
     half = np.array([0.1, 0.1, 0.1])
     for number in range(300):
         height = -0.14 + 0.2 * number / 300.0
-        world.obstacles = (
-            Box(
-                half=half,
-                position=np.array([0.0, 0.35, height]),
-                velocity=np.array([0.0, 0.0, 1.0 / 3.0]),
-            ),
-        )
+        world.obstacles = (Box(half=half, position=np.array([0.0, 0.35, height])),)
         world.step()
     tip = world.pose().positions[1] + rotate(world.pose().orientations[1], [0.0, 0.2, 0.0])
     assert tip[2] > 0.1
@@ -387,7 +375,7 @@ def test_limbs_collide_with_each_other_only_when_asked():
 
 def test_neighbours_and_what_overlaps_at_rest_never_collide():
     figure = octopus()
-    detector = Detector(figure, self_collision=True, friction=0.5)
+    detector = Detector(figure, self_collision=True)
     pose = posed(figure)
     found = detector.find(pose.positions, to_matrix(pose.orientations), [], 1e-4)
     assert len(found) == 0 or found.gaps.min() >= -1e-12

@@ -26,7 +26,7 @@ from octo_motion.core.rotations import (
     rotate,
 )
 from tests.core.puppets import chain, doll, opening, posed, soft, tree
-from tests.core.world_probes import energy_of, set_velocities
+from tests.core.world_probes import energy_of, joint_turns, set_velocities
 
 FREE = (-np.pi, np.pi)
 SLOP = np.radians(0.2)
@@ -61,7 +61,7 @@ def pulled(figure: Figure, angle: float, aside: float = 0.0, step: float = 1e-3)
         grab.pull(place)
         world.step()
     assert opening(figure, world.pose()) < 1e-9
-    return np.degrees(bends(world.joint_turns()[1]))
+    return np.degrees(bends(joint_turns(world)[1]))
 
 
 # --- What a bend is ------------------------------------------------------------------------------
@@ -126,10 +126,10 @@ def test_a_pull_that_lasts_does_not_push_a_joint_through_its_end():
     world.forces[1, 3:] = -20.0 * float(world.figure.elements.yield_torque[1]) * np.eye(3)[0]
     for _ in range(250):
         world.step()
-    early = bends(world.joint_turns()[1])[0]
+    early = bends(joint_turns(world)[1])[0]
     for _ in range(2500):
         world.step()
-    assert bends(world.joint_turns()[1])[0] == pytest.approx(early, abs=1e-4)
+    assert bends(joint_turns(world)[1])[0] == pytest.approx(early, abs=1e-4)
     assert abs(early) < SLOP
 
 
@@ -142,7 +142,7 @@ def test_a_twist_ends_on_each_side_where_it_should():
         world.forces[1, 3:] = way * np.array([0.0, 5.0, 0.0])
         for _ in range(800):
             world.step()
-        assert np.degrees(bends(world.joint_turns()[1])[1]) == pytest.approx(end, abs=0.2)
+        assert np.degrees(bends(joint_turns(world)[1])[1]) == pytest.approx(end, abs=0.2)
 
 
 def test_a_fast_limb_does_not_jump_over_the_end_of_its_range():
@@ -154,7 +154,7 @@ def test_a_fast_limb_does_not_jump_over_the_end_of_its_range():
     set_velocities(world, velocities)
     for _ in range(100):
         world.step()
-        bend = np.degrees(bends(world.joint_turns()[1]))
+        bend = np.degrees(bends(joint_turns(world)[1]))
         # 14° a step: the end is met within the step that would pass it.
         assert -0.5 < bend[0] < 150.5
         assert bend[1:] == pytest.approx([0.0, 0.0], abs=0.5)
@@ -203,7 +203,7 @@ def test_a_limited_doll_that_is_thrown_about_stays_in_its_ranges():
         for _ in range(100):
             grab.pull(grab.target_position + 0.01 * way)
             world.step()
-            own = multiply(figure.rest * [1.0, -1.0, -1.0, -1.0], world.joint_turns())
+            own = multiply(figure.rest * [1.0, -1.0, -1.0, -1.0], joint_turns(world))
             angles = bends(own)[1:]
             worst = max(worst, float(np.maximum(ends[:, 0] - angles, angles - ends[:, 1]).max()))
         world.release(grab)

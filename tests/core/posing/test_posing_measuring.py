@@ -23,6 +23,7 @@ from octo_motion.core.posing.puppet.materials import (
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats
 from tests.core.puppets import chain, octopus, posed
+from tests.core.world_probes import joint_turns
 
 ASKED = Bend(2.0, 1.25, 0.5, np.radians(30.0), np.radians(20.0), 0.05)
 """Torques in loads of the joint."""
@@ -37,11 +38,11 @@ def pulled(material: Material, bend: Bend, strength: float = 1.0) -> tuple[float
     world.forces[2, 3] = bend.torque * strength * joint_loads(figure)[2]
     for _ in range(round(bend.seconds / 1e-3)):
         world.step()
-    most = bends(world.joint_turns()[2])[0]
+    most = bends(joint_turns(world)[2])[0]
     world.forces[2] = 0.0
     for _ in range(round((20.0 * bend.settles + 0.5) / 1e-3)):
         world.step()
-    return tuple(np.degrees([most, bends(world.joint_turns()[2])[0]]))
+    return tuple(np.degrees([most, bends(joint_turns(world)[2])[0]]))
 
 
 def made_of(bend: Bend, load: float = 1.0) -> Material:

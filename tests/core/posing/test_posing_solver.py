@@ -38,7 +38,7 @@ def busy_world(seed: int) -> World:
     count = 4
     even = soft(count, 3.0, 0.1, 0.3, 0.5)
     elements = Elements(
-        even.stiffness * rng.uniform(0.5, 2.0, (count, 3)) if seed % 2 else even.stiffness,
+        even.stiffness * rng.uniform(0.5, 2.0, (count, 3))[:, 0] if seed % 2 else even.stiffness,
         even.damping,
         even.flow,
         np.zeros(count) if seed % 3 == 0 else even.yield_torque,
@@ -58,7 +58,7 @@ def busy_world(seed: int) -> World:
             self_collision=True,
         ),
         [
-            Plane(velocity=np.array([0.2, 0.0, 0.0])),
+            Plane(),
             Box(position=np.array([0.3, 0.0, 0.1]), half=np.array([0.1, 0.5, 0.1])),
         ],
     )
@@ -66,7 +66,7 @@ def busy_world(seed: int) -> World:
 
 # Figures on which Gauss–Seidel arrives within some hundred sweeps; on others it takes thousands,
 # and comes as near to the fast solver as its own changes still are from nothing.
-@pytest.mark.parametrize("seed", [0, 1, 5, 12, 13, 19, 30, 32])
+@pytest.mark.parametrize("seed", [0, 1, 5, 12, 13, 21, 30, 32])
 def test_fast_solver_gives_the_answer_of_gauss_seidel(seed: int):
     world = busy_world(seed)
     rng = np.random.default_rng(seed)
@@ -193,8 +193,6 @@ def test_slopes_of_contacts_and_holds_are_derivatives_of_convex_functions(seed: 
         rng.normal(size=(count, 3)),
         normals,
         1e-3 * rng.normal(size=count),
-        np.zeros((count, 3)),
-        rng.uniform(0.0, 1.5, count),
         np.arange(count),
     )
     holds = Holds(
@@ -206,11 +204,13 @@ def test_slopes_of_contacts_and_holds_are_derivatives_of_convex_functions(seed: 
         np.array([0.5, np.inf]),
         np.zeros((2, 3)),
     )
-    rows = Rows(contacts, holds, np.zeros(3), np.ones(1), 1e-2, 20.0 * rng.normal(size=(count, 3)))
+    friction = float(rng.uniform(0.0, 1.5))
+    grips = 20.0 * rng.normal(size=(count, 3))
+    rows = Rows(contacts, holds, np.zeros(3), np.ones(1), 1e-2, friction, grips)
     speeds = rng.normal(size=(count + 2, 3))
 
     def impulses(speeds: Floats) -> RowImpulses:
-        return rows.respond(rows.asked - rows.pattern.column * (speeds + rows.targets))
+        return rows.respond(rows.asked - rows.pattern.column * speeds)
 
     answer = impulses(speeds)
     slopes = rows.pattern.gains[:, None, None] * rows.tangent(answer).blocks()
@@ -224,7 +224,7 @@ def test_slopes_of_contacts_and_holds_are_derivatives_of_convex_functions(seed: 
     push = (answer.impulses[:count] * normals).sum(axis=1)
     across = np.linalg.norm(answer.impulses[:count] - push[:, None] * normals, axis=1)
     assert np.all(push >= -1e-12)
-    assert np.all(across <= contacts.friction * push + 1e-9)
+    assert np.all(across <= friction * push + 1e-9)
 
 
 def test_small_products_agree_with_the_rotations_of_the_project():

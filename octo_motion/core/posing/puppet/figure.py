@@ -57,33 +57,31 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """Coefficients of the three-element model [Plastic, eq. 16–26], about the parent's axes.
+    """Coefficients of the three-element model [Plastic, eq. 16–26], alike about all axes.
 
-    A row per joint and a column per axis; a root's row counts only where the root is pinned.
+    One for each joint; a root's counts only where the root is pinned.
     """
 
     stiffness: Floats
-    """(bodies, 3) K_f, N·m/rad."""
+    """(bodies,) K_f, N·m/rad."""
     damping: Floats
-    """(bodies, 3) D_f, beside the spring, N·m·s/rad."""
+    """(bodies,) D_f, beside the spring, N·m·s/rad."""
     flow: Floats
-    """(bodies, 3) D_d, in series, N·m·s/rad: how fast the joint gives way."""
+    """(bodies,) D_d, in series, N·m·s/rad: how fast the joint gives way."""
     yield_torque: Floats
     """(bodies,) N·m: below it the series damper holds; 0 lets it creep always, as in the source."""
 
     @classmethod
     def limp(cls, count: int) -> Elements:
         """Joints that resist nothing."""
-        nothing = np.zeros((count, 3))
-        return cls(nothing, nothing, nothing, np.zeros(count))
+        return cls(*np.zeros((4, count)))
 
     def where(self, works: Flags) -> Elements:
         """These in the joints (bodies,) of a mask, and others limp."""
-        mask = works[:, None]
         return Elements(
-            np.where(mask, self.stiffness, 0.0),
-            np.where(mask, self.damping, 0.0),
-            np.where(mask, self.flow, 0.0),
+            np.where(works, self.stiffness, 0.0),
+            np.where(works, self.damping, 0.0),
+            np.where(works, self.flow, 0.0),
             self.yield_torque,
         )
 

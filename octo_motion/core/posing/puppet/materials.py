@@ -105,11 +105,8 @@ def elements_for(
         )
     load = strength * joint_loads(figure)
     made_of = [(own or {}).get(body, material) for body in range(len(figure))]
-    # Rows: stiffness, damping, flow, yield torque.
-    values = np.array([_values(each, at) for each, at in zip(made_of, load.tolist(), strict=True)])
-    stiffness, damping, flow, limit = values.reshape(-1, 4).T
-    ones = np.ones((len(figure), 3))
-    return Elements(stiffness[:, None] * ones, damping[:, None] * ones, flow[:, None] * ones, limit)
+    values = [_values(each, at) for each, at in zip(made_of, load.tolist(), strict=True)]
+    return Elements(*np.array(values).reshape(-1, 4).T)
 
 
 def _values(material: Material, load: float) -> tuple[float, float, float, float]:

@@ -15,8 +15,8 @@ that the element would bear if it did not flow, λ_e = −K_f q_f[t] − G w[t+1
 
 with s = λ_e/|λ_e|, and q_f[t+1] = q_f[t] + h (w − w_d). At τ = 0 that is eq. 25 with
 C = (D_d + G)/(D_d G) and D = K_f/G, and eq. 21 for q_f. λ falls as w grows and λ·w_d ≤ 0 whatever
-the step: the element stores or loses energy and never makes any. Axes are the parent's, all
-functions work on arrays ``(…, 3)``; a scalar element is one whose other two axes are zero.
+the step: the element stores or loses energy and never makes any. It is alike about all axes, so
+these may be any, and all functions work on arrays (joints, 3).
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ from .figure import Elements, Flags, Integers
 _TINY = 1e-300
 _ONES = np.ones(3)
 _UNIT = np.eye(3)
-_INDEX = np.arange(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,46 +39,27 @@ class ElementResponse:
 
     law: PlasticLaw
     load: Floats
-    """(…, 3) λ, the torque on the child, N·m."""
+    """(joints, 3) λ, the torque on the child, N·m."""
     trial: Floats
-    """(…, 3) λ_e, what it would be without flow."""
+    """(joints, 3) λ_e, what it would be without flow."""
     size: Floats
-    """(…) |λ_e|; of no account where nothing flows."""
+    """(joints,) |λ_e|; of no account where nothing flows."""
     flows: Flags | None
-    """(…) where the series damper moves; None where all hold, and the load is linear in w."""
+    """(joints,) where the series damper moves; None where all hold: the load is linear in w."""
 
     @property
     def slope(self) -> Floats:
-        """(…, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
+        """(joints, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
         law = self.law
         if self.flows is None:
             return law.diagonal
-        if law.alike:
-            return self._slope_alike(self.flows)
-        toward = self.trial / (self.size + _TINY)[..., None]
-        # Along s only what the flow leaves, across it also the turning of s. With unequal axes the
-        # exact slope is not symmetric; its symmetric neighbour leads to the same solution.
-        root = np.sqrt(law.backward)
-        ratio = law.shared_yield / (self.size + _TINY)[..., None]
-        middle = -(np.sqrt(ratio)[..., :, None] * np.sqrt(ratio)[..., None, :]) * (
-            toward[..., :, None] * toward[..., None, :]
-        )
-        middle[..., _INDEX, _INDEX] += law.kept + ratio
-        return np.where(
-            self.flows[..., None, None],
-            root[..., :, None] * middle * root[..., None, :],
-            law.diagonal,
-        )
-
-    def _slope_alike(self, flows: Flags) -> Floats:
-        """The same for elements whose axes are alike, worked out only for those that flow."""
-        law = self.law
-        which = flows.nonzero()[0]
+        # Along s only what the flow leaves, across it also the turning of s.
+        which = self.flows.nonzero()[0]
         size = self.size.take(which) + _TINY
         toward = self.trial.take(which, 0) / size[:, None]
-        gain = law.backward[:, 0].take(which)
-        ratio = gain * law.shared_yield[:, 0].take(which) / size
-        across = gain * law.kept[:, 0].take(which) + ratio
+        gain = law.backward.take(which)
+        ratio = gain * law.shared_yield.take(which) / size
+        across = gain * law.kept.take(which) + ratio
         blocks = across[:, None, None] * _UNIT
         blocks -= (ratio[:, None] * toward)[:, :, None] * toward[:, None, :]
         slope = law.diagonal.copy()
@@ -92,7 +72,7 @@ class ElementResponse:
         size = self.size.take(which)
         excess = (size - law.yield_torque.take(which)) / (size + _TINY)
         toward = self.trial.take(which, 0) * excess[:, None]
-        return -toward * law.compliance.take(which, 0)
+        return -toward * law.compliance.take(which)[:, None]
 
 
 class PlasticLaw:
@@ -113,34 +93,25 @@ class PlasticLaw:
         """G/(D_d + G), of a load above yield: what the flow takes away."""
         self.kept = 1.0 - self.share
         self.yield_torque = np.array(elements.yield_torque, dtype=np.float64)
-        self.shared_yield = (
-            self.share * np.where(np.isfinite(self.yield_torque), self.yield_torque, 0.0)[..., None]
-        )
+        yields = np.isfinite(self.yield_torque)
+        self.shared_yield = self.share * np.where(yields, self.yield_torque, 0.0)
         """G τ/(D_d + G)."""
-        self.can_flow = bool(
-            np.any((self.compliance > 0.0) & np.isfinite(self.yield_torque)[..., None])
-        )
-        self.diagonal = np.zeros((*self.backward.shape, 3))
-        self.diagonal[..., _INDEX, _INDEX] = self.backward
-        """(…, 3, 3) slope of an element that holds."""
+        self.can_flow = bool(np.any((self.compliance > 0.0) & yields))
+        self.diagonal = self.backward[:, None, None] * _UNIT
+        """(joints, 3, 3) slope of an element that holds."""
         self.held = step * self.diagonal
         """The same for the impulse over a step."""
-        self.alike = self.yield_torque.ndim == 1 and all(
-            bool((array == array[:, :1]).all())
-            for array in (self.stiffness, self.backward, self.compliance)
-        )
-        """Whether all axes of an element are alike, so that no axes are needed at all."""
 
     def at_rest(self, spring: Floats) -> Floats:
-        """−K_f q_f (…, 3), the load at rest without flow."""
-        return -self.stiffness * spring
+        """−K_f q_f (joints, 3), the load at rest without flow."""
+        return -self.stiffness[:, None] * spring
 
-    def respond(self, spring: Floats, speed: Floats) -> ElementResponse:
-        """Load, its slope and the flow, from q_f at the step's start and w at its end."""
-        return self.answer(self.at_rest(spring) - self.backward * speed)
+    def respond(self, at_rest: Floats, speed: Floats) -> ElementResponse:
+        """The response from the load at rest (joints, 3) and w (joints, 3) at the step's end."""
+        return self.answer(at_rest - self.backward[:, None] * speed)
 
     def answer(self, trial: Floats) -> ElementResponse:
-        """The same from λ_e (…, 3)."""
+        """The same from λ_e (joints, 3)."""
         if not self.can_flow:
             return ElementResponse(self, trial, trial, _NONE, None)
         size = np.sqrt((trial * trial) @ _ONES)
@@ -148,15 +119,11 @@ class PlasticLaw:
         flows = size >= self.yield_torque
         if not flows.any():
             return ElementResponse(self, trial, trial, size, None)
-        if self.alike:
-            which = flows.nonzero()[0]
-            factor = self.shared_yield[:, 0].take(which) / (size.take(which) + _TINY)
-            factor += self.kept[:, 0].take(which)
-            load = trial.copy()
-            load[which] = trial.take(which, 0) * factor[:, None]
-        else:
-            held = self.shared_yield * (trial / (size + _TINY)[..., None])
-            load = np.where(flows[..., None], self.kept * trial + held, trial)
+        which = flows.nonzero()[0]
+        factor = self.shared_yield.take(which) / (size.take(which) + _TINY)
+        factor += self.kept.take(which)
+        load = trial.copy()
+        load[which] = trial.take(which, 0) * factor[:, None]
         return ElementResponse(self, load, trial, size, flows)
 
 

@@ -79,13 +79,7 @@ class Bodies:
     # Springs
 
     def springs(self) -> Floats:
-        """(bodies, 3) q_f of the elements: rotation vectors in the parents' frames."""
-        return small_batches.to_rotation_vector(
-            small_batches.multiply_conjugate(self.turns(), self.rest)
-        )
-
-    def springs_in_world(self) -> Floats:
-        """(bodies, 3) the same in world axes."""
+        """(bodies, 3) q_f of the elements: rotation vectors in world axes."""
         at_rest = small_batches.multiply(self._parent_turns(), self.rest)
         return small_batches.to_rotation_vector(
             small_batches.multiply_conjugate(self.orientations, at_rest)

@@ -130,9 +130,9 @@ class Pattern:
     """What hangs only on which bodies touch or are held: the same for many steps in a row."""
 
     def __init__(
-        self, contacts: Contacts, holds: Holds | None, masses: Floats, step: float
+        self, contacts: Contacts, holds: Holds | None, masses: Floats, step: float, friction: float
     ) -> None:
-        """For bodies of masses (bodies,) and steps of h."""
+        """For bodies of masses (bodies,), steps of h and Coulomb's coefficient μ."""
         self.key = Pattern.key_of(contacts, holds)
         count = len(contacts.bodies)
         self.bodies, self.others = contacts.bodies, contacts.others
@@ -156,9 +156,10 @@ class Pattern:
         """(contacts,) least g/h that counts, m/s."""
         self.deepest_gaps = step * self.deepest
         self.column = self.gains[:, None]
-        self.slipping = contacts.friction / self.contact_gains
-        self.spread = 1.0 / (1.0 + contacts.friction * contacts.friction)
-        self.root_spread = np.sqrt(self.spread)
+        self.friction = friction
+        self.slipping = friction / self.contact_gains
+        self.spread = 1.0 / (1.0 + friction * friction)
+        self.root_spread = float(np.sqrt(self.spread))
         self._crossed: Floats | None = None
         self._crossing = np.zeros((0, 3, 3))
 
@@ -171,7 +172,7 @@ class Pattern:
     @staticmethod
     def key_of(contacts: Contacts, holds: Holds | None) -> tuple[bytes, ...]:
         """What tells two patterns apart."""
-        own = (contacts.bodies.tobytes(), contacts.others.tobytes(), contacts.friction.tobytes())
+        own = (contacts.bodies.tobytes(), contacts.others.tobytes())
         if holds is None:
             return own
         return (*own, holds.bodies.tobytes(), holds.turns.tobytes(), holds.gains.tobytes())
@@ -187,6 +188,7 @@ class Rows:
         origin: Floats,
         masses: Floats,
         step: float,
+        friction: float,
         grips: Floats | None = None,
         pattern: Pattern | None = None,
     ) -> None:
@@ -198,13 +200,14 @@ class Rows:
             origin: (3,) the common one of spatial velocities.
             masses: (bodies,)
             step: h.
+            friction: μ.
             grips: (contacts, 3) friction of the step before; None where nothing touched.
             pattern: of the step before, for it may be the same.
         """
         self.contacts = contacts
         self.holds = holds
         if pattern is None or pattern.key != Pattern.key_of(contacts, holds):
-            pattern = Pattern(contacts, holds, masses, step)
+            pattern = Pattern(contacts, holds, masses, step, friction)
         self.pattern = pattern
         self.count = len(contacts.bodies)
         """Number of contacts, the first rows."""
@@ -213,12 +216,10 @@ class Rows:
         """Rows between two bodies of the figure."""
         self.gains = pattern.contact_gains
         """(contacts,) a."""
-        if holds is None:
-            self.places = contacts.points - origin
-            self.targets = contacts.speeds
-        else:
-            self.places = np.concatenate([contacts.points, holds.points]) - origin
-            self.targets = np.concatenate([contacts.speeds, np.zeros((len(holds), 3))])
+        points = contacts.points
+        if holds is not None:
+            points = np.concatenate([points, holds.points])
+        self.places = points - origin
         self.reach = (self.places @ _REACH + _REACH_AT_ORIGIN).reshape(-1, 3, 6)
         """(rows, 3, 6) from a spatial velocity to that of the point or turn."""
         if holds is not None and len(pattern.turning):
@@ -235,8 +236,6 @@ class Rows:
         if grips is not None:
             normals = contacts.normals
             self.grips = grips - ((grips * normals) @ _ONES)[:, None] * normals
-        self.still = not contacts.speeds.any()
-        """Whether no obstacle moves: then w is the velocity of the points themselves."""
         self._ask()
 
     def __len__(self) -> int:
@@ -249,8 +248,6 @@ class Rows:
         asked = contacts.normals * (-self.gains * self.rates)[:, None]
         if self.grips is not None:
             asked += self.grips
-        if not self.still:
-            asked += self.gains[:, None] * contacts.speeds
         if holds is None:
             self.asked = asked
             return
@@ -261,14 +258,10 @@ class Rows:
 
     def wanted(self, velocities: Floats) -> Floats:
         """What rows want to give, y (rows, 3), at spatial velocities (bodies, 6)."""
-        return self.asked - self.pattern.column * self._moving(velocities)
+        return self.asked - self.pattern.column * self.speeds(velocities)
 
     def speeds(self, velocities: Floats) -> Floats:
         """The rows' velocities w (rows, 3), of spatial velocities (bodies, 6)."""
-        moving = self._moving(velocities)
-        return moving if self.still else moving - self.targets
-
-    def _moving(self, velocities: Floats) -> Floats:
         own = velocities.take(self.bodies, 0)
         if len(self.paired):
             own[self.paired] -= velocities[self.others[self.paired]]
@@ -287,7 +280,7 @@ class Rows:
         """(contacts,) the same at spatial velocities (bodies, 6)."""
         normals, w = self.contacts.normals, self.speeds(velocities)[: self.count]
         across = w - ((w * normals) @ _ONES)[:, None] * normals
-        return self.contacts.friction * np.sqrt((across * across) @ _ONES)
+        return self.pattern.friction * np.sqrt((across * across) @ _ONES)
 
     def follow(self, slip: Floats, tolerance: float) -> bool:
         """Take over μ |w_t| (contacts,); false where that changes no rate by ``tolerance``, m/s."""
@@ -319,7 +312,7 @@ class Rows:
 
     def _touch(self, y: Floats, impulses: Floats) -> _Touch:
         """Contacts' impulses (contacts, 3) at y, and what ``RowImpulses`` tells of them."""
-        normals, friction = self.contacts.normals, self.contacts.friction
+        normals, friction = self.contacts.normals, self.pattern.friction
         push = (y * normals) @ _ONES
         across = y - push[:, None] * normals
         size = np.sqrt((across * across) @ _ONES)
@@ -371,7 +364,7 @@ class Rows:
         # Along n + μ t with 1/(1 + μ²), sideways of both with |p_t|/|y_t|.
         toward = answer.across / (answer.size + _TINY)[:, None]
         ways = np.empty((len(toward), 3, 2))
-        both = contacts.normals + contacts.friction[:, None] * toward
+        both = contacts.normals + pattern.friction * toward
         np.multiply(both, (answer.slips * pattern.root_spread)[:, None], out=ways[:, :, 0])
         aside = np.sqrt(answer.slips * answer.shares)
         sideways = (pattern.crossing(contacts.normals) @ toward[:, :, None])[:, :, 0]

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from ...rotations import Floats, cross, rotate, to_matrix
+from ...rotations import Floats, rotate, to_matrix
 from ..puppet import Figure, Flags, Integers, capsules_in_world, rest_pose
 from .obstacle_shapes import Obstacle, Plane
 
@@ -38,10 +38,6 @@ class Contacts:
     """(contacts, 3) from the other to the body."""
     gaps: Floats
     """(contacts,) less than 0 where they overlap."""
-    speeds: Floats
-    """(contacts, 3) of the obstacle's surface there; zero for another body."""
-    friction: Floats
-    """(contacts,)"""
     labels: Integers
     """(contacts,) the same number for the same place on the same thing in every step."""
 
@@ -53,9 +49,7 @@ class Contacts:
 _NOBODY: Final = np.zeros(0, np.int64)
 _NO_ROWS: Final = np.zeros((0, 3))
 _NO_ONES: Final = np.zeros(0)
-_NONE: Final = Contacts(
-    *(_NOBODY, _NOBODY, _NO_ROWS, _NO_ROWS, _NO_ONES, _NO_ROWS, _NO_ONES, _NOBODY)
-)
+_NONE: Final = Contacts(_NOBODY, _NOBODY, _NO_ROWS, _NO_ROWS, _NO_ONES, _NOBODY)
 
 
 @dataclass(eq=False)
@@ -77,9 +71,8 @@ class _Touched:
 class Detector:
     """Finds the contacts of one figure; what hangs on the figure alone is worked out once."""
 
-    def __init__(self, figure: Figure, *, self_collision: bool, friction: float) -> None:
+    def __init__(self, figure: Figure, *, self_collision: bool) -> None:
         self._radii = figure.radii
-        self._friction = friction
         self._ends = figure.capsules.copy()
         self._first_label = len(figure) ** 2
         keep = _separate_ends(figure)
@@ -151,21 +144,11 @@ class Detector:
             labels = 3 * bodies + (near & 1) + label
             touched.inward = self._radii[bodies, None] * normals
             points = centres.take(near, 0) - touched.inward
-            found = self._contacts(bodies, points, normals, gaps, plane, labels)
+            touched.found = _with_obstacle(bodies, points, normals, gaps, labels)
             touched.key = label, near.tobytes()
-            touched.found = None if plane.angular_velocity.any() else found
-            return found
+            return touched.found
         points = centres.take(near, 0) - touched.inward
-        return Contacts(
-            found.bodies,
-            found.others,
-            points,
-            found.normals,
-            gaps,
-            found.speeds,
-            found.friction,
-            found.labels,
-        )
+        return Contacts(found.bodies, found.others, points, found.normals, gaps, found.labels)
 
     def _on_solid(
         self,
@@ -226,7 +209,7 @@ class Detector:
         radii = self._radii[bodies]
         normals = outward @ frame.T
         points = centres @ frame.T + obstacle.position - radii[:, None] * normals
-        return self._contacts(bodies, points, normals, apart - radii, obstacle, labels)
+        return _with_obstacle(bodies, points, normals, apart - radii, labels)
 
     def _around(self, obstacle: Obstacle, boxes: tuple[Floats, Floats]) -> Integers:
         """The bodies whose boxes touch that of an obstacle."""
@@ -258,37 +241,8 @@ class Detector:
         normals = away[near] / distance[near, None]
         bodies = first[near]
         points = on_first[near] - normals * (self._radii[bodies] + 0.5 * gaps[near])[:, None]
-        return Contacts(
-            bodies,
-            second[near],
-            points,
-            normals,
-            gaps[near],
-            np.zeros((len(near), 3)),
-            np.full(len(near), self._friction),
-            bodies * len(self._radii) + second[near],
-        )
-
-    def _contacts(  # noqa: PLR0917
-        self,
-        bodies: Integers,
-        points: Floats,
-        normals: Floats,
-        gaps: Floats,
-        obstacle: Obstacle,
-        labels: Integers,
-    ) -> Contacts:
-        count = len(bodies)
-        others = np.empty(count, np.int64)
-        others.fill(-1)
-        speeds = np.empty((count, 3))
-        speeds[:] = obstacle.velocity
-        if obstacle.angular_velocity.any():
-            turning = np.broadcast_to(obstacle.angular_velocity, speeds.shape)
-            speeds += cross(turning, points - obstacle.position)
-        friction = np.empty(count)
-        friction.fill(self._friction if obstacle.friction is None else obstacle.friction)
-        return Contacts(bodies, others, points, normals, gaps, speeds, friction, labels)
+        labels = bodies * len(self._radii) + second[near]
+        return Contacts(bodies, second[near], points, normals, gaps[near], labels)
 
     def _touched(self, plane: Plane) -> _Touched:
         """What is known of a plane."""
@@ -317,6 +271,14 @@ class Detector:
             self._known.clear()
         self._known[id(obstacle)] = obstacle, value
         return value
+
+
+def _with_obstacle(
+    bodies: Integers, points: Floats, normals: Floats, gaps: Floats, labels: Integers
+) -> Contacts:
+    others = np.empty(len(bodies), np.int64)
+    others.fill(-1)
+    return Contacts(bodies, others, points, normals, gaps, labels)
 
 
 def nearest_on_segments(first: Floats, second: Floats) -> tuple[Floats, Floats]:

@@ -47,7 +47,7 @@ class Iterate:
     joint_impulses: Floats
     """(bodies, 3) of elements and stops, world axes."""
     response: ElementResponse
-    """Loads and flow of the elements, in the problem's axes."""
+    """Loads and flow of the elements, world axes."""
     pressed: Flags | None
     """(stops,) which ends of ranges bear; None where none is near."""
     rows: RowImpulses | None
@@ -171,14 +171,10 @@ class Newton:
             speeds = start.speeds.take(self._tree.joint_slot, 0)
             pressed = _pushes(problem.stops[0], speeds) >= 0.0
         rows = None if start.rows is None else problem.rows.tangent(start.rows)
-        if problem.frames is not None:
-            speeds = start.speeds.take(self._tree.joint_slot, 0)
-            response, _ = self._elements(problem, speeds)
-            return None, self._bent(problem, response, speeds, pressed, rows)
         if response is None:
             return None, _planes(problem, law.held, self._held, pressed, rows)
         # The speeds at which they would bear now what they bore then.
-        speeds = (self._base - response.trial) * law.mobility
+        speeds = (self._base - response.trial) * law.mobility[:, None]
         return None, self._bent(problem, response, speeds, pressed, rows)
 
     def _follow(self, problem: Problem, point: Iterate) -> bool:
@@ -197,21 +193,12 @@ class Newton:
         answer = rows.respond(rows.wanted(velocities)) if len(rows.bodies) else None
         return Iterate(speeds, velocities, joint_speeds, impulses, response, pressed, answer)
 
-    def _elements(self, problem: Problem, speeds: Floats) -> tuple[ElementResponse, Floats]:
-        """Elements, and their impulses (bodies, 3), at relative turns of joints (bodies, 3)."""
-        frames, law = problem.frames, problem.law
-        if frames is None:
-            response = law.answer(self._base - law.backward * speeds)
-            return response, problem.step * response.load
-        seen = (speeds[:, None, :] @ frames)[:, 0]
-        response = law.answer(self._base - law.backward * seen)
-        return response, problem.step * (frames @ response.load[:, :, None])[:, :, 0]
-
     def _joints(
         self, problem: Problem, speeds: Floats
     ) -> tuple[ElementResponse, Floats, Flags | None]:
-        """The same with stops, and which of them bear."""
-        response, impulses = self._elements(problem, speeds)
+        """Elements, impulses (bodies, 3) of joints that turn so (bodies, 3), stops that bear."""
+        response = problem.law.respond(self._base, speeds)
+        impulses = problem.step * response.load
         if not problem.stops:
             return response, impulses, None
         stops = problem.stops[0]
@@ -224,7 +211,7 @@ class Newton:
     def _tangents(self, problem: Problem, point: Iterate) -> _Tangents:
         """All laws as planes that touch them at a point."""
         rows = None if point.rows is None else problem.rows.tangent(point.rows)
-        if point.response.flows is None and problem.frames is None:
+        if point.response.flows is None:
             return _planes(problem, problem.law.held, self._held, point.pressed, rows)
         return self._bent(problem, point.response, point.joint_speeds, point.pressed, rows)
 
@@ -236,12 +223,8 @@ class Newton:
         pressed: Flags | None,
         rows: Tangent | None,
     ) -> _Tangents:
-        """Planes of elements that flow, or have axes of their own."""
+        """Planes of elements that flow."""
         slopes, loads = problem.step * response.slope, problem.step * response.load
-        frames = problem.frames
-        if frames is not None:
-            slopes = frames @ slopes @ frames.transpose(0, 2, 1)
-            loads = (frames @ loads[:, :, None])[:, :, 0]
         right = loads + (slopes @ speeds[:, :, None])[:, :, 0]
         return _planes(problem, slopes, right, pressed, rows, linear=response.flows is None)
 

@@ -23,27 +23,17 @@ _MOST_EACH: Final = 64
 """In so many cells, and so many for each triangle, the triangles of a mesh may lie."""
 
 
-def _origin() -> Floats:
-    return np.zeros(3)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Obstacle:
-    """A rigid thing that moves as it is told; nothing pushes it back.
+    """A rigid thing that stands still, or is put elsewhere; nothing pushes it back.
 
     ``closest`` is what the kinds differ in; they have no other behaviour.
     """
 
-    position: Floats = field(default_factory=_origin)
+    position: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,) of its origin, world, metres."""
     orientation: Floats = field(default_factory=IDENTITY.copy)
     """(4,)"""
-    velocity: Floats = field(default_factory=_origin)
-    """(3,) of its origin, m/s: carried over to what rests on it."""
-    angular_velocity: Floats = field(default_factory=_origin)
-    """(3,) rad/s, world axes."""
-    friction: float | None = None
-    """Coulomb's coefficient against this obstacle; None takes the world's."""
 
     def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
         """Signed distances ``(…)`` of points ``(…, 3)``, less than 0 inside, and the ways out.

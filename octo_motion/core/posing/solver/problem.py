@@ -40,10 +40,7 @@ class Problem:
     """(bodies, 6) M v + h f about the origin: angular, linear."""
     law: PlasticLaw
     springs: Floats
-    """(bodies, 3) q_f in the elements' axes."""
-    frames: Floats | None
-    """(bodies, 3, 3) the elements' axes, as columns; None where all axes of an element are alike:
-    then ``springs`` and loads are in world axes."""
+    """(bodies, 3) q_f, world axes."""
     stops: tuple[Stops, ...]
     """Ends of joints' ranges; empty or one set."""
     rows: Rows
@@ -153,10 +150,6 @@ class ProblemBuilder:
         momenta[:, :3] += bodies.kept_spin()
         if self._kept < 1.0:
             momenta *= self._kept
-        if law.alike:
-            springs, axes = bodies.springs_in_world(), None
-        else:
-            springs, axes = bodies.springs(), bodies.parent_matrices
         stops = ()
         if len(self._stops.joints):
             turning = speeds[self._tree.joint_slot]
@@ -170,8 +163,7 @@ class ProblemBuilder:
             spread.reshape(-1, 16),
             momenta,
             law,
-            springs,
-            axes,
+            bodies.springs(),
             stops,
             rows,
             _BLOW * h,

@@ -24,8 +24,8 @@ class WarmStartSnapshot:
     speeds: Floats
     """(slots, 3)"""
     trial: Floats | None
-    """(bodies, 3) load that the elements would have borne without flow, N·m, in the problem's axes;
-    None where none flowed."""
+    """(bodies, 3) load that the elements would have borne without flow, N·m; None where none
+    flowed."""
     pressed: Integers
     """Labels of the ends of joints' ranges that bore."""
     contacts: tuple[Integers, Floats, Floats, Floats]
@@ -77,8 +77,8 @@ class WarmStart:
             rows.follow(slip, 0.0)
         return before
 
-    def keep(self, problem: Problem, solution: Solution, most: Floats) -> None:
-        """Remember a step; ``most`` is the friction (contacts,) that is held on to, N·s."""
+    def keep(self, problem: Problem, solution: Solution, most: float) -> None:
+        """Remember a step; ``most`` is the friction of a contact that is held on to, N·s."""
         self.speeds = solution.speeds
         self._response = None if solution.response.flows is None else solution.response
         self._pressed = _NOBODY
@@ -161,13 +161,13 @@ class ContactMemory:
         place = np.minimum(ordered.searchsorted(contacts.labels), len(order) - 1)
         return order.take(place), (ordered.take(place) == contacts.labels)[:, None]
 
-    def keep(self, rows: Rows, answer: RowImpulses | None, most: Floats | float) -> None:
+    def keep(self, rows: Rows, answer: RowImpulses | None, most: float) -> None:
         """Remember a step.
 
         Args:
             rows: of the step.
             answer: what they did.
-            most: (contacts,) friction that is held on to, N·s: less than that of a blow.
+            most: friction of a contact that is held on to, N·s: less than that of a blow.
         """
         if answer is None:
             if len(self.wanted):

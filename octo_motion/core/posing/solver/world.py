@@ -9,8 +9,8 @@ A step of length h goes from the poses and velocities of one moment to those of 
 3. bodies turn and roots shift with these velocities; where joints are follows from the turns, so
    none ever opens.
 
-Kinetic energy and the springs' can only fall, except by what gravity, hands, external forces and
-moving obstacles bring in.
+Kinetic energy and the springs' can only fall, except by what gravity, hands and external forces
+bring in.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class WorldSettings:
     self_collision: bool = False
     """Whether limbs that are no neighbours push each other away."""
     friction: float = 0.6
-    """Coulomb's coefficient where an obstacle has none of its own."""
+    """Coulomb's coefficient."""
     drag: float = 0.0
     """1/s: how fast all motion dies away, as under water; calms a free puppet without weight."""
     tolerance: float = 1e-3
@@ -121,11 +121,9 @@ class World:
         self._newton = Newton(
             self._tree, tolerance=settings.tolerance, iterations=settings.iterations
         )
-        self._detector = Detector(
-            figure, self_collision=settings.self_collision, friction=settings.friction
-        )
+        self._detector = Detector(figure, self_collision=settings.self_collision)
         # A blow is not held on to: no more than twice the figure's weight on a point.
-        self._firmest = 2.0 * _WEIGHT * settings.step * mass
+        self._firmest = 2.0 * _WEIGHT * settings.step * mass * settings.friction
         self._builder = ProblemBuilder(
             figure, self._tree, settings.step, settings.gravity, settings.drag
         )
@@ -149,14 +147,6 @@ class World:
         It acts on the body, its opposite on the parent. Zero for the root of a free figure.
         """
         return self._loads.copy()
-
-    def joint_springs(self) -> Floats:
-        """(bodies, 3) q_f of the elements: rotation vectors in the parent's frame, radians."""
-        return self._bodies.springs()
-
-    def joint_turns(self) -> Floats:
-        """(bodies, 4) orientation of each body in its parent's frame (a root's in the world's)."""
-        return self._bodies.turns()
 
     # What the caller changes
 
@@ -308,6 +298,7 @@ class World:
             bodies.roots[0],
             self.figure.masses,
             self.settings.step,
+            self.settings.friction,
             self._warm.contacts.grips_of(contacts),
             self._pattern,
         )
@@ -326,11 +317,9 @@ class World:
     def _take(self, problem: Problem, solution: Solution) -> None:
         """Take over velocities, loads and what contacts and hands did."""
         rows = problem.rows
-        self._warm.keep(problem, solution, self._firmest * rows.contacts.friction)
+        self._warm.keep(problem, solution, self._firmest)
         self._bodies.take_velocities(solution.velocities, problem.skewed)
-        self._loads = loads = solution.response.load
-        if problem.frames is not None:
-            self._loads = (problem.frames @ loads[:, :, None])[:, :, 0]
+        self._loads = solution.response.load
         self._hold_builder.take(self._springs, solution.impulses[rows.count :])
 
     def _move(self, problem: Problem, solution: Solution) -> None:
@@ -351,14 +340,10 @@ class World:
     def _springs_after(self, problem: Problem, solution: Solution, flowing: Integers) -> Floats:
         """(flowing, 3) q_f at the step's end in the parents' frames: eq. 21."""
         speeds = solution.speeds.take(self._tree.joint_slot.take(flowing), 0)
-        parents = self._bodies.parent_matrices.take(flowing, 0)
-        if problem.frames is not None:
-            speeds = (speeds[:, None, :] @ parents)[:, 0]
         flow = solution.response.flow_of(flowing)
         springs = problem.springs.take(flowing, 0) + self.settings.step * (speeds - flow)
-        if problem.frames is None:
-            springs = (springs[:, None, :] @ parents)[:, 0]
-        return springs
+        parents = self._bodies.parent_matrices.take(flowing, 0)
+        return (springs[:, None, :] @ parents)[:, 0]
 
     def _use_elements(self) -> None:
         works = ~self._bodies.is_root
