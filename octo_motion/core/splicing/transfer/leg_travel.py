@@ -25,22 +25,21 @@ from ...rotations import (
     slerp,
     to_rotation_vector,
 )
+from ...skeleton import Skeleton
 from ..clip import Clip, Posture, SpliceWindow, sample_clip, sample_world
 from ..humanoid import chain_length
 from .body_frames import AnatomicalFrame
+from .foot_contacts import find_stance, own_paths
 from .parts import LEG
 from .retarget import MappedClip, Retarget
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _LEVEL: Final = np.array([1.0, 1.0, 0.0])
 
-_GROUND_SAMPLES: Final = 500
-"""Frames of a clip that are looked at to find the ground."""
-
 
 @dataclass(frozen=True, eq=False)
-class _Path:
-    """A body frame in the world: orientations (frames, 4) and places (frames, 3)."""
+class BodyPath:
+    """A body's frame in the world: orientations (frames, 4) and places (frames, 3)."""
 
     orientations: Floats
     places: Floats
@@ -49,7 +48,7 @@ class _Path:
 class LegTravel:
     """What of the way through the world does not hang on its timing.
 
-    The leg is seen from the pelvis; ``ground`` is the height on which the base stands, world units.
+    The leg is seen from the pelvis; ``ground`` is the height of the base's ankles as it stands.
 
     Raises:
         ClipError: the base's hips cannot leave their parent.
@@ -60,14 +59,8 @@ class LegTravel:
         self._ground = ground
         self._other_ground = ground_height(retarget.splice)
         ours, theirs = retarget.base, retarget.splice
-        skeleton, hips = ours.skeleton, retarget.frames[0].bone
-        if skeleton.connected[hips] and skeleton.parents[hips] >= 0:
-            name, parent = skeleton.names[hips], skeleton.names[skeleton.parents[hips]]
-            raise ClipError(
-                f"'{name}' cannot travel: it is connected to '{parent}'.",
-                "Turn off its Connected (bone properties, Relations), or With Travel.",
-            )
-        self._ratio = _leg(ours) * ours.clip.scale / (_leg(theirs) * theirs.clip.scale)
+        check_hips(ours.skeleton, retarget.frames[0].bone)
+        self._ratio = leg_length(ours) * ours.clip.scale / (leg_length(theirs) * theirs.clip.scale)
 
     def move(
         self, clip: Clip, span: SpliceWindow, base: Posture, rotations: Floats, locations: Floats
@@ -82,19 +75,19 @@ class LegTravel:
             locations: (frames, bones, 3), likewise.
         """
         ours = self._retarget.frames[0]
-        own = _path(clip, ours, base, clip.frames)
-        path = self._path(span)
+        own = body_path(clip, ours, base, clip.frames)
+        path = self._way(span)
         first, last = span.frames.start, span.frames.stop - 1
         # Begin where the base is, and the way it faces.
-        turn = _heading(own.orientations[first], path.orientations[0])
+        turn = heading(own.orientations[first], path.orientations[0])
         places = own.places[first] + self._ratio * rotate(turn, path.places - path.places[0])
         heights = path.places[:, 2] - self._other_ground
         places[:, 2] = self._ground + self._ratio * heights
         orientations = multiply(turn, path.orientations)
         # Go on from where it ends.
-        away = _heading(orientations[-1], own.orientations[last])
+        away = heading(orientations[-1], own.orientations[last])
         shift = (places[-1] - rotate(away, own.places[last])) * _LEVEL
-        later = _Path(
+        later = BodyPath(
             multiply(away, own.orientations[first:]), rotate(away, own.places[first:]) + shift
         )
         count = len(places)
@@ -103,18 +96,18 @@ class LegTravel:
         goal_places = np.where(leaving, later.places[:count], own.places[span.frames])
         later.orientations[:count] = slerp(goal_turns, orientations, span.weights)
         later.places[:count] = goal_places + span.weights[:, None] * (places - goal_places)
-        _write_hips(clip, ours, base, later, (rotations, locations))
+        write_hips(clip, ours, base, later, (rotations, locations))
 
-    def _path(self, span: SpliceWindow) -> _Path:
+    def _way(self, span: SpliceWindow) -> BodyPath:
         """The splice's pelvis through the world, round after round where it loops."""
         clip, frame = self._retarget.splice.clip, self._retarget.frames[1]
-        path = _path(clip, frame, sample_clip(clip, span.splice_frames), span.splice_frames)
+        path = body_path(clip, frame, sample_clip(clip, span.splice_frames), span.splice_frames)
         if not (span.rounds.any() or span.seams.any()):
             return path
         ends = np.array([clip.frames[0], clip.frames[-1]])
-        ends = _path(clip, frame, sample_clip(clip, ends), ends)
+        ends = body_path(clip, frame, sample_clip(clip, ends), ends)
         # Each round goes on from where the one before has led, and the way it faced then.
-        turn = _heading(ends.orientations[1], ends.orientations[0])
+        turn = heading(ends.orientations[1], ends.orientations[0])
         numbers = np.arange(span.rounds.max() + 1.0)
         turns = from_axis_angle(_UP, 2.0 * np.arctan2(turn[3], turn[0]) * numbers)
         step = rotate(turns, (ends.places[1] - ends.places[0]) * _LEVEL)
@@ -127,17 +120,31 @@ class LegTravel:
         own = turns[span.rounds]
         added = from_rotation_vector(span.seams[:, None] * lean)
         places = rotate(own, path.places - ends.places[0]) + shifts[span.rounds] + ends.places[0]
-        return _Path(
+        return BodyPath(
             multiply(multiply(own, path.orientations), added),
             places + span.seams[:, None] * rise,
         )
 
 
-def _write_hips(
+def check_hips(skeleton: Skeleton, hips: int) -> None:
+    """Whether the hips can leave their parent.
+
+    Raises:
+        ClipError: they cannot.
+    """
+    if skeleton.connected[hips] and skeleton.parents[hips] >= 0:
+        name, parent = skeleton.names[hips], skeleton.names[skeleton.parents[hips]]
+        raise ClipError(
+            f"'{name}' cannot travel: it is connected to '{parent}'.",
+            "Turn off its Connected (bone properties, Relations), or With Travel.",
+        )
+
+
+def write_hips(
     clip: Clip,
     frame: AnatomicalFrame,
     base: Posture,
-    path: _Path,
+    path: BodyPath,
     arrays: tuple[Floats, Floats],
 ) -> None:
     """Write a path of the pelvis from some frame on to the end."""
@@ -158,32 +165,27 @@ def _write_hips(
     locations[chosen, bone] = rotate(conjugate(part(base.location_axes(bone))), moved)
 
 
-def _path(clip: Clip, frame: AnatomicalFrame, posture: Posture, frames: Floats) -> _Path:
+def body_path(clip: Clip, frame: AnatomicalFrame, posture: Posture, frames: Floats) -> BodyPath:
+    """The way of a body's frame at some moments of a clip, whose posture there is given."""
     turns, shifts, scale = sample_world(clip, frames)
-    return _Path(
+    return BodyPath(
         multiply(turns, frame.orientation(posture)),
         shifts + scale * rotate(turns, frame.place(posture)),
     )
 
 
-def _heading(goal: Floats, start: Floats) -> Floats:
+def heading(goal: Floats, start: Floats) -> Floats:
     """The turn about the vertical (4,) that brings one orientation closest to another."""
     between = multiply(goal, conjugate(start))
     return from_axis_angle(_UP, 2.0 * np.arctan2(between[3], between[0]))
 
 
-def _leg(mapped: MappedClip) -> float:
+def leg_length(mapped: MappedClip) -> float:
     """Length of the legs, armature units."""
     joints = ([mapped.bone(name) for name in LEG.limb_on(side)] for side in "LR")
     return 0.5 * sum(chain_length(mapped.skeleton, each) for each in joints)
 
 
 def ground_height(mapped: MappedClip) -> float:
-    """Height of the lowest point that a foot reaches in a clip, world units."""
-    clip = mapped.clip
-    count = min(len(clip), _GROUND_SAMPLES)
-    chosen = clip.frames[np.linspace(0, len(clip) - 1, count).astype(np.intp)]
-    posture = sample_clip(clip, chosen)
-    turns, shifts, scale = sample_world(clip, chosen)
-    feet = (posture.head(mapped.bone(foot)) for foot in ("foot.L", "foot.R"))
-    return float(min((shifts + scale * rotate(turns, each))[:, 2].min() for each in feet))
+    """Height of the ankles of somebody who stands in a clip, world units."""
+    return find_stance(own_paths(mapped)).ankle

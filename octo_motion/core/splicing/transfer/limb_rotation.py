@@ -122,11 +122,16 @@ def _angle_about(axis: Floats, start: Floats, goal: Floats) -> Floats:
 
 
 def bend_to_reach(
-    limb: LimbTriangle, target: Floats, hinge: Floats, *, alike: bool = True
+    limb: LimbTriangle,
+    target: Floats,
+    hinge: Floats,
+    *,
+    alike: bool = True,
+    soft: float = SOFT,
 ) -> tuple[Floats, Floats]:
     """Bend a limb so that its hand, which points at the target already, lands on it.
 
-    It does so exactly up to the last stretch of its reach (:data:`SOFT`), and where it is already.
+    It does so exactly up to the last stretch of its reach (``soft``), and where it is already.
     How fast the elbow opens is bounded by how fast hand and target move.
 
     The elbow stays on the side on which it is. A straight limb has no side: it bends about its
@@ -138,12 +143,13 @@ def bend_to_reach(
         hinge: (frames, 3) unit vectors about which the elbow bends.
         alike: whether the limb is of the proportions for which the target was seen. If not, the
             point means less than the shape: what is straight stays straight.
+        soft: of the limb's length, the last stretch of its reach.
 
     Returns:
         Rotations (frames, 4) of the upper and of the lower limb.
     """
     upper, lower = np.linalg.norm(limb.upper, axis=-1), np.linalg.norm(limb.lower, axis=-1)
-    bend = _wanted_bend(upper, lower, limb, target)
+    bend = _wanted_bend(limb, target, soft)
     if not alike:
         bend = limb.bend + _trust(limb.bend, _SHAPED) * (bend - limb.bend)
     swung = _lift(upper, lower, bend) - _lift(upper, lower, limb.bend)
@@ -163,10 +169,11 @@ def bend_to_reach(
     return _untwisted(upper_turn, limb.upper), _untwisted(lower_turn, limb.lower)
 
 
-def _wanted_bend(upper: Floats, lower: Floats, limb: LimbTriangle, target: Floats) -> Floats:
+def _wanted_bend(limb: LimbTriangle, target: Floats, share: float) -> Floats:
     """The bend (frames,) with which a hand is as far from the joint as its target (frames, 3),
-    softened. Upper and lower limb are given with their lengths (frames,).
+    softened over a share of the limb's length.
     """
+    upper, lower = np.linalg.norm(limb.upper, axis=-1), np.linalg.norm(limb.lower, axis=-1)
     product = np.maximum(upper * lower, 1e-12)
     distance = np.linalg.norm(target - limb.joint, axis=-1)
 
@@ -180,7 +187,7 @@ def _wanted_bend(upper: Floats, lower: Floats, limb: LimbTriangle, target: Float
         share = np.clip(passed * speed / np.maximum(room, 1e-12), 0.0, 2.0)
         return room * (1.0 - (1.0 - 0.5 * share) ** 2)
 
-    soft = SOFT * (upper + lower)
+    soft = share * (upper + lower)
     far = upper + lower - soft
     near = np.sqrt(upper**2 + lower**2 + 2.0 * product * np.cos(_TIGHT))
     straight, tight = bend_at(far), np.full(len(far), _TIGHT)

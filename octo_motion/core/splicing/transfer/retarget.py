@@ -199,6 +199,19 @@ class Retarget:
         return longer / max(chain_length(self.splice.skeleton, theirs), 1e-12)
 
     @cached_property
+    def size(self) -> float:
+        """How much larger the base's part is: as a limb, or as the whole body."""
+        if self.limb is not None:
+            return self.ratio
+        spans = [
+            chain_length(each.skeleton, [each.bone(name) for name in ("hips", "chest", "head")])
+            if each.landmarks is not None
+            else 1.0
+            for each in (self.base, self.splice)
+        ]
+        return spans[0] / max(spans[1], 1e-12)
+
+    @cached_property
     def hinge(self) -> Floats:
         """Along the base's upper limb (3,): the axis about which the splice clip bends it."""
         assert self.limb is not None
@@ -255,8 +268,10 @@ def write_retargeted(
     result = posture_of(base.skeleton, rotations, locations)
     if retarget.spread is not None:
         _write_spread(retarget, between, splice, result, rotations)
+        locations[:, list(retarget.bones)] = 0.0
         return
-    _write_inner(retarget, between, (result, splice), rotations, locations)
+    _write_inner(retarget, between, (result, splice), rotations)
+    _write_locations(retarget, between, splice, result, locations)
     if retarget.limb is None:
         return
     (joint, elbow, hand), (other_joint, other_elbow, other_hand) = retarget.limb
@@ -302,7 +317,6 @@ def _write_inner(
     between: Floats,
     postures: tuple[Posture, Posture],
     rotations: Floats,
-    locations: Floats,
 ) -> None:
     """Orientations of all matched bones as they are seen from the body."""
     result, splice = postures
@@ -310,16 +324,29 @@ def _write_inner(
     if joined is not None:
         inner = multiply(joined.before, splice.rotations(joined.splice))
         rotations[:, joined.base] = multiply(inner, joined.after)
-        if retarget.match.same_body:
-            size = retarget.match.size
-            for bone, answer, turn in zip(joined.base, joined.splice, joined.before, strict=True):
-                locations[:, bone] = size * rotate(turn, splice.location(answer))
     inside = () if joined is None else joined.base
     for bone in retarget.bones:
         if bone in retarget.match.pairs and bone not in inside:
             answer, constant = retarget.match.pairs[bone], retarget.match.constants[bone]
             wanted = multiply(multiply(between, splice.orientation(answer)), constant)
             rotations[:, bone] = multiply(conjugate(result.carried(bone)), wanted)
+
+
+def _write_locations(
+    retarget: Retarget, between: Floats, splice: Posture, result: Posture, locations: Floats
+) -> None:
+    """How bones have left their places: as in the splice clip, at the base's size. Bones that
+    answer to none there are where they rest.
+    """
+    size = retarget.match.size if retarget.match.same_body else retarget.size
+    for bone in retarget.bones:
+        answer = retarget.match.pairs.get(bone)
+        moved = None if answer is None else splice.location(answer)
+        if answer is None or moved is None or not moved.any():
+            locations[:, bone] = 0.0
+            continue
+        seen = rotate(multiply(between, splice.location_axes(answer)), moved)
+        locations[:, bone] = size * rotate(conjugate(result.location_axes(bone)), seen)
 
 
 def _write_spread(

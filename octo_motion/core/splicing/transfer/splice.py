@@ -41,6 +41,7 @@ from ..humanoid import Landmarks
 from .leg_travel import LegTravel, ground_height
 from .mirror import mirror_name, mirrored_clip
 from .parts import Part, SeenFrom
+from .rehung import whole_limbs
 from .retarget import (
     MappedClip,
     ReferredClip,
@@ -99,7 +100,7 @@ class Splice:
         """
         splice = self.mapped
         if self.part.kind is not None:
-            base, splice = compared(base, splice)
+            base, splice = compared(whole_limbs(base)[0], whole_limbs(splice)[0])
         return find_retargets(
             self._part,
             base,
@@ -173,6 +174,7 @@ class Splicer:
         compared_base, compared_splice = self._retargets[0].base, self._retargets[0].splice
         self._rests = compared_base.rests if isinstance(compared_base, ReferredClip) else None
         self._clip = compared_splice.clip
+        self._hung = whole_limbs(mapped)[1] if splice.part.kind is not None else None
         self._bones = sorted({bone for each in self._retargets for bone in each.bones})
         self._travel = None
         if splice.travel:
@@ -197,6 +199,13 @@ class Splicer:
         """
         if span.frames.stop == span.frames.start:
             return base
+        if self._hung is None:
+            return self._onto_limbs(base, span)
+        before = self._hung.into(base)
+        return self._hung.back(self._onto_limbs(before, span), before, base)
+
+    def _onto_limbs(self, base: Clip, span: SpliceWindow) -> Clip:
+        """The same, of a clip whose limbs are whole."""
         if self._rests is None:
             return self._onto(base, span)
         before = self._rests.into(base)

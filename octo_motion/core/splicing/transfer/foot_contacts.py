@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""When feet stand: found from how they move in their own clip.
+
+Each foot has two points on which it may rest, the ankle and the ball: while a foot is flat both
+stand still, as its heel lifts only the ball does. How high they are does not count: stairs, slopes
+and mats need no ground to be known, and a foot held still in the air is to be still as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...rotations import Floats, conjugate, rotate
+from ..clip import Posture, sample_clip, sample_world
+from ..humanoid import chain_length
+from .parts import LEG
+from .retarget import MappedClip
+
+ANKLE: Final = 0
+BALL: Final = 1
+"""The points of a foot, in the order of arrays."""
+
+_SLOW: Final = 0.14
+"""Leg lengths per second: a point that stands is slower than this at some time, …"""
+
+_STILL: Final = 0.28
+"""… and never faster than this."""
+
+_SECONDS: Final = 0.04
+"""Over which a speed is measured, to either side: less would measure noise."""
+
+_SHORTEST: Final = 0.08
+"""Seconds for which a foot stands at least. At the top of a jump it is slow for less."""
+
+_ROOM: Final = np.array([(0.06, 0.06, 0.02), (0.06, 0.06, 0.04)])
+"""Leg lengths along X, Y and Z that ankle and ball are off the middle of where they stand, at most:
+a point that creeps on for long does not stand, nor does a heel that rises slowly."""
+
+_ROUNDS: Final = 3
+"""Of taking out what is too far off: what is left has another middle."""
+
+_LOWER: Final = 0.35
+"""Of all that stands: how much of it lies below the usual height."""
+
+_SPREAD: Final = 0.02
+"""Leg lengths by which heights on one ground differ: breath, soft soles, and what files lose."""
+
+_FLOOR: Final = 0.05
+"""Of all frames: for how many a point may be lower than where it stands."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootPaths:
+    """Where feet are in the world; axis 1 is left and right, axis 2 ankle and ball."""
+
+    points: Floats
+    """(frames, 2, 2, 3)"""
+    leg: float
+    """Length of a leg, world units."""
+    rate: float
+    """Frames per second."""
+    hips: Floats
+    """(frames, 2, 3) hip joints."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootContacts:
+    """Which points of the feet stand; axes as in :class:`FootPaths`."""
+
+    held: np.ndarray
+    """(frames, 2, 2) bool"""
+
+    def taken(self, rows: np.ndarray) -> FootContacts:
+        """Of some frames."""
+        return FootContacts(self.held[rows])
+
+
+def foot_bones(mapped: MappedClip, side: str) -> tuple[int, int, int, int]:
+    """Thigh, shin, foot and toes of a side; −1 where there are no toes.
+
+    Raises:
+        ClipError: a landmark is missing.
+    """
+    thigh, shin, foot = (mapped.bone(name) for name in LEG.limb_on(side))
+    toe = mapped.skeleton.index.get(mapped.humanoid().get(f"toe.{side}") or "", -1)
+    if toe not in mapped.skeleton.children[foot]:
+        toe = -1
+    return thigh, shin, foot, toe
+
+
+def ball_places(mapped: MappedClip) -> Floats:
+    """Where the balls of the feet are as seen from their bones, (2, 3), left and right: where the
+    toes begin. Of a foot without toes the ankle is all that is known: where its bone ends is the
+    file's choice.
+
+    Raises:
+        ClipError: a landmark is missing.
+    """
+    skeleton = mapped.skeleton
+    found = np.zeros((2, 3))
+    for side, name in enumerate("LR"):
+        _, _, foot, toe = foot_bones(mapped, name)
+        if toe >= 0:
+            back = conjugate(skeleton.rest_rotations[foot])
+            found[side] = rotate(back, skeleton.heads[toe] - skeleton.heads[foot])
+    return found
+
+
+def foot_paths(
+    mapped: MappedClip, posture: Posture, frames: Floats, balls: Floats | None = None
+) -> FootPaths:
+    """Where the feet are at some frames of a clip, whose posture there is given.
+
+    Args:
+        mapped: the clip.
+        posture: at those frames.
+        frames: (frames,)
+        balls: (2, 3) where the balls of the feet are if elsewhere than :func:`ball_places` says.
+
+    Raises:
+        ClipError: a landmark is missing.
+    """
+    clip = mapped.clip
+    turns, shifts, scale = sample_world(clip, frames)
+    points, hips = np.empty((len(frames), 2, 2, 3)), np.empty((len(frames), 2, 3))
+    balls = ball_places(mapped) if balls is None else balls
+    leg = 0.0
+    for side, name in enumerate("LR"):
+        thigh, shin, foot, _ = foot_bones(mapped, name)
+        leg += 0.5 * scale * chain_length(mapped.skeleton, (thigh, shin, foot))
+        hips[:, side] = shifts + scale * rotate(turns, posture.head(thigh))
+        ankle = posture.head(foot)
+        along = rotate(posture.orientation(foot), balls[side])
+        for number, place in ((ANKLE, ankle), (BALL, ankle + along)):
+            points[:, side, number] = shifts + scale * rotate(turns, place)
+    pace = float(np.median(np.diff(frames))) if len(frames) > 1 else 1.0
+    return FootPaths(points, leg, clip.rate / pace, hips)
+
+
+def own_paths(mapped: MappedClip, balls: Floats | None = None) -> FootPaths:
+    """Where the feet of a clip are at all its frames."""
+    clip = mapped.clip
+    return foot_paths(mapped, sample_clip(clip, clip.frames), clip.frames, balls)
+
+
+def find_contacts(paths: FootPaths) -> FootContacts:
+    """When the points of the feet stand."""
+    points = paths.points
+    count = len(points)
+    if count < 2:
+        return FootContacts(np.ones(points.shape[:3], dtype=bool))
+    speeds = _speeds(paths)
+    still = speeds < _STILL
+    held = np.zeros_like(still)
+    shortest = min(_SHORTEST * paths.rate, count)
+    for side in range(2):
+        for point in range(2):
+            own = side, point
+            held[:, side, point] = _standing(
+                still[:, *own], speeds[:, *own], points[:, *own], shortest, _ROOM[point] * paths.leg
+            )
+    return FootContacts(held)
+
+
+def _speeds(paths: FootPaths) -> Floats:
+    """(frames, 2, 2) leg lengths per second."""
+    points, count = paths.points, len(paths.points)
+    reach = max(1, round(_SECONDS * paths.rate))
+    rows = np.arange(count)
+    before, after = np.maximum(rows - reach, 0), np.minimum(rows + reach, count - 1)
+    seconds = np.maximum(after - before, 1)[:, None, None] / paths.rate
+    return np.linalg.norm(points[after] - points[before], axis=-1) / seconds / paths.leg
+
+
+def _standing(
+    still: np.ndarray, speeds: Floats, places: Floats, shortest: float, room: Floats
+) -> np.ndarray:
+    """(frames,) where one point stands: of where it is still, where it is slow at some time, long
+    enough, and stays within some room about one place.
+    """
+    count = len(still)
+    still = still | short_gaps(still, round(0.5 * shortest))
+    for _ in range(_ROUNDS):
+        starts, stops = runs(still)
+        if not len(starts):
+            break
+        edges = np.stack([starts, stops], axis=1).ravel()
+        slowest = np.minimum.reduceat(np.append(speeds, np.inf), edges)[::2]
+        good = (slowest < _SLOW) & (stops - starts >= shortest)
+        still = within_runs(starts[good], stops[good], count)
+        rows, counts = np.flatnonzero(still), (stops - starts)[good]
+        if not len(rows):
+            break
+        means = np.add.reduceat(places[rows], np.cumsum(counts) - counts, axis=0) / counts[:, None]
+        off = (places[rows] - np.repeat(means, counts, axis=0)) / room
+        far = np.linalg.norm(off, axis=-1) > 1.0
+        if not far.any():
+            break
+        still[rows[far]] = False
+    return still
+
+
+def runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First row of each run of true values, and the row after its last."""
+    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+
+
+def short_gaps(mask: np.ndarray, most: int) -> np.ndarray:
+    """(frames,) what lies between two runs that are so many frames apart at most."""
+    starts, stops = runs(~mask)
+    inner = (starts > 0) & (stops < len(mask)) & (stops - starts <= most)
+    return within_runs(starts[inner], stops[inner], len(mask))
+
+
+def within_runs(starts: np.ndarray, stops: np.ndarray, count: int) -> np.ndarray:
+    """(count,) whether a row is in one of some runs."""
+    steps = np.zeros(count + 1, dtype=np.intp)
+    np.add.at(steps, starts, 1)
+    np.add.at(steps, stops, -1)
+    return np.cumsum(steps)[:-1] > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """How a body stands."""
+
+    ankle: float
+    """Height of the ankles of feet that stand flat, world."""
+    ball: float
+    """Height of the balls of feet that stand, world."""
+
+
+def find_stance(paths: FootPaths) -> Stance:
+    """How a body stands in its clip: the usual heights of feet that do; where none does, of their
+    lowest points. A moment says the more the slower a foot is, without a limit from which on it
+    says nothing: files that keep a motion a little less exactly tell the same heights.
+    """
+    heights = paths.points[..., 2]
+    weights = 1.0 / (1.0 + (_speeds(paths) / _SLOW) ** 4)
+    flat = weights.prod(axis=-1)
+    found = []
+    for point in (ANKLE, BALL):
+        chosen = next((each for each in (flat, weights[..., point]) if each.max() > 0.5), None)
+        if chosen is None:
+            found.append(float(np.quantile(heights[..., point].min(axis=1), _FLOOR)))
+        else:
+            found.append(_usual(heights[..., point].ravel(), chosen.ravel(), _SPREAD * paths.leg))
+    return Stance(*found)
+
+
+def _usual(heights: Floats, weights: Floats, near: float) -> float:
+    """The mean of what is near the weighted height below which a third are: the ground, not a
+    step.
+    """
+    order = np.argsort(heights)
+    passed = np.cumsum(weights[order])
+    middles = passed - 0.5 * weights[order]
+    height = float(np.interp(_LOWER * passed[-1], middles, heights[order]))
+    weights = weights * np.exp(-(((heights - height) / near) ** 2))
+    return float(weights @ heights / weights.sum())

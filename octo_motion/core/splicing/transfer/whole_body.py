@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A whole clip carried over to another body: all parts, the way through the world, feet that stand.
+
+The parts are those of splicing, one after the other onto a body that does nothing: legs with the
+pelvis's way, trunk, arms, head. What no part takes rests. Each frame hangs on the clip's own alone,
+but for feet that stand, whose frames before and behind have a say: of a loop those are the rounds
+before and behind, so that it stays one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from ...errors import ClipError
+from ...rotations import (
+    Floats,
+    conjugate,
+    from_matrix,
+    multiply,
+    rotate,
+)
+from ...smoothing import blurred
+from ..clip import Clip, posture_of, sample_clip
+from .foot_contacts import (
+    Stance,
+    ball_places,
+    find_contacts,
+    find_stance,
+    foot_bones,
+    foot_paths,
+    own_paths,
+)
+from .foot_lock import Footing, GroundHeight, lock_feet, steps_of
+from .leg_travel import (
+    BodyPath,
+    body_path,
+    check_hips,
+    heading,
+    leg_length,
+    write_hips,
+)
+from .loop_rounds import Rounds, is_loop
+from .parts import PARTS
+from .rehung import whole_limbs
+from .retarget import (
+    MappedClip,
+    ReferredClip,
+    Retarget,
+    compared,
+    find_retargets,
+    write_retargeted,
+)
+from .splice import LimbGoal
+
+_PARTS: Final = ("legs", "trunk", "left_arm", "right_arm", "head")
+"""In the order in which they are put on: each hangs on those before it."""
+
+_FOLLOWED: Final = 0.2
+"""Seconds over which the body follows the ground, a third of it to either side."""
+
+_ANKLE: Final = 0.4
+"""Leg lengths: an ankle higher above where its object stands does not stand there."""
+
+_LEVEL: Final = np.array([1.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class WholeBody:
+    """How a whole clip is carried over."""
+
+    goal: LimbGoal = "direction"
+    """Hands in the direction where they were seen, or on the very point."""
+    travel: bool = True
+    """Whether the body goes through the world as the clip's does, at its own size; otherwise it
+    stays where it begins."""
+    foot_lock: bool = True
+    """Whether feet stand where the clip's do."""
+    ground: GroundHeight | None = None
+    """What it stands on; none for the height at which the body stands anyway."""
+
+
+def retarget_clip(
+    base: MappedClip, still: Clip, source: MappedClip, settings: WholeBody | None = None
+) -> Clip:
+    """A whole clip on another body, over all frames of a clip of that body that does nothing.
+
+    Args:
+        base: a clip of the body that gets it, by which the two are compared and of which the height
+            is at which it stands; it may be the same as the next.
+        still: of its skeleton, at rest where nothing is carried over, as many frames as the source
+            has; it says where its object stands, and at what frames the result is.
+        source: the clip.
+        settings: how, as usual if not given.
+
+    Raises:
+        ClipError: a landmark is missing, or the hips cannot leave their parent.
+    """
+    settings = settings or WholeBody()
+    _check_frames(still, source)
+    joined, hung = whole_limbs(base)
+    source, _ = whole_limbs(source)
+    before = still if hung is None else hung.into(still)
+    result = _on_whole_limbs(joined, before, source, settings)
+    return result if hung is None else hung.back(result, before, still)
+
+
+def _check_frames(still: Clip, source: MappedClip) -> None:
+    if len(still) != len(source.clip):
+        raise ClipError("The two clips differ in length.", "Give the clip at rest as many frames.")
+
+
+def _on_whole_limbs(base: MappedClip, still: Clip, source: MappedClip, settings: WholeBody) -> Clip:
+    ours, theirs = compared(base, source)
+    rests = ours.rests if isinstance(ours, ReferredClip) else None
+    before = still if rests is None else rests.into(still)
+    retargets = [
+        each
+        for name in _PARTS
+        for each in find_retargets(
+            PARTS[name], ours, theirs, clavicle=True, seen_from="pelvis" if name == "legs" else ""
+        )
+    ]
+    mover = _Mover(ours, theirs, retargets, settings)
+    result = mover.onto(before)
+    return result if rests is None else rests.back(result, before, still)
+
+
+class _Mover:
+    """Puts a whole clip onto a body; both rest in the poses in which they are compared."""
+
+    def __init__(
+        self,
+        base: MappedClip,
+        source: MappedClip,
+        retargets: list[Retarget],
+        settings: WholeBody,
+    ) -> None:
+        self._base, self._source = base, source
+        self._retargets = retargets
+        self._settings = settings
+        self._ratio = leg_length(base) * base.clip.scale / (leg_length(source) * source.clip.scale)
+        clip = source.clip
+        self._moment = sample_clip(clip, clip.frames)
+        self._paths = foot_paths(source, self._moment, clip.frames)
+        self._balls = _answering_balls(retargets, self._ratio * source.clip.scale / base.clip.scale)
+        self._stands = find_stance(own_paths(base, self._balls))
+        if settings.ground is not None:
+            self._stands = _above_soles(self._stands, base)
+        self._width = max(1, round(_FOLLOWED * self._paths.rate))
+        check_hips(base.skeleton, retargets[0].frames[0].bone)
+
+    def onto(self, before: Clip) -> Clip:
+        """The whole, on frames of a body that does nothing."""
+        rotations, locations = before.rotations.copy(), before.locations.copy()
+        skeleton = before.skeleton
+        exact = self._settings.goal == "exact"
+        for number, each in enumerate(self._retargets):
+            posture = posture_of(skeleton, rotations, locations)
+            reaches = exact and each.limb is not None
+            write_retargeted(each, posture, self._moment, rotations, locations, exact=reaches)
+            if number == 1:
+                # Both legs are on: what follows hangs on the pelvis.
+                self._travel(before, rotations, locations)
+        result = replace(before, rotations=rotations, locations=locations)
+        if not (self._settings.travel and self._settings.foot_lock):
+            return result
+        return self._standing(result)
+
+    def _travel(self, before: Clip, rotations: Floats, locations: Floats) -> None:
+        """The pelvis's way, at the body's own size, from where its object stands."""
+        ours, theirs = self._retargets[0].frames
+        clip = self._source.clip
+        path = body_path(clip, theirs, self._moment, clip.frames)
+        turn = heading(_object_turn(before), _object_turn(clip))
+        start = before.world[0, :3, 3] * _LEVEL
+        way = path.places - clip.world[0, :3, 3] * _LEVEL
+        if not self._settings.travel:
+            way = np.where(_LEVEL > 0.0, 0.0, way)
+        places = start + self._ratio * rotate(turn, way * _LEVEL)
+        rise = path.places[:, 2] - find_stance(self._paths).ankle
+        places[:, 2] = self._ground(places) + self._ratio * rise
+        goal = BodyPath(multiply(turn, path.orientations), places)
+        write_hips(
+            before,
+            ours,
+            posture_of(before.skeleton, rotations, locations),
+            goal,
+            (rotations, locations),
+        )
+
+    def _ground(self, places: Floats) -> Floats:
+        """(frames,) height of the ankles of somebody who stands there."""
+        ground = self._settings.ground
+        if ground is None:
+            return np.full(len(places), self._stands.ankle)
+        return self._stands.ankle + blurred(ground.height(places), self._width)
+
+    def _standing(self, result: Clip) -> Clip:
+        """With feet that stand."""
+        paths = self._paths
+        loops = is_loop(self._source, paths)
+        if loops:
+            paths = replace(paths, points=Rounds.between(paths.hips).points(paths.points))
+        contacts = find_contacts(paths)
+        steps = steps_of(paths, contacts, find_stance(paths), self._ratio)
+        footing = Footing(
+            contacts, self._stands, steps, self._settings.ground, self._balls, cyclic=loops
+        )
+        return lock_feet(self._base, result, footing)
+
+
+def _answering_balls(retargets: Sequence[Retarget], size: float) -> Floats | None:
+    """Where the balls of feet without toes are, (2, 3): where they are on a clip's that have them,
+    at their size; none where they are as usual.
+    """
+    base, source = retargets[0].base, retargets[0].splice
+    found, others = ball_places(base), ball_places(source)
+    for side, name in enumerate("LR"):
+        *_, foot, toe = foot_bones(base, name)
+        *_, answer, other_toe = foot_bones(source, name)
+        constant = retargets[side].match.constants.get(foot)
+        if toe >= 0 or other_toe < 0 or retargets[side].match.pairs.get(foot) != answer:
+            return None
+        assert constant is not None
+        found[side] = size * rotate(conjugate(constant), others[side])
+    return found
+
+
+def _above_soles(stands: Stance, base: MappedClip) -> Stance:
+    """Heights above the soles, which are where the object is, if that is beneath the feet as usual;
+    otherwise as low as the lowest joint.
+    """
+    floor = float(base.clip.world[0, 2, 3])
+    lowest = min(stands.ankle, stands.ball)
+    leg = leg_length(base) * base.clip.scale
+    if not 0.0 <= lowest - floor < _ANKLE * leg:
+        floor = lowest
+    return Stance(stands.ankle - floor, stands.ball - floor)
+
+
+def _object_turn(clip: Clip) -> Floats:
+    return from_matrix(clip.world[0, :3, :3] / clip.scale)
