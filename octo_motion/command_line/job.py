@@ -195,8 +195,7 @@ def bake(
 ) -> int:
     """Run a job as the command line asks for it, and print how far it has come.
 
-    Returns:
-        The exit status: 0 all is done, 1 a shot failed, 130 stopped.
+    The exit status is 0 where all is done, 1 where a shot failed, 130 where it was stopped.
 
     Raises:
         OctoMotionError: the job, its report or the options are wrong. Nothing has been run.

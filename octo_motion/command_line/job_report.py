@@ -219,17 +219,11 @@ def judge(
     wanted: Iterable[str],
     digest: Callable[[str], str],
 ) -> Verdict:
-    """Compare a shot with its record.
+    """Compare a shot as it is now, its inputs and wanted outputs, with its record of the run
+    before.
 
     A result that somebody has worked on since is never lost: while nothing else has changed the
-    shot is skipped, otherwise it must not be baked.
-
-    Args:
-        record: of the run before, if any.
-        fingerprint: of the shot as it is now.
-        inputs: paths of the files that the shot names.
-        wanted: paths of its outputs.
-        digest: of the file at a path, "" where there is none.
+    shot is skipped, otherwise it must not be baked. The digest is "" where there is no file.
     """
     paths = list(wanted)
     written = record.written if record else {}

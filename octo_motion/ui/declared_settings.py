@@ -95,11 +95,8 @@ Settings = TypeVar("Settings")
 
 
 def declared(kind: type, field: str) -> Any:
-    """The property of a setting.
-
-    Args:
-        kind: the dataclass that declares it.
-        field: its name there; the property's own is the one that it is stored as.
+    """The property of a setting that a dataclass declares by that name; its own is the one it is
+    stored as.
     """
     setting = declared_settings(kind)[field]
     default = setting.default if setting.offered is None else setting.offered
@@ -130,10 +127,7 @@ def declared(kind: type, field: str) -> Any:
 def read_settings(kind: type[Settings], group: Any, **worked_out: Any) -> Settings:
     """Core's settings, as a group of properties has them.
 
-    Args:
-        kind: the dataclass.
-        group: the properties.
-        worked_out: the fields that are no settings, and settings that do not count here.
+    Worked out are the fields that are no settings, and settings that do not count here.
     """
     own = {
         name: _value(getattr(group, each.stored_as or name), each)
@@ -165,9 +159,7 @@ _known: WeakKeyDictionary[type, list[tuple[str, str, bool]]] = WeakKeyDictionary
 def plain(group: Any, *, without: frozenset[str] = frozenset()) -> dict[str, Any]:
     """All properties of a group by name: groups become dictionaries, data-blocks their names.
 
-    Args:
-        group: any property group.
-        without: names that are left out, at every level.
+    Some names are left out, at every level.
     """
     result: dict[str, Any] = {}
     for name, kind, is_array in _properties(type(group), group):

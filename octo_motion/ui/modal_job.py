@@ -17,12 +17,7 @@ if TYPE_CHECKING:
 
 
 class Job:
-    """Work that yields the share of it that is done, 0…1.
-
-    Args:
-        steps: the work.
-        clock: seconds.
-    """
+    """Work that yields the share of it that is done, 0…1; its clock tells seconds."""
 
     def __init__(self, steps: Iterator[float], clock: Callable[[], float] = time.monotonic) -> None:
         self.progress = 0.0
@@ -74,13 +69,7 @@ class ModalJob(OctoOperator):
     def begin(
         self, context: bpy.types.Context, steps: Iterator[float], patience: float | None = None
     ) -> set[OperatorReturnItems]:
-        """Work for a while at once, and in turns from then on.
-
-        Args:
-            context: Blender's.
-            steps: the work; yields the share that is done.
-            patience: seconds that the window may stand still first; none for turns from the start.
-        """
+        """Work for a while at once, if there is patience, s, and in turns from then on."""
         self._job = Job(steps)
         try:
             if patience is not None and self._job.work(patience):

@@ -50,13 +50,9 @@ def draw_list(
 ) -> Any:
     """A list with its buttons; the column of the buttons, for more.
 
-    Args:
-        layout: where it goes.
-        row_type: what draws its rows.
-        settings: the group that has the list.
-        names: of the list, and of the number of its active item.
-        buttons: operators that add, that remove, and, if there is one, that move.
-        size: how many rows it shows, as Blender calls it.
+    The names are those of the list in its settings, and of the number of its active item; the
+    buttons operators that add, that remove, and, if there is one, that move; the size how many rows
+    it shows.
     """
     items, active = names
     row = layout.row()

@@ -73,11 +73,8 @@ class _Before:
 class PoseKeys:
     """Keys on one armature.
 
-    Args:
-        armature: the armature object.
-        target: where keys go: the action that the armature has (a new one if it has none), a copy
-            of it, a new action over it in the NLA, or a chosen one.
-        chosen: the chosen action.
+    They go to the action that it has (a new one if it has none), a copy of it, a new action over it
+    in the NLA, or a chosen one, as the target says.
 
     Raises:
         WriteError: it cannot be animated here, or the chosen action is gone or read-only.
@@ -110,19 +107,11 @@ class PoseKeys:
         *,
         auto: bool = False,
     ) -> list[str]:
-        """Key bones as they are, by the scene's keying set and the settings of keying.
+        """Key bones as they are, by the scene's keying set and the settings of (auto) keying.
 
-        Without a keying set the channels that posing moves get keys: rotation, and the location
-        of bones that were moved as a whole.
-
-        Args:
-            armature: the armature object.
-            keyed: its bones.
-            frame: at which.
-            auto: whether this is auto keying, which has settings of its own.
-
-        Returns:
-            Names of the bones that got a key: with *Only Insert Needed* not all may.
+        Without a keying set the channels that posing moves get keys: rotation, and the location of
+        bones that were moved as a whole. Returns names of the bones that got a key: with *Only
+        Insert Needed* not all may.
 
         Raises:
             WriteError: the action cannot be written.
@@ -187,18 +176,12 @@ class PoseKeys:
         angle: float,
         distance: float,
     ) -> int:
-        """Write a motion as few keys, in place of what the bones had between its ends.
+        """Write a motion as few keys, in place of what the bones had between its ends; number of
+        key frames.
 
-        Args:
-            armature: the armature object.
-            frames: (frames,) ascending.
-            rotations: (frames, 4) from rest, by bone.
-            locations: (frames, 3) in the bone's rest frame, by bone.
-            angle: radians by which each bone may be off.
-            distance: armature units by which locations may be off.
-
-        Returns:
-            Number of key frames.
+        At frames (frames,), ascending, bones have rotations (frames, 4) from rest, and locations
+        (frames, 3) in their rest frames. Each may be off by an angle, radians, and a distance,
+        armature units.
         """
         if not rotations or len(frames) < 2:
             return 0
@@ -546,8 +529,7 @@ def _restore_curves(action: bpy.types.Action, before: _Before) -> None:
 def _use_slot(data: bpy.types.AnimData, armature: bpy.types.Object) -> int | None:
     """Take the slot of the action that is the armature's, by name or as the only one.
 
-    Returns:
-        The handle of a slot that had to be made.
+    Returns the handle of a slot that had to be made.
     """
     action = data.action
     assert action is not None

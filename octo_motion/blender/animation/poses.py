@@ -62,15 +62,9 @@ def rest_bones(
 def standing_of(
     armature: bpy.types.Object, bone: str, *, left_out: Collection[str] = ()
 ) -> tuple[Floats, Floats]:
-    """Where the poses of a bone's ancestors have brought what it hangs on.
+    """Where the poses of a bone's ancestors, but for some, have brought what it hangs on.
 
-    Args:
-        armature: the armature object.
-        bone: name of a bone.
-        left_out: ancestors whose pose does not count.
-
-    Returns:
-        A shift (3,) and a turn (4,) of armature space; scale is left out.
+    That is a shift (3,) and a turn (4,) of armature space; scale is left out.
     """
     assert armature.pose is not None
     ancestors = list(reversed(armature.pose.bones[bone].parent_recursive))
@@ -87,18 +81,11 @@ def standing_of(
 def as_posed(
     armature: bpy.types.Object, skeleton: Skeleton, posed: Iterable[str], kept: Iterable[str]
 ) -> Skeleton | None:
-    """The skeleton as if some bones' poses were part of the rest pose.
+    """The rest skeleton as if some bones' poses of now were part of it; all others are at rest.
 
-    Args:
-        armature: the armature object.
-        skeleton: its rest skeleton.
-        posed: bones that stay as they are posed now; all others are at rest.
-        kept: bones that must keep their shape.
-
-    Returns:
-        The skeleton, or none where its numbers cannot tell it: something else than its pose moves
-        a bone, some of ``kept`` would be sheared or scaled unequally, or a rotation or a scale is
-        not handed on as a whole.
+    None where its numbers cannot tell it: something else than its pose moves a bone, some of
+    ``kept``, which must keep their shape, would be sheared or scaled unequally, or a rotation or a
+    scale is not handed on as a whole.
     """
     assert armature.pose is not None
     bones, posed = armature.pose.bones, set(posed)
@@ -137,10 +124,8 @@ def displaced_bones(
 ) -> list[str]:
     """Those of the bones that are posed by more than what is going to be keyed.
 
-    Args:
-        armature: the armature object.
-        turned: bones whose rotation is going to be keyed: location and scale count.
-        carrying: bones that get no keys: rotation counts as well.
+    Of bones whose rotation is going to be keyed, location and scale count; of those that carry
+    others and get no keys, rotation as well.
     """
     if armature.pose is None:
         return []
@@ -194,12 +179,8 @@ def show_pose(
 ) -> None:
     """Pose bones, without keys: the next change of frame brings back what the action says.
 
-    Args:
-        armature: the armature object.
-        names: bones; those that are gone are passed.
-        rotations: (bones, 4), from rest.
-        locations: (bones, 3), in each bone's rest frame.
-        scales: (bones, 3), if any bone has one.
+    Rotations (bones, 4) are from rest, locations (bones, 3) in each bone's rest frame, scales
+    (bones, 3). Bones that are gone are passed.
     """
     if armature.pose is None:
         return

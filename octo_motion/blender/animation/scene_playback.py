@@ -95,12 +95,10 @@ def _set_again(values: Iterable[_Value]) -> None:
 def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Floats, Floats]:
     """What an armature looks like at these frames of the current scene.
 
-    The scene is played through and put back to its frame; what has no keys yet survives.
-
-    Returns:
-        Bone matrices (frames, bones, 4, 4) in armature space, in the order of the armature's
-        bones, the object's world matrices (frames, 4, 4), and what its own channels make of it
-        (frames, 4, 4), before parents and constraints.
+    The scene is played through and put back to its frame; what has no keys yet survives. Returns
+    bone matrices (frames, bones, 4, 4) in armature space, in the order of the armature's bones, the
+    object's world matrices (frames, 4, 4), and what its own channels make of it (frames, 4, 4),
+    before parents and constraints.
     """
     scene = bpy.context.scene
     assert scene is not None
@@ -124,19 +122,11 @@ def shown_poses(armature: bpy.types.Object, frames: Floats) -> tuple[Floats, Flo
 def play_bones(
     armature: bpy.types.Object, names: Sequence[str], moments: Floats, seconds: float
 ) -> Floats:
-    """Where bones of an armature are in the world at the first of these moments.
+    """Where bones are in the world at the first of these moments: frames, and between frames.
 
     The current scene is played through and put back to its frame; what has no keys yet survives.
-
-    Args:
-        armature: the armature object.
-        names: of its bones.
-        moments: frames, and between frames.
-        seconds: after which no further moment is begun.
-
-    Returns:
-        Matrices (moments, bones, 4, 4) of as many moments as there was time for, at least of one;
-        of none if the scene does not show the armature.
+    After so many seconds no further moment is begun: the matrices (moments, bones, 4, 4) are of as
+    many as there was time for, at least of one, or of none if the scene does not show the armature.
     """
     scene, layer = bpy.context.scene, bpy.context.view_layer
     assert scene is not None

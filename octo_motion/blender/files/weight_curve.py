@@ -26,10 +26,7 @@ def ensure_weight_curve(
 ) -> bpy.types.NodeTree:
     """The node group given, if it has the curve and can be edited; else a new one.
 
-    Args:
-        group: what there is.
-        root: value of a new curve at its left end.
-        tip: value at its right end.
+    A new curve begins with the values of root and tip at its left and right end.
     """
     made: Any  # the stubs say that all of it may be None
     if group is not None and group.is_editable and curve_node(group) is not None:

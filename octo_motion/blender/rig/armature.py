@@ -354,14 +354,10 @@ def may_stretch(armature: bpy.types.Object, bones: Sequence[str]) -> bool:
 
 
 def linked_names(settings: bpy.types.PropertyGroup, collection: str) -> frozenset[str]:
-    """Names of a list's items that a library override has from its linked file.
+    """Names of the items of a list of settings that a library override has from its linked file.
 
     Blender allows to change their settings, but neither to rename, remove nor reorder them; items
     added in this file are free.
-
-    Args:
-        settings: a group of an object's settings.
-        collection: which of its lists.
     """
     override = settings.id_data.override_library if settings.id_data else None
     if override is None or override.reference is None:
@@ -447,15 +443,11 @@ def vertex_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
 
 def radii_of_skin(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> list[Floats]:
-    """Radii (bones + 1,) of the skin at the joints of each chain, armature units.
+    """Radii (bones + 1,) of the skin at the joints of each chain, root to tip, armature units.
 
     Within a bone's lie three quarters of the vertices that follow it more than any other bone, at
-    rest. Bones without such vertices take over their neighbours'; a chain without any is given
-    the slender form that arms usually have.
-
-    Args:
-        armature: the armature object.
-        chains: names of bones, root to tip.
+    rest. Bones without such vertices take over their neighbours'; a chain without any is given the
+    slender form that arms usually have.
     """
     assert isinstance(armature.data, bpy.types.Armature)
     bones = armature.data.bones
@@ -478,17 +470,10 @@ def skin_parts(
 ) -> list[tuple[str, Floats, Floats]]:
     """Parts of a body as thick and as long as the skin that follows single bones.
 
-    A bone's own ends tell little of that: a head is round about a bone of any length, and files
-    of other programs know no tails. So a part reaches as far as its skin does along its bone, or
-    along the skin's own longest way if that makes it much smaller. Bones that no skin follows are
-    none.
-
-    Args:
-        armature: the armature object.
-        names: of the bones.
-
-    Returns:
-        Name, ends (2, 3) and radii (2,) of each part, armature space.
+    A bone's own ends tell little of that: a head is round about a bone of any length, and files of
+    other programs know no tails. So a part reaches as far as its skin does along its bone, or along
+    the skin's own longest way if that makes it much smaller. Bones that no skin follows are none.
+    Returns name, ends (2, 3) and radii (2,) of each part, armature space.
     """
     assert isinstance(armature.data, bpy.types.Armature)
     bones = armature.data.bones
@@ -612,12 +597,8 @@ def arm_skins(
 
 
 def _arm_skins(points: Floats, joints: Sequence[Floats], frames: Sequence[Floats]) -> list[ArmSkin]:
-    """The same from points of the skin.
-
-    Args:
-        points: (n, 3).
-        joints: for each arm (bones + 1, 3).
-        frames: for each arm (bones, 4) its bones' rest orientations.
+    """The same from points (n, 3) of the skin, joints (bones + 1, 3) of each arm, and rest
+    orientations (bones, 4) of its bones.
     """
     lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
     found = [nearest_bones(points, each) for each in joints]
@@ -633,12 +614,7 @@ def _arm_skins(points: Floats, joints: Sequence[Floats], frames: Sequence[Floats
 
 
 def _skin(armature: bpy.types.Object, size: float) -> Floats:
-    """Some points (n, 3) of the meshes that the armature moves, at rest, armature space.
-
-    Args:
-        armature: the armature object.
-        size: how large it is, armature units.
-    """
+    """Some points (n, 3) of meshes that an armature of a size moves, at rest, armature space."""
     inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
     found: list[tuple[np.ndarray, Floats]] = []
     for item in deformed_meshes(armature):

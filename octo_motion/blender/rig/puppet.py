@@ -25,12 +25,7 @@ _STILL = 1e-6
 
 
 class Puppet:
-    """An armature in the hands of a session, whatever it is called meanwhile.
-
-    Args:
-        armature: the armature object, local to this file.
-        rig: what was read of it; read now if none is given.
-    """
+    """A local armature in the hands of a session, whatever it is called meanwhile."""
 
     def __init__(self, armature: bpy.types.Object, rig: PuppetRig | None = None) -> None:
         self.name = armature.name

@@ -88,9 +88,7 @@ class PuppetRig:
 def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> PuppetRig:
     """Make a figure of an armature as it stands now. Nothing in the file is changed.
 
-    Args:
-        armature: the armature object.
-        smallest: share of the figure's size below which bones only follow.
+    Bones below the ``smallest`` share of its size only follow.
 
     Raises:
         RigError: it is no armature, has no bones, no size, an uneven scale, or nothing to pose; or

@@ -49,9 +49,7 @@ class Contact:
 def markers(armature: bpy.types.Object, once: str = "") -> list[bpy.types.Object]:
     """The markers of an armature that are in some scene, by name.
 
-    Args:
-        armature: the armature object.
-        once: what it was called when its markers were put.
+    ``once`` is what it was called when its markers were put.
     """
     names = {armature.name}
     if once and bpy.data.objects.get((once, None)) is None:
@@ -93,13 +91,10 @@ def read_markers(armature: bpy.types.Object, once: str = "") -> dict[tuple[str, 
 def write_markers(
     armature: bpy.types.Object, contacts: Sequence[Contact], arm_length: float, once: str = ""
 ) -> None:
-    """Put markers where the contacts are: those that are there are moved, others made or removed.
+    """Put markers where all the contacts are: those that are there are moved, others made or
+    removed.
 
-    Args:
-        armature: whose they are.
-        contacts: all of them.
-        arm_length: metres.
-        once: as of :func:`markers`.
+    The arm's length is in metres; ``once`` is as of :func:`markers`.
     """
     known: dict[tuple[str, int], bpy.types.Object] = {}
     surplus: list[bpy.types.Object] = []

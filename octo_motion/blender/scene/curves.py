@@ -43,10 +43,8 @@ def read_route(
 ) -> Route:
     """The route that a curve object describes, in world space and metres.
 
-    Args:
-        curve: a curve object of any spline types, open or cyclic, in any mode, hidden or not.
-        depsgraph: the evaluated scene to read from; the current one if not given.
-        spline_index: which of the curve's splines; by default the longest that can be followed.
+    The curve may be of any spline types, open or cyclic, in any mode, hidden or not. Of its splines
+    the longest that can be followed is taken, if no other is asked for.
 
     Raises:
         RouteError: the object is no curve, or has no spline that can be followed.
@@ -75,14 +73,10 @@ def read_route(
 def add_route_curve(
     name: str, control_points: ArrayLike, collection: bpy.types.Collection
 ) -> bpy.types.Object:
-    """A new curve object: one cubic Bézier segment, the route of [Octopus] §3.5.
+    """A new curve object: one cubic Bézier segment of control points (4, 3), world, the route of
+    [Octopus] §3.5.
 
     Its origin is the first control point, so that moving the object moves the start.
-
-    Args:
-        name: wanted name; Blender makes it unique.
-        control_points: (4, 3) B₀…B₃ in world space.
-        collection: where the object is linked.
     """
     world = np.asarray(control_points, dtype=np.float64)
     points = world - world[0]

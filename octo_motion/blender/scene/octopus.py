@@ -46,13 +46,10 @@ _BODY_HUE: Final = 0.36
 def add_octopus(
     context: bpy.types.Context, shape: OctopusShape, matrix: Matrix, *, with_skin: bool = True
 ) -> bpy.types.Object:
-    """A new armature object in object mode, active and alone selected, with its skin.
+    """A new armature object in object mode, active and alone selected, with its skin as a child.
 
-    Args:
-        context: in object mode; the objects go where the view layer puts new ones.
-        shape: the artist's choices.
-        matrix: where the armature's origin goes, in world space.
-        with_skin: whether to make the mesh too, as a child of the armature.
+    The objects go where the view layer puts new ones, the armature's origin by a matrix of the
+    world.
 
     Raises:
         WriteError: the scene is linked from another file.

@@ -64,11 +64,8 @@ def read_triangles(
 
 
 def _corners(mesh: bpy.types.Mesh, points: np.ndarray) -> tuple[np.ndarray, bytes]:
-    """Vertices (faces, 3) of a mesh's triangles, and a key of its content.
-
-    Args:
-        mesh: the mesh.
-        points: (vertices, 3) its vertices.
+    """Vertices (faces, 3) of a mesh's triangles, and a key of its content; its points are
+    (vertices, 3).
     """
 
     def read() -> np.ndarray:
@@ -95,15 +92,11 @@ MOST_TRIANGLES: Final = 50_000
 
 
 def read_obstacle(item: bpy.types.Object, kind: str, unit: float) -> Obstacle:
-    """One object as an obstacle, as it is shown now.
+    """One object as an obstacle, as it is shown now, in puppet metres: ``unit`` of them are one of
+    the world's.
 
-    A box, a ball and a capsule are fitted to the object's own bounds, and turn and scale with it;
-    a plane lies at its origin and is solid below its local Z axis.
-
-    Args:
-        item: the object.
-        kind: "PLANE", "BOX", "SPHERE", "CAPSULE", "HULL" or "MESH".
-        unit: puppet metres of one metre in the world.
+    A box, a ball and a capsule are fitted to the object's own bounds, and turn and scale with it; a
+    plane lies at its origin and is solid below its local Z axis.
 
     Raises:
         RigError: the object has no size, no surface, or too much of it, or is nowhere.

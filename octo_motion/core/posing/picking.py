@@ -27,15 +27,10 @@ class Hit:
 def pick(
     figure: Figure, pose: Pose, origin: Floats, direction: Floats, *, margin: float = 0.0
 ) -> Hit | None:
-    """The body that a ray meets first, or else passes nearest to.
+    """The body that a ray from an origin (3,) in a direction (3,) meets first, or else passes
+    nearest to.
 
-    Args:
-        figure: the bodies.
-        pose: where they are.
-        origin: (3,) of the ray.
-        direction: (3,) of any length above zero.
-        margin: by how much a body may be missed, as a share of the distance: thin arms are hard to
-            hit. A body that is hit comes first.
+    It may be missed by ``margin``, a share of the distance: thin arms are hard to hit.
     """
     way = direction / np.linalg.norm(direction)
     ends = capsules_in_world(figure, pose)

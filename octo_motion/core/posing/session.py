@@ -63,12 +63,8 @@ class StepLength:
     """s of work for a simulated second, of late."""
 
     def after(self, spent: float, simulated: float, step: float) -> float:
-        """The step, s, to go on with.
-
-        Args:
-            spent: s that were worked.
-            simulated: s that came of it, above zero.
-            step: s of a step now.
+        """The step, s, to go on with, where so many seconds were worked, and more than none came of
+        it.
         """
         self.load += self.learning * (spent / simulated - self.load)
         wanted = step
@@ -159,15 +155,10 @@ def hand_for(figure: Figure, strength: float = 1.0) -> Coupling:
 
 
 class Session:
-    """A figure in a world, and hands that hold it.
+    """A figure in a world, and hands that hold it; the settings' step is the nominal one.
 
-    Args:
-        figure: the puppet.
-        pose: where it starts.
-        settings: of the world; their step is the nominal one.
-        obstacles: what it can touch.
-        clock: seconds; without, no tick asks for the time, steps stay as they are, and the same
-            calls give the same result.
+    Without a clock, in seconds, no tick asks for the time, steps stay as they are, and the same
+    calls give the same result.
     """
 
     def __init__(
@@ -258,11 +249,9 @@ class Session:
     def tick(
         self, seconds: float, hands: Mapping[HandSpring, HandSample] | None = None
     ) -> TickReport:
-        """Simulate what has passed, with hands on their way to where they are now.
+        """Simulate the real time that has passed, with hands on their way to where they are now.
 
-        Args:
-            seconds: real time since the last tick.
-            hands: by what they hold; who is not there stays where it was.
+        Hands are known by what they hold; who is not there stays where it was.
         """
         step = self.world.settings.step
         if self.resting:
@@ -287,11 +276,8 @@ class Session:
     ) -> None:
         """Take some steps, with hands going evenly from where they were to where they are now.
 
-        Args:
-            count: how many.
-            hands: by what they hold.
-            share: of the way that hands go meanwhile: less than 1 where simulated time falls
-                behind, for a target that jumps would yank the puppet.
+        They go a share of their way, less than 1 where simulated time falls behind: a target that
+        jumps would yank the puppet.
         """
         world, passed = self.world, count * self.world.settings.step
         sweeps = [
@@ -314,13 +300,7 @@ class Session:
         return self.world.pins
 
     def pin(self, body: int, *, state: bool, firm: bool = True) -> None:
-        """Nail a body to where it is, or take the nail out.
-
-        Args:
-            body: its index.
-            state: whether it is pinned from now on.
-            firm: whether it keeps its orientation as well as the place of its joint.
-        """
+        """Nail a body to where it is, if ``firm`` its orientation as well, or take the nail out."""
         if state:
             self.world.pin(body, firm=firm)
         else:

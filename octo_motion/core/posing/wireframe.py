@@ -23,11 +23,8 @@ def load_colours(loads: Floats) -> Floats:
 
 
 def capsule_lines(ends: Floats, radii: Floats) -> Floats:
-    """Lines (bodies, lines, 2, 3): rings at both ends, sides, and half circles over the caps.
-
-    Args:
-        ends: (bodies, 2, 3) of the axes.
-        radii: (bodies,)
+    """Lines (bodies, lines, 2, 3) of capsules with axes (bodies, 2, 3): rings at both ends, sides,
+    and half circles over the caps.
     """
     along = normalized(ends[:, 1] - ends[:, 0])
     along = np.where(np.abs(along).sum(axis=1, keepdims=True) > 0.0, along, [0.0, 0.0, 1.0])

@@ -145,10 +145,8 @@ def open_device(found: Found) -> Handle:
 def claim(found: Found) -> Callable[[], None]:
     """Keep others of us from a device that is open: two forces in turn would shake the hand.
 
-    On Linux alone; elsewhere nothing is kept from anyone.
-
-    Returns:
-        What sets it free again; so does the end of this process.
+    On Linux alone; elsewhere nothing is kept from anyone. What comes back sets it free again; so
+    does the end of this process.
 
     Raises:
         DeviceError: another Blender has it.

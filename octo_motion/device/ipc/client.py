@@ -73,9 +73,8 @@ class Client:
     def start(self, arguments: Sequence[str] = (), python: Path | None = None) -> None:
         """Start the bridge; one that runs is stopped first.
 
-        Args:
-            arguments: Options of ``python -m octo_motion.device bridge``.
-            python: Executable; None finds Blender's own.
+        Arguments are options of ``python -m octo_motion.device bridge``; without a Python,
+        Blender's own is found.
 
         Raises:
             DeviceError: it cannot be started.
@@ -150,11 +149,7 @@ class Client:
         self.send(messages.ObstacleMessage.of(number, obstacle))
 
     def poll(self) -> list[messages.Button]:
-        """Take in all that the bridge has said.
-
-        Returns:
-            Buttons of devices that were pressed or let go, in order.
-        """
+        """Take in all that the bridge has said; buttons that were pressed or let go, in order."""
         buttons: list[messages.Button] = []
         try:
             came = self._child.channel.receive() if self._child else []

@@ -69,12 +69,9 @@ class MessageChannel:
         self.closed = False
 
     def send(self, message: Message, *, droppable: bool = False) -> bool:
-        """Send a message, or keep it until the peer reads.
+        """Send a message, or keep it until the peer reads; whether it is on its way.
 
         One that may be dropped, since a newer one will replace it, is left out if the peer is slow.
-
-        Returns:
-            Whether it is on its way; else it was left out.
 
         Raises:
             ChannelClosedError: the peer is gone, or has not read for very long.
@@ -273,11 +270,7 @@ class Child:
 
     @classmethod
     def start(cls, arguments: Sequence[str], python: Path | None = None) -> Child:
-        """Start ``python -m octo_motion.device`` with arguments, and connect to it.
-
-        Args:
-            arguments: Subcommand and options.
-            python: Executable; None finds it.
+        """Start ``python -m octo_motion.device`` with subcommand and options, and connect to it.
 
         Raises:
             DeviceError: it does not start, or does not answer.
@@ -355,12 +348,8 @@ class Parent:
     """Whoever started this process; when it is gone, so are we.
 
     Nobody has to ask for it: the end of standard input wakes a thread that waits for nothing else.
-    No step of a simulation, no system call that never returns and nothing that Python would tidy
-    up keeps the process.
-
-    Args:
-        seconds: That the process may take for what must be done before its end, once ``gone`` is
-            set.
+    No step of a simulation, no system call that never returns and nothing that Python would tidy up
+    keeps the process, but for the seconds given for what must be done once ``gone`` is set.
     """
 
     def __init__(self, seconds: float = 0.0) -> None:

@@ -82,11 +82,7 @@ class Outcome(Enum):
 
 
 class PoseControls:
-    """Mouse and keys on a session.
-
-    Args:
-        session: what they act on.
-    """
+    """Mouse and keys on a session."""
 
     def __init__(self, session: PuppetSession) -> None:
         self.session = session
@@ -122,13 +118,8 @@ class PoseControls:
         self.session.tick(seconds, self.hand, self._turn)
 
     def handle(self, event: Any, view: EyeOn | None, x: float = 0.0, y: float = 0.0) -> Outcome:
-        """One event.
-
-        Args:
-            event: with Blender's ``type``, ``value``, ``shift``, ``ctrl`` and ``alt``.
-            view: the viewport under the mouse, none beside it.
-            x: the mouse in it, pixels.
-            y: likewise.
+        """One of Blender's events, or the like, at pixels x and y of the viewport under the mouse,
+        if any.
         """
         kind, press = event.type, event.value == "PRESS"
         if kind == "LEFTMOUSE" and event.value == "RELEASE" and self.holding and not self._latched:

@@ -81,11 +81,8 @@ class ShownPointer:
 
 
 class HandsBase:
-    """What devices and Blender's own space mouse share as hands of a session.
-
-    Args:
-        session: of posing.
-        client: to the bridge; off where there is none.
+    """What devices and Blender's own space mouse share as hands of a session; the client may be
+    off.
     """
 
     hand: Floats | None = None
@@ -133,11 +130,7 @@ class HandsBase:
 
 
 class Calibrations:
-    """The zero and range that devices have learned here: kept in a file, and handed to them.
-
-    Args:
-        client: to the bridge.
-    """
+    """The zero and range that devices have learned here: kept in a file, and handed to them."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -196,13 +189,7 @@ class Calibrations:
 
 
 class DeviceHands(HandsBase):
-    """Hands at devices: the bridge simulates, and the session steps no more by itself.
-
-    Args:
-        session: of posing.
-        client: to the bridge, started.
-        settings: how devices behave.
-    """
+    """Hands at devices: the bridge, started, simulates; the session steps no more by itself."""
 
     def __init__(self, session: PuppetSession, client: Client, settings: DeviceSettings) -> None:
         super().__init__(session, client)
@@ -317,12 +304,8 @@ class DeviceHands(HandsBase):
     def tick(self, settings: DeviceSettings, room: ViewRoom | None = None) -> list[Button]:
         """Take over what the bridge says, pose the armature, and tell the bridge what changed.
 
-        Args:
-            settings: how devices behave now.
-            room: where they are, if a view says so.
-
-        Returns:
-            Buttons that were pressed or let go.
+        What the view says of where devices are is the room. Returns buttons that were pressed or
+        let go.
 
         Raises:
             RigError: the armature is gone, changed or in edit mode.
@@ -464,10 +447,6 @@ class NdofHands(HandsBase):
     """One pointer, moved by the events of a space mouse that Blender itself has.
 
     No bridge is needed: the puppet is simulated in Blender, as with the mouse.
-
-    Args:
-        session: of posing.
-        clock: seconds.
     """
 
     def __init__(
@@ -505,18 +484,13 @@ class NdofHands(HandsBase):
         room: ViewRoom,
         settings: DeviceSettings,
     ) -> None:
-        """One event of Blender's.
+        """One event of Blender's: a push (3,) right, up, towards the user, and a turn (3,) about
+        these.
 
         It is made for a camera: a turn is told as the scene then seems to turn, against the cap
         (GHOST_NDOFManagerUnix and libspnav's spnav_posrot_moveobj differ in all three signs). And
-        it is multiplied by what the preferences say of flying.
-
-        Args:
-            translation: (3,) push: right, up, towards the user.
-            rotation: (3,) turn about these, against the cap's.
-            seconds: since the event before.
-            room: what the view shows.
-            settings: how devices behave.
+        it is multiplied by what the preferences say of flying. So many seconds have passed since
+        the event before.
         """
         if self.position is None:
             self.position = room.middle.copy()

@@ -74,15 +74,10 @@ def room_of(context: bpy.types.Context, scale: float, session: PuppetSession) ->
 
 
 def camera_room(data: Any, scale: float, figure: Floats) -> ViewRoom:
-    """What is seen through a camera, at the depth of a figure.
+    """What ``RegionView3D`` shows through a camera, at the depth of a figure's middle (3,), world.
 
     Where the view turns and how far it is from there, as Blender tells it, is then that of another
     view: the one before.
-
-    Args:
-        data: ``RegionView3D``.
-        scale: of the room.
-        figure: (3,) middle of the figure, world.
     """
     axes = _axes(data)
     eye = np.array(data.view_matrix.inverted(), dtype=np.float64)[:3, 3]

@@ -74,12 +74,7 @@ def device_settings(window_manager: bpy.types.WindowManager) -> Any:
 
 
 def message(settings: Any, size: float) -> Settings:
-    """What the bridge hears of them.
-
-    Args:
-        settings: the property group.
-        size: of the figure, puppet metres.
-    """
+    """What the bridge hears of them, for a figure of a size in puppet metres."""
     defaults = Settings()
     return Settings(
         force=settings.force,

@@ -34,12 +34,9 @@ BEARS: Final = 1.25
 
 
 class MeasuringHand:
-    """One joint that is bent by hand, to measure what it is to be made of.
+    """The joint of a limb that is bent by hand, to measure what it is to be made of.
 
-    Args:
-        figure: the puppet.
-        pose: where it stands; nothing but what hangs on the joint is moved.
-        body: the limb whose joint it is.
+    Nothing but what hangs on the joint is moved.
 
     Raises:
         RigError: the limb hangs on nothing.
@@ -144,13 +141,8 @@ def check_joint(figure: Figure, body: int) -> None:
 def measured_joint(
     figure: Figure, body: int, strength: float, bend: Bend
 ) -> tuple[MeasuredBend, Material]:
-    """Coefficients of a joint that does what a bend says, and the material that has them.
-
-    Args:
-        figure: the puppet.
-        body: whose joint it is.
-        strength: of the settings.
-        bend: its torques in loads of the joint.
+    """Coefficients of a joint that does what a bend says, its torques in loads of the joint, and
+    the material that has them.
 
     Raises:
         RigError: the body hangs on nothing.

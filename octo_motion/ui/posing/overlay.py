@@ -35,12 +35,9 @@ Lines = list[tuple[Floats, Floats, float]]
 def overlay_lines(
     controls: PoseControls | DeviceHands | NdofHands, eye: Floats, *, loads: bool = True
 ) -> Lines:
-    """All lines of a session, in the world.
+    """All lines of a session, in the world, seen from a direction (3,) towards the eye.
 
-    Args:
-        controls: of the session.
-        eye: (3,) direction towards the eye.
-        loads: whether all limbs are shown, by what they bear.
+    With ``loads`` all limbs are shown, by what they bear.
     """
     session = controls.session
     ends, radii = session.capsules()
@@ -85,9 +82,7 @@ def take_down_all() -> None:
 class Overlay:
     """The drawing of one session, in all 3D viewports, until it is taken down.
 
-    Args:
-        controls: of the session; a device's have the same attributes.
-        lines: what is drawn, by ``overlay_lines`` if nothing else is given.
+    Controls are those of the session; a device's have the same attributes.
     """
 
     def __init__(self, controls: Any, lines: Callable[..., Lines] = overlay_lines) -> None:

@@ -129,10 +129,7 @@ def tell(
 ) -> None:
     """Show a line in the headers of 3D viewports, and what keys do in the status bar.
 
-    Args:
-        context: Blender's.
-        line: none to show Blender's own again.
-        keys: and what each does.
+    Without a line, Blender's own are shown again.
     """
     screens, workspaces = [context.screen], [context.workspace]
     if line is None:

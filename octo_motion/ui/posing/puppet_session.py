@@ -30,12 +30,7 @@ from .session_settings import GRAVITY, BoneMaterials, SessionSettings
 
 
 class PosedPuppet:
-    """An armature's puppet that is simulated as the panel's settings say.
-
-    Args:
-        armature: the armature object.
-        scene: whose obstacles count.
-        clock: as of ``Session``.
+    """An armature's puppet that is simulated as the panel's settings say, with a scene's obstacles.
 
     Raises:
         OctoMotionError: it cannot be posed.
@@ -217,10 +212,8 @@ class PosedPuppet:
             self.puppet.write(self.core.pose)
 
     def take_measure(self, *, bone_only: bool = False) -> str:
-        """End measuring, and let the figure be of what was shown; the coefficients, in words.
-
-        Args:
-            bone_only: whether only the joint that was bent is.
+        """End measuring, and let the figure, or only the joint that was bent, be of what was shown;
+        the coefficients, in words.
 
         Raises:
             SettingsError: what was shown makes no sense; measuring goes on.
@@ -280,12 +273,7 @@ def active_session() -> PuppetSession | None:
 
 
 class PuppetSession(PosedPuppet):
-    """An armature in a hand, from start to end.
-
-    Args:
-        armature: the armature object.
-        scene: whose frames and obstacles count.
-        clock: as of ``Session``; none makes it repeatable.
+    """An armature in a hand, from start to end; without a clock it is repeatable.
 
     Raises:
         OctoMotionError: it cannot be posed; nothing has changed then.
@@ -337,12 +325,9 @@ class PuppetSession(PosedPuppet):
     def tick(
         self, seconds: float, position: Floats | None = None, turn: Floats | None = None
     ) -> TickReport:
-        """Simulate, and pose the armature.
+        """Simulate so many seconds of real time, and pose the armature.
 
-        Args:
-            seconds: real time since the last tick.
-            position: (3,) of the hand, world.
-            turn: (4,) of the hand since it took hold.
+        The hand is at a position (3,), world, and has turned by (4,) since it took hold.
 
         Raises:
             RigError: the armature is gone, changed or in edit mode.
@@ -389,10 +374,8 @@ class PuppetSession(PosedPuppet):
     # --- Keys -----------------------------------------------------------------------------------
 
     def key(self, *, all_bones: bool = False, bones: Iterable[str] | None = None) -> list[str]:
-        """Key the bones that were touched, or all limbs, at the current frame.
-
-        Returns:
-            The bones that got a key.
+        """Key the bones that were touched, or all limbs, at the current frame; the bones that got a
+        key.
         """
         if bones is not None:
             bodies = [self.body(each) for each in bones]

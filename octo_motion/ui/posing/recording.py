@@ -19,13 +19,7 @@ _LOCATION_SHARE: Final = 0.002
 
 
 class Recording:
-    """The poses of a puppet, frame by frame.
-
-    Args:
-        puppet: what is posed.
-        frame: where it begins.
-        pose: of the puppet there.
-    """
+    """The poses of a puppet, frame by frame, from the one where it begins."""
 
     def __init__(self, puppet: Puppet, frame: float, pose: Pose) -> None:
         self._puppet = puppet
@@ -73,10 +67,8 @@ class Recording:
         """Let what stood still in the recording go on with what carries it; whether anything did.
 
         While a root bone travels, the figure's own root is held back to stay in its place, and is
-        to be no further off once that is over: unless it was moved, it has got no keys.
-
-        Args:
-            recorded: bones that got keys.
+        to be no further off once that is over: unless it was moved, it is not among the recorded
+        bones.
         """
         puppet, armature = self._puppet, self._puppet.armature()
         loose = {name for body, name in enumerate(puppet.figure.names) if puppet.places(body)}

@@ -23,12 +23,7 @@ TICK: Final = 1.0 / 60.0
 
 
 class Player:
-    """Plays a script on a session.
-
-    Args:
-        session: without a clock, so that each run is the same.
-        script: what to do.
-    """
+    """Plays a script on a session that has no clock, so that each run is the same."""
 
     def __init__(self, session: PuppetSession, script: PoseScript) -> None:
         self._session = session

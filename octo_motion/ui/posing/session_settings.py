@@ -101,11 +101,7 @@ class SessionSettings(SimpleNamespace):
 
 
 class BoneMaterials:
-    """Materials of single joints, and what was measured in a session, to be taken back.
-
-    Args:
-        puppet: whose.
-    """
+    """Materials of single joints, and what was measured in a session, to be taken back."""
 
     def __init__(self, puppet: Puppet) -> None:
         self._puppet = puppet
@@ -137,11 +133,7 @@ class BoneMaterials:
 
 
 def chosen_material(settings: Any) -> str | Material:
-    """What a figure is made of, for ``elements_for``.
-
-    Args:
-        settings: the armature's, or anything with the same names.
-    """
+    """What a figure is made of, for ``elements_for``, by settings or the like."""
     if settings.material != CUSTOM:
         return settings.material.lower()
     yields = settings.custom_yields
@@ -154,13 +146,7 @@ def chosen_material(settings: Any) -> str | Material:
 
 
 def keep_material(armature: bpy.types.Object, settings: Any, material: Material, bone: str) -> None:
-    """Make the figure of a material, or one bone's joint.
-
-    Args:
-        armature: the armature object.
-        settings: its own of posing.
-        material: the new one.
-        bone: the one that it is for; empty for all.
+    """Make the figure of a material, or with the name of a bone that one's joint.
 
     Raises:
         WriteError: the bones are linked.

@@ -83,17 +83,12 @@ class RigFacts:
 
 
 def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") -> Roles:
-    """Tell bodies from helpers.
+    """Tell bodies from helpers; ``name`` is the armature's, for messages.
 
     Bones that deform are bodies, or where something else moves these, their controls at the same
     joints. Helpers by name, by size or without skin are left out; what joins several limbs is put
     in again. A limb that hangs on the rig's root but begins where another ends (feet for inverse
     kinematics) hangs on that one.
-
-    Args:
-        skeleton: the rest pose.
-        facts: what else is known.
-        name: the armature's, for messages.
 
     Raises:
         RigError: the skeleton has no size, or no bone is left.

@@ -85,21 +85,12 @@ def build_figure(
     skin: Mapping[int, Floats] | None = None,
     limits: Mapping[str, JointLimits] | None = None,
 ) -> tuple[Figure, Pose]:
-    """Rigid bodies for the bones that are bodies, jointed as the bones stand now.
+    """Rigid bodies for the bones that are bodies, jointed as the bones stand now, and that pose.
 
     Joints are where the pose has them, so that a bone that was moved away from its parent stays
-    there, and a pose beyond a limit widens it: a puppet that is taken up does not move.
-    The joints' elements are without strength; see the presets.
-
-    Args:
-        skeleton: the rest pose, for orientations at rest.
-        roles: which bones are bodies.
-        posed: where they are.
-        skin: (points, 3) in the world, by the bone that moves them most; limbs without are slim.
-        limits: by name of the bone.
-
-    Returns:
-        The figure, and the pose it has now.
+    there, and a pose beyond a limit widens it: a puppet that is taken up does not move. The joints'
+    elements are without strength; see the presets. ``skin`` has points (points, 3), world, by the
+    bone that moves them most; limbs without are slim. ``limits`` are by name of the bone.
     """
     bones = list(roles.bodies)
     parents = np.array(roles.parents)
@@ -219,11 +210,8 @@ def _bulk(
 ) -> tuple[Floats, Floats]:
     """Masses (bodies,) and inertias (bodies, 3, 3) of solid capsules about their middles.
 
-    Args:
-        straight: (bodies,) length between the caps.
-        along: (bodies, 3) unit vectors.
-        radius: (bodies,)
-        lengths: (bodies,)
+    They lie along unit vectors (bodies, 3), and are straight (bodies,) for a length between the
+    caps.
     """
     tube = DENSITY * np.pi * radius**2 * straight
     ball = DENSITY * 4.0 / 3.0 * np.pi * radius**3

@@ -102,12 +102,10 @@ def rest_pose(figure: Figure) -> Pose:
 
 
 def pose_of(figure: Figure, turns: Floats, roots: Floats) -> Pose:
-    """The pose with joints turned so; every joint is closed.
+    """The pose with joints turned by (bodies, 4) in their parents' frames; every joint is closed.
 
-    Args:
-        figure: the puppet.
-        turns: (bodies, 4) orientation of each body in its parent's frame.
-        roots: (bodies, 3) world position of the roots' joints; other rows count for nothing.
+    ``roots`` (bodies, 3) has the world positions of the roots' joints; other rows count for
+    nothing.
     """
     positions = np.array(roots, dtype=np.float64)
     orientations = np.array(turns, dtype=np.float64)

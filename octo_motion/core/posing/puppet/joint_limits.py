@@ -27,8 +27,7 @@ _ONES = np.ones(3)
 def bends(turns: Floats) -> Floats:
     """How far joints are bent about X, twisted about Y, and bent about Z: (…, 3) radians.
 
-    Args:
-        turns: (…, 4) from rest, in the bone's own axes at rest.
+    Turns (…, 4) are from rest, in the bone's own axes at rest.
     """
     w, x, y, z = (turns[..., part] for part in range(4))
     cosine = np.sqrt(w * w + y * y)
@@ -46,10 +45,8 @@ def bends(turns: Floats) -> Floats:
 
 
 def slopes(turns: Floats) -> Floats:
-    """Rates of ``bends`` for angular velocities in the bone's axes at rest: (…, 3, 3).
-
-    Args:
-        turns: (…, 4) as for ``bends``; none by a half turn.
+    """Rates of ``bends``, of turns none by a half turn, for angular velocities in the bone's axes
+    at rest: (…, 3, 3).
     """
     w, x, y, z = (turns[..., part] for part in range(4))
     cosine = np.maximum(np.sqrt(w * w + y * y), _TINY)

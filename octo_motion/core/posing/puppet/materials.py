@@ -81,14 +81,11 @@ def elements_for(
     strength: float = 1.0,
     own: Mapping[int, Material] | None = None,
 ) -> Elements:
-    """The elements of a figure that is made of one material.
+    """The elements of a figure of a material, in ``MATERIALS`` or measured; single bodies may have
+    their own.
 
-    Args:
-        figure: the puppet; its own elements are of no account.
-        material: a name in ``MATERIALS``, or one that was measured.
-        strength: factor on all torques; with 1 every joint of a material that yields just bears
-            what hangs on it.
-        own: bodies whose joints are made of another material.
+    The strength is a factor on all torques: with 1 every joint of a material that yields just bears
+    what hangs on it.
 
     Raises:
         SettingsError: no such material, or a strength that is not positive.
@@ -123,12 +120,7 @@ def _values(material: Material, load: float) -> tuple[float, float, float, float
 
 
 def material_of(measured: MeasuredBend, load: float) -> Material:
-    """The material of which a joint with a load has been measured.
-
-    Args:
-        measured: its coefficients.
-        load: of the joint, N·m, strength included; see ``joint_loads``.
-    """
+    """The material of which a joint with a load, N·m, strength included, has been measured."""
     yields = bool(np.isfinite(measured.yield_torque))
     bearing = measured.yield_torque if yields else load
     return Material(
@@ -231,12 +223,9 @@ def measure_shown(
 ) -> Bend:
     """What was acted out with a limb: it is bent, let go, and led to where it is to stay.
 
-    Args:
-        times: (samples,) seconds in which the limb was held, ascending.
-        angles: (samples,) radians it was turned by.
-        released: the time when it was let go for the first time.
-        torque: N·m that the pull stands for.
-        bears: N·m that the joint is to bear.
+    At times (samples,), s, in which it was held, ascending, it was turned by angles (samples,),
+    radians; it was let go for the first time at ``released``. The pull stands for a torque, N·m, of
+    which the joint is to bear some.
 
     Raises:
         SettingsError: nothing was bent, or it had not come to rest yet.

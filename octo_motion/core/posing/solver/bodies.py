@@ -130,11 +130,10 @@ class Bodies:
         return now
 
     def take_velocities(self, velocities: Floats, skewed: Floats) -> None:
-        """Take over spatial velocities (bodies, 6).
+        """Take over spatial velocities (bodies, 6) about a common origin.
 
-        Args:
-            velocities: about a common origin.
-            skewed: (bodies, 3, 3) matrices of the cross product with the centres, from there.
+        ``skewed`` are the matrices (bodies, 3, 3) of the cross product with the centres, from
+        there.
         """
         self.angular = velocities[:, :3].copy()
         self.linear = velocities[:, 3:] - (skewed @ self.angular[:, :, None])[:, :, 0]

@@ -192,17 +192,10 @@ class Rows:
         grips: Floats | None = None,
         pattern: Pattern | None = None,
     ) -> None:
-        """Put them together.
+        """Put them together, as seen from the common origin (3,) of spatial velocities.
 
-        Args:
-            contacts: those near enough.
-            holds: pins and grabs; None where there are none.
-            origin: (3,) the common one of spatial velocities.
-            masses: (bodies,)
-            step: h.
-            friction: μ.
-            grips: (contacts, 3) friction of the step before; None where nothing touched.
-            pattern: of the step before, for it may be the same.
+        The pattern and the friction (contacts, 3) of contacts, ``grips``, are those of the step
+        before.
         """
         self.contacts = contacts
         self.holds = holds

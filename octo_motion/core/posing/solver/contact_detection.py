@@ -91,13 +91,8 @@ class Detector:
     def find(
         self, positions: Floats, matrices: Floats, obstacles: Sequence[Obstacle], margin: float
     ) -> Contacts:
-        """Contacts with a gap below ``margin``.
-
-        Args:
-            positions: (bodies, 3) of the joints, world.
-            matrices: (bodies, 3, 3) orientations.
-            obstacles: what can be touched.
-            margin: metres.
+        """Contacts with a gap below ``margin``, m, of bodies whose joints are at positions (bodies,
+        3), world, with orientations (bodies, 3, 3).
         """
         if not obstacles and self._pairs is None:
             return _NONE

@@ -50,9 +50,7 @@ class Coupling:
     def for_figure(cls, figure: Figure, strength: float = 1.0) -> Coupling:
         """One that moves the figure as a hand would: firm against its weight and size.
 
-        Args:
-            figure: the puppet.
-            strength: factor on stiffness and limits.
+        The strength is a factor on stiffness and limits.
         """
         mass = float(figure.masses.sum())
         arm = 0.25 * float(np.max(figure.lengths, initial=0.0) + _extent(figure))
@@ -103,12 +101,10 @@ class HandSpring(Hold):
     def pull(
         self, position: Floats, orientation: Floats | None = None, velocity: Floats | None = None
     ) -> None:
-        """Draw the bone towards where the hand is now.
+        """Draw the point that is held to a position (3,), world.
 
-        Args:
-            position: (3,) where the held point is drawn to, world.
-            orientation: (4,) of the hand; None leaves the bone free to turn.
-            velocity: (6,) linear and angular, of the hand; at rest by default.
+        Without the hand's orientation (4,) the bone is free to turn. Its velocity (6,) is linear
+        and angular, and at rest if not given.
         """
         self.target_position = np.array(position, dtype=np.float64)
         self.target_orientation = None if orientation is None else normalized(orientation)

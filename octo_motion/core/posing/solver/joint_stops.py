@@ -50,11 +50,9 @@ class JointStops:
     """The joints of a figure that have limits, and the rows that hold them."""
 
     def __init__(self, figure: Figure, gains: Floats) -> None:
-        """Find them.
+        """Find them; limits of roots count for nothing.
 
-        Args:
-            figure: the puppet; limits of roots count for nothing.
-            gains: (bodies,) a of a row at each joint, N·m·s per rad/s.
+        Gains (bodies,) are the a of a row at each joint, N·m·s per rad/s.
         """
         ranges = np.array(figure.limits, dtype=np.float64)
         least = np.where(ranges[..., 0] <= -_ENDLESS, -np.inf, ranges[..., 0])
@@ -72,13 +70,10 @@ class JointStops:
         self._count = len(figure)
 
     def near(self, turns: Floats, frames: Floats, speeds: Floats, step: float) -> tuple[Stops, ...]:
-        """Ends of ranges that a joint could reach within a step or is at, as rows.
+        """Ends of ranges that a joint could reach within a step, s, or is at, as rows.
 
-        Args:
-            turns: (bodies, 4) of the joints, in the parents' frames.
-            frames: (bodies, 3, 3) of the parents.
-            speeds: (bodies, 3) with which joints turn now, rad/s.
-            step: h.
+        Joints are turned (bodies, 4) in their parents' frames (bodies, 3, 3), and turn with
+        (bodies, 3), rad/s.
         """
         if not len(self.joints):
             return ()

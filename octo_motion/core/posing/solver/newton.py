@@ -117,12 +117,8 @@ class Newton:
     def solve(
         self, problem: Problem, start: InitialGuess, corrections: Floats | None = None
     ) -> Solution:
-        """Velocities at the end of the step.
-
-        Args:
-            problem: the step.
-            start: the end of the step before.
-            corrections: (rows, 3) velocities for positions alone, or None.
+        """Velocities at the end of the step; corrections (rows, 3) are velocities for positions
+        alone.
         """
         self._tree.place(problem.joints)
         self._base = problem.law.at_rest(problem.springs)

@@ -56,13 +56,9 @@ class Problem:
 def moments(masses: Floats, centres: Floats, inertias: Floats) -> Floats:
     """(bodies, 4, 4) Σ m [r; 1] [r; 1]ᵀ, the whole of a body's mass in one matrix.
 
-    A body that is put elsewhere by the homogeneous matrix T has T J Tᵀ: two products instead of
-    a dozen for inertia, first moment and mass by themselves.
-
-    Args:
-        masses: (bodies,)
-        centres: (bodies, 3) of mass.
-        inertias: (bodies, 3, 3) about them.
+    A body that is put elsewhere by the homogeneous matrix T has T J Tᵀ: two products instead of a
+    dozen for inertia, first moment and mass by themselves. Inertias (bodies, 3, 3) are about the
+    centres of mass (bodies, 3).
     """
     result = np.empty((len(masses), 4, 4))
     halves = 0.5 * np.trace(inertias, axis1=1, axis2=2)
@@ -123,14 +119,10 @@ class ProblemBuilder:
     def problem(
         self, bodies: Bodies, law: PlasticLaw, forces: Floats, rows: Rows, speeds: Floats
     ) -> Problem:
-        """The question of the coming step.
+        """The question of the coming step; the bodies' matrices get their places from the origin.
 
-        Args:
-            bodies: as they are now; their matrices get their places from the origin.
-            law: of the elements.
-            forces: (bodies, 6) N and N·m from outside.
-            rows: contacts and holds, from the same origin: the first root's joint.
-            speeds: (slots, 3) with which joints turn now.
+        Forces (bodies, 6) from outside are N and N·m. Contacts and holds are seen from the same
+        origin, the first root's joint. Joints turn with speeds (slots, 3) now.
         """
         h = self._step
         joints = bodies.positions - bodies.roots[0]

@@ -138,10 +138,8 @@ class Tree:
     def assemble(self, carried: Floats, joints: Floats) -> None:
         """Fill the matrix of (1).
 
-        Args:
-            carried: (slots, 3, 6) ``motion`` times the inertia of all that moves with each slot,
-                rows included.
-            joints: (slots, 3, 3) K, which stands on each slot's own block.
+        ``carried`` (slots, 3, 6) is ``motion`` times the inertia of all that moves with each slot,
+        rows included; ``joints`` (slots, 3, 3) is K, which stands on each slot's own block.
         """
         trunk, branches, width = self.layout.trunk, self.layout.branches, self.layout.width
         motion = self.motion

@@ -162,12 +162,8 @@ class ContactMemory:
         return order.take(place), (ordered.take(place) == contacts.labels)[:, None]
 
     def keep(self, rows: Rows, answer: RowImpulses | None, most: float) -> None:
-        """Remember a step.
-
-        Args:
-            rows: of the step.
-            answer: what they did.
-            most: friction of a contact that is held on to, N·s: less than that of a blow.
+        """Remember what the rows of a step did, and of a contact's friction so much at most, N·s:
+        less than that of a blow.
         """
         if answer is None:
             if len(self.wanted):

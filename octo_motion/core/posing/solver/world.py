@@ -177,12 +177,10 @@ class World:
         self._use_elements()
 
     def pin(self, body: int, *, firm: bool | None = None) -> None:
-        """Hold a body's joint where it is now.
+        """Hold a body's joint where it is now, and its orientation too if ``firm``.
 
-        Args:
-            body: its index.
-            firm: whether its orientation is held as well. By default that of a root is not: a
-                pinned root turns about its joint on its own plastic element.
+        By default that of a root is not: a pinned root turns about its joint on its own plastic
+        element.
         """
         if not 0 <= body < len(self.figure):
             raise IndexError(body)
@@ -228,14 +226,11 @@ class World:
         orientation: Floats | None = None,
         coupling: Coupling | None = None,
     ) -> HandSpring:
-        """Take hold of a body.
+        """Take hold of a body at a point (3,), world, that need not lie on the surface.
 
-        Args:
-            body: its index.
-            point: (3,) where, world; it need not lie on the surface.
-            orientation: (4,) of the hand, world, where it keeps the body from turning from the
-                start; else it does so once it has turned, and its turns count from here.
-            coupling: how firmly; one for this figure by default.
+        Where the hand's orientation (4,), world, is given, it keeps the body from turning from the
+        start; else it does so once it has turned, and its turns count from here. It holds by a
+        coupling for this figure, if none is given.
         """
         own = self._bodies.orientations[body]
         hand = IDENTITY if orientation is None else normalized(orientation)

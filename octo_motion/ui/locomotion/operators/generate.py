@@ -173,8 +173,7 @@ def pending() -> bool:
 def run_pending() -> float | None:
     """What the timer does: make the motions anew whose sources have changed.
 
-    Returns:
-        Seconds until it has to be called again, none if all is done.
+    Returns seconds until it has to be called again, none if all is done.
     """
     if _state.busy or _others_at_work():
         return _LATER
@@ -255,11 +254,8 @@ def _rate(scene: bpy.types.Scene) -> float:
 def _touched(
     depsgraph: bpy.types.Depsgraph, among: set[bpy.types.ID] | None = None
 ) -> set[bpy.types.ID]:
-    """What has changed so that something may move; a selection, for one, moves nothing.
-
-    Args:
-        depsgraph: what tells it.
-        among: what is asked for, all if none.
+    """What has changed, of all or some, so that something may move; a selection, for one, moves
+    nothing.
     """
     found: set[bpy.types.ID] = set()
     for update in depsgraph.updates:

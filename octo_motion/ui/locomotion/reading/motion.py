@@ -137,12 +137,9 @@ def read_timing(settings: OCTO_MOTION_PG_locomotion, render: bpy.types.RenderSet
 def read_changes(
     settings: OCTO_MOTION_PG_change, first: str, *, in_place: bool
 ) -> tuple[ChangesByHeight | tuple[ChangeAt, ...], list[str]]:
-    """Where the gait changes, and the names of the gaits that it changes to.
+    """Where the gait changes from the first, and the names of the gaits that it changes to.
 
-    Args:
-        settings: what decides.
-        first: name of the gait that the motion begins with.
-        in_place: whether nothing travels, and the gait stays what it is.
+    In place nothing travels, and the gait stays what it is.
 
     Raises:
         SettingsError: there is no place to change at.
@@ -194,15 +191,8 @@ def read_ground(
     *,
     walks: bool,
 ) -> GroundJob | None:
-    """The ground under a walk, none where nothing holds it.
-
-    Args:
-        settings: of the armature.
-        armature: the armature object.
-        depsgraph: the evaluated scene.
-        creature: its rig.
-        edits: the artist's, of single contacts.
-        walks: whether any of its gaits goes over the ground.
+    """The ground under a walk with the artist's edits of single contacts, none where nothing holds
+    it.
 
     Raises:
         GroundError: the ground is no mesh, or has no faces.
@@ -236,13 +226,7 @@ _AXES: Final = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)
 def read_reaches(
     armature: bpy.types.Object, settings: Any, rig: RigRead, frames: Floats
 ) -> Reaching | None:
-    """What the list of reaches asks for; none if it is empty or muted.
-
-    Args:
-        armature: the armature object.
-        settings: its settings.
-        rig: as it was read.
-        frames: (frames,) of the motion.
+    """What the list of reaches asks for at frames (frames,); none if it is empty or muted.
 
     Raises:
         OctoMotionError: an object is missing, has no surface, or moves with the armature; frames

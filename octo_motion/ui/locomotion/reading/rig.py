@@ -170,12 +170,7 @@ class RigRead:
 def read_creature(
     armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion, world: Floats
 ) -> RigRead:
-    """The rig, its arms, and where it stands.
-
-    Args:
-        armature: the armature object.
-        settings: its settings.
-        world: (4, 4) its world matrix.
+    """The rig, its arms, and where it stands by its world matrix (4, 4).
 
     Raises:
         RigError: it has no arms, bones are gone, or it is scaled unequally.
@@ -435,11 +430,7 @@ def warnings_for_poses(
 ) -> list[str]:
     """What there is to say of poses that stay and move the arms.
 
-    Args:
-        settings: of the armature.
-        armature: the armature object.
-        arms: its arms.
-        carriers: bones that move the arms and could not be reckoned with.
+    Carriers are bones that move the arms and could not be reckoned with.
     """
     turned = [bone for arm in arms for bone in arm.bones]
     if (previous := previous_action(armature, settings)) is not None:
@@ -470,12 +461,8 @@ def read_volume(
 ) -> BodyVolume | None:
     """The arms and the parts of the body as thick as their skin, where that is asked for.
 
-    Args:
-        settings: of the armature.
-        armature: the armature object.
-        creature: its rig.
-        live: whether it is to be quick: which bones a skin follows is then looked at anew only
-            where the skin has changed its form, and nothing is told of overlaps.
+    Live, it is to be quick: which bones a skin follows is then looked at anew only where the skin
+    has changed its form, and nothing is told of overlaps.
     """
     if not settings.keep_apart and (live or not settings.tell_overlaps):
         return None

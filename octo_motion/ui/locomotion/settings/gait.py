@@ -302,11 +302,7 @@ def fill_curve(curve: OCTO_MOTION_PG_gait_curve, values: GaitCurve) -> None:
 
 
 def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None) -> GaitTable:
-    """The table that the properties stand for.
-
-    Args:
-        group: the properties.
-        preset: stands in for curves where the properties have none.
+    """The table that the properties stand for; a preset stands in for curves where they have none.
 
     Raises:
         GaitError: two curves are for one pair, two knots at one phase, a number is not finite.

@@ -205,8 +205,7 @@ class Shot:
     def write(self, *, unedited: bool = False) -> Summary:
         """Give the armature its action, in place of the one that was generated before.
 
-        Args:
-            unedited: whether it is known already that the one before may be made anew.
+        Unedited, it is known already that the one before may be made anew.
 
         Raises:
             WriteError: the object is gone, or has become read-only.
@@ -350,13 +349,7 @@ class Shot:
 def show_contacts(
     armature: bpy.types.Object, plan: MotionPlan, edits: dict[Place, ContactEdit]
 ) -> int:
-    """Put markers where a motion's contacts are; how many.
-
-    Args:
-        armature: whose they are.
-        plan: of a motion that has contacts.
-        edits: the artist's.
-    """
+    """Put markers where a motion's contacts are, with the artist's edits; how many."""
     settings = locomotion_settings(armature).ground
     store(settings, edits)
     contacts = []
@@ -390,11 +383,8 @@ def generate_locomotion(armature: bpy.types.Object, context: bpy.types.Context) 
 def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Shot:
     """Read all that the motion of an armature needs. Nothing is changed, nothing worked out.
 
-    Args:
-        armature: the armature object, with its settings.
-        context: for the scene, its frame rate and its evaluated state.
-        live: whether it is to be quick: the same motion with a key on every frame, and without
-            figures of how good it is.
+    Live, it is to be quick: the same motion with a key on every frame, and without figures of how
+    good it is.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
