@@ -266,7 +266,6 @@ class _Run:
     report_problem: str = ""
 
     def all(self, plans: Sequence[_Plan], jobs: int) -> int:
-        """Bake what is to be baked."""
         for plan in plans:
             if plan.verdict.reason:
                 self._fail(plan, plan.verdict.reason)

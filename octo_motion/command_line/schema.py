@@ -55,11 +55,9 @@ class Reading:
     """Whether Blender has a file open that is meant where no other is named."""
 
     def fault(self, sentence: str) -> None:
-        """Tell that something is wrong."""
         self.faults.append(f"{self.place}{sentence}")
 
     def within(self, place: str) -> Reading:
-        """The same, for a table within."""
         return replace(self, place=f"{self.place}{place}: ") if place else self
 
 

@@ -205,7 +205,6 @@ def _script(given: Any, reading: Reading) -> Path:
 
 
 def _export(given: Any, reading: Reading) -> Path:
-    """A file to export to."""
     name = Path(Text()(given, reading)).name
     if name.lower().endswith(".gltf"):
         raise SettingsError(f"'{name}' would be several files: export to .glb, the same in one.")
@@ -222,7 +221,6 @@ def _exports(given: Any, reading: Reading) -> tuple[Path, ...] | None:
 
 
 def _points(given: Any, reading: Reading) -> Points:
-    """A list of points."""
     try:
         points = [point(each, reading) for each in given]
     except (TypeError, Unfit):

@@ -302,7 +302,6 @@ class Bridge:
             self._hands = None
 
     def close(self) -> None:
-        """End the process at the devices."""
         if self._hands is not None:
             self._hands.stop(0.5)
             self._hands = None

@@ -45,7 +45,6 @@ class Response:
     """0.2 to 5; 1 is proportional, above 1 is finer in the middle."""
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
         for each in fields(self):
             value = getattr(self, each.name)
             if not all(map(isfinite, value if isinstance(value, tuple) else (value,))):
@@ -120,7 +119,6 @@ class Calibration:
     most: Axes = _ONES
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense."""
         numbers = [each for field in fields(self) for each in getattr(self, field.name)]
         ends = zip(self.least, self.rest, self.most, strict=True)
         if not all(map(isfinite, numbers)) or not all(a <= b <= c for a, b, c in ends):

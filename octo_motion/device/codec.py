@@ -48,11 +48,9 @@ class Number:
         return values if self.count > 1 else values[0]
 
     def put(self, value: Any, out: bytearray) -> None:
-        """Append the value's bytes."""
         out += struct.pack("<" + self.layout, *(value if self.count > 1 else (value,)))
 
     def take(self, data: BytesIO) -> Any:
-        """Read the value."""
         layout = "<" + self.layout
         return self.check(struct.unpack(layout, _take(data, struct.calcsize(layout))))
 
@@ -81,7 +79,6 @@ class Text:
         out += struct.pack("<H", len(text)) + text
 
     def take(self, data: BytesIO) -> str:
-        """Read the text."""
         (length,) = struct.unpack("<H", _take(data, 2))
         if length > self.most:
             raise MessageError("a text is too long")
@@ -99,13 +96,11 @@ class Many:
     most: int
 
     def put(self, value: Any, out: bytearray) -> None:
-        """Append the values."""
         out += struct.pack("<H", len(value))
         for each in value:
             self.of.put(each, out)
 
     def take(self, data: BytesIO) -> tuple[Any, ...]:
-        """Read the values."""
         (count,) = struct.unpack("<H", _take(data, 2))
         if count > self.most:
             raise MessageError("too many of something")
@@ -123,7 +118,6 @@ class Table:
     """Whether a number may be infinite: a joint that never gives way."""
 
     def put(self, value: Any, out: bytearray) -> None:
-        """Append the array."""
         array = np.ascontiguousarray(value, dtype="<f8")
         if array.shape[1:] != self.row:
             raise MessageError(f"an array of shape {array.shape}")
@@ -164,7 +158,6 @@ class Record:
             self._struct = struct.Struct("<" + "".join(each.layout for each in self._numbers))
 
     def pack(self, message: object) -> bytes:
-        """Bytes of a message's fields."""
         values = [getattr(message, name) for name in self.codecs]
         if self._struct is not None:
             flat: list[Any] = []
@@ -180,7 +173,6 @@ class Record:
         return bytes(out)
 
     def unpack(self, data: bytes) -> tuple[Any, ...]:
-        """Values of a message's fields."""
         if self._struct is not None:
             if len(data) != self._struct.size:
                 raise MessageError("of another length")

@@ -53,7 +53,6 @@ class HandLoop:
 
     @property
     def pointers(self) -> Iterable[Pointer]:
-        """Of the devices that are there."""
         return self._pointers.values()
 
     def tick(self, now: float) -> None:
@@ -220,7 +219,6 @@ class HandLoop:
         )
 
     def close(self) -> None:
-        """Take all force away."""
         for pointer in self.pointers:
             pointer.close()
         self._pointers.clear()

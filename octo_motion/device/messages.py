@@ -95,7 +95,6 @@ class FigureMessage(Message):
 
     @classmethod
     def of(cls, figure: Figure) -> FigureMessage:
-        """The message that carries a figure."""
         return cls(
             *(figure.names, tuple(map(int, figure.parents)), figure.anchors, figure.rest),
             *(figure.lengths, figure.masses, figure.centres, figure.inertias),
@@ -105,7 +104,6 @@ class FigureMessage(Message):
         )
 
     def figure(self) -> Figure:
-        """The figure that came."""
         count = len(self.names)
         if len(self.parents) != count or any(
             len(value) != count
@@ -339,7 +337,6 @@ class WorldMessage(Message):
     drag: Annotated[float, F64] = 0.0
 
     def settings(self) -> WorldSettings:
-        """The settings that came."""
         if not 1e-4 <= self.step <= 0.02 or self.friction < 0.0 or self.drag < 0.0:
             raise MessageError("settings of the world that cannot be")
         return WorldSettings(**vars(self))
@@ -388,7 +385,6 @@ class ObstacleMessage(Message):
 
     @classmethod
     def of(cls, number: int, obstacle: Obstacle | None) -> ObstacleMessage:
-        """The message that carries an obstacle; None takes it away."""
         if obstacle is None:
             return cls(number)
         kinds = (each for each, shape in _SHAPES.items() if type(obstacle) is shape.kind)
@@ -456,11 +452,9 @@ class CalibrationMessage(Message):
 
     @classmethod
     def of(cls, pointer: int, calibration: Calibration, phase: Phase = Phase.DONE) -> Self:
-        """The message that carries a calibration."""
         return cls(pointer, phase, calibration.rest, calibration.least, calibration.most)
 
     def calibration(self) -> Calibration:
-        """The calibration that came."""
         try:
             return Calibration(self.rest, self.least, self.most)
         except DeviceError as error:

@@ -69,7 +69,6 @@ class SimulatedPointer:
     """s that this process has run without a message from the hand."""
 
     def sample(self) -> HandSample:
-        """Where the hand is."""
         message = self.message
         velocity = np.array((*message.velocity, *message.angular_velocity))
         return HandSample(np.array(message.position), np.array(message.orientation), velocity)
@@ -104,7 +103,6 @@ class Simulation:
 
     @property
     def world(self) -> World:
-        """What is stepped."""
         return self.session.world
 
     @property

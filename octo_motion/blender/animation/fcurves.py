@@ -114,7 +114,6 @@ class KeyArrays:
         return cls(values | {name: np.zeros(count, dtype=kind) for name, kind in kinds.items()})
 
     def __len__(self) -> int:
-        """Number of keys."""
         return len(self.values["co"])
 
     @property
@@ -123,7 +122,6 @@ class KeyArrays:
         return self.values["co"][:, 0]
 
     def chosen(self, rows: np.ndarray) -> KeyArrays:
-        """Some of the keys."""
         return KeyArrays({name: values[rows] for name, values in self.values.items()})
 
 

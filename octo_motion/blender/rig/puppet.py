@@ -38,7 +38,6 @@ class Puppet:
 
     @property
     def figure(self) -> Figure:
-        """What the puppet is made of."""
         return self.rig.figure
 
     def armature(self) -> bpy.types.Object:

@@ -189,12 +189,10 @@ class Session:
 
     @property
     def figure(self) -> Figure:
-        """The puppet."""
         return self.world.figure
 
     @property
     def pose(self) -> Pose:
-        """Where the bodies are."""
         return self.world.pose()
 
     @property
@@ -358,7 +356,6 @@ class Session:
         self.wake()
 
     def restore(self) -> None:
-        """Back to the pose at the start."""
         self.release()
         self.remember()
         self.show(self._start)

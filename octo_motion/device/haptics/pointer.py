@@ -70,7 +70,6 @@ class Pointer:
     """Buttons pressed and let go, to be sent."""
 
     def __post_init__(self) -> None:
-        """Choose the coupling for the device."""
         who = self.driver.description
         self.has_force = who.dynamics is not None
         """Whether the device has motors."""
@@ -115,7 +114,6 @@ class Pointer:
     # --- What is asked of it ---------------------------------------------------------------------
 
     def use(self, settings: Settings) -> None:
-        """Take over settings."""
         self._response = settings.response()
         self.settings = settings
 
@@ -313,6 +311,5 @@ class Pointer:
         )
 
     def close(self) -> None:
-        """Take force away and let the device go."""
         self._shaper.drop()
         self.driver.close()

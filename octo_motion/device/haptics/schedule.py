@@ -49,7 +49,6 @@ class Histogram:
         self.longest = 0.0
 
     def add(self, seconds: float) -> None:
-        """Count one."""
         self._counts[bisect(_EDGES, seconds)] += 1
         self.count += 1
         self.longest = max(self.longest, seconds)

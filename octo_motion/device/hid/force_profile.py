@@ -302,7 +302,6 @@ class ForceDevice(HidDriver):
         self.write(pack_command(self._sequence, force, torque))
 
     def close(self) -> None:
-        """Take force away and let the device go."""
         with suppress(DeviceLostError, ReportError):
             self.send(ZERO, ZERO)
         super().close()

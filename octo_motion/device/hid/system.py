@@ -263,7 +263,6 @@ class HidDriver(Driver):
         return reports
 
     def write(self, report: bytes) -> None:
-        """Send a report."""
         try:
             written = self._there().write(report)
         except (OSError, ValueError) as error:
@@ -275,7 +274,6 @@ class HidDriver(Driver):
         """Nothing, where a device has no motors."""
 
     def close(self) -> None:
-        """Let the device go."""
         if self._handle is not None:
             self._handle.close()
             self._handle = None

@@ -179,7 +179,6 @@ class Client:
         return buttons
 
     def calibrate(self, pointer: int, order: messages.Order) -> None:
-        """Begin to learn a device's zero and range, finish, or give it up."""
         self.send(messages.Calibrate(pointer, order))
 
     def _take_calibration(self, message: CalibrationMessage) -> None:

@@ -95,7 +95,6 @@ class Discovery:
         self._search.gone.append(identity)
 
     def close(self) -> None:
-        """Look no more."""
         if self._port is not None:
             self._port.close()
         self._search.close()

@@ -114,7 +114,6 @@ class Haply(Driver):
             return None
 
     def read(self) -> Sample | None:
-        """The newest state."""
         texts = self._there().receive()
         now = time.perf_counter()
         if not texts:

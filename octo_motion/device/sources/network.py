@@ -164,7 +164,6 @@ class NetworkDevice(Driver):
         return sample
 
     def send(self, force: Vector, torque: Vector) -> None:
-        """Answer with a force."""
         self._sequence += 1
         self._port.answer(self._sequence, force, torque)
 
@@ -239,7 +238,6 @@ class Port:
         self._features = self._sample = self._known = None
 
     def close(self) -> None:
-        """Close the port."""
         self.forget()
         self._socket.close()
 

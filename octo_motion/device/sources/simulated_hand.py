@@ -82,7 +82,6 @@ class Hand:
     _torque: Vector = ZERO
 
     def __post_init__(self) -> None:
-        """Draw the tremor."""
         dice = random.Random(1)  # noqa: S311 - a tremor, not a secret
         self._waves = [
             [(dice.uniform(50.0, 75.0), dice.uniform(0.0, 6.3)) for _ in range(3)]
@@ -90,11 +89,9 @@ class Hand:
         ]
 
     def feel(self, force: Vector, torque: Vector) -> None:
-        """Hold a force from now on."""
         self._force, self._torque = force, torque
 
     def move(self, period: float) -> None:
-        """Let time pass."""
         count = max(1, round(period * 1000.0 * _STEPS))
         for _ in range(count):
             self._step(period / count)
@@ -148,7 +145,6 @@ class SimulatedHand(Driver):
         )
 
     def read(self) -> Sample | None:
-        """Where the hand has got to."""
         now = self._clock()
         # After a pause (a stopped process) the hand does not race through all that time.
         self.hand.move(min(now - self._last, 0.01))
@@ -160,7 +156,6 @@ class SimulatedHand(Driver):
         )
 
     def send(self, force: Vector, torque: Vector) -> None:
-        """Let the hand feel a force."""
         self.hand.feel(force, torque)
 
     def close(self) -> None:

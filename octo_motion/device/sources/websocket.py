@@ -114,7 +114,6 @@ class WebSocket:
 
     @classmethod
     def connect(cls, host: str, port: int, seconds: float = 0.3) -> WebSocket:
-        """Open a connection."""
         key = base64.b64encode(os.urandom(16))
         request = (
             f"GET / HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\n"
@@ -133,12 +132,10 @@ class WebSocket:
             raise WebSocketError(str(error)) from error
 
     def send(self, text: str) -> None:
-        """Send a text."""
         self._stream.unsent += frame(_TEXT, text.encode(), os.urandom(4))
         self._flush()
 
     def receive(self) -> list[str]:
-        """All texts that have come."""
         self._flush()
         if not self._stream.receive():
             raise WebSocketError("the connection ended")

@@ -104,11 +104,9 @@ class PoseControls:
 
     @property
     def help(self) -> tuple[tuple[str, str], ...]:
-        """Keys and what they do now."""
         return HELP if self.session.measuring is None else MEASURING
 
     def tick(self, seconds: float) -> None:
-        """Time has passed."""
         if self.session.measuring is not None:
             self.session.tick(seconds, self.hand)
             return

@@ -229,7 +229,6 @@ class DeviceHands(HandsBase):
         return next(held, None)
 
     def shown(self) -> list[ShownPointer]:
-        """The pointers."""
         return [self._shown(each) for each in self.client.pointers.values()]
 
     def _shown(self, pointer: PointerMessage) -> ShownPointer:
@@ -279,7 +278,6 @@ class DeviceHands(HandsBase):
         self._spaces.clear()
 
     def begin_calibration(self, number: int) -> None:
-        """Begin to learn a device's zero and range."""
         self.client.calibrate(number, Order.BEGIN)
         self.message = f"Calibrating: {self.client.devices[number].name}"
 
@@ -417,7 +415,6 @@ class DeviceHands(HandsBase):
                 self.client.send(space)
 
     def stop(self) -> None:
-        """End the bridge."""
         self.client.stop()
 
 
@@ -466,7 +463,6 @@ class NdofHands(HandsBase):
         return None if held is None else held.body
 
     def shown(self) -> list[ShownPointer]:
-        """The pointer."""
         if self.position is None:
             return []
         held, point = self.hover, self.session.held_point()
@@ -536,5 +532,4 @@ class NdofHands(HandsBase):
         return []
 
     def stop(self) -> None:
-        """Let go."""
         self.session.core.release()

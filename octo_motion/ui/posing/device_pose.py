@@ -144,7 +144,6 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         return self._handle(hands, event)
 
     def put_down(self) -> None:
-        """Leave no process behind."""
         hands, self._hands = self._hands, None
         if hands is not None:
             _going_on.remove(hands)
@@ -205,7 +204,6 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         return Outcome.TAKEN
 
     def replace(self, old: Hands, new: NdofHands) -> NdofHands:
-        """Let other hands take over the session."""
         assert self._overlay is not None
         self._hands = new
         _going_on[:] = [new if each is old else each for each in _going_on]

@@ -53,7 +53,6 @@ class SessionOperator(ArmatureOperator):
         return super().obstacle(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
-        """Take the armature into the hand."""
         window_manager, scene, window = context.window_manager, context.scene, context.window
         if window is None or bpy.app.background:
             return self.execute(context)
@@ -73,7 +72,6 @@ class SessionOperator(ArmatureOperator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
-        """One event."""
         if self._session is None or self._session.ended:
             # Another file was opened.
             self._end(context, keep=True)

@@ -82,7 +82,6 @@ class PosedPuppet:
 
     @property
     def figure(self) -> Figure:
-        """The puppet."""
         return self.core.figure
 
     @property
@@ -96,7 +95,6 @@ class PosedPuppet:
         return self.core.held
 
     def bone(self, body: int) -> str:
-        """The bone of a body."""
         return self.figure.names[body]
 
     def body(self, bone: str) -> int:
@@ -180,7 +178,6 @@ class PosedPuppet:
     # --- Settings -------------------------------------------------------------------------------
 
     def apply_settings(self, armature: bpy.types.Object) -> None:
-        """Take what was changed in the panel."""
         settings = SessionSettings.of(armature)
         if settings == self.settings:
             return

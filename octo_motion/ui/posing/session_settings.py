@@ -42,7 +42,6 @@ class SessionSettings(SimpleNamespace):
 
     @classmethod
     def of(cls, armature: bpy.types.Object) -> SessionSettings:
-        """As they are now."""
         settings = posing_settings(armature)
         return cls(**{name: getattr(settings, name) for name in _FOLLOWED})
 
@@ -109,7 +108,6 @@ class BoneMaterials:
         self.read()
 
     def read(self) -> None:
-        """Take what the bones have now."""
         own = bone_materials(self._puppet.armature())
         names = self._puppet.figure.names
         self.by_body = {body: own[name] for body, name in enumerate(names) if name in own}
@@ -127,7 +125,6 @@ class BoneMaterials:
         self.read()
 
     def take_back(self, armature: bpy.types.Object) -> None:
-        """As they were at the start."""
         for put_back in reversed(self._before):
             put_back(armature)
 

@@ -51,7 +51,6 @@ class Figure:
     elements: Elements
 
     def __len__(self) -> int:
-        """Number of bodies."""
         return len(self.names)
 
 

@@ -101,7 +101,6 @@ class Bodies:
         return {name: getattr(self, name).copy() for name in _CHANGING}
 
     def restore(self, state: Mapping[str, Floats]) -> None:
-        """Go back to what was."""
         for name in _CHANGING:
             setattr(self, name, state[name].copy())
         self.refresh()

@@ -62,7 +62,6 @@ class Holds:
     """(holds, 3) how far they are from where they are pinned, made good without velocity."""
 
     def __len__(self) -> int:
-        """Number of rows."""
         return len(self.bodies)
 
 
@@ -232,7 +231,6 @@ class Rows:
         self._ask()
 
     def __len__(self) -> int:
-        """Number of rows."""
         return len(self.bodies)
 
     def _ask(self) -> None:
@@ -287,7 +285,6 @@ class Rows:
 
     @property
     def followed(self) -> bool:
-        """Whether any slip was taken over."""
         return self._followed is not None
 
     def respond(self, wanted: Floats) -> RowImpulses:

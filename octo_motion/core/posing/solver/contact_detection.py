@@ -42,7 +42,6 @@ class Contacts:
     """(contacts,) the same number for the same place on the same thing in every step."""
 
     def __len__(self) -> int:
-        """Number of contacts."""
         return len(self.bodies)
 
 

@@ -92,7 +92,6 @@ class WarmStart:
         return WarmStartSnapshot(self.speeds, trial, self._pressed, self.contacts.state())
 
     def restore(self, state: WarmStartSnapshot, law: PlasticLaw) -> None:
-        """Go back to what was."""
         self.speeds, self._pressed = state.speeds, state.pressed
         self._response = None if state.trial is None else law.answer(state.trial)
         self.contacts.set(*state.contacts)
@@ -105,7 +104,6 @@ class ContactMemory:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew."""
         self.set(np.zeros(0, np.int64), _NO_ROWS, _NO_ROWS, _NO_ONES)
 
     def set(self, labels: Integers, grips: Floats, wanted: Floats, slips: Floats) -> None:

@@ -159,7 +159,6 @@ class OCTO_MOTION_PT_ground(ArmaturePanel, bpy.types.Panel):
             cast("Any", self).layout.prop(locomotion_settings(armature).ground, "use", text="")
 
     def show(self, layout: Any, settings: Any) -> None:
-        """How arms hold the ground, and where."""
         ground = settings.ground
         layout.active = ground.use and settings.table.manner != "SWIM"
         for names in (("duty", "planted"), ("stretch", "lift"), ("lean", "smoothing")):

@@ -60,7 +60,6 @@ class _GaitOperator(ArmatureOperator):
         self.edit(_writable(context))
 
     def edit(self, settings: OCTO_MOTION_PG_locomotion) -> None:
-        """Do the work."""
         raise NotImplementedError
 
 
@@ -135,7 +134,6 @@ class OCTO_MOTION_OT_gait_save(_GaitOperator, bpy.types.Operator):
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
-        """Ask for the name."""
         current = locomotion_settings(active_armature(context)).gait
         own = current in user_gait_names()
         self.name = current if own else f"my {current}"
@@ -165,7 +163,6 @@ class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:
-        """Ask first."""
         return window_manager(context).invoke_confirm(self, event)
 
     def run(self, context: bpy.types.Context) -> None:
@@ -210,7 +207,6 @@ class OCTO_MOTION_OT_gait_export(_GaitFile, ArmatureOperator, bpy.types.Operator
         return super().invoke(context, event)
 
     def check(self, context: bpy.types.Context) -> bool:  # noqa: ARG002
-        """Keep the file's ending."""
         proper = bpy.path.ensure_ext(self.filepath, SUFFIX)
         if proper == self.filepath:
             return False

@@ -153,7 +153,6 @@ class OCTO_MOTION_PT_reaches(ArmaturePanel, bpy.types.Panel):
     settings_of = staticmethod(locomotion_settings)
 
     def show(self, layout: Any, settings: Any) -> None:
-        """The list, and what belongs to its active reach."""
         buttons = OCTO_MOTION_OT_reach_add, OCTO_MOTION_OT_reach_remove
         draw_list(
             layout, OCTO_MOTION_UL_reaches, settings, ("reaches", "active_reach"), buttons, rows=2
@@ -262,7 +261,6 @@ class OCTO_MOTION_PT_change(ArmaturePanel, bpy.types.Panel):
     settings_of = staticmethod(_change_settings)
 
     def show(self, layout: Any, settings: Any) -> None:
-        """What decides, and the list."""
         layout.prop(settings, "by")
         if settings.by == "HEIGHT":
             column = layout.column(align=True)

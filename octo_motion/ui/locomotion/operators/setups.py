@@ -173,7 +173,6 @@ class OCTO_MOTION_MT_setups(bpy.types.Menu):
     bl_description = "Ready ways to move, and those that you have kept"
 
     def draw(self, context: bpy.types.Context | None) -> None:  # noqa: ARG002
-        """All set-ups, by name."""
         layout = cast("Any", self).layout
         for name, icon in _icons():
             _button(layout, name, text=shown_name(name), icon_value=icon)
@@ -194,7 +193,6 @@ class OCTO_MOTION_OT_setup_add(  # pyright: ignore[reportIncompatibleMethodOverr
 
     @property
     def preset_values(self) -> list[str]:
-        """What is written to the file."""
         # The text first: the name of the gait, when it is set, is then that of the table.
         return [
             *("settings.table.as_text", "settings.gait"),
