@@ -9,7 +9,6 @@ Both are learned: what the axes say at rest, and the least and the most that the
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from math import copysign, isfinite
@@ -20,7 +19,7 @@ import numpy as np
 from ..core.errors import DeviceError
 from ..core.rotations import Floats
 from ..core.rotations.scalars import subtract
-from .driver import Axes, Kind, Sample
+from .driver import Axes, Kind, Sample, six
 
 _ONES: Final[Axes] = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 
@@ -64,7 +63,7 @@ class Response:
     def speeds(self, push: Axes) -> Axes:
         """m/s along and rad/s about the axes, for a push of −1…1 on each."""
         full = (self.speed,) * 3 + (self.angular_speed,) * 3
-        return _axes(map(_response, push, full, self.gain, self.dead_zone, self.curve))
+        return six(map(_response, push, full, self.gain, self.dead_zone, self.curve))
 
 
 def _response(push: float, full: float, gain: float, zone: float, curve: float) -> float:
@@ -126,7 +125,7 @@ class Calibration:
 
     def push(self, raw: Axes) -> Axes:
         """−1…1 along each axis of a rate device, 0 at its own rest and 1 at its own end."""
-        return _axes(map(_share, raw, self.rest, self.least, self.most))
+        return six(map(_share, raw, self.rest, self.least, self.most))
 
     @property
     def width(self) -> float:
@@ -240,9 +239,4 @@ def _ways(learned: Calibration) -> tuple[Floats, Floats, Floats]:
 
 
 def _calibration(rest: Floats, least: Floats, most: Floats) -> Calibration:
-    return Calibration(_axes(rest.tolist()), _axes(least.tolist()), _axes(most.tolist()))
-
-
-def _axes(values: Iterable[float]) -> Axes:
-    a, b, c, d, e, f = values
-    return (a, b, c, d, e, f)
+    return Calibration(six(rest), six(least), six(most))

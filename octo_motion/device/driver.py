@@ -9,6 +9,7 @@ response curve (``response``).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final, NamedTuple
@@ -17,6 +18,13 @@ from ..core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector
 
 Axes = tuple[float, float, float, float, float, float]
 """Along X, Y, Z, then about X, Y, Z; Blender's axes."""
+
+
+def six(values: Iterable[float]) -> Axes:
+    """So many numbers, as a type checker wants them."""
+    a, b, c, d, e, f = map(float, values)
+    return (a, b, c, d, e, f)
+
 
 FRESH_SECONDS: Final = 0.02
 """Without fresh data for so long, in either direction, there is no force."""

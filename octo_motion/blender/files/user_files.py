@@ -23,7 +23,7 @@ from ...core.locomotion.gait import (
     renamed_gait,
 )
 from ...device.calibration import Calibration
-from ...device.driver import Axes
+from ...device.driver import six
 
 
 def own_folder(name: str = "", *, create: bool = False) -> Path:
@@ -229,15 +229,10 @@ def load_calibrations() -> dict[str, Calibration]:
     found: dict[str, Calibration] = {}
     for identity, entry in entries.items() if isinstance(entries, dict) else ():
         try:
-            found[identity] = Calibration(*(_six(entry[name]) for name in _AXES))
+            found[identity] = Calibration(*(six(entry[name]) for name in _AXES))
         except (ValueError, KeyError, TypeError, DeviceError) as error:
             log.warning("The calibration of %s cannot be read: %s", identity, error)
     return found
-
-
-def _six(values: Any) -> Axes:
-    a, b, c, d, e, f = map(float, values)
-    return (a, b, c, d, e, f)
 
 
 def save_calibrations(calibrations: dict[str, Calibration]) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..rotations import Floats
-from .puppet import Figure, Pose, capsules_in_world
+from .puppet import Figure, Pose, capsules_in_world, distances_to_axes
 
 _TINY = 1e-12
 
@@ -71,10 +71,6 @@ def _nearest(ends: Floats, origin: Floats, way: Floats) -> tuple[Floats, Floats,
 
 def nearest_body(figure: Figure, pose: Pose, point: Floats) -> tuple[int, float]:
     """The body nearest to a point (3,), and how far its surface is; less than 0 within."""
-    ends = capsules_in_world(figure, pose)
-    axis = ends[:, 1] - ends[:, 0]
-    along = ((point - ends[:, 0]) * axis).sum(axis=1)
-    share = np.clip(along / np.maximum((axis * axis).sum(axis=1), 1e-12), 0.0, 1.0)
-    gaps = np.linalg.norm(ends[:, 0] + share[:, None] * axis - point, axis=1) - figure.radii
+    gaps = distances_to_axes(capsules_in_world(figure, pose), point) - figure.radii
     body = int(np.argmin(gaps))
     return body, float(gaps[body])

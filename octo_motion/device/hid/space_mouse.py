@@ -23,7 +23,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
-from ..driver import Axes, Kind, Sample, numbered_buttons
+from ..driver import Axes, Kind, Sample, numbered_buttons, six
 from .descriptor import DescriptorError, Field, ReportField, ReportLayout, parse_descriptor
 from .system import MULTI_AXIS, Found, Handle, HidDriver, descriptor_of, open_device
 
@@ -160,8 +160,7 @@ class MultiAxis:
     @property
     def push(self) -> Axes:
         """−1…1 along X, Y, Z and about X, Y, Z, Blender's axes."""
-        a, b, c, d, e, f = self._push
-        return (a, b, c, d, e, f)
+        return six(self._push)
 
     def feed(self, report: bytes) -> bool:
         """Take one report as the system gives it; whether it was one of ours."""

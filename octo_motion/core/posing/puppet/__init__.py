@@ -11,7 +11,16 @@ from .build import (
     joints_of,
     turned_bodies,
 )
-from .figure import Elements, Figure, Flags, Integers, Pose, capsules_in_world, rest_pose
+from .figure import (
+    Elements,
+    Figure,
+    Flags,
+    Integers,
+    Pose,
+    capsules_in_world,
+    distances_to_axes,
+    rest_pose,
+)
 from .joint_limits import bends, slopes
 from .materials import (
     Bend,
@@ -49,6 +58,7 @@ __all__ = [
     "build_figure",
     "capsules_in_world",
     "diagonal",
+    "distances_to_axes",
     "elements_for",
     "find_roles",
     "joint_loads",

@@ -18,6 +18,7 @@ import numpy as np
 from ...errors import RigError
 from ...rotations import Floats
 from ...skeleton import Skeleton
+from .figure import distances_to_axes
 
 BODY: Final = "BODY"
 FOLLOW: Final = "FOLLOW"
@@ -188,15 +189,15 @@ def _twin(skeleton: Skeleton, facts: RigFacts, bone: int, size: float) -> int | 
     """The bone at the same joint that an artist moves in place of one that is driven."""
     apart = np.linalg.norm(skeleton.heads - skeleton.heads[bone], axis=1)
     along = skeleton.rest_matrices[:, :3, 1] @ skeleton.rest_matrices[bone, :3, 1]
-    best: tuple[float, int] | None = None
-    for other in np.flatnonzero((apart < _TWIN * size) & (along > 0.9)).tolist():
-        name = skeleton.names[other]
-        if other == bone or name in facts.moved | facts.locked or is_helper_name(name):
-            continue
-        off = abs(float(skeleton.lengths[other] - skeleton.lengths[bone]))
-        if best is None or off < best[0]:
-            best = off, other
-    return None if best is None else best[1]
+    off = np.abs(skeleton.lengths - skeleton.lengths[bone])
+    fitting = [
+        other
+        for other in np.flatnonzero((apart < _TWIN * size) & (along > 0.9)).tolist()
+        if other != bone
+        and skeleton.names[other] not in facts.moved | facts.locked
+        and not is_helper_name(skeleton.names[other])
+    ]
+    return min(fitting, key=lambda other: off[other], default=None)
 
 
 def _roots(skeleton: Skeleton, chosen: set[int]) -> list[int]:
@@ -259,10 +260,10 @@ def _common_ancestor(skeleton: Skeleton, facts: RigFacts, bones: Sequence[int]) 
 
 
 def _tree(skeleton: Skeleton, chosen: set[int], size: float) -> Roles:
-    above = {
-        bone: next((each for each in skeleton.ancestors(bone) if each in chosen), -1)
-        for bone in chosen
-    }
+    def carrier(bone: int) -> int:
+        return next((each for each in skeleton.ancestors(bone) if each in chosen), -1)
+
+    above = {bone: carrier(bone) for bone in chosen}
     roots = [bone for bone in sorted(chosen) if above[bone] < 0]
     main = max(roots, key=lambda root: _limb_size(skeleton, chosen, root))
     hangs = dict(above)
@@ -277,14 +278,7 @@ def _tree(skeleton: Skeleton, chosen: set[int], size: float) -> Roles:
     ordered = _parents_first(hangs)
     place = {bone: number for number, bone in enumerate(ordered)}
     place[-1] = -1
-    follows = [
-        place[
-            bone
-            if bone in chosen
-            else next((each for each in skeleton.ancestors(bone) if each in chosen), -1)
-        ]
-        for bone in range(len(skeleton))
-    ]
+    follows = [place[bone if bone in chosen else carrier(bone)] for bone in range(len(skeleton))]
     return Roles(
         bodies=tuple(ordered),
         parents=tuple(place[hangs[bone]] for bone in ordered),
@@ -298,16 +292,8 @@ def _nearest(skeleton: Skeleton, chosen: set[int], root: int) -> int | None:
     others = [bone for bone in chosen if root not in [bone, *skeleton.ancestors(bone)]]
     if not others:
         return None
-    distances = _to_axes(skeleton, others, skeleton.heads[root])
-    return others[int(np.argmin(distances))]
-
-
-def _to_axes(skeleton: Skeleton, bones: Sequence[int], point: Floats) -> Floats:
-    heads, tails = skeleton.heads[bones], skeleton.tails[bones]
-    along = tails - heads
-    square = np.maximum((along**2).sum(axis=1), 1e-300)
-    share = np.clip(((point - heads) * along).sum(axis=1) / square, 0.0, 1.0)
-    return np.linalg.norm(heads + share[:, None] * along - point, axis=1)
+    axes = np.stack([skeleton.heads[others], skeleton.tails[others]], axis=1)
+    return others[int(np.argmin(distances_to_axes(axes, skeleton.heads[root])))]
 
 
 def _leads_to(hangs: Mapping[int, int], bone: int, wanted: int) -> bool:

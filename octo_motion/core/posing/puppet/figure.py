@@ -116,6 +116,14 @@ def pose_of(figure: Figure, turns: Floats, roots: Floats) -> Pose:
     return Pose(positions, orientations)
 
 
+def distances_to_axes(ends: Floats, point: Floats) -> Floats:
+    """(axes,) how far a point (3,) is from axes with ends (axes, 2, 3)."""
+    start, along = ends[:, 0], ends[:, 1] - ends[:, 0]
+    square = np.maximum((along * along).sum(axis=1), 1e-300)
+    share = np.clip(((point - start) * along).sum(axis=1) / square, 0.0, 1.0)
+    return np.linalg.norm(start + share[:, None] * along - point, axis=1)
+
+
 def capsules_in_world(figure: Figure, pose: Pose) -> Floats:
     """Ends (bodies, 2, 3) of the capsules' axes."""
     turned = rotate(pose.orientations[:, None, :], figure.capsules)

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from operator import attrgetter
-from typing import Any, Final, TypeVar
+from typing import Final
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,9 +19,7 @@ from ...rotations import Floats, rotate, to_matrix
 from ..puppet import Figure, Flags, Integers, capsules_in_world, rest_pose
 from .obstacle_shapes import Obstacle, Plane
 
-_Kept = TypeVar("_Kept")
 _MOST_SAMPLES: Final = 9
-_MOST_KEPT: Final = 1024
 _TINY: Final = 1e-12
 
 
@@ -83,8 +82,9 @@ class Detector:
         most = float(np.max(lengths / np.maximum(figure.radii, _TINY), initial=1.0))
         self._samples = int(min(max(np.ceil(most) + 1, 3), _MOST_SAMPLES))
         self._pairs = _pairs(figure) if self_collision else None
-        self._known: dict[int, tuple[Obstacle, Any]] = {}
-        """By id: what was worked out of obstacles, kept as long as they stay the same."""
+        # What was worked out of obstacles, kept as long as they are the same ones.
+        self._planes: WeakKeyDictionary[Plane, _Touched] = WeakKeyDictionary()
+        self._world_boxes: WeakKeyDictionary[Obstacle, Floats] = WeakKeyDictionary()
         self._reach = float(figure.radii.max(initial=0.0))
 
     def find(
@@ -239,32 +239,23 @@ class Detector:
         return Contacts(bodies, second[near], points, normals, gaps[near], labels)
 
     def _touched(self, plane: Plane) -> _Touched:
-        """What is known of a plane."""
-        known = self._known.get(id(plane))
-        if known is not None and known[0] is plane:
-            return known[1]
-        normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
-        touched = _Touched(normal, self._end_radii + float(normal @ plane.position))
-        return self._keep_known(plane, touched)
+        known = self._planes.get(plane)
+        if known is None:
+            normal = rotate(plane.orientation, (0.0, 0.0, 1.0))
+            known = _Touched(normal, self._end_radii + float(normal @ plane.position))
+            self._planes[plane] = known
+        return known
 
     def _world_box(self, obstacle: Obstacle) -> Floats | None:
         """Lower and upper corner in the world."""
-        known = self._known.get(id(obstacle))
-        if known is not None and known[0] is obstacle:
-            return known[1]
-        bounds = obstacle.bounds
-        if bounds is None:
-            return None
+        known, bounds = self._world_boxes.get(obstacle), obstacle.bounds
+        if known is not None or bounds is None:
+            return known
         frame = to_matrix(obstacle.orientation)
         middle = frame @ bounds.mean(axis=0) + obstacle.position
         half = np.abs(frame) @ (0.5 * (bounds[1] - bounds[0]))
-        return self._keep_known(obstacle, np.stack([middle - half, middle + half]))
-
-    def _keep_known(self, obstacle: Obstacle, value: _Kept) -> _Kept:
-        if len(self._known) > _MOST_KEPT:
-            self._known.clear()
-        self._known[id(obstacle)] = obstacle, value
-        return value
+        known = self._world_boxes[obstacle] = np.stack([middle - half, middle + half])
+        return known
 
 
 def _with_obstacle(

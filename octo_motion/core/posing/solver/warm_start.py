@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
 
 import numpy as np
 
@@ -15,21 +15,6 @@ from .contact_detection import Contacts
 from .newton import InitialGuess, Solution
 from .problem import Problem
 from .tree import Tree
-
-
-@dataclass(frozen=True, eq=False)
-class WarmStartSnapshot:
-    """Where the solver begins, to come back to."""
-
-    speeds: Floats
-    """(slots, 3)"""
-    trial: Floats | None
-    """(bodies, 3) load that the elements would have borne without flow, N·m; None where none
-    flowed."""
-    pressed: Integers
-    """Labels of the ends of joints' ranges that bore."""
-    contacts: tuple[Integers, Floats, Floats, Floats]
-    """See ``ContactMemory``."""
 
 
 class WarmStart:
@@ -86,15 +71,18 @@ class WarmStart:
             self._pressed = problem.stops[0].labels[solution.pressed]
         self.contacts.keep(problem.rows, solution.rows, most)
 
-    def state(self) -> WarmStartSnapshot:
-        """All of it. No array of these is changed later: each step makes its own."""
-        trial = None if self._response is None else self._response.trial
-        return WarmStartSnapshot(self.speeds, trial, self._pressed, self.contacts.state())
+    def state(self) -> WarmStart:
+        """A copy, to come back to. No array of it is changed later: each step makes its own."""
+        kept = copy(self)
+        kept.contacts = copy(self.contacts)
+        return kept
 
-    def restore(self, state: WarmStartSnapshot, law: PlasticLaw) -> None:
-        self.speeds, self._pressed = state.speeds, state.pressed
-        self._response = None if state.trial is None else law.answer(state.trial)
-        self.contacts.set(*state.contacts)
+    def restore(self, state: WarmStart, law: PlasticLaw) -> None:
+        self.speeds, self._pressed = state.speeds, state._pressed
+        self._response = state._response
+        self.use_law(law)
+        memory = state.contacts
+        self.contacts.set(memory.labels, memory.grips, memory.wanted, memory.slips)
 
 
 class ContactMemory:
@@ -118,10 +106,6 @@ class ContactMemory:
         """(contacts,) μ |w_t| at its end, m/s; none where it is not known, or nothing slipped."""
         self._answer: RowImpulses | None = None
         self._normals: Floats | None = None
-
-    def state(self) -> tuple[Integers, Floats, Floats, Floats]:
-        """What ``set`` takes over."""
-        return self.labels, self.grips, self.wanted, self.slips
 
     def grips_of(self, contacts: Contacts) -> Floats | None:
         """(contacts, 3) b of these contacts, zero for those that are new; None where all are."""

@@ -31,7 +31,7 @@ from .newton import InitialGuess, Newton, Solution
 from .obstacle_shapes import Obstacle
 from .problem import Problem, ProblemBuilder, typical_size
 from .tree import Tree
-from .warm_start import WarmStart, WarmStartSnapshot
+from .warm_start import WarmStart
 
 _WEIGHT = 9.81
 
@@ -75,7 +75,7 @@ class WorldSnapshot:
     """All that a simulation remembers from step to step; holds are not part of it."""
 
     bodies: dict[str, Floats]
-    start: WarmStartSnapshot
+    start: WarmStart
 
 
 class World:
