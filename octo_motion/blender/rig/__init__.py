@@ -29,7 +29,14 @@ from .armature import (
     world_of,
 )
 from .puppet import Puppet
-from .puppet_reading import bone_materials, is_part_of, mark_bones, read_rig, set_bone_material
+from .puppet_reading import (
+    bone_materials,
+    even_scale,
+    is_part_of,
+    mark_bones,
+    read_rig,
+    set_bone_material,
+)
 
 __all__ = [
     "ALIGNED",
@@ -42,6 +49,7 @@ __all__ = [
     "bone_materials",
     "carrying_axes",
     "deformed_meshes",
+    "even_scale",
     "hidden_bones",
     "is_driven_object",
     "is_part_of",

@@ -146,7 +146,7 @@ def even_scale(armature: bpy.types.Object) -> float:
     if not np.isfinite(matrix).all() or sizes.min() <= 1e-9 * max(1.0, sizes.max()):
         raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
     if sizes.max() - sizes.min() > _EVEN * sizes.max():
-        shown = ", ".join(f"{size:.3g}" for size in sizes)
+        shown = ", ".join(f"{size:.4g}" for size in sizes)
         raise RigError(
             f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
         )

@@ -277,14 +277,11 @@ class DeviceHands(HandsBase):
         """Bring all pointers to the middle of the view."""
         self._spaces.clear()
 
-    def begin_calibration(self, number: int) -> None:
-        self.client.calibrate(number, Order.BEGIN)
-        self.message = f"Calibrating: {self.client.devices[number].name}"
-
-    def end_calibration(self, number: int, *, keep: bool) -> None:
-        """Use what was learned, or go on as before."""
-        self.client.calibrate(number, Order.FINISH if keep else Order.CANCEL)
-        self.message = ""
+    def calibrate(self, number: int, order: Order) -> None:
+        """Begin to learn a device's zero and range, use what was learned, or go on as before."""
+        self.client.calibrate(number, order)
+        name = self.client.devices[number].name
+        self.message = f"Calibrating: {name}" if order is Order.BEGIN else ""
 
     def reset_calibration(self, number: int) -> None:
         """Forget what was learned of a device.

@@ -14,7 +14,7 @@ from ...core.errors import DeviceError, OctoMotionError, SettingsError
 from ...core.rotations import Floats
 from ...device.driver import Kind
 from ...device.ipc import Client
-from ...device.messages import Buzz, Notice
+from ...device.messages import Buzz, Notice, Order
 from ..operator_base import OctoOperator
 from .controls import Outcome
 from .device_hands import (
@@ -341,17 +341,12 @@ class OCTO_MOTION_OT_device_calibrate(DeviceOperator, bpy.types.Operator):
             raise SettingsError(
                 f"No device has the number {number}.", "Plug it in, or choose another one."
             )
-        match self.step:
-            case "BEGIN":
-                hands.begin_calibration(number)
-            case "RESET":
-                hands.reset_calibration(number)
-            case _:
-                if number not in hands.client.calibrating:
-                    raise SettingsError(
-                        "This device is not being calibrated.", "Click Calibrate first."
-                    )
-                hands.end_calibration(number, keep=self.step == "FINISH")
+        if self.step == "RESET":
+            hands.reset_calibration(number)
+            return
+        if self.step != "BEGIN" and number not in hands.client.calibrating:
+            raise SettingsError("This device is not being calibrated.", "Click Calibrate first.")
+        hands.calibrate(number, Order[self.step])
 
 
 def unregister() -> None:

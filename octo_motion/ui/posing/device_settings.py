@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Final, cast
 
 import bpy
@@ -11,60 +12,51 @@ from bpy.props import BoolProperty, FloatProperty, PointerProperty
 
 from ...device.messages import Settings
 
+_Factor: Final = partial(FloatProperty, subtype="FACTOR", options={"SKIP_SAVE"})
+_Flag: Final = partial(BoolProperty, options={"SKIP_SAVE"})
+
 
 class OCTO_MOTION_PG_device(bpy.types.PropertyGroup):
     """Settings of devices: they belong to the hand and the desk, not to a file."""
 
-    force: FloatProperty(
+    force: _Factor(
         name="Force",
         description="How much of its force a device may give. 0 for a device that only leads",
-        subtype="FACTOR",
         default=1.0,
         min=0.0,
         max=1.0,
-        options={"SKIP_SAVE"},
     )
-    toggle: BoolProperty(
+    toggle: _Flag(
         name="Press to Grab",
         description="One press of the first button grabs and another lets go; else hold the button",
-        default=False,
-        options={"SKIP_SAVE"},
     )
-    reach: FloatProperty(
+    reach: _Factor(
         name="Reach",
         description="How near to a limb the pointer must be to grab it, of the figure's size",
-        subtype="FACTOR",
         default=0.1,
         min=0.01,
         max=1.0,
-        options={"SKIP_SAVE"},
     )
-    speed: FloatProperty(
+    speed: _Factor(
         name="Speed",
         description="How fast a space mouse moves its pointer",
-        subtype="FACTOR",
         default=1.0,
         min=0.05,
         max=10.0,
         soft_max=3.0,
-        options={"SKIP_SAVE"},
     )
-    scale: FloatProperty(
+    scale: _Factor(
         name="Scale",
         description="How far the pointer of a force device goes in the view for the way of the "
         "hand. Zooming in makes it finer as well",
-        subtype="FACTOR",
         default=1.0,
         min=0.05,
         max=20.0,
         soft_max=4.0,
-        options={"SKIP_SAVE"},
     )
-    simulate: BoolProperty(
+    simulate: _Flag(
         name="Simulated Hand",
         description="Add a hand that moves by itself, to see what a force device would do",
-        default=False,
-        options={"SKIP_SAVE"},
     )
 
 

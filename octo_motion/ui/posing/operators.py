@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -97,6 +98,11 @@ class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
 # --- Saying how a joint is to give way, and getting the material that does so ---------------------
 
 
+_InLoads: Final = partial(FloatProperty, min=0.01, max=1000.0, soft_max=10.0)
+_Angle: Final = partial(FloatProperty, subtype="ANGLE", min=0.0, max=float(np.pi))
+_Seconds: Final = partial(FloatProperty, subtype="TIME_ABSOLUTE", max=60.0)
+
+
 class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
     bl_idname = "octo_motion.pose_measure"
     bl_label = "Measure Joint"
@@ -108,54 +114,38 @@ class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
     bone: StringProperty(
         name="Bone", description="The limb whose joint is bent; empty for the active bone"
     )
-    pull: FloatProperty(
+    pull: _InLoads(
         name="Pull",
         description="How hard it is pulled, in the weight of what hangs on the joint",
         default=2.0,
-        min=0.01,
-        max=1000.0,
-        soft_max=10.0,
     )
-    seconds: FloatProperty(
+    seconds: _Seconds(
         name="Time",
         description="How long it is pulled",
-        subtype="TIME_ABSOLUTE",
         default=0.5,
         min=0.01,
-        max=60.0,
     )
-    bends: FloatProperty(
+    bends: _Angle(
         name="Bends",
         description="How far the joint is bent at the end of the pull",
-        subtype="ANGLE",
         default=float(np.radians(30.0)),
-        min=0.0,
-        max=float(np.radians(180.0)),
     )
-    stays: FloatProperty(
+    stays: _Angle(
         name="Stays",
         description="How much of the bend is left afterwards; 0 springs back always",
-        subtype="ANGLE",
         default=float(np.radians(20.0)),
-        min=0.0,
-        max=float(np.radians(180.0)),
     )
-    settles: FloatProperty(
+    settles: _Seconds(
         name="Settles",
         description="How long springing back takes",
-        subtype="TIME_ABSOLUTE",
         default=0.05,
         min=0.001,
-        max=60.0,
         precision=3,
     )
-    bears: FloatProperty(
+    bears: _InLoads(
         name="Bears",
         description="What the joint bears without giving way, in the weight of what hangs on it",
         default=BEARS,
-        min=0.01,
-        max=1000.0,
-        soft_max=10.0,
     )
     bone_only: BoolProperty(
         name="This Bone Only",

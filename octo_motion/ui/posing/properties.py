@@ -64,7 +64,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         name="Material",
         description="What the joints are made of",
         items=MATERIALS,
-        default="CLAY",
     )
     strength: props.FloatProperty(
         name="Strength",
@@ -90,10 +89,9 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         soft_max=10.0,
         step=10,
     )
-    custom_springs: props.FloatProperty(
+    custom_springs: props.AngleProperty(
         name="Springs Back",
         description="How far a joint springs back that was pulled as hard as it bears",
-        subtype="ANGLE",
         default=float(np.radians(2.0)),
         min=float(np.radians(0.01)),
         max=float(np.radians(720.0)),
@@ -112,16 +110,13 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         step=1,
         precision=3,
     )
-    custom_gives: props.FloatProperty(
+    custom_gives: props.AngleProperty(
         name="Gives",
         description="How far a joint gives way in a second, pulled twice as hard as it bears",
-        subtype="ANGLE",
         default=float(np.radians(90.0)),
         min=0.0,
         max=float(np.radians(36000.0)),
         soft_max=float(np.radians(1000.0)),
-        step=500,
-        precision=1,
     )
     root: props.EnumProperty(
         name="Root",
@@ -132,14 +127,11 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
             ("FREE", "Free", "The whole figure can be carried about", 2),
         ),
     )
-    smallest: props.FloatProperty(
+    smallest: props.FactorProperty(
         name="Smallest Bone",
         description="Bones shorter than this share of the figure are no limbs of their own and "
         "follow the bone they hang on. Raise it to pose a hand without its fingers",
-        subtype="FACTOR",
         default=SMALLEST,
-        min=0.0,
-        max=1.0,
         soft_max=0.1,
         step=1,
         precision=3,
@@ -147,19 +139,15 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
 
     # --- The world -----------------------------------------------------------------------------
 
-    gravity: props.BoolProperty(
-        name="Gravity", description="Let the figure have weight", default=False
-    )
+    gravity: props.BoolProperty(name="Gravity", description="Let the figure have weight")
     floor: props.BoolProperty(
         name="Floor",
         description="A solid floor through the whole scene",
-        default=False,
     )
     floor_height: props.FloatProperty(
         name="Height",
         description="Height of the floor",
         subtype="DISTANCE",
-        default=0.0,
         soft_min=-10.0,
         soft_max=10.0,
     )
@@ -171,7 +159,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
     self_collision: props.BoolProperty(
         name="Self Collision",
         description="Limbs stop each other. Takes longer to compute",
-        default=False,
     )
     friction: props.FloatProperty(
         name="Friction",
@@ -189,17 +176,15 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         name="Keys",
         description="Which action gets the keys",
         items=TARGETS,
-        default="CURRENT",
     )
     action: props.PointerProperty(
         name="Action",
         description="The action that gets the keys",
         type=bpy.types.Action,
     )
-    record_angle: props.FloatProperty(
+    record_angle: props.AngleProperty(
         name="Tolerance Angle",
         description="How far a recorded motion's keys may be off the motion of the hand, per bone",
-        subtype="ANGLE",
         default=float(np.radians(1.0)),
         min=float(np.radians(0.01)),
         max=float(np.radians(45.0)),
@@ -221,7 +206,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         name="Obstacle",
         description="What puppets take this object for",
         items=OBSTACLES,
-        default="NONE",
     )
 
 

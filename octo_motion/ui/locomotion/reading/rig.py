@@ -21,6 +21,7 @@ from ....blender.animation import (
 )
 from ....blender.rig import (
     armature_data,
+    even_scale,
     is_driven_object,
     linked_names,
     radii_of_skin,
@@ -149,9 +150,6 @@ def previous_action(
     return settings.result
 
 
-_UNEQUAL: Final = 1e-3
-
-
 @dataclass(frozen=True, eq=False)
 class RigRead:
     """A creature as it was read, and what was seen on the way."""
@@ -176,7 +174,7 @@ def read_creature(
         RigError: it has no arms, bones are gone, or it is scaled unequally.
     """
     at_rest = read_skeleton(armature)
-    scale = uniform_scale(armature, world)
+    scale = uniform_scale(armature)
     arms, rest_body, detection = listed_arms(settings, armature, at_rest)
     root_bone = chosen_root_bone(settings, armature, detection)
     skeleton, body = at_rest, rest_body
@@ -216,29 +214,13 @@ def read_creature(
     )
 
 
-def uniform_scale(armature: bpy.types.Object, world: Floats) -> float:
+def uniform_scale(armature: bpy.types.Object) -> float:
     """Metres of the armature's unit.
 
     Raises:
         RigError: its world matrix is no rotation and one scale.
     """
-    axes = world[:3, :3]
-    sizes = np.linalg.norm(axes, axis=0)
-    name = f"'{armature.name}'"
-    if not np.isfinite(world).all() or sizes.min() < 1e-9:
-        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
-    scale = float(sizes.mean())
-    if np.ptp(sizes) > _UNEQUAL * scale:
-        shown = ", ".join(f"{size:.4g}" for size in sizes)
-        raise RigError(
-            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
-        )
-    if np.abs(axes.T @ axes / scale**2 - np.eye(3)).max() > _UNEQUAL:
-        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
-    if np.linalg.det(axes) < 0.0:
-        raise RigError(
-            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
-        )
+    scale = even_scale(armature)
     # A world matrix has the scale but for the rounding of its rotation, and rotation is what an
     # earlier result changes: the same settings must give the same keys.
     own = np.abs(np.array(armature.scale) * np.array(armature.delta_scale)).mean()
