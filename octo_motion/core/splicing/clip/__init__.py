@@ -11,9 +11,12 @@ from .clip import (
     sample_clip,
     sample_scales,
     sample_world,
+    seam_shifts,
+    seam_turns,
     unposed,
     without_scale,
 )
+from .clip_clock import ClipClock, MarkerPair, RateCurve
 from .rest_pose import (
     Reresting,
     average_pose,
@@ -21,13 +24,24 @@ from .rest_pose import (
     robust_rotations,
     with_rest_pose,
 )
-from .splice_timing import After, SpliceWindow, Timing, splice_window, window_middle
+from .splice_timing import (
+    After,
+    SpliceWindow,
+    Timing,
+    splice_clock,
+    splice_span,
+    splice_window,
+    window_middle,
+)
 
 __all__ = [
     "MOTION_SUFFIXES",
     "After",
     "Clip",
+    "ClipClock",
+    "MarkerPair",
     "Posture",
+    "RateCurve",
     "Reresting",
     "SpliceWindow",
     "Timing",
@@ -40,6 +54,10 @@ __all__ = [
     "sample_clip",
     "sample_scales",
     "sample_world",
+    "seam_shifts",
+    "seam_turns",
+    "splice_clock",
+    "splice_span",
     "splice_window",
     "unposed",
     "window_middle",

@@ -160,17 +160,23 @@ def posture_of(skeleton: Skeleton, rotations: Floats, locations: Floats) -> Post
     return Posture(skeleton, lambda bones: rotations[:, bones], lambda bone: locations[:, bone])
 
 
-def sample_clip(clip: Clip, frames: Floats, seams: Floats | None = None) -> Posture:
+def sample_clip(
+    clip: Clip, frames: Floats, seams: Floats | None = None, seam_speeds: Floats | None = None
+) -> Posture:
     """A clip at any times, in its own frame numbers; beyond its ends it stands still.
 
     Args:
         clip: the clip.
         frames: (frames,)
-        seams: (frames,) how much of the step from the clip's last pose to its first is added.
+        seams: (frames,) how much of the step from the clip's last pose to its first is added; below
+            zero behind it.
+        seam_speeds: (frames,) likewise of the step in speed, in frames of the clip.
     """
     before, after, share = _between(clip, frames)
     between = share.any()
-    looped = seams is not None and seams.any()
+    seams = np.zeros(len(frames)) if seams is None else seams
+    speeds = np.zeros(len(frames)) if seam_speeds is None else seam_speeds
+    looped = seams.any()
 
     def rotations(bones: Sequence[int]) -> Floats:
         own = np.asarray(bones, dtype=np.intp)
@@ -178,10 +184,8 @@ def sample_clip(clip: Clip, frames: Floats, seams: Floats | None = None) -> Post
         if between:
             values = slerp(values, clip.rotations[after[:, None], own], share[:, None])
         if looped:
-            assert seams is not None
-            step = multiply(conjugate(clip.rotations[-1, own]), clip.rotations[0, own])
-            added = seams[:, None, None] * to_rotation_vector(step)
-            values = multiply(values, from_rotation_vector(added))
+            ends = clip.rotations[_SEAM][:, own]
+            values = multiply(values, seam_turns(ends, clip.frames[_SEAM], seams, speeds))
         return values
 
     def location(bone: int) -> Floats:
@@ -189,15 +193,16 @@ def sample_clip(clip: Clip, frames: Floats, seams: Floats | None = None) -> Post
         if between:
             values = values + share[:, None] * (clip.locations[after, bone] - values)
         if looped:
-            assert seams is not None
-            step = clip.locations[0, bone] - clip.locations[-1, bone]
-            values = values + seams[:, None] * step
+            ends = clip.locations[_SEAM, bone]
+            values = values + seam_shifts(ends, clip.frames[_SEAM], seams, speeds)
         return values
 
     return Posture(clip.skeleton, rotations, location)
 
 
-def sample_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[int]) -> Floats:
+def sample_scales(
+    clip: Clip, frames: Floats, seams: Floats, seam_speeds: Floats, bones: Sequence[int]
+) -> Floats:
     """Scales (frames, bones, 3) of some bones of a clip at any times, like :func:`sample_clip`."""
     if clip.scales is None:
         return np.ones((len(frames), len(bones), 3))
@@ -205,7 +210,7 @@ def sample_scales(clip: Clip, frames: Floats, seams: Floats, bones: Sequence[int
     own = np.asarray(bones, dtype=np.intp)
     values = clip.scales[before[:, None], own]
     values += share[:, None, None] * (clip.scales[after[:, None], own] - values)
-    return values + seams[:, None, None] * (clip.scales[0, own] - clip.scales[-1, own])
+    return values + seam_shifts(clip.scales[_SEAM][:, own], clip.frames[_SEAM], seams, seam_speeds)
 
 
 def sample_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
@@ -228,6 +233,43 @@ def _between(clip: Clip, frames: Floats) -> tuple[np.ndarray, np.ndarray, Floats
     before = np.floor(place).astype(np.intp)
     after = np.minimum(before + 1, len(clip) - 1)
     return before, after, np.asarray(place - before)
+
+
+# --- Where a clip begins again: what brings its last pose and speed and its first ones together ---
+
+
+_SEAM: Final = np.array([-2, -1, 0, 1])
+"""The frames of a clip from which the steps at its seam are told."""
+
+
+def seam_turns(ends: Floats, frames: Floats, seams: Floats, speeds: Floats) -> Floats:
+    """Rotations (frames, …, 4) to be made before those of a clip, in its bones' own axes.
+
+    Args:
+        ends: (4, …, 4) rotations in the last two frames of the clip and in its first two.
+        frames: (4,) their numbers.
+        seams: (frames,) shares of the step in pose, below zero behind the seam.
+        speeds: (frames,) likewise of the step in speed.
+    """
+    shape = (-1, *(1,) * (ends.ndim - 1))
+    step = to_rotation_vector(multiply(conjugate(ends[1]), ends[2]))
+    leaves = to_rotation_vector(multiply(conjugate(ends[0]), ends[1])) / (frames[1] - frames[0])
+    arrives = to_rotation_vector(multiply(conjugate(ends[2]), ends[3])) / (frames[3] - frames[2])
+    # Seen from the last pose, and from the first one.
+    across = from_rotation_vector(step)
+    swings = rotate(across, arrives) - leaves, arrives - rotate(conjugate(across), leaves)
+    seams, speeds = seams.reshape(shape), speeds.reshape(shape)
+    swing = from_rotation_vector(speeds * np.where(seams >= 0.0, *swings))
+    return multiply(swing, from_rotation_vector(seams * step))
+
+
+def seam_shifts(ends: Floats, frames: Floats, seams: Floats, speeds: Floats) -> Floats:
+    """What is to be added (frames, …, 3) to places or sizes; see :func:`seam_turns`."""
+    shape = (-1, *(1,) * (ends.ndim - 1))
+    leaves = (ends[1] - ends[0]) / (frames[1] - frames[0])
+    arrives = (ends[3] - ends[2]) / (frames[3] - frames[2])
+    step = seams.reshape(shape) * (ends[2] - ends[1])
+    return step + speeds.reshape(shape) * (arrives - leaves)
 
 
 # --- Forward kinematics backwards: from where the bones are to how each is turned and moved -------

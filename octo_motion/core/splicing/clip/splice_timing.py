@@ -13,6 +13,14 @@ from ...errors import ClipError
 from ...rotations import Floats
 from ...smoothing import smooth_step
 from .clip import Clip
+from .clip_clock import (
+    ClipClock,
+    MarkerPair,
+    RateCurve,
+    matched_clock,
+    rated_clock,
+    steady_clock,
+)
 
 Integers = NDArray[np.intp]
 
@@ -22,7 +30,9 @@ AFTER: Final = ("hold", "loop", "stop")
 
 @dataclass(frozen=True)
 class Timing:
-    """``splice_time = splice_start + (t − base_start) · rate``, over a length."""
+    """``splice_time = splice_start + (t − base_start) · rate``, over a length; the rate may change,
+    and markers may say what is shown when.
+    """
 
     base_start: float
     """Frame of the base at which the splice begins."""
@@ -40,6 +50,11 @@ class Timing:
     """What happens when the splice clip runs out: its last pose, again from its first frame, or
     back to the base. Easing holds there too: over ``ease_out`` the clip slows down to its last
     pose, or goes; a round of a loop goes over ``ease_out`` and the next comes over ``ease_in``."""
+    rates: RateCurve | None = None
+    """In place of the rate, one that changes over the base's frames."""
+    markers: tuple[MarkerPair, ...] = ()
+    """What is shown when: those behind both starts are met, whatever the rate is; it holds after
+    the last of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +74,9 @@ class SpliceWindow:
     seams: Floats
     """(window,) of the step from the clip's last pose to its first: how much of it a frame takes
     on, so that the round before a seam and the one behind it meet."""
+    seam_speeds: Floats
+    """(window,) frames of the clip: how much a frame takes on of the step in speed, so that the two
+    rounds meet at one speed as well."""
 
     def easing(self, row: int) -> range:
         """The base's frames from this one to the middle of the easing in which it lies."""
@@ -81,84 +99,121 @@ class SpliceWindow:
             self.splice_frames[chosen],
             self.rounds[chosen],
             self.seams[chosen],
+            self.seam_speeds[chosen],
         )
+
+
+def splice_clock(timing: Timing, base_rate: float, splice_rate: float) -> ClipClock:
+    """Which moment of the splice clip each frame of the base shows, both with their frame rates.
+
+    Raises:
+        ClipError: rate, length or easing make no sense, or markers cross.
+    """
+    _check(timing)
+    start, unit = (timing.base_start, timing.splice_start), splice_rate / base_rate
+    if timing.markers:
+        rate = timing.rate
+        if timing.rates is not None:
+            rate = float(timing.rates.at(np.array(max(each.base for each in timing.markers))))
+        return matched_clock(start, timing.markers, rate * unit)
+    if timing.rates is not None:
+        return rated_clock(start, timing.rates, unit)
+    return steady_clock(start, timing.rate * unit)
+
+
+def splice_span(timing: Timing, base: Clip, splice: Clip) -> tuple[float, float]:
+    """First and last moment of a splice, in the base's frames; the last may be infinite.
+
+    Raises:
+        ClipError: rate, length or easing make no sense, or markers cross.
+    """
+    clock = splice_clock(timing, base.rate, splice.rate)
+    start, end = timing.base_start, np.inf
+    if timing.length is not None:
+        end = start + timing.length
+    if timing.after == "stop":
+        end = min(end, max(float(clock.when(splice.frames[-1])), start))
+    return start, float(end)
 
 
 def splice_window(timing: Timing, base: Clip, splice: Clip) -> SpliceWindow:
     """Frames, weights and moments of a splice.
 
     Raises:
-        ClipError: rate, length or easing make no sense.
+        ClipError: rate, length or easing make no sense, or markers cross.
     """
-    _check(timing)
-    # Frames of the splice clip per frame of the base.
-    step = timing.rate * splice.rate / base.rate
+    start, end = splice_span(timing, base, splice)
+    clock = splice_clock(timing, base.rate, splice.rate)
     times = splice.frames[0], splice.frames[-1]
-    start, end = timing.base_start, np.inf
-    if timing.length is not None:
-        end = start + timing.length
-    if timing.after == "stop":
-        end = min(end, start + max(times[1] - timing.splice_start, 0.0) / step)
-    inside = (base.frames >= start - 1e-6) & (base.frames <= end + 1e-6)
+    looks = base.frames
+    inside = (looks >= start - 1e-6) & (looks <= end + 1e-6)
     chosen = np.flatnonzero(inside)
     frames = slice(int(chosen[0]), int(chosen[-1]) + 1) if len(chosen) else slice(0, 0)
-    passed = base.frames[frames] - start
-    weights = entering = np.ones(len(passed))
+    looks = looks[frames]
+    weights = entering = np.ones(len(looks))
     if timing.ease_in > 0.0:
-        weights = entering = smooth_step(passed / timing.ease_in)
+        weights = entering = smooth_step((looks - start) / timing.ease_in)
     if timing.ease_out > 0.0 and np.isfinite(end):
-        weights = np.minimum(weights, smooth_step((end - base.frames[frames]) / timing.ease_out))
-    moments = timing.splice_start + passed * step
-    rounds, seams = np.zeros(len(passed), dtype=np.intp), np.zeros(len(passed))
-    eases = timing.ease_in * step, timing.ease_out * step
+        weights = np.minimum(weights, smooth_step((end - looks) / timing.ease_out))
+    rounds, seams = np.zeros(len(looks), dtype=np.intp), np.zeros((2, len(looks)))
+    shown = clock.at(looks)
     if timing.after == "loop":
-        moments, rounds, seams = _looped(moments, times, eases)
+        shown, rounds, seams = _looped(looks, clock, times, (timing.ease_in, timing.ease_out))
     elif timing.after == "hold":
-        moments = _slowed(moments, times, eases[1])
-    return SpliceWindow(frames, weights, entering, moments, rounds, seams)
+        shown = clock.at(_slowed(looks, float(clock.when(times[1])), timing.ease_out))
+    return SpliceWindow(frames, weights, entering, shown, rounds, seams[0], seams[1])
 
 
 def _looped(
-    moments: Floats, times: tuple[float, float], eases: tuple[float, float]
+    looks: Floats, clock: ClipClock, times: tuple[float, float], eases: tuple[float, float]
 ) -> tuple[Floats, Integers, Floats]:
-    """Moments within the clip, rounds, and shares of the step at the seams."""
-    (first, last), (ease_in, ease_out) = times, eases
-    period = last - first
+    """Moments within the clip, rounds, and shares (2, window) of the steps in pose and speed."""
+    (first, last), seams = times, np.zeros((2, len(looks)))
+    period, moments = last - first, clock.at(looks)
     # The last frame itself is shown once, before the clip begins anew.
     over = moments > last + 1e-6
     rounds = np.where(over, np.floor((moments - first) / period + 1e-9), 0.0)
     wrapped = moments - rounds * period
-    ease_in, ease_out = min(ease_in, 0.5 * period), min(ease_out, 0.5 * period)
-    seams = np.zeros(len(moments))
-    if ease_in + ease_out > 0.0 and len(rounds):
-        before = ease_out / (ease_in + ease_out)
-        goes_on = rounds < rounds[-1]
-        if ease_out > 0.0:
-            going = before * smooth_step(1.0 - (last - wrapped) / ease_out)
-            seams += np.where(goes_on, going, 0.0)
-        if ease_in > 0.0:
-            coming = (1.0 - before) * smooth_step(1.0 - (wrapped - first) / ease_in)
-            seams -= np.where(rounds > 0, coming, 0.0)
+    if sum(eases) <= 0.0 or not len(rounds):
+        return wrapped, rounds.astype(np.intp), seams
+    before = eases[1] / sum(eases)
+    # Of the frames at which a round begins and ends, the speeds with which the clip goes by.
+    numbers, own = np.unique(rounds, return_inverse=True)
+    begins, ends = (clock.when(first + (numbers + behind) * period) for behind in (0.0, 1.0))
+    ease_in, ease_out = (np.minimum(ease, 0.5 * (ends - begins))[own] for ease in eases)
+    leaves, arrives = clock.speed(begins)[own], clock.speed(ends)[own]
+    if eases[1] > 0.0:
+        share = np.clip(1.0 - (ends[own] - looks) / ease_out, 0.0, 1.0)
+        goes = before * np.stack([smooth_step(share), arrives * ease_out * _swing(share)])
+        seams += np.where(rounds < rounds[-1], goes, 0.0)
+    if eases[0] > 0.0:
+        share = np.clip(1.0 - (looks - begins[own]) / ease_in, 0.0, 1.0)
+        comes = np.stack([-smooth_step(share), leaves * ease_in * _swing(share)])
+        seams += np.where(rounds > 0, (1.0 - before) * comes, 0.0)
     return wrapped, rounds.astype(np.intp), seams
 
 
-def _slowed(moments: Floats, times: tuple[float, float], ease: float) -> Floats:
-    """Moments that slow down to the clip's last one where they would run past it."""
-    last = times[1]
-    if not len(moments) or moments[-1] <= last + 1e-6:
-        return moments
-    ease = min(ease, max(last - moments[0], 0.0))
+def _swing(share: Floats) -> Floats:
+    """``t³ − t²``: nothing at either end, level at the first, and with slope one at the other."""
+    return share * share * (share - 1.0)
+
+
+def _slowed(looks: Floats, end: float, ease: float) -> Floats:
+    """Frames that slow down to the one at which the clip ends where they would run past it."""
+    if not len(looks) or looks[-1] <= end + 1e-6:
+        return looks
+    ease = min(ease, max(end - float(looks[0]), 0.0))
     if ease <= 0.0:
-        return moments
-    left = np.clip(ease - (moments - last), 0.0, 2.0 * ease)
-    return np.where(left < 2.0 * ease, last - left**2 / (4.0 * ease), moments)
+        return looks
+    left = np.clip(ease - (looks - end), 0.0, 2.0 * ease)
+    return np.where(left < 2.0 * ease, end - left**2 / (4.0 * ease), looks)
 
 
 def _check(timing: Timing) -> None:
     numbers = (timing.base_start, timing.splice_start, timing.rate, timing.length or 0.0)
     if not np.isfinite((*numbers, timing.ease_in, timing.ease_out)).all():
         raise ClipError("The timing has values that are no numbers.", "Enter them again.")
-    if timing.rate <= 0.0:
+    if timing.rate <= 0.0 or (timing.rates is not None and not (timing.rates.rates > 0.0).all()):
         raise ClipError("The rate of a splice must be above zero.", "Enter 1 for normal speed.")
     if timing.length is not None and timing.length <= 0.0:
         raise ClipError("The length of a splice must be above zero.", "Enter a number of frames.")

@@ -19,14 +19,20 @@ from ...rotations import (
     Floats,
     conjugate,
     from_axis_angle,
-    from_rotation_vector,
     multiply,
     rotate,
     slerp,
-    to_rotation_vector,
 )
 from ...skeleton import Skeleton
-from ..clip import Clip, Posture, SpliceWindow, sample_clip, sample_world
+from ..clip import (
+    Clip,
+    Posture,
+    SpliceWindow,
+    sample_clip,
+    sample_world,
+    seam_shifts,
+    seam_turns,
+)
 from ..humanoid import chain_length
 from .body_frames import AnatomicalFrame
 from .foot_contacts import find_stance, own_paths
@@ -104,26 +110,28 @@ class LegTravel:
         path = body_path(clip, frame, sample_clip(clip, span.splice_frames), span.splice_frames)
         if not (span.rounds.any() or span.seams.any()):
             return path
-        ends = np.array([clip.frames[0], clip.frames[-1]])
-        ends = body_path(clip, frame, sample_clip(clip, ends), ends)
+        times = clip.frames[[-2, -1, 0, 1]]
+        ends = body_path(clip, frame, sample_clip(clip, times), times)
+        last, first = ends.places[1].copy(), ends.places[2].copy()
         # Each round goes on from where the one before has led, and the way it faced then.
-        turn = heading(ends.orientations[1], ends.orientations[0])
+        turn = heading(ends.orientations[1], ends.orientations[2])
         numbers = np.arange(span.rounds.max() + 1.0)
         turns = from_axis_angle(_UP, 2.0 * np.arctan2(turn[3], turn[0]) * numbers)
-        step = rotate(turns, (ends.places[1] - ends.places[0]) * _LEVEL)
+        step = rotate(turns, (last - first) * _LEVEL)
         shifts = np.concatenate([np.zeros((1, 3)), np.cumsum(step, axis=0)[:-1]])
-        # What is left of the step at the seam: how the pelvis leans, and how high it is.
-        lean = to_rotation_vector(
-            multiply(conjugate(ends.orientations[1]), multiply(turn, ends.orientations[0]))
-        )
-        rise = (ends.places[0] - ends.places[1]) * _UP
+        # What is left at the seam: how the pelvis leans, how high it is, and its speeds.
+        begins = slice(2, None)
+        ends.orientations[begins] = multiply(turn, ends.orientations[begins])
+        begun = rotate(turn, ends.places[begins] - first)
+        ends.places[begins] = begun + last * _LEVEL + first * _UP
+        seams = span.seams, span.seam_speeds
+        added = seam_turns(ends.orientations, times, *seams)
+        shift = seam_shifts(ends.places, times, *seams)
+        # Behind the seam as the round that begins there sees it.
+        shift = np.where(span.seams[:, None] < 0.0, rotate(conjugate(turn), shift), shift)
         own = turns[span.rounds]
-        added = from_rotation_vector(span.seams[:, None] * lean)
-        places = rotate(own, path.places - ends.places[0]) + shifts[span.rounds] + ends.places[0]
-        return BodyPath(
-            multiply(multiply(own, path.orientations), added),
-            places + span.seams[:, None] * rise,
-        )
+        places = rotate(own, path.places - first + shift) + shifts[span.rounds] + first
+        return BodyPath(multiply(multiply(own, path.orientations), added), places)
 
 
 def check_hips(skeleton: Skeleton, hips: int) -> None:

@@ -215,7 +215,7 @@ class Splicer:
         """The same, of a clip that rests as the base does where the two were compared."""
         rotations, locations = base.rotations.copy(), base.locations.copy()
         before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
-        moment = sample_clip(self._clip, span.splice_frames, span.seams)
+        moment = sample_clip(self._clip, span.splice_frames, span.seams, span.seam_speeds)
         # Views: what is written here is written into the whole.
         turned, moved = rotations[span.frames], locations[span.frames]
         exact = self.splice.goal == "exact"
@@ -246,7 +246,7 @@ def _scaled(
         bones = [bone for bone in each.bones if bone in pairs and each.match.same_axes(bone)]
         others = [pairs[bone] for bone in bones]
         rest = [bone for bone in each.bones if bone not in bones]
-        there = sample_scales(splice, span.splice_frames, span.seams, others)
+        there = sample_scales(splice, span.splice_frames, span.seams, span.seam_speeds, others)
         acting[:, bones] += weights * (there - acting[:, bones])
         acting[:, rest] += weights * (1.0 - acting[:, rest])
     return scales

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, conjugate, rotate
-from ..clip import Timing, sample_clip
+from ..clip import Timing, sample_clip, splice_clock
 from ..humanoid import chain_length
 from .body_frames import laid_over, pelvis_frame
 from .parts import LEG
@@ -54,20 +54,23 @@ def suggest_timings(
 ) -> list[Suggestion]:
     """The best moments for a splice to begin, at most so many, best first, none close to another.
 
-    Where it begins in its clip, its rate and its length are as the timing says.
+    Where it begins in its clip, its rate and its length are as the timing says, and its warp as it
+    is at the start that it has.
 
     Raises:
         ClipError: a landmark is missing.
     """
     base, splice = compared(base, splice)
     ours, theirs = base.clip, splice.clip
-    start, end = timing.splice_start, theirs.frames[-1]
+    # As it goes by from its start on, wherever in the base that comes to be.
+    clock = splice_clock(timing, ours.rate, theirs.rate)
+    begins, ends = timing.base_start, float(clock.when(theirs.frames[-1]))
     if timing.length is not None:
-        end = min(end, start + timing.length / ours.rate * theirs.rate * timing.rate)
-    seconds = max((end - start) / theirs.rate / timing.rate, 1e-3)
+        ends = min(ends, begins + timing.length)
+    seconds = max((ends - begins) / ours.rate, 1e-3)
     pace = min(_RATE, _LONGEST / seconds)
-    splice_frames = np.arange(start, end + 1e-6, theirs.rate * timing.rate / pace)
-    seen = _legs(splice, base, splice_frames, pace)
+    moments = np.arange(begins, max(ends, begins) + 1e-6, ours.rate / pace)
+    seen = _legs(splice, base, clock.at(moments), pace)
     step = ours.rate / pace
     first, last = ours.frames[0], ours.frames[-1]
     # Samples may be several frames apart; every frame may be the one to begin with.
