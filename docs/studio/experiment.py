@@ -135,7 +135,7 @@ def sheet(clips: Clips, cell: tuple[int, int] = _CELL, columns: int = _COLUMNS) 
 
 
 def _imported(path: Path) -> Any:
-    bpy.ops.octo_motion.import_clips(filepath=str(path))
+    bpy.ops.octo_motion.import_clips(filepath=str(path), fit="NONE", frame_view=False)
     armature: Any = bpy.context.object
     return armature
 

@@ -84,7 +84,7 @@ def _add_octopus(screen: Screen) -> Any:
 
 
 def _imported(path: Any) -> Any:
-    bpy.ops.octo_motion.import_clips(filepath=str(path))
+    bpy.ops.octo_motion.import_clips(filepath=str(path), fit="NONE", frame_view=False)
     return bpy.context.view_layer.objects.active
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curves, meshes, markers and importers."""
 
+from .clip_placing import place_clip, room_of, show_selected
 from .contact_markers import Contact, markers, read_markers, remove_markers, write_markers
 from .curves import add_route_curve, read_route, suggested_control_points
 from .grasp_target import (
@@ -34,6 +35,7 @@ __all__ = [
     "is_carried",
     "is_enabled",
     "markers",
+    "place_clip",
     "put_back",
     "read_form",
     "read_markers",
@@ -43,6 +45,8 @@ __all__ = [
     "read_triangles",
     "remove_clips",
     "remove_markers",
+    "room_of",
+    "show_selected",
     "suggested_control_points",
     "write_markers",
 ]

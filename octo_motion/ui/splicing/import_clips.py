@@ -9,13 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import bpy
-from bpy.props import CollectionProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    StringProperty,
+)
 
-from ...blender.scene import ImportedClip, Up, import_clip, remove_clips
+from ...blender.scene import ImportedClip, Up, import_clip, remove_clips, show_selected
 from ...core.errors import ClipError, OctoMotionError
 from ...core.splicing.clip import MOTION_SUFFIXES
 from ..modal_job import ModalJob
 from ..operator_base import window_manager
+from .clip_places import Placing, place_clips, target_height
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -36,6 +44,7 @@ class ImportSession:
         context: bpy.types.Context,
         *,
         up: Up = "AUTO",
+        placing: Placing | None = None,
     ) -> None:
         self._paths = list(dict.fromkeys(paths))
         if not self._paths:
@@ -44,6 +53,10 @@ class ImportSession:
         self.refused: list[tuple[Path, ClipError]] = []
         self._frame_start = frame_start
         self._up: Up = up
+        self._placing = placing or Placing()
+        self._target = target_height(context)
+        self.placed = ""
+        """A sentence on how tall the clips are, "" if they are as in their files."""
         layer = context.view_layer
         assert layer is not None
         self._selected = [
@@ -77,7 +90,8 @@ class ImportSession:
             yield (number + 1) / len(self._paths)
 
     def end(self) -> ImportSession:
-        """Leave the new armatures selected, the first one active, as importers do.
+        """Give the clips their places, and leave the new armatures selected, the first one active,
+        as importers do.
 
         Raises:
             ClipError: not one of the files was imported.
@@ -86,6 +100,8 @@ class ImportSession:
             path, error = self.refused[0]
             more = f" {len(self.refused) - 1} more were refused." if len(self.refused) > 1 else ""
             raise ClipError(f"'{path.name}' was not imported. {error.problem}", error.remedy + more)
+        context = bpy.context
+        self.clips, self.placed = place_clips(self.clips, context, self._placing, self._target)
         _select([name for clip in self.clips for name in clip.armatures])
         return self
 
@@ -120,8 +136,9 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
     bl_description = (
         "Import several BVH, FBX or glTF files at once, each as an armature with its action, into "
         "the collection Clips. Every clip plays at its own speed: its keys lie where the scene's "
-        "frame rate puts their seconds, and the scene stays as it is. A file that is damaged is "
-        "left out, and the message says why"
+        "frame rate puts their seconds, and the scene stays as it is. Bodies get the height of the "
+        "one that is there, and stand side by side. A file that is damaged is left out, and the "
+        "message says why"
     )
 
     filepath: StringProperty(
@@ -150,6 +167,39 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
             ("Y", "Y", "As most programs write it", 1),
             ("Z", "Z", "As Blender and MakeHuman may write it", 2),
         ),
+        options={"SKIP_SAVE"},
+    )
+    fit: EnumProperty(
+        name="Fit to Height",
+        description="Which clips are scaled to one height. The armature is scaled, its keys stay "
+        "as the file has them",
+        items=(
+            ("NONE", "None", "As large as their files have them", 0),
+            ("HUMANOIDS", "Humanoids", "Bodies with arms, legs and a head", 1),
+            ("ALL", "All", "Others too, by their longest side", 2),
+        ),
+        default="HUMANOIDS",
+        options={"SKIP_SAVE"},
+    )
+    height: FloatProperty(
+        name="Height",
+        description="How tall they get; 0 is as tall as the active armature, else as another "
+        "humanoid of the scene, else 1.7 m",
+        min=0.0,
+        soft_max=10.0,
+        unit="LENGTH",
+        options={"SKIP_SAVE"},
+    )
+    side_by_side: BoolProperty(
+        name="Side by Side",
+        description="Let several clips stand in a row on the ground, not one in the other",
+        default=True,
+        options={"SKIP_SAVE"},
+    )
+    frame_view: BoolProperty(
+        name="Show",
+        description="Let the 3D views show the clips as large as they can",
+        default=True,
         options={"SKIP_SAVE"},
     )
     filter_glob: StringProperty(
@@ -185,6 +235,10 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
                     files=[{"name": each.name} for each in self.files],
                     frame_start=self.frame_start,
                     up=self.up,
+                    fit=self.fit,
+                    height=self.height,
+                    side_by_side=self.side_by_side,
+                    frame_view=self.frame_view,
                 )
             return {"CANCELLED"}
         return super().execute(context)
@@ -198,14 +252,21 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
                 pass
         finally:
             manager.progress_end()
-        self._report(session.end())
+        self._finished(context, session)
+
+    def _finished(self, context: bpy.types.Context, session: ImportSession) -> None:
+        session.end()
+        if self.frame_view:
+            show_selected(context)
+        self._report(session)
 
     def _new_session(self, context: bpy.types.Context) -> ImportSession:
         folder = Path(bpy.path.abspath(self.directory))
         named = [folder / each.name for each in self.files if each.name]
         if not named and self.filepath:
             named = [Path(bpy.path.abspath(self.filepath))]
-        return ImportSession(named, self.frame_start, context, up=self.up)
+        placing = Placing(self.fit, self.height, self.side_by_side)
+        return ImportSession(named, self.frame_start, context, up=self.up, placing=placing)
 
     def _import(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
         manager = window_manager(context)
@@ -216,9 +277,9 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
             return {"CANCELLED"}
         return self.begin(context, self._session.steps(manager.progress_update))
 
-    def conclude(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+    def conclude(self, context: bpy.types.Context) -> None:
         assert self._session is not None
-        self._report(self._session.end())
+        self._finished(context, self._session)
 
     def status(self, progress: float) -> str:  # noqa: ARG002
         assert self._session is not None
@@ -233,7 +294,7 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
         message = f"{count} {'clip' if count == 1 else 'clips'} imported"
         if session.refused:
             message += f", {len(session.refused)} refused"
-        self.report({"INFO"}, f"{message}.")
+        self.report({"INFO"}, f"{message}. {session.placed}".rstrip())
         # Blender's status bar keeps the last, which is to be the one that says most.
         for clip in session.clips:
             for note in clip.notes:

@@ -11,17 +11,14 @@ from collections.abc import Sequence
 from typing import Any, Final, cast
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty
 
-from ...blender.animation import read_clip
 from ...blender.rig import armature_data, read_skeleton
-from ...core.errors import OctoMotionError, RigError
-from ...core.skeleton import Skeleton
-from ...core.splicing.clip import average_pose
+from ...core.errors import RigError
 from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
 from ..operator_base import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in
+from .bodies import in_motion
 from .properties import PROPERTIES, read_landmarks, title, write_landmarks
 from .splice_operators import StackOperator
 
@@ -29,10 +26,6 @@ _CHOICES: Final = tuple(
     (name, each, "Part of the body", number)
     for number, (each, name) in enumerate(PROPERTIES.items())
 )
-
-
-_LOOKS: Final = 50
-"""Frames of an action that are looked at to see how its bones lie."""
 
 
 class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
@@ -50,7 +43,7 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
     )
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
-        found = map_skeleton(read_skeleton(armature), _in_motion(armature))
+        found = map_skeleton(read_skeleton(armature), in_motion(armature))
         if found.problem:
             raise RigError(
                 f"'{armature.name}' has no landmarks. {found.problem}",
@@ -67,18 +60,6 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
             self.report({"WARNING"}, f"Choose the bones of: {names}. {found.missing[asked[0]]}")
         for note in found.notes:
             self.report({"WARNING"}, note)
-
-
-def _in_motion(armature: bpy.types.Object) -> Skeleton | None:
-    """The bones as they lie in the armature's action, if it has one that moves them."""
-    data = armature.animation_data
-    if data is None or data.action is None:
-        return None
-    first, last = data.action.frame_range
-    try:
-        return average_pose(read_clip(armature, frames=np.unique(np.linspace(first, last, _LOOKS))))
-    except OctoMotionError:
-        return None
 
 
 class OCTO_MOTION_OT_landmark_pick(StackOperator, bpy.types.Operator):

@@ -27,7 +27,7 @@ from ...blender.animation import (
 from ...blender.rig import armature_data
 from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.splicing.clip import After, Clip, Timing, average_pose, splice_window
-from ...core.splicing.humanoid import LANDMARKS, OPTIONAL, Landmarks, map_skeleton
+from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
 from ...core.splicing.transfer import (
     CHAIN,
     LimbGoal,
@@ -45,7 +45,8 @@ from ...core.splicing.transfer import (
     suggest_timings,
 )
 from ..declared_settings import plain
-from .properties import read_landmarks, splicing_settings, write_landmarks
+from .bodies import known_landmarks
+from .properties import splicing_settings, write_landmarks
 
 _FINER: Final = 4
 """Samples per frame of a clip that is slowed down, …"""
@@ -246,7 +247,8 @@ class ClipReader:
                 count = finer * (len(clip) - 1) + 1
                 frames = np.linspace(clip.frames[0], clip.frames[-1], count)
                 clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
-            landmarks, problem, found = known_landmarks(armature, clip)
+            known = known_landmarks(armature, clip.skeleton, average_pose(clip))
+            landmarks, problem, found = known
             self._sources[key] = Source(clip, landmarks, armature.name, problem, found)
         return self._sources[key]
 
@@ -265,22 +267,6 @@ def _check_mixing(armature: bpy.types.Object) -> None:
             "In the NLA editor set the action's Blending to Replace and its Influence to 1, mute "
             "the tracks, or turn off Base As Shown.",
         )
-
-
-def known_landmarks(armature: bpy.types.Object, clip: Clip) -> tuple[Landmarks | None, str, bool]:
-    """Landmarks of an armature with a motion: of its table, completed by what can be found.
-
-    Returns:
-        The landmarks, none where the table is empty and the skeleton is no humanoid; why that is
-        so; and whether the table was empty and could be filled with them.
-    """
-    bones = dict(read_landmarks(splicing_settings(armature).landmarks).bones)
-    if all(each in bones for each in LANDMARKS if each not in OPTIONAL):
-        return Landmarks(bones), "", False
-    found = map_skeleton(clip.skeleton, average_pose(clip))
-    if found.problem and not bones:
-        return None, found.problem, False
-    return Landmarks(dict(found.landmarks.bones) | bones), "", not bones
 
 
 def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:

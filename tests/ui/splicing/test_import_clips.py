@@ -176,7 +176,7 @@ def test_a_clip_stands_as_blenders_own_importer_shows_it(shared_data: Data) -> N
     bpy.ops.import_anim.bvh(filepath=str(path))
     own: Any = bpy.context.object
     own_joints = [joints_in_world(own, frame) for frame in (1, 9, 25)]
-    import_files(path)
+    click("import_clips", filepath=str(path), fit="NONE")
     clip: Any = bpy.context.object
 
     assert clip != own
@@ -490,6 +490,9 @@ class Operator:
     frame_start = 1
     filepath = ""
     up = "AUTO"
+    fit = "HUMANOIDS"
+    height = 0.0
+    side_by_side = frame_view = True
 
     def __init__(self, folder: Path, names: list[str]) -> None:
         self.directory = str(folder)
@@ -524,7 +527,7 @@ def test_several_files_come_one_after_the_other(shared_data: Data) -> None:
         assert operator.modal(window, Press("LEFTMOUSE")) == {"RUNNING_MODAL"}
     assert counts == [1, 2, 3]
     assert window.calls[-3:] == CLEAN
-    assert operator.reports == ["3 clips imported."]
+    assert operator.reports == ["3 clips imported. Fitted to the height: 1.7 m."]
     layer: Any = bpy.context.view_layer
     assert layer.objects.active.name == "avatar_walk"
     assert all(each.select_get() for each in bpy.data.objects)

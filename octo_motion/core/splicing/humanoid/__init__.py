@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which bone of a skeleton is which landmark of a body."""
 
+from .body_height import stature
 from .correspondence import (
     Correspondence,
     chain_length,
@@ -29,4 +30,5 @@ __all__ = [
     "mirrored",
     "opposite",
     "rest_alike",
+    "stature",
 ]
