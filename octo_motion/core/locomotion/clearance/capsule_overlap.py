@@ -76,13 +76,10 @@ class Separation:
 
 
 def measure_overlap(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) -> Separation:
-    """How far chains pass through each other and through parts of the body.
+    """How far chains, the arms, pass through each other and through parts of the body.
 
-    Neighbouring capsules of one chain are joined; a chain is not measured against itself.
-
-    Args:
-        chains: the arms, all of as many frames.
-        still: parts of the body; they are not measured against each other.
+    Neighbouring capsules of one chain are joined; a chain is not measured against itself, nor parts
+    against each other.
     """
     every = [*chains, *still]
     if not chains:
@@ -137,12 +134,8 @@ def parts_of(chains: Sequence[Capsules]) -> Parts:
 def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (pairs,) and (pairs,) of the capsules that must not overlap.
 
-    They are of two chains, of which one at least moves, and are apart at rest, and no longer
-    crowded there.
-
-    Args:
-        chains: those that move first.
-        moving: how many these are.
+    They are of two chains, of which one at least moves (those come first), and are apart at rest,
+    and no longer crowded there.
     """
     rest = [Capsules(each.name, each.at_rest[None], each.radii, each.at_rest) for each in chains]
     parts = parts_of(rest)
@@ -165,16 +158,11 @@ def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.nd
 def near(
     parts: Parts, one: np.ndarray, other: np.ndarray, margin: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Numbers of frames and of pairs whose bounding spheres touch.
+    """Numbers of frames and of pairs whose bounding spheres touch, and how far apart their middle
+    lines are at least.
 
-    Args:
-        parts: the capsules.
-        one: (pairs,) capsules …
-        other: (pairs,) … and others.
-        margin: radii by which they may be further apart.
-
-    Returns:
-        Frames and pairs, and how far apart the middle lines of the two are at least.
+    Of capsules ``one`` (pairs,) and ``other`` (pairs,), those count that are no further apart than
+    a margin in radii.
     """
     if len(one) == 0:
         none = np.zeros(0, dtype=np.intp)
@@ -234,17 +222,11 @@ def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> 
 
 
 def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
-    """Where two line segments are nearest to each other.
+    """Where two segments, from p and from q (3, pairs) along u and v (3, pairs), are nearest to
+    each other.
 
-    Args:
-        p: (3, pairs) start of the one.
-        u: (3, pairs) from its start to its end.
-        q: (3, pairs) start of the other.
-        v: (3, pairs)
-
-    Returns:
-        Shares (pairs,) of the way from start to end on the one and on the other, and the way
-        (3, pairs) from there on the other to there on the one.
+    Shares (pairs,) of the way from start to end on the one and on the other, and the way (3, pairs)
+    from there on the other to there on the one.
     """
     w = p - q
     a, b, e = dot(u, u), dot(u, v), dot(v, v)
@@ -366,11 +348,8 @@ class Touches:
 
 
 class Touching:
-    """The capsules that are so near to each other that they may ever touch, at all frames.
-
-    Args:
-        crowd: the arms.
-        still: parts of the body, one frame each.
+    """The capsules of arms and of parts of the body, one frame each, that are so near to each other
+    that they may ever touch, at all frames.
     """
 
     def __init__(self, crowd: Crowd, still: Sequence[Capsules]) -> None:
@@ -410,11 +389,10 @@ class Touching:
         return self._at(self._crowd.joints, *rows)
 
     def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:
-        """Look from now on only at what is near enough for arms that make way.
+        """Look from now on only at what is near enough for arms that make way, in frames (frames,)
+        in which anybody may have to.
 
-        Args:
-            frames: (frames,) whether anybody may have to, then.
-            without: pairs of capsules (``Touches.pair``) that are left as they are.
+        Some pairs (``Touches.pair``) are left as they are.
         """
         chosen = frames[self._frame]
         if len(without):
@@ -515,8 +493,7 @@ def _sides(places: Floats) -> Floats:
 def aside(touches: Touches) -> tuple[Floats, Floats]:
     """How the one of each pair has to move against the other for them to touch no more.
 
-    Returns:
-        Unit vectors (3, touches) which way, and how far (touches,), 0 where they are apart.
+    Unit vectors (3, touches) say which way, and how far (touches,), 0 where they are apart.
     """
     apart = touches.distance / touches.wide
     straight = touches.gap / np.maximum(touches.distance, _TINY)

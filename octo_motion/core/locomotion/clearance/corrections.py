@@ -181,13 +181,11 @@ class _Posed:
         return np.moveaxis(found.reshape(bones + 1, 3, -1, count), (0, 1), (2, 3))
 
     def turn(self, rotations: Floats, before: Floats, after: Floats, which: np.ndarray) -> None:
-        """Turn bones along with their segments, by the smallest turn.
+        """Turn bones (frames, all bones, 4) along with their segments, by the smallest turn, in
+        place.
 
-        Args:
-            rotations: (frames, all bones, 4), changed in place.
-            before: (frames, all arms, joints, 3)
-            after: the same, as they are to be.
-            which: numbers of the joints that stand for all of these arms.
+        Joints (frames, all arms, joints, 3) are as before and as they are to be; ``which`` are the
+        numbers of those that stand for all of these arms.
         """
         count = len(self.columns)
         start, end = (each[:, self.numbers, : len(which)] for each in (before, after))
@@ -264,9 +262,8 @@ class BodyVolume:
     def measure(self, rotations: Floats, strains: Floats) -> tuple[Separation, int]:
         """What overlaps, and at every how many frames it was looked for.
 
-        Args:
-            rotations: (frames, bones, 4) of all arms, one after the other.
-            strains: (frames, bones) by how much bones are longer than at rest.
+        Rotations (frames, bones, 4) and strains (frames, bones) are of all arms, one after the
+        other.
         """
         every = max(1, -(-self._distances(len(rotations)) // _MOST_DISTANCES))
         looked = rotations[::every]
@@ -287,12 +284,9 @@ class BodyVolume:
 
     @staticmethod
     def told(found: Separation, every: int, frames: Floats) -> tuple[str, ...]:
-        """A sentence on the deepest overlap, none if arms keep apart.
+        """A sentence on the deepest overlap that :meth:`measure` found, none if arms keep apart.
 
-        Args:
-            found: what :meth:`measure_overlap` says.
-            every: at every how many frames it looked.
-            frames: (frames,) their numbers in the scene.
+        Frames (frames,) are their numbers in the scene.
         """
         worst = found.worst
         if worst is None or worst.depth <= DEEP:
@@ -366,11 +360,8 @@ class ArmsOverGround:
         return batches_by_bones(self.arms)
 
     def clear(self, joints: Sequence[Floats], arms: Sequence[int] | None = None) -> Floats:
-        """Arm lengths (frames, arms) that each arm's lowest joint is above the ground.
-
-        Args:
-            joints: of each arm (frames, joints, 3), world.
-            arms: which are looked at, none for all.
+        """Arm lengths (frames, arms) that the lowest of each arm's joints (frames, joints, 3),
+        world, is above the ground, of some arms or all.
         """
         found = []
         for number in range(len(self.arms)) if arms is None else arms:
@@ -383,10 +374,8 @@ class ArmsOverGround:
         """Arm lengths (frames − 1, arms) that each one's lowest joint is below the ground half way
         between frames; 0 where it cannot be.
 
-        Args:
-            poses: at the frames.
-            clear: (frames, all arms) arm lengths that they are above the ground there.
-            arms: which are looked at, none for all.
+        At the frames they are ``clear`` (frames, all arms) arm lengths above it. Some arms are
+        looked at, or all.
         """
         frames, count = poses.rotations.shape[:2]
         found = np.zeros((frames - 1, len(self.arms)))
@@ -542,12 +531,9 @@ _ALONG: Final = np.array([1.0, 0.0, 0.0])
 def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
     """How far arms (frames, arms) are to be kept off the ground, 0…1.
 
-    Those that walk see to it themselves; all that swim or go over from one gait to another do not.
-
-    Args:
-        swims: whether each segment of the route is swum, one at least.
-        shares: for each change from one to the next, how far each arm (frames, arms) has gone
-            over.
+    Those that walk see to it themselves; all that swim (one segment of the route at least) or go
+    over from one gait to another do not. Shares say for each change how far each arm (frames, arms)
+    has gone over.
     """
     result = np.full(shares[0].shape if shares else (1, 1), float(swims[0]))
     for swum, share in zip(swims[1:], shares, strict=True):
@@ -562,11 +548,8 @@ def keep_off_ground(
 ) -> Floats:
     """Rotations (frames, bones, 4) of the same arms off the ground.
 
-    Args:
-        course: the arms and the ground.
-        poses: the arms as they are.
-        radii: for each arm (joints,) metres from each joint to the skin below it.
-        loose: (frames, arms) how far each is to be raised, 0…1.
+    Radii are metres from each joint (joints,) of an arm to the skin below it; ``loose`` (frames,
+    arms) is how far each is to be raised, 0…1.
     """
     result = poses.rotations.copy()
     for number, arm in enumerate(course.arms):

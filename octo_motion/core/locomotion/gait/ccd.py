@@ -29,16 +29,10 @@ GROUPS = 3
 
 
 def diameters(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
-    """Diameters ``w_i = w₀ (1 − τ i)``, i = 0 … joints − 1 [Octopus, eq. 3.1].
+    """Diameters ``w_i = w₀ (1 − τ i)``, i = 0 … joints − 1, in metres [Octopus, eq. 3.1].
 
-    Args:
-        joints: number of segments n.
-        first: diameter w₀ at the root, in metres.
-        taper: τ, the share of w₀ that each joint loses; 1/n makes a cone, and more would leave
-            joints that are thinner than nothing.
-
-    Returns:
-        (joints,) in metres.
+    τ is the share of w₀, the diameter at the root, that each joint loses; 1/n makes a cone, and
+    more would leave joints that are thinner than nothing.
     """
     return first * (1.0 - taper * np.arange(joints, dtype=np.float64))
 
@@ -46,12 +40,10 @@ def diameters(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
 def split_groups(lengths: Floats) -> tuple[int, int, int]:
     """Sizes of the three groups, as equal in length as whole segments allow.
 
-    The source cuts n segments, n a multiple of three, into thirds. Artists' arms have any number
-    of segments of any length, so the cuts are made where the three sums differ least (the sum of
-    their squares is smallest); of equal cuts the one nearest to equal counts wins.
-
-    Args:
-        lengths: (segments,), at least three of them, not all zero.
+    The source cuts n segments, n a multiple of three, into thirds. Artists' arms have any number of
+    segments of any length, at least three, not all zero, so the cuts are made where the three sums
+    differ least (the sum of their squares is smallest); of equal cuts the one nearest to equal
+    counts wins.
     """
     count = len(lengths)
     reach = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -98,33 +90,24 @@ SHORTEST = 0.05
 
 
 def contraction(angles: Floats, factor: float = 1.0) -> Floats:
-    """Contraction ``e_g = −|F_g| / 2π`` of each link [Octopus, eq. 3.11].
+    """Contraction ``e_g = −|F_g| / 2π`` of each link (…, links), from ``SHORTEST − 1`` to 0
+    [Octopus, eq. 3.11].
 
     The source has one angle for each link; where head and pitch turn it together, F is the length
     of the two as a vector, which equals the one angle when the other is zero. Bank only twists.
-
-    Args:
-        angles: (…, links, 3) head, pitch, bank in radians.
-        factor: 1 as in the source, 0 for links of fixed width.
-
-    Returns:
-        (…, links), from ``SHORTEST − 1`` to 0.
+    Angles (…, links, 3) are head, pitch, bank in radians; the factor is 1 as in the source, 0 for
+    links of fixed width.
     """
     turn = np.hypot(angles[..., HEAD], angles[..., PITCH])
     return np.maximum(-factor * turn / (2.0 * np.pi), SHORTEST - 1.0)
 
 
 def link_rotations(angles: Floats) -> Floats:
-    """Orientation of each link, carried by those before it [Octopus, §3.1.3].
+    """Orientation (…, links, 4) of each link, carried by those before it [Octopus, §3.1.3].
 
     Within a link, pitch turns first about the vertical axis, then head about the lateral axis so
-    turned. Bank does not turn the chain: the source moves targets by head and pitch alone.
-
-    Args:
-        angles: (…, links, 3) head, pitch, bank in radians; positive pitch turns x towards y.
-
-    Returns:
-        (…, links, 4) quaternions.
+    turned. Bank does not turn the chain: the source moves targets by head and pitch alone. Angles
+    (…, links, 3) are head, pitch, bank in radians; positive pitch turns x towards y.
     """
     own = multiply(
         from_axis_angle(_UP, angles[..., PITCH]), from_axis_angle(-_ACROSS, angles[..., HEAD])
@@ -137,15 +120,10 @@ def link_rotations(angles: Floats) -> Floats:
 
 
 def pseudo_targets(rotations: Floats, widths: Floats) -> Floats:
-    """Positions Q₀ … Q₃.
+    """Positions Q₀ … Q₃ (…, links + 1, 3), from ``link_rotations``.
 
-    Args:
-        rotations: (…, links, 4) from ``link_rotations``.
-        widths: (…, links) width ``H_g (1 + e_g)`` of each link [Octopus, eq. 3.12–3.14, which
-            reuse the name H for the change of the width].
-
-    Returns:
-        (…, links + 1, 3).
+    Widths (…, links) are ``H_g (1 + e_g)`` of each link [Octopus, eq. 3.12–3.14, which reuse the
+    name H for the change of the width].
     """
     steps = rotate(rotations, _OUTWARD * widths[..., None])
     zero = np.zeros_like(steps[..., :1, :])
@@ -516,11 +494,8 @@ def _partial_turn(
     """A share of the smallest turn from one vector (3, batch) to another; the first is turned.
 
     Where the turn has no definite axis it fades out: near half a turn, and where the vectors are
-    short against the ``whole`` group.
-
-    Returns:
-        Two unit vectors that span the plane which is turned, (2, 3, batch), and the two whose
-        products with these make the turn, less one.
+    short against the ``whole`` group. Two unit vectors (2, 3, batch) span the plane which is
+    turned, and the two whose products with these make the turn, less one.
     """
     plane = np.empty((2, *end.shape))
     size = _size(end)

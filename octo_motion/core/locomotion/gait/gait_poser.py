@@ -73,12 +73,9 @@ class Build:
 def builds_of(
     segments: Sequence[Floats], weights: Sequence[float], *, on_ground: bool
 ) -> tuple[Build, ...]:
-    """Arms by how they are built.
+    """Arms by how they are built, of segments (bones,) as long, in any unit.
 
-    Args:
-        segments: for each arm (bones,) the lengths of its segments, any unit.
-        weights: of the joints, at even steps from an arm's root to its tip [Octopus, eq. 3.7].
-        on_ground: whether they walk.
+    Weights are of the joints, at even steps from an arm's root to its tip [Octopus, eq. 3.7].
     """
     shares = [lengths / float(lengths.sum()) for lengths in segments]
     same: dict[tuple[float, ...], list[int]] = {}
@@ -98,9 +95,7 @@ def builds_of(
 def bone_twists(build: Build, angles: Floats) -> Floats:
     """Radians (segments, frames, arms) by which each bone is twisted against the one before.
 
-    Args:
-        build: which arms.
-        angles: (frames, arms, links, 3) of these; bank is spread evenly over its group.
+    Of the angles (frames, arms, links, 3), bank is spread evenly over its group.
     """
     sizes = build.chain.sizes
     shares = np.moveaxis(angles[..., BANK], -1, 0) / np.array(sizes)[:, None, None]
@@ -418,11 +413,9 @@ class GaitPoser:
         return phase[:, None] + self.offsets
 
     def pose(self, phase: Floats, turn: Floats) -> ArmPoses:
-        """The arms at some frames.
+        """The arms at phases (frames,) of the body's gait, radians.
 
-        Args:
-            phase: (frames,) of the body's gait, radians.
-            turn: (frames, 2) turn that lies ahead, in the body's XY plane (``Travel.turn``).
+        The turn (frames, 2) lies ahead, in the body's XY plane (``Travel.turn``).
         """
         phases = self.arm_phases(np.asarray(phase, dtype=np.float64))
         angles, steering = self.asked(phases, turn)
@@ -510,10 +503,8 @@ class GaitPoser:
     def shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
         """Directions (segments, 3, frames, arms) in the arms' frames; misses (frames, arms, 3).
 
-        Args:
-            build: which arms.
-            angles: (frames, arms, links, 3) of these, from :meth:`asked`.
-            steering: (frames, arms) of these.
+        Angles (frames, arms, links, 3) and steering (frames, arms) of this build are from
+        :meth:`asked`.
         """
         if angles.shape[0] * angles.shape[1] > _FEW:
             return self._shapes(build, angles, steering)

@@ -37,13 +37,10 @@ _SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
 def swim_azimuths(
     skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFrame, lean: float
 ) -> Floats:
-    """Where each arm opens to (arms,), seen along the way: radians from the front, left positive.
+    """Where each arm, its bones root to tip, opens to (arms,), seen along the way: radians from the
+    front, left positive.
 
-    Args:
-        skeleton: the rig.
-        arms: bone names, root to tip.
-        body: which way the body faces.
-        lean: radians from the body's +Z towards its back to its way.
+    The way leans, radians, from the body's +Z towards its back.
     """
     fan = arm_azimuths(skeleton, arms, body)
     turned = body.rotation @ to_matrix(from_axis_angle(_SIDEWAYS, -lean))
@@ -58,9 +55,7 @@ def swim_azimuths(
 def trailing_asides(roots: Floats, first_groups: Floats) -> Floats:
     """By how far the first link of each arm (arms,) has to point beside the way, radians.
 
-    Args:
-        roots: (arms,) arm lengths from the way to where each arm begins.
-        first_groups: (arms,) arm lengths that the first group of each is long.
+    Roots (arms,) are arm lengths from the way, first groups (arms,) as many long.
     """
     if len(roots) < 2:
         return np.zeros(len(roots))
@@ -72,12 +67,8 @@ def trailing_beside(angles: Floats, asides: Floats) -> Floats:
     """Angles (frames, arms, links, 3) with which no arm trails in the line of all others.
 
     Arms that spring from one point would all come to lie in it as they close. They turn in less
-    far with their first links, and what is left with their second ones: so they trail side by
-    side.
-
-    Args:
-        angles: (frames, arms, links, 3) as the gait has them.
-        asides: (arms,) as of :func:`trailing_asides`.
+    far, by :func:`trailing_asides`, with their first links, and what is left with their second
+    ones: so they trail side by side.
     """
     off = asides > 0.0
     if not np.any(off):

@@ -179,17 +179,10 @@ class GaitTable:
 def gait_angles(
     table: GaitTable, phases: Floats, pairs: tuple[int, ...], *, smoothing_cycles: float = 0.0
 ) -> Floats:
-    """Angles of all arms.
+    """Angles (frames, arms, links, angles), radians, of arms of these pairs at phases (frames,
+    arms), radians, each arm's own offset included.
 
-    Args:
-        table: the gait.
-        phases: (frames, arms) radians, each arm's own offset included.
-        pairs: pair of each arm.
-        smoothing_cycles: cycles before and after each moment over which it is evened out
-            (:meth:`GaitCurve.rounding`).
-
-    Returns:
-        (frames, arms, links, angles) radians.
+    They are evened out over cycles before and after each moment (:meth:`GaitCurve.rounding`).
     """
     result = np.empty((*phases.shape, LINKS, len(ANGLES)))
     for pair, columns in _columns_by_curve(table, pairs).items():
@@ -273,12 +266,8 @@ def _rounded_off(
 ) -> Floats:
     """What rounds the corners of random additions off (frames, arms, links, 2).
 
-    Args:
-        curve: whose knots they are.
-        values: (cycles × knots, arms, links, 2) at these.
-        phases: (frames, arms) radians.
-        first: number of the first cycle.
-        smoothing_cycles: as of :func:`gait_angles`.
+    Values (cycles × knots, arms, links, 2) are at the curve's knots from the first cycle on, phases
+    (frames, arms) in radians.
     """
     knots, arms = len(curve.phases) - 1, np.arange(phases.shape[1])
     apart = np.tile(np.diff(curve.phases), len(values) // knots)[:-1, None, None, None]
@@ -307,11 +296,7 @@ def _columns_by_curve(table: GaitTable, pairs: tuple[int, ...]) -> dict[int, np.
 
 
 def curve_from_degrees(phases: list[float], **angles: list[list[float]]) -> GaitCurve:
-    """A curve from degrees, each angle as one list of knot values for each link.
-
-    Args:
-        phases: of the knots.
-        angles: by their names; those that are not given stay at zero.
+    """A curve from degrees, each angle as one list of knot values for each link, zero if not given.
 
     Raises:
         ValueError: phases are no row of numbers, or an angle has not one for each link and knot.
@@ -416,9 +401,7 @@ def _rounded(values: Any) -> list[float]:
 def gait_from_json(text: str, source: str = "The gait file") -> GaitTable:
     """The table in a text made by ``gait_to_json`` or by hand.
 
-    Args:
-        text: JSON.
-        source: what error messages call it, such as the file's name.
+    The source is what error messages call it, such as the file's name.
 
     Raises:
         GaitError: no JSON, not a gait, from a newer version, or damaged (see ``check_gait``).

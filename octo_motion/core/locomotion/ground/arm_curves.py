@@ -136,16 +136,11 @@ def _at_a_step(way: _Way, length: Floats) -> tuple[Floats, Floats]:
 def _resting(
     ground: Ground, points: Floats, radius: Floats, bones: Floats, ahead: Floats
 ) -> Floats:
-    """Height (…,) of a joint such that the skin of the bones at it lies on the ground.
+    """Height (…,) of a joint at points (…, 2 or 3) such that the skin of the bones at it lies on
+    the ground, a radius (…,) of metres below.
 
-    Between its ends a bone is straight. Over a crest both are higher, by what it would cut off.
-
-    Args:
-        ground: what it lies on.
-        points: (…, 2 or 3) where the joint is.
-        radius: (…,) metres from it to the skin below.
-        bones: (…,) metres that these bones are long.
-        ahead: (…, 2) unit: which way they lie.
+    Between its ends a bone (…,) of metres is straight, and lies ahead (…, 2), unit. Over a crest
+    both are higher, by what it would cut off.
     """
     points = points[..., :2]
     slope = ground.slope(points)
@@ -186,12 +181,8 @@ class Seen:
 def skin_below(skin: ArmSkin, seen: Seen, known: Floats, ground: Ground, *, scale: float) -> Floats:
     """Metres (cycles, bones + 1 − c) from joints that lie to the skin below them.
 
-    Args:
-        skin: of the arm.
-        seen: how it lies if it is round.
-        known: (cycles, bones + 1 − c) the same for round skin.
-        ground: what it lies on.
-        scale: metres of the armature's unit.
+    If it is round, they are as ``known``; the arm lies as ``seen`` on the ground, by a scale of
+    metres to the armature's unit.
     """
     first = seen.joints.shape[1] - known.shape[1]
     # The bone that comes down has the ground of where it does so.
@@ -214,11 +205,8 @@ def skin_below(skin: ArmSkin, seen: Seen, known: Floats, ground: Ground, *, scal
 def _lowered(ends: Floats, reach: Floats, upward: Floats, ground: Ground) -> Floats:
     """Metres (moments,) that a bone's tail can be lowered before its skin is in the ground.
 
-    Args:
-        ends: (moments, 2, 3) head and tail, world.
-        reach: (moments, 2) metres that its skin reaches down there.
-        upward: (moments, 3) which way up the ground is there.
-        ground: what it comes down to.
+    Its ends (moments, 2, 3) are head and tail, world; skin reaches (moments, 2) metres down there,
+    and the ground's up is (moments, 3).
     """
     along = _ALONG[:, None]
     points = ends[:, None, 0] + along * (ends[:, 1] - ends[:, 0])[:, None]
@@ -532,12 +520,10 @@ def _heights(directions: Floats, lengths: Floats, roots: Floats, ground: Ground)
 
 
 def _turn_up(directions: Floats, turn: Floats, level: Floats) -> None:
-    """Turn directions (segments, 3, batch) in place towards z.
+    """Turn directions (segments, 3, batch), unit, in place towards z, by the share of it in
+    ``turn`` (segments, batch), which is changed too.
 
-    Args:
-        directions: unit.
-        turn: (segments, batch) how much of z is added to each; changed in place.
-        level: (segments, batch) square of what is level of each direction.
+    ``level`` (segments, batch) is the square of what is level of each direction.
     """
     square = turn * turn
     square *= level

@@ -163,11 +163,9 @@ def _over_bumps(
 ) -> Floats:
     """Heights (n,) raised where a bump right under the body would come too near to it.
 
-    Args:
-        level: (n,) metres, the ground as it is evened out.
-        felt: (n, places across the way) metres, the ground as it is.
-        heights: metres of the body's centre above the level, and at least above the bump.
-        kernel: by which what is lacking is evened out.
+    The ground is (n,) metres as it is evened out, and (n, places across the way) as it is. Heights
+    are of the body's centre above the level, and at least above the bump; a kernel evens out what
+    is lacking.
     """
     clearance, headroom = heights
     near = np.abs(_ACROSS) <= _UNDER
@@ -256,9 +254,8 @@ class ContactTiming(Protocol):
     def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """Where arms are to take hold in cycles whose numbers are (cycles,), seen from above.
 
-        Returns:
-            Radians (arms, cycles) anticlockwise from an arm's own direction, and metres (arms,
-            cycles) from its root half way through the stance, nan for where it holds on with ease.
+        Radians (arms, cycles) are anticlockwise from an arm's own direction, metres (arms, cycles)
+        from its root half way through the stance, nan for where it holds on with ease.
         """
         ...
 
@@ -317,13 +314,10 @@ class TabledTiming:
 
 
 def crawl_timing(stances: CrawlStances, arms: int, *, middle: float, duty: float) -> TabledTiming:
-    """The rhythm of arms whose cycles begin and end with their own stances.
+    """The rhythm of so many arms whose cycles begin and end with their own stances.
 
-    Args:
-        stances: of all arms.
-        arms: how many there are.
-        middle: phase of the gait half way through a stance, radians.
-        duty: share of a cycle that a stance takes in the gait.
+    In the gait a stance takes ``duty`` of a cycle, and is half over at the phase ``middle``,
+    radians.
     """
     return TabledTiming([_table(stances, arm, duty) for arm in range(arms)], middle)
 
@@ -405,12 +399,9 @@ class CrawlingBody:
 def crawling(
     body: CrawlingBody, settings: CrawlSettings, stands: tuple[bool, bool] = (False, False)
 ) -> TabledTiming:
-    """When the arms of a crawling body are in contact with the ground.
+    """When the arms of a crawling body on its way are in contact with the ground.
 
-    Args:
-        body: on its way.
-        settings: how it crawls.
-        stands: whether it stands at the start of its way, and at the end, with all arms down.
+    It stands with all arms down at the start of its way, at the end, or not.
     """
     distance = body.samples(body.line.route.length)
     stances = plan_crawl(body.path(distance, *body.line.at(distance), stands), settings)

@@ -111,11 +111,8 @@ def easy_height(
 ) -> float:
     """How far above the ground an arm may begin and still hold on with ease.
 
-    Args:
-        reach: (segments + 1,) along it to each joint.
-        radii: (segments + 1,) from each joint to the skin below it.
-        settings: how it holds on.
-        may_stretch: whether its bones may get longer.
+    Reach (segments + 1,) is along it to each joint, radii (segments + 1,) from there to the skin
+    below.
     """
     joint = touching(reach, settings.planted)
     longer = 1.0 + _STRETCHED * settings.stretch * may_stretch
@@ -227,11 +224,8 @@ def _spot(
 def peeled_to(limbs: Limbs, joint: int, joints: Floats, roots: Floats) -> Floats:
     """Metres along the arm (arms, cycles) up to which a body at its farthest peels it off.
 
-    Args:
-        limbs: the arms.
-        joint: the one that touches first.
-        joints: (arms, cycles, joints, 3) from that one on, as they lie, world.
-        roots: (arms, cycles, 3) where the arms' roots are then, world.
+    From the joint that touches first on, joints (arms, cycles, joints, 3) lie as they are; the
+    roots are (arms, cycles, 3) then, world.
     """
     along = limbs.reach[joint:]
     first, last = along[0][:, None], along[-1][:, None]
@@ -514,11 +508,7 @@ def _places(
 def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) -> Footholds:
     """The same footholds of arms that lie otherwise.
 
-    Args:
-        footholds: of these arms.
-        limbs: the arms.
-        ground: what they lie on.
-        skins: (arms, cycles, segments + 1 − c) metres from each joint to the skin below it.
+    Skins (arms, cycles, segments + 1 − c) are metres from each joint to the skin below it.
     """
     joint, spot = footholds.touching, footholds.joints[:, :, 0]
     turns = {"heading": footholds.headings, "curl": footholds.curls}

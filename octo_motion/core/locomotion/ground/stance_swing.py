@@ -203,11 +203,8 @@ class StancePose:
 def stance_at(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Floats) -> Stance:
     """The footholds of a batch, and how far each is laid down or peeled off.
 
-    Args:
-        batch: the arms.
-        footholds: of their limbs.
-        cycles: (batch,) number of each one's cycle.
-        since: (batch,) cycles since the middle of the stance that the gait gives it.
+    Each one is in its cycle (batch,), and cycles (batch,) since the middle of the stance that the
+    gait gives it.
     """
     roots = batch.roots
     at = batch.arms, cycles - footholds.first
@@ -246,14 +243,8 @@ def pulled_to_footholds(
 ) -> tuple[Floats, Floats]:
     """Strains (segments, batch) and directions (segments, 3, batch) of arms.
 
-    Arms with their gait's shapes, brought to their footholds; in the air they may be in the ground.
-
-    Args:
-        batch: the arms.
-        shapes: (segments, 3, batch) the gait's directions, world.
-        stance: how each one holds on.
-        ground: what it must not pass through.
-        settings: how arms hold on.
+    Arms with their gait's shapes (segments, 3, batch), world, brought to their footholds; in the
+    air they may be in the ground.
     """
     strains, standing = _in_stance(batch, shapes, stance, ground, settings)
     return strains, lerp_bends(batch.outward, standing, shapes, 1.0 - stance.weight)
@@ -271,14 +262,8 @@ def kept_over_ground(
     ground: Ground,
     settings: StanceSettings,
 ) -> StancePose:
-    """Arms that are in the air brought off the ground.
-
-    Args:
-        batch: the arms.
-        pose: strains and directions, as :func:`pulled_to_footholds` returns them.
-        stance: how each one holds on.
-        ground: what it must not pass through.
-        settings: how arms hold on.
+    """Arms that are in the air brought off the ground, by strains and directions as
+    :func:`pulled_to_footholds` returns them.
     """
     (strains, directions), weight, reach = pose, stance.weight, batch.reach
     lengths = batch.lengths * (1.0 + strains)
@@ -362,15 +347,10 @@ def _in_stance(
 def _drawn_to_foothold(
     batch: Batch, own: Floats, stance: Stance, ground: Ground, *, strain: Floats, chord: Floats
 ) -> Floats:
-    """Directions (segments, 3, batch) of arms in stance that meet their footholds.
+    """Directions (segments, 3, batch) of arms in stance, from their own, that meet their footholds.
 
-    Args:
-        batch: the arms.
-        own: (segments, 3, batch) what they begin with.
-        stance: how each holds on.
-        ground: what it must not pass through.
-        strain: (segments, batch) by how much their bones are longer than at rest, as a share.
-        chord: (3, batch) from each one's root to where it meets the ground.
+    Strain (segments, batch) is by how much bones are longer than at rest, as a share; the chord (3,
+    batch) leads from each one's root to where it meets the ground.
     """
     free, lengths = _freedom(batch, stance), batch.lengths * (1.0 + strain)
     # What is out of reach is pointed at: at full stretch no solver has a definite answer.
@@ -522,11 +502,10 @@ def _met(batch: Batch, stance: Stance, lying: Floats) -> tuple[Floats, Floats]:
 
 
 def _strained(ratio: Floats, stretch: float) -> Floats:
-    """Strains (batch,) of arms that may stretch, and shorten where they are crowded.
+    """Strains (batch,) of arms that may stretch by a share at most, and shorten where they are
+    crowded.
 
-    Args:
-        ratio: (batch,) of the way from body to ground to the length of arm between the two.
-        stretch: the most that bones get longer by, as a share.
+    The ratio (batch,) is of the way from body to ground to the length of arm between the two.
     """
     taut = np.maximum(ratio / _EASY - 1.0, 0.0)
     taut = taut * taut / (taut + _GENTLE)
@@ -540,14 +519,8 @@ def _arch(batch: Batch, stance: Stance, chord: Floats, arriving: Floats, strain:
     """Directions (segments, 3, batch) of arms that are one curve from the body to the ground.
 
     A cubic that leaves and arrives as the arm does, and is as long. The slacker the arm, the more
-    it rises.
-
-    Args:
-        batch: the arms.
-        stance: how each holds on.
-        chord: (3, batch) from each one's root to where it meets the ground.
-        arriving: (3, batch) unit: which way it runs into it there.
-        strain: (batch,) by how much it is longer than at rest, as a share.
+    it rises. Its chord (3, batch) leads from the root to where it meets the ground, which it runs
+    into by a unit vector (3, batch), longer than at rest by a share (batch,).
     """
     lengths, reach = batch.lengths, batch.reach
     ratio = np.sqrt(dot(chord, chord)) / stance.contact_from

@@ -45,15 +45,11 @@ class SwingSmoothing:
 
     @classmethod
     def over(cls, cycles: float, frames_per_cycle: float) -> SwingSmoothing | None:
-        """Means over so many cycles before and after each frame; none where that is nothing.
+        """Means over so many cycles before and after each frame, h; none where that is nothing.
 
         Weights that fall off evenly to nothing within h have a variance of h² / 6, as has the
         rounding of a gait's table (``GaitCurve.rounding``). That of a mean over k frames to either
         side is k (k + 1) / 3, and variances of means in a row add up.
-
-        Args:
-            cycles: h, in cycles of the gait.
-            frames_per_cycle: of the gait.
         """
         variance = (cycles * frames_per_cycle) ** 2 / 6.0 / _PASSES
         if not variance > 0.0:
@@ -68,14 +64,11 @@ class SwingSmoothing:
         return _PASSES * (self.frames + 1)
 
     def evened(self, directions: Floats, share: Floats) -> Floats:
-        """Directions (segments, 3, frames, arms), evened out over frames that follow one another.
+        """Directions (segments, 3, frames, arms), unit, evened out over frames that follow one
+        another, each arm by a share (frames, arms) of 0…1.
 
         Before the first and after the last frame it goes on as it is there: those within
         :attr:`reach` of an end that is none of the motion's own are of no use.
-
-        Args:
-            directions: unit vectors.
-            share: (frames, arms) how far an arm is to be evened out, 0…1.
         """
         result = directions
         for _ in range(_PASSES):
@@ -103,13 +96,11 @@ class SwingSmoothing:
 
 
 def frames_around(part: slice, reach: int, count: int, *, cyclic: bool) -> tuple[np.ndarray, slice]:
-    """Numbers of some frames and of those round them, and where among these the frames are.
+    """Numbers of some frames that follow one another and of those round them, and where among these
+    the frames are.
 
-    Args:
-        part: frames that follow one another.
-        reach: how many more to either side.
-        count: frames of the whole motion.
-        cyclic: whether the last frame is the first again.
+    So many more are within reach to either side, of ``count`` in all; cyclic, the last is the
+    first.
     """
     if not cyclic or count < 2:
         first = max(part.start - reach, 0)
@@ -213,13 +204,10 @@ class WalkPart:
         higher: Raise | None,
         smoothing: SwingSmoothing | None,
     ) -> PartPoses:
-        """The arms at some frames.
+        """The arms of this part, by its number as ``Raise`` counts them, at some moments.
 
-        Args:
-            number: of this part among all, as ``Raise`` counts them.
-            moments: the frames.
-            higher: which arms are to be higher, none for all as high as they have to be.
-            smoothing: how arms in the air are evened out over frames that follow one another.
+        Some are to be higher, or all are as high as they have to be. In the air they are evened out
+        over frames that follow one another.
         """
         wanted = self.build.arms if higher is None else higher.arms
         chosen = [place for place, arm in enumerate(self.build.arms) if arm in wanted]
@@ -541,9 +529,7 @@ class GroundedWalk:
     def by_arm(self, values: Sequence[np.ndarray], higher: Raise | None = None) -> list[np.ndarray]:
         """What poses have for each build (frames, arms, …), for each arm (frames, …) instead.
 
-        Args:
-            values: of the builds.
-            higher: which arms they were asked of, none for all; of others it is none at all.
+        Of those arms that were not asked of it is none at all.
         """
         wanted = range(len(self._poser.arms)) if higher is None else higher.arms
         found = {arm: np.zeros((0, 1, 3)) for arm in range(len(self._poser.arms))}

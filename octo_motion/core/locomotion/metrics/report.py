@@ -35,11 +35,8 @@ class Worst:
 def slip(joints: Floats, lying: np.ndarray, cycles: np.ndarray, lengths: Floats) -> Worst:
     """How far a joint that rests on the ground has moved since it came to rest, in arm lengths.
 
-    Args:
-        joints: (frames, arms, joints, 3) world, frames in their order.
-        lying: (frames, arms, joints) which rest.
-        cycles: (frames, arms) number of each arm's cycle: in another cycle it rests anew.
-        lengths: (arms,) in the units of the joints.
+    Joints (frames, arms, joints, 3), world, and lengths (arms,) are of one unit. Those that lie
+    (frames, arms, joints) rest anew in another of each arm's cycles (frames, arms).
     """
     fresh = lying.copy()
     same = cycles[1:] == cycles[:-1]
@@ -67,11 +64,8 @@ def miss(misses: Floats) -> Worst:
 
 
 def change(rotations: Floats, frames: Floats) -> Worst:
-    """How far a bone turns from one frame to the next, radians per frame.
-
-    Args:
-        rotations: (frames, bones, 4) unit quaternions.
-        frames: (frames,) ascending; need not be whole.
+    """How far bones turn from one of the frames (frames,), ascending, to the next, radians per
+    frame, by unit quaternions (frames, bones, 4).
     """
     angle = angle_between(rotations[:-1], rotations[1:])
     return _worst(angle / np.diff(frames)[:, None])
@@ -142,14 +136,11 @@ class Played:
 
 
 def played_arm(matrices: Floats, length: float) -> tuple[Floats, Floats]:
-    """What :class:`Played` has of one arm.
+    """What :class:`Played` has of one arm: joints (moments, bones + 1, 3) and orientations
+    (moments, bones, 4).
 
-    Args:
-        matrices: (moments, bones, 4, 4) of its bones in the world, root to tip.
-        length: of the last one, in its own units.
-
-    Returns:
-        Joints (moments, bones + 1, 3) and orientations (moments, bones, 4).
+    Matrices (moments, bones, 4, 4) are of its bones in the world, root to tip; the length is that
+    of the last one, in its own units.
     """
     heads, axes = matrices[..., :3, 3], matrices[..., :3, :3]
     tip = heads[:, -1:] + length * axes[:, -1:, :, 1]
@@ -288,9 +279,7 @@ class _ArmMoving:
 def _places(measured: Measured, *, going: bool) -> tuple[Floats, Floats]:
     """Locations (2 frames − 1, 3) and orientations (2 frames − 1, 4) of the armature, world.
 
-    Args:
-        measured: the motion.
-        going: whether one that stays is taken to go along.
+    One that stays is taken to go along, if asked so.
     """
     poses, half = measured.poses, _half(measured)
     locations = _joined(poses.locations, half.locations)
@@ -334,14 +323,11 @@ def _moving(measured: Measured, number: int) -> _ArmMoving:
 def _skin_below(
     below: Floats, skin: ArmSkin, orientations: Floats, scale: float, seen: float
 ) -> Floats:
-    """Metres (moments, joints − 1) that skin is below the ground.
+    """Metres (moments, joints − 1) that skin is below the ground, of joints that are so far but the
+    root.
 
-    Args:
-        below: (moments, joints − 1) metres that joints are, but for the root.
-        skin: of the arm.
-        orientations: (moments, bones, 4) of its bones, world.
-        scale: metres of the armature's unit.
-        seen: metres from which on it matters that the skin may not be round.
+    Bones are oriented (moments, bones, 4), world; the scale is metres of the armature's unit. Only
+    from so many metres on does it matter that the skin may not be round.
     """
     found = below + scale * skin.radii[1:]
     some = np.flatnonzero(found.max(axis=1) > seen)
@@ -354,13 +340,10 @@ def _skin_below(
 
 
 def _beside_walls(below: Floats, joints: Floats, ground: Ground, length: float) -> Worst:
-    """The deepest skin of an arm, beside a wall no deeper than the wall is near.
+    """The deepest skin of an arm of a length in metres, beside a wall no deeper than the wall is
+    near.
 
-    Args:
-        below: (moments, joints) arm lengths that skin is below the ground above it.
-        joints: (moments, joints, 3) arm lengths.
-        ground: what it is below of.
-        length: metres of the arm.
+    Below the ground above it are (moments, joints) arm lengths, at joints (moments, joints, 3).
     """
     deepest = depth(below[:, None])
     if not deepest.value > TOLD["DEPTH"]:
@@ -398,10 +381,8 @@ def _going(measured: Measured, joints: Floats) -> Floats:
 
 
 def _lying(measured: Measured, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """One arm on every frame and half way between them.
-
-    Returns:
-        Which of its joints rest on the ground (moments, 1, joints), and its cycles (moments, 1).
+    """One arm on every frame and half way between them: which of its joints rest on the ground
+    (moments, 1, joints), and its cycles (moments, 1).
     """
     rests, cycle = measured.lying[number], measured.cycles[:, number : number + 1]
     # Half way it rests if it does so before and after.

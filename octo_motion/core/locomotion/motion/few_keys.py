@@ -202,13 +202,8 @@ def measure_keyed(
     """What is measured of a motion, of what its keys play in place of what was computed.
 
     Whether arms overlap, and how far they are from their targets, stays as it was computed.
-
-    Args:
-        measured: the motion as it was computed.
-        creature: whose keys they are.
-        channels: all that the motion has, those that have few keys and those that have one on
-            each frame.
-        travels: whether anything takes it along; in place it is measured as if something did.
+    Channels are all that the motion has, those with few keys and those with one on each frame.
+    Where nothing takes it along, it is measured as if something did.
     """
     frames = measured.frames
     halves = 0.5 * (frames[:-1] + frames[1:])

@@ -98,12 +98,7 @@ def pace_of(route: Route, travel: TravelSettings, frames: float) -> Pace:
 
 
 def too_few_frames(timing: Timing, pace: Pace) -> list[str]:
-    """What there is to say of arms that have no frames to swing in, with what would do.
-
-    Args:
-        timing: how the motion's frames are found.
-        pace: of the motion.
-    """
+    """What there is to say of arms that have no frames to swing in, with what would do."""
     swing = (1.0 - timing.duty) * pace.fastest
     if swing >= _SWING:
         return []

@@ -122,11 +122,8 @@ class Standing:
         return centres, leaning(upright, travel.rotations)
 
     def walk(self, line: Line, overrides: Sequence[ContactOverride]) -> GroundedWalk:
-        """The walk with its footholds.
-
-        Args:
-            line: the body's way: this walk's own, or one that other ways of moving are part of.
-            overrides: the artist's, for single contacts.
+        """The walk with its footholds and the artist's, on this body's way, or one that it is part
+        of.
         """
         creature = self.creature
         return GroundedWalk(
@@ -461,14 +458,10 @@ class Segments:
         *,
         cyclic: bool,
     ) -> Generator[float, None, SegmentedMotion]:
-        """Work the arms out, in steps that yield the share that is done.
+        """Work the arms out, so many moments at a step, yielding the share that is done.
 
-        Args:
-            travel: the body's, at all moments.
-            places: centres (moments, 3) and orientations (moments, 4) of the body.
-            step: moments to be worked on at a time.
-            frames_per_metre: moments, on the way.
-            cyclic: whether the last moment is the first again.
+        The body travels through centres (moments, 3) and orientations (moments, 4). Cyclic, the
+        last moment is the first again.
         """
         motion = SegmentedMotion(self, travel, places)
         for segment in range(self.count):
@@ -520,14 +513,9 @@ class SegmentedMotion:
         *,
         cyclic: bool,
     ) -> None:
-        """Pose the arms at a part of the moments of a segment.
+        """Pose the arms at a part of the moments (n,) of a segment.
 
-        Args:
-            segment: which.
-            moments: (n,) those of the segment.
-            part: which of them.
-            smoothing: how swings are evened out over time, none for each moment by itself.
-            cyclic: whether the last moment is the first again.
+        Swings are evened out over time, or not. Cyclic, the last moment is the first again.
         """
         plan, made, chosen = self.plan, self.segments[segment], moments[part]
         number = plan.gait_of(segment)
@@ -569,17 +557,13 @@ class SegmentedMotion:
     def calm(
         self, segment: int, moments: np.ndarray, arms: ArmMotion, lift: Floats | None = None
     ) -> None:
-        """Let arms that are about to go over, or have just done so, come to rest in their gait.
+        """Let arms that are about to go over, or have just done so, come to rest in their gait, in
+        place.
 
         The body turns meanwhile as no walking body does: what an arm on the ground would make of
-        that is wild. So an arm goes over from the pose in which it let go.
-
-        Args:
-            segment: which.
-            moments: (n,) which are looked at.
-            arms: the arms on this segment; changed in place.
-            lift: (n, arms) arm lengths by which arms are to be higher, and nothing happens to the
-                others; none for all of them as high as they have to be.
+        that is wild. So an arm goes over from the pose in which it let go. With a lift (n, arms) in
+        arm lengths, arms are to be so much higher and nothing happens to the others; else they are
+        as high as they have to be.
         """
         plan, number = self.plan, self.plan.gait_of(segment)
         walk = plan.walks[number]
@@ -643,15 +627,11 @@ class SegmentedMotion:
         return asked, here, higher
 
     def higher(self, chosen: np.ndarray, lift: Floats) -> tuple[ArmMotion, list[Floats] | None]:
-        """Some moments anew, with arms that are higher.
+        """Some moments (n,) anew, with arms that are a lift (n, arms) of arm lengths higher than
+        they have to be.
 
-        Args:
-            chosen: (n,) moments.
-            lift: (n, arms) arm lengths by which arms are to be higher than they have to be.
-
-        Returns:
-            The arms there, of which those that are not raised count for nothing where the gait
-            never changes; and, where they are known, joints of the raised ones by arm.
+        Of the arms there, those that are not raised count for nothing where the gait never changes.
+        With them come joints of the raised ones by arm, where they are known.
         """
         if self.plan.transitions is None:
             return self._higher_on_one(chosen, lift)

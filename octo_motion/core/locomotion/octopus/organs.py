@@ -59,16 +59,8 @@ _SIPHON_SHARES: Final = np.array([0.1, 0.4, 0.8, 1.0, 1.0, 1.0, 1.0, 1.0])
 def add_head_details(
     surface: Surface, form: BodyForm, sheet: Sheet, vertices: Indices
 ) -> NDArray[np.bool_]:
-    """Eyes in their lids, and the siphon.
-
-    Args:
-        surface: takes vertices and faces.
-        form: the body.
-        sheet: the upper sheet.
-        vertices: (rows, columns) its vertices.
-
-    Returns:
-        (rows − 1, columns) whether a face of the sheet is still wanted.
+    """Eyes in their lids, and the siphon; (rows − 1, columns) whether a face of the upper sheet, of
+    vertices (rows, columns), is still wanted.
     """
     count = vertices.shape[1]
     wanted = np.ones((len(vertices) - 1, count), dtype=bool)
@@ -253,13 +245,9 @@ def add_ventral_strips(
 ) -> None:
     """Faces of the arms' undersides, with suckers.
 
-    Args:
-        surface: takes the faces.
-        shape: the artist's choices.
-        strips: (arms, rows, columns + 1) vertices, rows outwards, columns even in number and
-            from left to right, so that faces look down.
-        points: (arms, rows, columns + 1, 3) their positions.
-        distance: (rows,) from P₀.
+    Strips (arms, rows, columns + 1) are vertices, rows outwards, columns even in number and from
+    left to right, so that faces look down; points (arms, rows, columns + 1, 3) are where they are,
+    and distances (rows,) those from P₀.
     """
     pairs = (strips.shape[1] - 1) // 2
     lanes = (strips.shape[2] - 1) // 2

@@ -93,12 +93,9 @@ class ArmLayout:
     def section(self, distance: Floats, scale: Floats | float = 1.0) -> tuple[Floats, Floats]:
         """Outlines of the upper half (rows, dorsal + 1, 3) and of the lower (rows, ventral + 1, 3).
 
-        In the frame of an arm: outwards from the body's axis, across towards the left, up from
-        the ground. Columns go from right to left.
-
-        Args:
-            distance: (rows,) from P₀, in metres; negative under the body.
-            scale: (rows,), share of the skin's diameter.
+        In the frame of an arm: outwards from the body's axis, across towards the left, up from the
+        ground. Columns go from right to left. Distances (rows,) are from P₀, in metres, negative
+        under the body; the scale (rows,) is a share of the skin's diameter.
         """
         shape = self.shape
         radius = 0.5 * shape.skin_diameter(distance) * scale

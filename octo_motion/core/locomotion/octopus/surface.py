@@ -55,12 +55,10 @@ def cap_size(loop_length: int) -> tuple[int, int]:
 
 
 def cap_grid(loop: Indices, interior: Indices, a: int) -> Indices:
-    """Vertices of a filling grid, (…, a + 1, b + 1), from its border and its inside.
+    """Vertices of a filling grid, (…, a + 1, b + 1), from its border and its inside (…, a − 1, b −
+    1).
 
-    Args:
-        loop: (…, 2 (a + b)); the corner (0, 0) comes first, then side a.
-        interior: (…, a − 1, b − 1).
-        a: faces along the first side.
+    The loop (…, 2 (a + b)) begins with the corner (0, 0), then comes side a.
     """
     b = loop.shape[-1] // 2 - a
     grid = np.empty((*loop.shape[:-1], a + 1, b + 1), dtype=loop.dtype)
@@ -73,14 +71,10 @@ def cap_grid(loop: Indices, interior: Indices, a: int) -> Indices:
 
 
 def cap_interior(border: Floats, a: int) -> Floats:
-    """Points inside a filled loop: Coons' patch.
+    """Points inside a filled loop (…, a − 1, b − 1, d): Coons' patch.
 
-    Args:
-        border: (…, 2 (a + b), d), positions (or anything else that blends) on the loop.
-        a: faces along the first side.
-
-    Returns:
-        (…, a − 1, b − 1, d)
+    The border (…, 2 (a + b), d) is positions, or anything else that blends; a, faces along its
+    first side.
     """
     b = border.shape[-2] // 2 - a
     bottom = border[..., : a + 1, :]

@@ -175,11 +175,7 @@ _INHALE: Final = 0.42
 
 
 def route_in_place(stride: float, cycles: int) -> Route:
-    """A straight way that takes so many strides: what a body in place would have travelled.
-
-    Args:
-        stride: metres.
-        cycles: of the gait.
+    """A straight way that takes so many strides, metres: what a body in place would have travelled.
 
     Raises:
         SettingsError: there is not one whole cycle.
@@ -200,16 +196,12 @@ def whole_frames(frames: float) -> float:
 
 
 def breathing_scales(times: Floats, amount: float, *, breath: float, whole: float | None) -> Floats:
-    """Scales (frames, 3) of a mantle that breathes: across, along the bone, across.
+    """Scales (frames, 3) of a mantle that breathes at times (frames,), s: across, along the bone,
+    across.
 
-    It fills rather quickly and empties slowly, without a corner between the two.
-
-    Args:
-        times: (frames,) seconds.
-        amount: by how much it gets wider, as a share.
-        breath: seconds that a breath takes.
-        whole: seconds of a loop, which takes a whole number of breaths, at least one; none: it
-            is no loop.
+    It fills rather quickly and empties slowly, without a corner between the two. A breath takes so
+    many seconds, and widens it by an amount, as a share; a loop takes a whole number of breaths, at
+    least one.
 
     Raises:
         SettingsError: a breath takes no time.

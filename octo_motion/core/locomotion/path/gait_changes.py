@@ -90,11 +90,8 @@ def transitions_by_height(
 ) -> tuple[GaitTransition, ...]:
     """Way 1 wherever the route is higher over the ground than so much, way 0 elsewhere.
 
-    Args:
-        distance: (samples,) metres along the route, ascending.
-        height: (samples,) metres over the ground.
-        take_off: metres.
-        length: metres that each change is long. Shorter stretches of either way are left out.
+    All is in metres: distances (samples,) along the route, ascending, heights (samples,) there, and
+    the length of each change. Shorter stretches of either way are left out.
     """
     above = height > take_off
     borders = np.flatnonzero(above[1:] != above[:-1])
@@ -130,12 +127,8 @@ def transition_windows(
     before: Sequence[tuple[Floats, Floats]],
     after: Sequence[tuple[Floats, Floats]],
 ) -> Windows:
-    """When each arm goes over from one way to the other.
-
-    Args:
-        change: where.
-        before: for each arm, where its stances (stances,) in the way before begin and end.
-        after: the same of the way after.
+    """When each arm goes over from one way to the other, by where its stances (stances,) begin and
+    end in the way before and in the way after.
     """
     held = _HELD * (change.end - change.start)
     starts, ends = np.empty(len(before)), np.empty(len(before))

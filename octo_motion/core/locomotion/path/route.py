@@ -352,13 +352,9 @@ class Route:
 def s_bend(start: ArrayLike, front: ArrayLike, reach: float) -> Floats:
     """Control points (4, 3) of a level S that suits a creature which has none yet.
 
-    It leaves straight ahead, bends to the left and back, and ends facing as it began, so that a
-    walk shows a turn to either side.
-
-    Args:
-        start: (3,) where it begins.
-        front: (3,) direction in which it leaves, of any length.
-        reach: metres from the middle of the creature to its arms' tips.
+    It leaves straight ahead (3,), bends to the left and back, and ends facing as it began, so that
+    a walk shows a turn to either side. The reach is metres from the creature's middle to its arms'
+    tips.
     """
     origin = np.asarray(start, dtype=np.float64)
     ahead = normalized(front)
@@ -374,13 +370,8 @@ def s_bend(start: ArrayLike, front: ArrayLike, reach: float) -> Floats:
 
 
 def _bernstein(controls: Floats, segment: np.ndarray, t: Floats, highest: int) -> list[Floats]:
-    """Bézier segments and their derivatives by their own parameter t, by de Casteljau.
-
-    Args:
-        controls: (segments, degree + 1, 4).
-        segment: (…,) which segment.
-        t: (…, 1) its parameter.
-        highest: highest derivative wanted.
+    """Bézier segments (segments, degree + 1, 4) and their derivatives, up to the highest wanted, by
+    their own parameter t (…, 1), by de Casteljau.
     """
     values = [controls[segment, corner] for corner in range(controls.shape[1])]
     degree = len(values) - 1

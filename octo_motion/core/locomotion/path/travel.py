@@ -120,10 +120,8 @@ class Bearings:
 def bearings(route: Route, corner: float, settle: float) -> Bearings:
     """The table of a route.
 
-    Args:
-        route: what is travelled.
-        corner: metres before and after a sharp corner within which most of it is turned through.
-        settle: metres within which a body that is not upright comes most of the way there.
+    Before and after a sharp corner most of it is turned through within some metres; within others,
+    a body that is not upright comes most of the way to settle there.
     """
     corner = min(corner, _MOST_CORNER * route.length)
     count = int(np.clip(np.ceil(_PER_CORNER * route.length / corner), _FEWEST, _MOST))
@@ -534,12 +532,10 @@ def travel_at(
 def walked_at(
     route: Route, settings: TravelSettings, table: Bearings, distance: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Where a walking, upright body is at distances (n,) along its route, and before and after it.
+    """Where a walking, upright body is, (n, 3) and (n, 4) world, at distances (n,) along its route,
+    and before and after it.
 
     Beyond the ends of an open route it goes straight on; a closed one it goes round again.
-
-    Returns:
-        World positions (n, 3) and orientations (n, 4).
     """
     wanted = np.asarray(distance, dtype=np.float64)
     inside = np.mod(wanted, route.length) if route.cyclic else np.clip(wanted, 0.0, route.length)
@@ -570,11 +566,8 @@ def unhurried(
 ) -> TravelSettings:
     """The same travel, but with more time to get going and to stop, if it has too little.
 
-    Args:
-        settings: how the route is travelled.
-        length: metres of the route.
-        start: metres within which the body speeds up at least; 0 leaves that as it is.
-        end: metres within which it slows down at least.
+    All is in metres: the length of the route, and those within which the body speeds up and slows
+    down at least; 0 leaves that as it is.
     """
     # While the body eases it is half as fast on average, so m = 1 / (1 + a + b) of the time would
     # do at full speed, a and b being the shares of the way.
@@ -687,17 +680,10 @@ of 3π/2 about 1 % is left of the stroke's speed."""
 
 
 def stroke_distance(phase: ArrayLike, burst: float, stroke_phase: float) -> Floats:
-    """Distance covered since phase 0, in units in which one stroke is 2π.
+    """Distance (…,) covered since phase 0, radians, unwrapped, in units in which one stroke is 2π.
 
-    Strictly increasing, equal to the phase at whole strokes, twice continuously differentiable.
-
-    Args:
-        phase: (…,) radians, unwrapped.
-        burst: 0 steady (distance = phase) … 1 all travel comes from the push.
-        stroke_phase: phase of the middle of the push.
-
-    Returns:
-        (…,)
+    Strictly increasing, equal to the phase at whole strokes, twice continuously differentiable. A
+    burst of 0 is steady, of 1 all travel comes from the push, whose middle is at a phase.
     """
     turned = np.asarray(phase, dtype=np.float64)
     start = np.array(-stroke_phase)

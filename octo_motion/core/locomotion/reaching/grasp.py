@@ -216,12 +216,8 @@ class Grasp:
         return result
 
     def apply(self, times: Floats, places: Places, otherwise: Floats) -> Floats:
-        """Rotations (frames, bones, 4) of the arm, of what it does otherwise (frames, bones, 4).
-
-        Args:
-            times: (frames,) any, in any order.
-            places: of the object at these times.
-            otherwise: in each bone's rest frame, as the result.
+        """Rotations (frames, bones, 4) of the arm at any times (frames,), of what it does
+        otherwise, alike.
         """
         arm, lengths, timeline = self.arm, self.arm.lengths, self.timeline
         weight = timeline.weight(times, arm.reach[:-1] / arm.length)

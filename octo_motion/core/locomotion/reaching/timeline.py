@@ -88,14 +88,11 @@ class Timeline:
             )
 
     def weight(self, times: Floats, along: Floats) -> Floats:
-        """How far (frames, joints) the arm has left what it does otherwise, 0…1.
+        """How far (frames, joints) the arm has left what it does otherwise, 0…1, of joints along it
+        (joints,), 0…1.
 
         The tip curls up before the root aims, and stretches out after the root has gone back: so
         the arm does not sweep over what it reaches for.
-
-        Args:
-            times: (frames,)
-            along: (joints,) where joints are on the arm, 0 at its root to 1.
         """
         whole, back = self.contact - self.start, self.end - self.release
         out = (times[:, None] - self.start) / (_GATHERED * whole)
@@ -142,13 +139,8 @@ def passed(lengths: Floats, front: Floats) -> Floats:
 
 
 def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1.0) -> Floats:
-    """Turns (…, segments, 4) of what the front (…) has not passed: bend, and spiral beyond it.
-
-    Args:
-        lengths: (segments,).
-        front: (…) its place along the arm.
-        bend: how much of the bend.
-        curl: how much of the spiral.
+    """Turns (…, segments, 4) of what the front (…), a place along the arm, has not passed: so much
+    of the bend, and of the spiral beyond it.
     """
     whole, width = float(lengths.sum()), front_width(lengths)
     shy = _SHY + (1.0 - _SHY) * least_jerk(front[..., None] / (_BOLD * whole))
@@ -180,12 +172,7 @@ def curled(arm: ArmFrames, timeline: Timeline, times: Floats, otherwise: Floats)
     """Rotations (frames, bones, 4) of an arm that curls up until it "touches", in arm lengths.
 
     A spiral forms at the tip and runs towards the root; letting go, the root is first to stretch.
-
-    Args:
-        arm: which.
-        timeline: of it ``start``, ``contact``, ``release`` and ``end`` count.
-        times: (frames,)
-        otherwise: (frames, bones, 4) what the arm does otherwise.
+    Of the timeline ``start``, ``contact``, ``release`` and ``end`` count.
     """
     along = arm.reach[:-1] / arm.length
     up = (times[:, None] - timeline.start) / (timeline.contact - timeline.start)

@@ -82,12 +82,8 @@ class Profile:
     def way_out(self, points: Floats, near: Floats) -> Floats:
         """Vectors (…, 3) from the axis towards points (…, 3), across it; object's frame.
 
-        Their length is 1 far from the axis and 0 on it, so that nothing jumps where a point
-        passes from one side to the other.
-
-        Args:
-            points: in the object's frame.
-            near: (…) distance from the axis at which they are 0.7 long.
+        Their length is 1 far from the axis, 0.7 at the distance ``near`` (…) and 0 on it, so that
+        nothing jumps where a point passes from one side to the other.
         """
         local = self.to_profile(points)
         local[..., 2] = 0.0
@@ -103,13 +99,11 @@ class Profile:
 
 
 def profile_of(vertices: Floats, triangles: np.ndarray, axis: Floats | None = None) -> Profile:
-    """The form of a mesh.
+    """The form of a mesh with vertices (vertices, 3) in the object's frame, and triangles
+    (triangles, 3).
 
-    Args:
-        vertices: (vertices, 3) in the object's frame.
-        triangles: (triangles, 3) their numbers.
-        axis: (3,) to wind about; none: the longest way through the object, and where no way is
-            longest, the one nearest to z.
+    It is wound about an axis (3,); without one, about the longest way through the object, and where
+    no way is longest, the one nearest to z.
 
     Raises:
         RigError: the mesh has no faces, or no size along its axis.
@@ -374,13 +368,8 @@ def _height_limits(profile: Profile, skin: float) -> tuple[float, float]:
 def _touching_angle(
     point: Callable[[float], Floats], root: Floats, winding: Winding, profile: Profile
 ) -> float:
-    """In which direction from the axis the line from an arm's root only just passes the object.
-
-    Args:
-        point: where the arm's joint is that touches in a direction.
-        root: (3,) as the profile has it.
-        winding: which way.
-        profile: the object.
+    """In which direction from the axis the line from an arm's root (3,), as the profile has it,
+    only just passes the object.
 
     Raises:
         RigError: the arm starts within the object.

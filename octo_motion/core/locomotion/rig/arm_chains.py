@@ -79,11 +79,8 @@ class BodyFrame:
 
 
 def nearest_axis(direction: Floats, *, across: str | None = None) -> str:
-    """Name of the axis ("X", "-Y", …) that is nearest a direction (3,).
-
-    Args:
-        direction: of any length but zero.
-        across: an axis that the answer must be perpendicular to.
+    """Name of the axis ("X", "-Y", …) that is nearest a direction (3,), across another axis if
+    given.
     """
     allowed = [
         name
@@ -183,16 +180,12 @@ def joint_positions(skeleton: Skeleton, bones: Sequence[str]) -> Floats:
 def arrange(
     skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFrame
 ) -> tuple[ArmChain, ...]:
-    """Sides, pairs, directions and names of arms, front to back and left before right.
+    """Sides, pairs, directions and names of arms (bones root to tip), front to back and left before
+    right.
 
     An arm is on the side that its root bone's name says (``.L``, ``_R``, ``Left`` …), unless
-    geometry contradicts; else on the side where it lies. Arms that mirror each other, by name or
-    by shape, share a pair number. A single arm close to the mid plane is ``CENTER``.
-
-    Args:
-        skeleton: the rig.
-        arms: bone names, root to tip.
-        body: which way the body faces.
+    geometry contradicts; else on the side where it lies. Arms that mirror each other, by name or by
+    shape, share a pair number. A single arm close to the mid plane is ``CENTER``.
 
     Raises:
         RigError: a bone does not exist.
@@ -235,13 +228,7 @@ def place_added(
     others: Sequence[tuple[Sequence[str], Side, int]],
     body: BodyFrame,
 ) -> ArmChain:
-    """Side and pair of an arm that joins others, whose sides and pairs stay as they are.
-
-    Args:
-        skeleton: the rig.
-        bones: the new arm's, root to tip.
-        others: bones, side and pair of the arms that are there.
-        body: which way the body faces.
+    """Side and pair of an arm, its bones root to tip, that joins others, which stay as they are.
 
     Raises:
         RigError: a bone does not exist, or belongs to another arm already.
@@ -292,14 +279,10 @@ def arm_shapes(skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFram
 
 
 def arm_azimuths(skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFrame) -> Floats:
-    """Where each arm points at rest, (arms,): radians from the front, positive to the left.
+    """Where each arm, its bones root to tip, points at rest, (arms,): radians from the front,
+    positive to the left.
 
     An arm that stands on the body's axis points to the front.
-
-    Args:
-        skeleton: the rig.
-        arms: bone names, root to tip.
-        body: which way the body faces.
 
     Raises:
         RigError: a bone does not exist.

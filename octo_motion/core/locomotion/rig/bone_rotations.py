@@ -124,14 +124,9 @@ class Facing:
 
 
 def sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Floats:
-    """The side of each bone (bones, 3) that the suckers are on, in its rest frame.
+    """The side of each bone (bones, 3) of an arm that the suckers are on, in its rest frame.
 
-    Where the rig does not say, it is the side that looks down at rest.
-
-    Args:
-        skeleton: the rig.
-        bones: of an arm.
-        down: (3,) armature space.
+    Where the rig does not say, it is the side that looks down (3,), armature space, at rest.
     """
     key = content_key(skeleton, tuple(bones), down)
     return _sides.get(key, lambda: _sucker_sides(skeleton, bones, down))
@@ -303,11 +298,8 @@ class ArmFrames:
         return result
 
     def joints(self, frames: Floats, strains: Floats | None = None) -> Floats:
-        """Joints P₀ … Pₙ (…, bones + 1, 3) in armature space of an arm with these frames.
-
-        Args:
-            frames: (…, bones, 4)
-            strains: (…, bones) by how much bones are longer than at rest, as a share.
+        """Joints P₀ … Pₙ (…, bones + 1, 3) in armature space of an arm with frames (…, bones, 4),
+        whose bones are longer than at rest by strains (…, bones), as a share.
         """
         lengths = self.lengths if strains is None else self.lengths * (1.0 + strains)
         steps = lengths[..., None] * rotate(frames, _ALONG)
@@ -359,11 +351,9 @@ def bend_rotations(angles: Floats) -> Floats:
 
 
 def transport_frames(directions: Floats, first: Floats) -> Floats:
-    """Frames (…, segments, 4) without twist along directions (…, segments, 3).
+    """Frames (…, segments, 4) without twist along directions (…, segments, 3), unit.
 
-    Args:
-        directions: unit vectors.
-        first: (…, 4) a frame before the first segment, which is turned the shortest way to it.
+    A frame (…, 4) before the first segment is turned the shortest way to it.
     """
     result = np.empty((*directions.shape[:-1], 4))
     before = first
@@ -410,11 +400,8 @@ class ArmBatch:
         )
 
     def orientations(self, rotations: Floats, arm: np.ndarray) -> Floats:
-        """Orientations (bones, 4, batch) in armature space.
-
-        Args:
-            rotations: (bones, 4, batch) in each bone's rest frame.
-            arm: (batch,) which of the arms each one is.
+        """Orientations (bones, 4, batch) in armature space, of rotations (bones, 4, batch) in each
+        bone's rest frame; ``arm`` (batch,) is which of the arms each one is.
         """
         result = np.empty(rotations.shape)
         for bone, own in enumerate(rotations):
@@ -446,12 +433,11 @@ class ArmBatch:
         return taken if follows.all() else np.where(follows[arm], taken, carried)
 
     def joints(self, orientations: Floats, arm: np.ndarray, strains: Floats) -> Floats:
-        """Joints P₀ … Pₙ (bones + 1, 3, batch) in armature space.
+        """Joints P₀ … Pₙ (bones + 1, 3, batch) in armature space, of orientations (bones, 4,
+        batch).
 
-        Args:
-            orientations: (bones, 4, batch)
-            arm: (batch,) which of the arms each one is.
-            strains: (bones, batch) by how much bones are longer than at rest, as a share.
+        Bones are longer than at rest by strains (bones, batch), as a share; ``arm`` (batch,) is
+        which of the arms each one is.
         """
         result = np.empty((len(orientations) + 1, 3, orientations.shape[2]))
         result[0] = self.roots[:, arm]

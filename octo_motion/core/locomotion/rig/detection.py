@@ -294,13 +294,10 @@ _LIMB_WORDS: Final = (
 def best_family(
     skeleton: Skeleton, tree: BoneTree, chains: list[BoneChain], up: str
 ) -> tuple[BoneChain, ...]:
-    """The largest family of chains that passes for the arms of one body.
+    """The largest family of chains, ending in a tip of the tree, that passes for the arms of one
+    body.
 
-    Args:
-        skeleton: the rig.
-        tree: the bones that are looked at.
-        chains: those that end in a tip of the tree.
-        up: name of the armature's axis that is the body's up.
+    Up is the name of the armature's axis that is the body's.
 
     Raises:
         RigError: none does.

@@ -29,12 +29,8 @@ _ROOT: Final = 0.15
 
 
 def room_needed(skin: Floats, length: Floats, more: Floats | float = 0.0) -> Floats:
-    """Heights of joints that do not lie.
-
-    Args:
-        skin: from joints to the skin below them.
-        length: of their arms, in the same unit.
-        more: by how much they are to be higher than they need be.
+    """Heights of joints that do not lie, by how far skin is below them and the length of their
+    arms, in one unit; some are to be higher by ``more``.
     """
     return skin + (MARGIN * length + more)
 
@@ -45,11 +41,8 @@ def lowest_allowed(heights: Floats, skin: Floats) -> Floats:
 
 
 def loose_from_root(reach: Floats, length: Floats) -> Floats:
-    """How far joints are free to be raised: 0 at the root, 1 a little further out.
-
-    Args:
-        reach: from the root, along the arm.
-        length: of the arm.
+    """How far joints, at a reach from the root of an arm of a length, are free to be raised: 0 at
+    the root, 1 a little further out.
     """
     return smooth_step(reach / (_ROOT * length))
 
@@ -132,12 +125,11 @@ class ArmSkin:
     at its tail, to sides all round from the first of ``across`` to the second and on."""
 
     def is_round(self, sides: Floats, first: int) -> bool:
-        """Whether it reaches as far to whichever side joints may lie on, as nearly as can be told.
+        """Whether it reaches as far to whichever side the joints that may lie, from the first on,
+        may lie on, as nearly as can be told.
 
-        Args:
-            sides: (bones, 3) where the suckers are, in the bones' rest frames; none of a bone whose
-                any side may come to be below.
-            first: the first joint that may lie.
+        Suckers are on sides (bones, 3), in the bones' rest frames; none of a bone whose any side
+        may come to be below.
         """
         seen = np.einsum("bc,bac->ba", sides, self.across)
         middle = np.rint(np.arctan2(seen[:, 1], seen[:, 0]) / _SIDE).astype(np.int64)
@@ -157,12 +149,9 @@ class ArmSkin:
         return self.reaches / np.maximum(ends, _TINY)[..., None]
 
     def seen_below(self, down: Floats) -> Floats:
-        """How far the skin was seen to reach down at both ends of bones (…, bones, 2).
-
-        Armature units; :meth:`below` leaves room for what is not known.
-
-        Args:
-            down: (…, bones, 3) which way is down there, in the bones' rest frames.
+        """How far the skin was seen to reach down (…, bones, 3), in the bones' rest frames, at both
+        ends of bones (…, bones, 2), armature units; :meth:`below` leaves room for what is not
+        known.
         """
         seen = np.einsum("...bc,bac->...ba", down, self.across)
         side = np.rint(np.arctan2(seen[..., 1], seen[..., 0]) / _SIDE).astype(np.int64) % _SIDES
@@ -170,13 +159,10 @@ class ArmSkin:
         return np.clip(reach, 0.0, np.stack([self.radii[:-1], self.radii[1:]], axis=-1))
 
     def below(self, down: Floats, first: int = 0) -> Floats:
-        """How far the skin reaches down at both ends of bones (…, bones, 2), armature units.
+        """How far the skin reaches down (…, bones, 2, 3), in the bones' rest frames, at both ends
+        of bones (…, bones, 2), from the first on, armature units.
 
         A bone that is outside its skin is not in the ground either.
-
-        Args:
-            down: (…, bones, 2, 3) which way is down there, in the bones' rest frames.
-            first: the first of these bones.
         """
         seen = np.einsum("...bec,bac->...bea", down, self.across[first:])
         place = np.arctan2(seen[..., 1], seen[..., 0]) / _SIDE
@@ -197,13 +183,11 @@ class ArmSkin:
 
 
 def arm_skin(points: Floats, joints: Floats, frames: Floats, radii: Floats) -> ArmSkin:
-    """The skin of an arm from points of it at rest.
+    """The skin of an arm from points (n, 3) of it at rest, about joints (bones + 1, 3), armature
+    space.
 
-    Args:
-        points: (n, 3) of its skin, armature space.
-        joints: (bones + 1, 3) of the arm, armature space.
-        frames: (bones, 4) the bones' rest orientations.
-        radii: (bones + 1,) from each joint to the skin about it, as if it were round.
+    Frames (bones, 4) are the bones' rest orientations, radii (bones + 1,) from each joint to the
+    skin about it, as if it were round.
     """
     steps = np.diff(joints, axis=0)
     segments = steps / np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), _TINY)
@@ -245,14 +229,9 @@ def _filled(parts: Floats) -> Floats:
 
 
 def nearest_bones(points: Floats, joints: Floats) -> tuple[np.ndarray, Floats, Floats]:
-    """The bone that each point is nearest to.
+    """The bone of a chain of joints (bones + 1, 3) that each point (n, 3) is nearest to.
 
-    Args:
-        points: (n, 3).
-        joints: (bones + 1, 3) of a chain.
-
-    Returns:
-        Its number (n,), where along it that is (n,), 0…1, and the way from there (n, 3).
+    Its number (n,), where along it that is (n,), 0…1, and the way from there (n, 3).
     """
     starts, steps = joints[:-1], np.diff(joints, axis=0)
     seen = points[:, None] - starts
@@ -267,9 +246,7 @@ def nearest_bones(points: Floats, joints: Floats) -> tuple[np.ndarray, Floats, F
 def _at_ends(reach: Floats, share: Floats) -> Floats:
     """How far a bone's skin reaches at its ends (2, sides), nan where its points are too few.
 
-    Args:
-        reach: (n, sides) how far each of its points does.
-        share: (n,) where along it they are, 0…1.
+    So far (n, sides) does each of its points, at a share (n,) along it, 0…1.
     """
     ends = np.full((2, reach.shape[1]), np.nan)
     for end, near in enumerate((share <= 0.5, share >= 0.5)):

@@ -50,12 +50,7 @@ class ArmMotion:
 
     @classmethod
     def at_rest(cls, moments: int, bones: Sequence[int]) -> ArmMotion:
-        """Arms at rest that hold on to nothing.
-
-        Args:
-            moments: how many.
-            bones: how many bones each arm has.
-        """
+        """Arms at rest, each of so many bones, that hold on to nothing for so many moments."""
         rotations = np.zeros((moments, sum(bones), 4))
         rotations[..., 0] = 1.0
         return cls(
@@ -82,11 +77,8 @@ class ArmMotion:
 
 
 def halfway_automatic(poses: Poses, *, cyclic: bool) -> Poses:
-    """Half way between frames (frames − 1), as Blender plays keys with automatic handles.
-
-    Args:
-        poses: at the frames, one frame apart.
-        cyclic: whether the motion is a loop whose curves repeat.
+    """Half way between frames (frames − 1), as Blender plays keys with automatic handles, of a loop
+    whose curves repeat if cyclic.
     """
     return Poses(
         _automatic(continuous(poses.rotations), cyclic=cyclic, turns=True),
@@ -137,13 +129,11 @@ def _half_turns(turns: Floats) -> Floats:
 def object_transforms(
     body: BodyFrame, scale: float, positions: Floats, rotations: Floats
 ) -> tuple[Floats, Floats]:
-    """World locations (frames, 3) and orientations (frames, 4) of the armature object.
+    """World locations (frames, 3) and orientations (frames, 4) of an armature object of uniform
+    scale.
 
-    Args:
-        body: where the body lies in armature space.
-        scale: uniform scale of the object in the world.
-        positions: (frames, 3) of the body's centre, world space.
-        rotations: (frames, 4) of the canonical body, world space.
+    Positions (frames, 3) and rotations (frames, 4), world, are of the body's centre and of the
+    canonical body.
     """
     turned = multiply(rotations, conjugate(from_matrix(body.rotation)))
     return positions - rotate(turned, scale * body.center), turned
@@ -159,14 +149,8 @@ def root_bone_transforms(
     """Locations (frames, 3) and rotations (frames, 4) of a bone, in its rest frame.
 
     The bone carries the body as the object would have, were the object at ``locations`` and
-    ``orientations``; its own parents stay at rest.
-
-    Args:
-        skeleton: the rig.
-        bone: name of the root bone.
-        world: (4, 4) world matrix of the object, which stays where it is; uniform scale.
-        locations: (frames, 3) from ``object_transforms``.
-        orientations: (frames, 4) from ``object_transforms``.
+    ``orientations`` of ``object_transforms``; its own parents stay at rest, and the object by its
+    world matrix (4, 4), of uniform scale.
     """
     scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     still = conjugate(from_matrix(world[:3, :3] / scale))
@@ -183,18 +167,10 @@ def root_bone_transforms(
 def carried_by_root_bone(
     skeleton: Skeleton, bone: str, world: Floats, locations: Floats, rotations: Floats
 ) -> tuple[Floats, Floats]:
-    """Inverse of :func:`root_bone_transforms`.
+    """Inverse of :func:`root_bone_transforms`, of which it takes the results.
 
-    Args:
-        skeleton: the rig.
-        bone: name of the root bone.
-        world: (4, 4) world matrix of the object, which stays where it is; uniform scale.
-        locations: (frames, 3) of the bone, in its rest frame.
-        rotations: (frames, 4) likewise.
-
-    Returns:
-        Locations (frames, 3) and orientations (frames, 4) in the world that the object would have
-        to have, were it the one that travels.
+    Locations (frames, 3) and orientations (frames, 4) are those in the world that the object would
+    have to have, were it the one that travels.
     """
     scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     stands = from_matrix(world[:3, :3] / scale)
@@ -227,17 +203,12 @@ _SAME_PLACE: Final = 1e-3
 def find_mantle(
     skeleton: Skeleton, arms: Sequence[Sequence[str]], body: BodyFrame
 ) -> tuple[str, ...]:
-    """Bones from what the arms stand on to the tip of the largest part that is no arm; none if
-    there is no such part above the arms or level behind them, or if it can neither be raised nor
-    be swum along.
+    """Bones from what the arms (bones root to tip) stand on to the tip of the largest part that is
+    no arm; none if there is no such part above the arms or level behind them, or if it can neither
+    be raised nor be swum along.
 
     Bones without length of their own, as importers put between others, are left out: they ride
     along.
-
-    Args:
-        skeleton: the rig.
-        arms: bone names, root to tip.
-        body: which way the body faces.
     """
     limbs = {skeleton.index[bone] for bones in arms for bone in bones}
     carrying: set[int] = set()
@@ -267,13 +238,7 @@ def find_mantle(
 
 
 def lies_back(skeleton: Skeleton, mantle: Sequence[str], body: BodyFrame) -> float:
-    """How far from the body's +Z a mantle lies back that is not to be raised, radians; else 0.
-
-    Args:
-        skeleton: the rig.
-        mantle: bone names from ``find_mantle``.
-        body: which way the body faces.
-    """
+    """How far from the body's +Z a mantle lies back that is not to be raised, radians; else 0."""
     lying = _not_raised(skeleton, mantle, body)
     if not len(lying):
         return 0.0
@@ -289,13 +254,8 @@ def lies_back(skeleton: Skeleton, mantle: Sequence[str], body: BodyFrame) -> flo
 def stretch_mantle(
     skeleton: Skeleton, mantle: Sequence[str], body: BodyFrame, amount: float
 ) -> Floats:
-    """Rotations (bones, 4) in each bone's rest frame that stretch the mantle towards the body's +Z.
-
-    Args:
-        skeleton: the rig.
-        mantle: bone names from ``find_mantle``.
-        body: which way the body faces.
-        amount: 0 leaves it at rest, 1 makes it straight.
+    """Rotations (bones, 4) in each bone's rest frame that stretch the mantle towards the body's +Z:
+    by 0 it stays at rest, by 1 it is straight.
     """
     if not mantle:
         return np.empty((0, 4))
