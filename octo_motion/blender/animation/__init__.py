@@ -17,7 +17,14 @@ from .actions import (
     writable_object,
     write_action,
 )
-from .clips import further_channels, read_clip, scaled_channels, write_clip
+from .clips import (
+    further_channels,
+    read_clip,
+    scaled_channels,
+    scene_rate,
+    setting_values,
+    write_clip,
+)
 from .fcurves import lasting
 from .pose_keys import Keyed, PoseKeys
 from .poses import (
@@ -60,6 +67,8 @@ __all__ = [
     "rest_bones",
     "restore_pose",
     "scaled_channels",
+    "scene_rate",
+    "setting_values",
     "show_pose",
     "standing_of",
     "time_kept",

@@ -105,7 +105,7 @@ def read_clip(
     if action is None and data is not None:
         action = data.action
         slot = slot or (data.action_slot if action is not None else None)
-    per_second = float(rate or _scene_rate())
+    per_second = float(rate or scene_rate())
     if action is None:
         tracks = data is not None and any(track.strips for track in data.nla_tracks)
         if not (visual and tracks):
@@ -217,6 +217,36 @@ def further_channels(
         bone = path.removeprefix('pose.bones["').partition('"]')[0]
         channels.append(Channel(path, values, group.name if group is not None else bone))
     return channels
+
+
+def setting_values(
+    armature: bpy.types.Object,
+    path: str,
+    frames: Floats,
+    action: bpy.types.Action | None,
+    slot: bpy.types.ActionSlot | None,
+) -> Floats | None:
+    """Values (frames,) of a setting of an armature that has keys; none if it has none.
+
+    Keys are in the action that the armature has at present, which is what its editors show, or else
+    in the one that is given.
+
+    Args:
+        armature: the armature object.
+        path: of the setting.
+        frames: (frames,)
+        action: where else to look.
+        slot: its slot; if none is given the one that the armature uses, or would.
+    """
+    data = armature.animation_data
+    places = [] if data is None or data.action is None else [(data.action, data.action_slot)]
+    if action is not None:
+        places.append((action, slot or _slot_for(armature, action)))
+    for each, own in places:
+        for curve in () if own is None else shown_curves(each, own):
+            if curve.data_path == path:
+                return evaluate_fcurve(curve, frames)
+    return None
 
 
 def scaled_channels(
@@ -463,7 +493,8 @@ def _whole_frames(start: float, end: float) -> Floats:
     return np.arange(first, last + 1.0) if last > first else np.array([start, end])
 
 
-def _scene_rate() -> float:
+def scene_rate() -> float:
+    """Frames per second of the scene."""
     scene = bpy.context.scene
     assert scene is not None
     return scene.render.fps / scene.render.fps_base

@@ -91,6 +91,11 @@ AFTER: Final = (
     ("LOOP", "Loop", "Begin again with the clip's first frame", 2),
 )
 
+FADE_UNITS: Final = (
+    ("FRAMES", "Frames", "They get shorter with more frames per second", 0),
+    ("SECONDS", "Seconds", "They last as long at any frame rate", 1),
+)
+
 MODES: Final = (
     ("DIRECTION", "Direction", "Hands and feet lie in the direction where the clip has them", 0),
     ("EXACT", "Exact", "The limb bends so that hands and feet are where the clip has them", 1),
@@ -139,6 +144,21 @@ def _frame(name: str, description: str, **options: Any) -> Any:
     return props.FloatProperty(name=name, description=description, step=100, precision=1, **options)
 
 
+def _seconds(name: str, description: str) -> Any:
+    """How long something takes."""
+    return props.FloatProperty(
+        name=name,
+        description=description,
+        default=0.25,
+        min=0.0,
+        soft_max=2.0,
+        step=5,
+        precision=2,
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+    )
+
+
 class SpliceItem(bpy.types.PropertyGroup):
     """One part of one clip, and when."""
 
@@ -178,17 +198,37 @@ class SpliceItem(bpy.types.PropertyGroup):
     base_start: _frame("Base Start", "Frame of the base at which the splice begins", default=1.0)
     rate: props.FloatProperty(
         name="Rate",
-        description="Speed of the clip, 1 as it is",
+        description="Speed of the clip, 1 as it is. With keys (I over the field) the clip goes "
+        "faster and slower: all that it has gone by then adds up",
         default=1.0,
         min=0.01,
         max=100.0,
         soft_max=4.0,
         step=5,
     )
+    match_markers: props.BoolProperty(
+        name="Match Markers",
+        description="Show the moments of the clip's pose markers where the base has markers of "
+        "the same name: pose markers of its action, else the scene's. Between them the clip goes "
+        "faster or slower as it must, without a jump in speed; after the last one at Rate",
+    )
     length: _frame(
         "Length",
         "Frames of the base that the splice lasts; 0 is as long as there is motion",
         min=0.0,
+    )
+    fade_unit: props.EnumProperty(
+        name="Fades",
+        description="What the lengths of fades are given in",
+        items=FADE_UNITS,
+    )
+    fade_in_seconds: _seconds(
+        "Ease In", "Time over which the splice comes in, and each further round of a loop"
+    )
+    fade_out_seconds: _seconds(
+        "Ease Out",
+        "Time over which the splice goes, if it ends before the base; over which a round of a loop "
+        "goes; and over which a clip that is held comes to rest",
     )
     ease_in: _frame(
         "Ease In",

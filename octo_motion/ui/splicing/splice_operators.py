@@ -9,7 +9,7 @@ from typing import Any, Final, cast
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from ...blender.animation import writable_armature
+from ...blender.animation import scene_rate, writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError
 from ...core.rotations import Floats
@@ -62,6 +62,8 @@ def add_splice(
     item.base_start, item.splice_start = base_start, float(frames[0])
     ease = min(item.ease_in, _SPARE_EASE * float(frames[-1] - frames[0]))
     item.ease_in = item.ease_out = round(ease)
+    spare = _SPARE_EASE * float(frames[-1] - frames[0]) / scene_rate()
+    item.fade_in_seconds = item.fade_out_seconds = min(item.fade_in_seconds, spare)
     return item
 
 

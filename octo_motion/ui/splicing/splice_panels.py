@@ -20,6 +20,7 @@ from .splice_operators import (
     active_splice,
 )
 from .timing_drag import OCTO_MOTION_OT_splice_drag_timing
+from .timing_settings import matched_markers
 
 
 class _Panel(ArmaturePanel):
@@ -108,11 +109,23 @@ class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(item, "base_start")
         column.prop(item, "splice_start")
-        layout.prop(item, "rate")
+        row = layout.row()
+        # What can have keys says so.
+        row.use_property_decorate = True
+        row.prop(item, "rate")
+        layout.prop(item, "match_markers")
+        if item.match_markers:
+            matched = len(matched_markers(settings, item))
+            icon = "PMARKER_ACT" if matched else "ERROR"
+            layout.label(text=f"Markers of the same name: {matched}", icon=icon)
         layout.prop(item, "length")
+        layout.row().prop(item, "fade_unit", expand=True)
+        ease_in, ease_out = "ease_in", "ease_out"
+        if item.fade_unit == "SECONDS":
+            ease_in, ease_out = "fade_in_seconds", "fade_out_seconds"
         column = layout.column(align=True)
-        column.prop(item, "ease_in")
-        column.prop(item, "ease_out", text="Out")
+        column.prop(item, ease_in)
+        column.prop(item, ease_out, text="Out")
         layout.row().prop(item, "after", expand=True)
 
 

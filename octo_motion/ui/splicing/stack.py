@@ -26,7 +26,7 @@ from ...blender.animation import (
 )
 from ...blender.rig import armature_data
 from ...core.errors import ClipError, OctoMotionError, WriteError
-from ...core.splicing.clip import After, Clip, Timing, average_pose, splice_window
+from ...core.splicing.clip import Clip, average_pose, splice_window
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
 from ...core.splicing.transfer import (
     CHAIN,
@@ -47,6 +47,7 @@ from ...core.splicing.transfer import (
 from ..declared_settings import plain
 from .bodies import known_landmarks
 from .properties import splicing_settings, write_landmarks
+from .timing_settings import is_slowed, read_timing
 
 _FINER: Final = 4
 """Samples per frame of a clip that is slowed down, …"""
@@ -203,8 +204,8 @@ class ClipReader:
             _check_mixing(armature)
         return self.source(armature, settings.base, settings.base_slot, visual=settings.visual)
 
-    def item(self, item: Any) -> Source:
-        """The clip of a splice.
+    def item(self, item: Any, *, slowed: bool) -> Source:
+        """The clip of a splice; of one that is ``slowed`` what it does between its frames as well.
 
         Raises:
             OctoMotionError: it is gone, or cannot be read.
@@ -214,8 +215,8 @@ class ClipReader:
             raise ClipError("Its source armature is gone, or was never chosen.", remedy)
         if item.action is None:
             raise ClipError("Its action is gone, or was never chosen.", remedy)
-        # Slowed down, what a clip does between its frames is seen. To play the scene takes longer.
-        between = item.rate < 1.0 and not item.visual
+        # To play the scene takes longer.
+        between = slowed and not item.visual
         return self.source(item.source, item.action, item.slot, visual=item.visual, between=between)
 
     def source(
@@ -270,20 +271,13 @@ def _check_mixing(armature: bpy.types.Object) -> None:
 
 
 def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
-    source = reader.item(item)
+    timing = read_timing(splicing_settings(item.id_data), item, base.clip)
+    source = reader.item(item, slowed=is_slowed(timing))
     part = _part(item, base, source)
     splice = Splice(
         part=part,
         clip=source.clip,
-        timing=Timing(
-            base_start=item.base_start,
-            splice_start=item.splice_start,
-            rate=item.rate,
-            length=item.length or None,
-            ease_in=item.ease_in,
-            ease_out=item.ease_out,
-            after=cast("After", item.after.lower()),
-        ),
+        timing=timing,
         landmarks=source.landmarks,
         goal=cast("LimbGoal", item.mode.lower()),
         # The panel offers it for legs alone.
