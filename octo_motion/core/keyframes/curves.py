@@ -33,10 +33,18 @@ class Curves:
         smooth: (tracks, frames) keys whose handles stay in one line.
         pinned: (tracks, frames) keys that keep their values.
         loops: whether the handles at both ends stay in one line, too, where both are smooth.
+        held: (tracks, 2) slopes at both ends that stay as they are; none without.
     """
 
     def __init__(
-        self, times: Floats, keyed: Booleans, smooth: Booleans, pinned: Booleans, *, loops: bool
+        self,
+        times: Floats,
+        keyed: Booleans,
+        smooth: Booleans,
+        pinned: Booleans,
+        *,
+        loops: bool,
+        held: Booleans | None = None,
     ) -> None:
         self._times, count = times, keyed.shape[1]
         self.shape = keyed.shape
@@ -83,6 +91,9 @@ class Curves:
         self.free = np.ones(self.size, dtype=bool)
         """(size,) the others."""
         self.free[self.pins] = False
+        if held is not None:
+            self.free[after[first][held[:, 0]]] = False
+            self.free[before[last][held[:, 1]]] = False
 
     def started(self, values: Floats, slopes: Floats) -> Floats:
         """Choices (4, size) by the motion's own values and slopes (4, elements)."""

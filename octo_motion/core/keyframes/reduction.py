@@ -25,7 +25,7 @@ from ..rotations import Floats
 from .channels import BezierKeys, Booleans
 from .dense import dense_keys
 from .key_times import Choice
-from .search import Search
+from .stretches import searched
 from .tracks import LOCATION, SCALE, Limb, Track, looked_at
 
 _SLACK: Final = 1.15
@@ -107,8 +107,8 @@ def reducing(
     done, whole = 0, max(sum(len(limb.tracks) for limb in limbs), 1)
     for plan in plans:
         fine = looked_at(times, plan.limb, every)
-        search = Search(fine, fine.marked(plan.keyed), fine.marked(plan.corners), loops=loops)
-        own, steps = len(plan.limb.tracks), search.found()
+        own = len(plan.limb.tracks)
+        steps = searched(fine, fine.marked(plan.keyed), fine.marked(plan.corners), loops=loops)
         while True:
             try:
                 share = next(steps)

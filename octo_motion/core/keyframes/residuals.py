@@ -254,32 +254,75 @@ class _Ends:
         (held,) = np.nonzero(np.isfinite(room).any(axis=1))
         tip = np.broadcast_to(1.0 / np.asarray(limb.distance), (1, frames))
         self._share = np.concatenate([tip, 1.0 / room[held]]).astype(np.float32)
-        ends = np.concatenate([[bones - 1], held])
-        self._upto: Singles = np.tri(bones, dtype=np.float32)[ends]
+        self._ends = np.concatenate([[bones - 1], held])
         self._steps = np.ascontiguousarray(np.moveaxis(steps, 2, 0).astype(np.float32))
         # A track's own error is what it turns or stretches as a share of the angle.
         self._angle = np.float32(limb.angle)
-        self._turns: Singles = _carried(chain.turned, chain.follows, tracks) * self._angle
-        self._scaled = np.array(chain.scaled, dtype=np.intp)
-        self._scales = _carried(chain.scaled, chain.handed, tracks)
+        self._turns = _Carried(chain.turned, chain.follows, tracks)
+        self._scales = _Carried(chain.scaled, chain.handed, tracks) if chain.scaled else None
         self._along = np.zeros((tracks, frames), dtype=np.float32)
-        for track in self._scaled[self._scaled >= 0]:
-            self._along[track] = self._angle / limb.tracks[track].values[:, 1]
+        for track in chain.scaled:
+            if track >= 0:
+                self._along[track] = self._angle / limb.tracks[track].values[:, 1]
 
     def errors(self, own: Singles) -> Singles:
         """How tracks' own errors (3, tracks, frames) move ends: (3, ends, frames)."""
-        moved = _cross(self._turns @ own, self._steps)
-        if len(self._scaled):
-            moved += (self._scales @ (self._along * own[1])) * self._steps
-        return (self._upto @ moved) * self._share
+        moved = _cross(self._turns.of_bones(self._angle * own), self._steps)
+        if self._scales is not None:
+            moved += self._scales.of_bones(self._along * own[1]) * self._steps
+        for bone in range(1, moved.shape[1]):
+            moved[:, bone] += moved[:, bone - 1]
+        return moved[:, self._ends] * self._share
 
     def pull(self, ends: Singles) -> Singles:
         """Transpose of :meth:`errors`."""
-        moved: Singles = self._upto.T @ (self._share * ends).astype(np.float32, copy=False)
-        result = self._turns.T @ _cross(self._steps, moved)
-        if len(self._scaled):
+        moved = np.zeros_like(self._steps)
+        for row, bone in enumerate(self._ends):
+            moved[:, bone] += self._share[row] * ends[:, row]
+        for bone in range(moved.shape[1] - 1, 0, -1):
+            moved[:, bone - 1] += moved[:, bone]
+        result = self._angle * self._turns.of_tracks(_cross(self._steps, moved))
+        if self._scales is not None:
             along = (self._steps * moved).sum(axis=0)
-            result[1] += self._along * (self._scales.T @ along)
+            result[1] += self._along * self._scales.of_tracks(along)
+        return result
+
+
+class _Carried:
+    """How tracks move the bones of a chain: by what they do themselves and by those before.
+
+    Sums from bone to bone, for the matrix that they stand for is as large as the chain is long,
+    and numpy's linear algebra wakes threads for its products: beside other programs these wait for
+    each other many times as long as a sum takes.
+
+    Args:
+        moved: of each bone its track, −1 for none.
+        on: of each bone whether the one before takes it along.
+        tracks: number of all.
+    """
+
+    def __init__(self, moved: Sequence[int], on: Sequence[bool], tracks: int) -> None:
+        self._tracks = tracks
+        self._moved = [(bone, track) for bone, track in enumerate(moved) if track >= 0]
+        self._bones = len(moved)
+        self._followers = [bone for bone in range(1, len(moved)) if on[bone]]
+
+    def of_bones(self, own: Singles) -> Singles:
+        """What tracks (…, tracks, frames) do to bones (…, bones, frames)."""
+        result = np.zeros((*own.shape[:-2], self._bones, own.shape[-1]), dtype=np.float32)
+        for bone, track in self._moved:
+            result[..., bone, :] = own[..., track, :]
+        for bone in self._followers:
+            result[..., bone, :] += result[..., bone - 1, :]
+        return result
+
+    def of_tracks(self, bones: Singles) -> Singles:
+        """Transpose of :meth:`of_bones`; bones (…, bones, frames) are summed up in place."""
+        for bone in reversed(self._followers):
+            bones[..., bone - 1, :] += bones[..., bone, :]
+        result = np.zeros((*bones.shape[:-2], self._tracks, bones.shape[-1]), dtype=np.float32)
+        for bone, track in self._moved:
+            result[..., track, :] += bones[..., bone, :]
         return result
 
 
@@ -290,17 +333,6 @@ def _cross(one: Singles, two: Singles) -> Singles:
         ahead, behind = (axis + 1) % 3, (axis + 2) % 3
         np.multiply(one[ahead], two[behind], out=result[axis])
         result[axis] -= one[behind] * two[ahead]
-    return result
-
-
-def _carried(moved: Sequence[int], on: Sequence[bool], tracks: int) -> Singles:
-    """Which tracks move each bone, by itself and by those before: (bones, tracks)."""
-    result = np.zeros((len(moved), tracks), dtype=np.float32)
-    for bone, track in enumerate(moved):
-        if bone and on[bone]:
-            result[bone] = result[bone - 1]
-        if track >= 0:
-            result[bone, track] += 1.0
     return result
 
 

@@ -10,6 +10,7 @@ bound is broken by most: what is broken by less may yet be fitted.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -40,6 +41,16 @@ _PINNING: Final = 40
 """… in so many more at most."""
 
 
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """How curves go on beyond the first moment and the last one."""
+
+    held: Booleans
+    """(tracks, 2) which of them keep a slope there …"""
+    slopes: Floats
+    """… and (4, tracks, 2) which slope."""
+
+
 class Search:
     """All tracks of a limb.
 
@@ -48,10 +59,17 @@ class Search:
         keyed: (columns, moments) where there are keys to begin with.
         corners: (tracks, moments) where the motion itself has a corner.
         loops: whether the motion goes on from its last frame to its first.
+        ends: slopes to keep at both ends; else they are as fits best.
     """
 
     def __init__(
-        self, fine: Fine, keyed: Booleans, corners: Booleans, *, loops: bool = False
+        self,
+        fine: Fine,
+        keyed: Booleans,
+        corners: Booleans,
+        *,
+        loops: bool = False,
+        ends: Ends | None = None,
     ) -> None:
         limb = fine.limb
         self._times, self._keyed, self._loops = fine.times, keyed.copy(), loops
@@ -71,9 +89,14 @@ class Search:
             turned = self._model.turns_at_the_seam(np.flatnonzero(fine.allowed))
             self._corners[:, [0, -1]] = turned[:, None]
         self._smooth = ~self._corners
-        self._curves = self._laid()
+        self.held: Booleans = np.zeros((len(corners), 2), dtype=bool)
+        """(tracks, 2) which of the slopes at both ends are kept."""
         targets = self._model.targets
         slopes = np.asarray(np.gradient(targets, self._times, axis=2))
+        if ends is not None:
+            self.held = ends.held.copy()
+            slopes[..., [0, -1]] = np.where(self.held, ends.slopes, slopes[..., [0, -1]])
+        self._curves = self._laid()
         self._chosen = self._curves.started(targets.reshape(4, -1), slopes.reshape(4, -1))
 
     def found(self) -> Generator[float, None, list[BezierKeys]]:
@@ -98,7 +121,9 @@ class Search:
 
     def _laid(self) -> Curves:
         keyed = self._keyed[self._columns]
-        return Curves(self._times, keyed, self._smooth, self._pinned, loops=self._loops)
+        return Curves(
+            self._times, keyed, self._smooth, self._pinned, loops=self._loops, held=self.held
+        )
 
     def _fit(self, steps: int, *, bounded: bool = True) -> None:
         change = fitted(self._curves, self._model, self._away(), steps, bounded=bounded)
@@ -214,6 +239,8 @@ class Search:
             self._keyed[self._columns[tracks], at] = True
             self._pinned[tracks, at] = True
             self._smooth[tracks, at] = False
+            for side, end in enumerate((0, len(self._times) - 1)):
+                self.held[tracks[at == end], side] = False
         self._relay()
 
     # --- Keys as Blender keeps them -----------------------------------------------------------
@@ -333,9 +360,10 @@ def _eased(curves: Curves, weight: Singles) -> Callable[[Singles], Singles]:
             near = (rows // _BLOCK == columns // _BLOCK) & curves.free[rows] & curves.free[columns]
             rows, columns = rows[near], columns[near]
             both = curves.coupled(one, two, weight)[near]
-            np.add.at(matrix, (rows // _BLOCK, rows % _BLOCK, columns % _BLOCK), both)
+            # No two spans have the same choice in the same place: nothing is added twice at once.
+            matrix[rows // _BLOCK, rows % _BLOCK, columns % _BLOCK] += both
             if one != two:
-                np.add.at(matrix, (rows // _BLOCK, columns % _BLOCK, rows % _BLOCK), both)
+                matrix[rows // _BLOCK, columns % _BLOCK, rows % _BLOCK] += both
     place = np.arange(_BLOCK)
     diagonal = matrix[:, place, place]
     # What is not free, and what fills up the last block, is by itself.

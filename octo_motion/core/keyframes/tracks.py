@@ -132,6 +132,12 @@ class Fine:
         result[:, self.allowed] = marks
         return result
 
+    def between(self, first: int, last: int) -> Fine:
+        """The same from one of its moments to another one."""
+        chosen = np.zeros(len(self.times), dtype=bool)
+        chosen[first : last + 1] = True
+        return Fine(self.times[chosen], self.limb.at(chosen), self.allowed[chosen])
+
 
 def with_halves(times: Floats, limb: Limb) -> Fine:
     """A limb on frames and half way between them.

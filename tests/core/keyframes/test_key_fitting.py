@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What few keys are made of: moments between frames, joints that rest, slopes, curves, handles."""
 
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from octo_motion.core.keyframes import reduce_keys
+from octo_motion.core.keyframes import BezierKeys, reduce_keys
 from octo_motion.core.keyframes.channels import values_at
 from octo_motion.core.keyframes.curves import Curves
 from octo_motion.core.keyframes.residuals import LinearModel, Residuals
 from octo_motion.core.keyframes.search import Search
+from octo_motion.core.keyframes.stretches import searched
 from octo_motion.core.keyframes.tracks import SCALE, Fine, Limb, Track, looked_at, with_halves
 from octo_motion.core.rotations import (
     Floats,
@@ -45,6 +48,15 @@ def resting_arm(seed: int, frames: int, *, room: float, stretching: bool = False
         columns=range(2 * count),
         chain=replace(chain, scaled=tuple(range(count, 2 * count)), handed=handed),
     )
+
+
+def finished(steps: Generator[float, None, list[BezierKeys]]) -> list[BezierKeys]:
+    """What comes of work that is done in steps."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as done:
+            return done.value
 
 
 # --- Moments between frames -----------------------------------------------------------------------
@@ -91,13 +103,7 @@ def test_keys_stand_where_they_are_allowed_alone() -> None:
     fine = Fine(np.arange(61.0), limb, np.arange(61) % 4 == 0)
     keyed = np.zeros((1, 61), dtype=bool)
     keyed[:, [0, -1]] = True
-    steps = Search(fine, keyed, np.ones((2, 61), dtype=bool)).found()
-    while True:
-        try:
-            next(steps)
-        except StopIteration as finished:
-            (keys, _) = finished.value
-            break
+    (keys, _) = finished(Search(fine, keyed, np.ones((2, 61), dtype=bool)).found())
     assert set(keys.frames) <= set(range(0, 61, 4))
 
 
@@ -225,6 +231,65 @@ def test_few_keys_of_what_few_keys_play_are_hardly_more(seed: int, count: int) -
     ((again,),) = reduce_keys(times, [limb_of(played)])
     assert len(again) <= len(once) + max(2, len(once) // 5)
     assert angle_between(normalized(values_at(again, times)), played[:, 0]).max() <= LIMIT * 1.001
+
+
+# --- Long shots -----------------------------------------------------------------------------------
+
+
+def long_arm(frames: int) -> Limb:
+    """An arm of four bones that swings, each its own way, and is where it was after all frames."""
+    _, bones, chain = an_arm(np.random.default_rng(2), joints=5)
+    share = np.linspace(0.0, 2.0 * np.pi, frames)[:, None, None]
+    cycles = np.arange(frames // 30, frames // 30 + 3 * len(bones)).reshape(len(bones), 3)
+    turn = 0.25 * np.sin(share * cycles + cycles)
+    limb = limb_of(continuous(from_rotation_vector(turn)), angle=0.01, distance=0.02)
+    return replace(limb, chain=chain, columns=range(len(bones)))
+
+
+def slopes(keys: BezierKeys) -> tuple[Floats, Floats]:
+    """Before and after keys (keys, components)."""
+    at = np.stack(np.broadcast_arrays(keys.frames[:, None], keys.values), axis=-1)
+    left = (at - keys.left).astype(np.float64)
+    right = (keys.right - at).astype(np.float64)
+    return left[..., 1] / left[..., 0], right[..., 1] / right[..., 0]
+
+
+@pytest.mark.parametrize("loops", [False, True])
+def test_a_shot_that_is_cut_keeps_its_bounds_and_goes_on_in_one_line(*, loops: bool) -> None:
+    times = np.arange(1701.0)
+    limb = long_arm(1701)
+    (found,) = reduce_keys(times, [limb], loops=loops)
+    fine = with_halves(times, limb)
+    own, joint = Residuals(fine.limb).measure([values_at(each, fine.times) for each in found])
+    assert max(own.max(), joint.max()) <= 1.001
+    for keys in found:
+        # The motion has no corner, and neither have its keys, those at cuts among them.
+        assert keys.smooth[1:-1].all()
+        before, after = slopes(keys)
+        np.testing.assert_allclose(before[1:-1], after[1:-1], atol=1e-4)
+        assert (np.diff(keys.frames) > 0.0).all()
+        if loops:
+            np.testing.assert_allclose(before[-1], after[0], atol=1e-4)
+
+
+def test_cutting_a_shot_adds_hardly_a_key() -> None:
+    def per_frame(count: int) -> float:
+        (found,) = reduce_keys(
+            np.arange(float(count)), [long_arm(1701).at(np.arange(1701) < count)]
+        )
+        return sum(map(len, found)) / count
+
+    assert per_frame(1701) <= 1.03 * per_frame(500)
+
+
+def test_what_hardly_moves_is_not_cut_however_long_it_is() -> None:
+    fine = looked_at(np.arange(3000.0), limb_of(swing(3000, 1500.0)), 1)
+    keyed = np.zeros((1, 3000), dtype=bool)
+    keyed[:, [0, 700, 1500, 2200, -1]] = True
+    corners = np.zeros((1, 3000), dtype=bool)
+    (keys,) = finished(searched(fine, keyed, corners))
+    (whole,) = finished(Search(fine, keyed, corners).found())
+    np.testing.assert_array_equal(keys.frames, whole.frames)
 
 
 # --- Keys on every frame --------------------------------------------------------------------------
