@@ -51,6 +51,8 @@ class Clip:
     own: Floats | None = None
     """(frames, 4, 4) of ``world`` what the object's own channels make, where parents or constraints
     may carry it further; none if nothing is known of that."""
+    cyclic: bool = False
+    """Whether the last frame is the first one again, over and over, wherever that leads."""
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -60,6 +62,11 @@ class Clip:
     def scale(self) -> float:
         """World size of one armature unit, metres."""
         return float(np.cbrt(abs(np.linalg.det(self.world[0, :3, :3]))))
+
+    @property
+    def cycle(self) -> float:
+        """Frames after which it begins again; infinite if it does not."""
+        return float(self.frames[-1] - self.frames[0]) if self.cyclic else np.inf
 
     def posed(self) -> tuple[Floats, Floats]:
         """World orientations (frames, bones, 4) and head positions (frames, bones, 3)."""

@@ -94,6 +94,16 @@ class ClipClock:
         inside = np.where(moments < self.moments[0], early, low)
         return np.where(moments >= self.moments[-1], late, inside)
 
+    def fitted(self, frames: float, period: float) -> ClipClock:
+        """The same a little faster or slower: in so many frames from its first knot on whole
+        periods of the clip go by.
+        """
+        start = self.moments[0]
+        gone = float(self.at(self.frames[0] + frames) - start)
+        factor = max(round(gone / period), 1) * period / gone
+        moments = start + factor * (self.moments - start)
+        return ClipClock(self.frames, moments, factor * self.speeds)
+
     def _within(self, frames: Floats) -> tuple[np.ndarray, Floats, Floats | None]:
         """The knot before each frame, how far it is to the next, and how many frames that is; none
         where there is only one.

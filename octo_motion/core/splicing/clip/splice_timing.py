@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
@@ -62,7 +63,9 @@ class SpliceWindow:
     """What a timing means for the frames of a base."""
 
     frames: slice
-    """The base's frames that the splice changes."""
+    """The base's frames that the splice changes; of a cycle perhaps with others between them."""
+    looks: Floats
+    """(window,) their numbers; on a cyclic base in the round that begins where the splice does."""
     weights: Floats
     """(window,) 0 is the base, 1 the splice."""
     entering: Floats
@@ -78,15 +81,26 @@ class SpliceWindow:
     """(window,) frames of the clip: how much a frame takes on of the step in speed, so that the two
     rounds meet at one speed as well."""
 
-    def easing(self, row: int) -> range:
+    def easing(self, row: int) -> list[int]:
         """The base's frames from this one to the middle of the easing in which it lies."""
         number = row - self.frames.start
-        if not 0 <= number < len(self.weights) or self.weights[number] >= 1.0:
-            return range(row, row)
+        if not 0 <= number < len(self.weights):
+            return []
+        for same in self.easings:
+            place = np.flatnonzero(same == number)
+            if len(place):
+                center = window_middle(self.weights[same])
+                first, last = sorted((int(place[0]), center))
+                return (same[first : last + 1] + self.frames.start).tolist()
+        return []
+
+    @cached_property
+    def easings(self) -> list[Integers]:
+        """The window's rows in which it comes, and those in which it goes, as it sees them."""
+        easing = (self.weights > 0.0) & (self.weights < 1.0)
         leaving = self.weights < self.entering
-        same = np.flatnonzero((self.weights < 1.0) & (leaving == leaving[number]))
-        center = int(same[window_middle(self.weights[same])]) + self.frames.start
-        return range(min(row, center), max(row, center) + 1)
+        chosen = (np.flatnonzero(easing & side) for side in (~leaving, leaving))
+        return [rows[np.argsort(self.looks[rows])] for rows in chosen if len(rows)]
 
     def taken(self, rows: Integers) -> SpliceWindow:
         """Of some of the base's frames, ascending, as if the base had no others."""
@@ -94,6 +108,7 @@ class SpliceWindow:
         chosen = rows[start:stop] - self.frames.start
         return SpliceWindow(
             slice(int(start), int(stop)),
+            self.looks[chosen],
             self.weights[chosen],
             self.entering[chosen],
             self.splice_frames[chosen],
@@ -133,41 +148,79 @@ def splice_span(timing: Timing, base: Clip, splice: Clip) -> tuple[float, float]
         end = start + timing.length
     if timing.after == "stop":
         end = min(end, max(float(clock.when(splice.frames[-1])), start))
-    return start, float(end)
+    # No longer than a cycle of the base: there the splice begins again.
+    return start, float(min(end, start + base.cycle))
 
 
-def splice_window(timing: Timing, base: Clip, splice: Clip) -> SpliceWindow:
+def splice_window(timing: Timing, base: Clip, splice: Clip, *, wraps: bool = True) -> SpliceWindow:
     """Frames, weights and moments of a splice.
+
+    On a cyclic base it acts in every round alike: what lies beyond the end of one comes at the
+    start of the next. A loop as long as a round never comes nor goes, and is fitted to it by whole
+    rounds of its own.
+
+    Args:
+        timing: when it is.
+        base: the base.
+        splice: the splice clip.
+        wraps: whether a splice may begin at the end of a cyclic base and end at its start.
 
     Raises:
         ClipError: rate, length or easing make no sense, or markers cross.
     """
     start, end = splice_span(timing, base, splice)
     clock = splice_clock(timing, base.rate, splice.rate)
-    times = splice.frames[0], splice.frames[-1]
-    looks = base.frames
-    inside = (looks >= start - 1e-6) & (looks <= end + 1e-6)
+    times, looks = (splice.frames[0], splice.frames[-1]), base.frames
+    endless = base.cyclic and timing.after == "loop" and end - start >= base.cycle - 1e-6
+    if endless:
+        clock = clock.fitted(base.cycle, times[1] - times[0])
+    if base.cyclic and wraps:
+        looks = start + np.mod(looks - start + 1e-6, base.cycle) - 1e-6
+    elif base.cyclic and not endless:
+        end = min(end, float(base.frames[-1]))
+    inside = (looks >= start - 1e-5) & (looks <= end + 1e-6)
     chosen = np.flatnonzero(inside)
     frames = slice(int(chosen[0]), int(chosen[-1]) + 1) if len(chosen) else slice(0, 0)
-    looks = looks[frames]
+    inside, looks = inside[frames], looks[frames]
     weights = entering = np.ones(len(looks))
-    if timing.ease_in > 0.0:
-        weights = entering = smooth_step((looks - start) / timing.ease_in)
-    if timing.ease_out > 0.0 and np.isfinite(end):
-        weights = np.minimum(weights, smooth_step((end - looks) / timing.ease_out))
+    if not endless:
+        weights, entering = _eased(looks, (start, end), (timing.ease_in, timing.ease_out))
+        # Between an end and a start the base is as it was.
+        weights, entering = np.where(inside, weights, 0.0), np.where(inside, entering, 1.0)
     rounds, seams = np.zeros(len(looks), dtype=np.intp), np.zeros((2, len(looks)))
     shown = clock.at(looks)
     if timing.after == "loop":
-        shown, rounds, seams = _looped(looks, clock, times, (timing.ease_in, timing.ease_out))
+        eases = timing.ease_in, timing.ease_out
+        shown, rounds, seams = _looped(looks, clock, times, eases, endless=endless)
     elif timing.after == "hold":
         shown = clock.at(_slowed(looks, float(clock.when(times[1])), timing.ease_out))
-    return SpliceWindow(frames, weights, entering, shown, rounds, seams[0], seams[1])
+    return SpliceWindow(frames, looks, weights, entering, shown, rounds, seams[0], seams[1])
+
+
+def _eased(
+    looks: Floats, span: tuple[float, float], eases: tuple[float, float]
+) -> tuple[Floats, Floats]:
+    """Weights, and those of coming in alone."""
+    weights = entering = np.ones(len(looks))
+    if eases[0] > 0.0:
+        weights = entering = smooth_step((looks - span[0]) / eases[0])
+    if eases[1] > 0.0 and np.isfinite(span[1]):
+        weights = np.minimum(weights, smooth_step((span[1] - looks) / eases[1]))
+    return weights, entering
 
 
 def _looped(
-    looks: Floats, clock: ClipClock, times: tuple[float, float], eases: tuple[float, float]
+    looks: Floats,
+    clock: ClipClock,
+    times: tuple[float, float],
+    eases: tuple[float, float],
+    *,
+    endless: bool,
 ) -> tuple[Floats, Integers, Floats]:
-    """Moments within the clip, rounds, and shares (2, window) of the steps in pose and speed."""
+    """Moments within the clip, rounds, and shares (2, window) of the steps in pose and speed.
+
+    ``endless``: whether a round comes before the first and after the last one.
+    """
     (first, last), seams = times, np.zeros((2, len(looks)))
     period, moments = last - first, clock.at(looks)
     # The last frame itself is shown once, before the clip begins anew.
@@ -185,11 +238,11 @@ def _looped(
     if eases[1] > 0.0:
         share = np.clip(1.0 - (ends[own] - looks) / ease_out, 0.0, 1.0)
         goes = before * np.stack([smooth_step(share), arrives * ease_out * _swing(share)])
-        seams += np.where(rounds < rounds[-1], goes, 0.0)
+        seams += np.where(endless | (rounds < rounds.max()), goes, 0.0)
     if eases[0] > 0.0:
         share = np.clip(1.0 - (looks - begins[own]) / ease_in, 0.0, 1.0)
         comes = np.stack([-smooth_step(share), leaves * ease_in * _swing(share)])
-        seams += np.where(rounds > 0, (1.0 - before) * comes, 0.0)
+        seams += np.where(endless | (rounds > 0), (1.0 - before) * comes, 0.0)
     return wrapped, rounds.astype(np.intp), seams
 
 
@@ -200,9 +253,9 @@ def _swing(share: Floats) -> Floats:
 
 def _slowed(looks: Floats, end: float, ease: float) -> Floats:
     """Frames that slow down to the one at which the clip ends where they would run past it."""
-    if not len(looks) or looks[-1] <= end + 1e-6:
+    if not len(looks) or looks.max() <= end + 1e-6:
         return looks
-    ease = min(ease, max(end - float(looks[0]), 0.0))
+    ease = min(ease, max(end - float(looks.min()), 0.0))
     if ease <= 0.0:
         return looks
     left = np.clip(ease - (looks - end), 0.0, 2.0 * ease)

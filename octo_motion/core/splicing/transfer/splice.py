@@ -182,7 +182,9 @@ class Splicer:
 
     def window(self, timing: Timing) -> SpliceWindow:
         """What a timing means for the base; ClipError if it makes no sense."""
-        return splice_window(timing, self._base, self.splice.clip)
+        # A way through the world has a beginning and an end.
+        wraps = self._travel is None
+        return splice_window(timing, self._base, self.splice.clip, wraps=wraps)
 
     def needed(self, span: SpliceWindow, rows: Iterable[int]) -> list[int]:
         """Frames on which the result at these hangs, themselves included, ascending."""
@@ -256,10 +258,11 @@ def _ease(
     base: Clip, span: SpliceWindow, bones: Sequence[int], rotations: Floats, locations: Floats
 ) -> None:
     """Mix the base back in where the splice comes and goes."""
-    leaving = span.weights < span.entering
-    for chosen in (np.flatnonzero((span.weights < 1.0) & side) for side in (~leaving, leaving)):
-        if not len(chosen):
-            continue
+    # Where the splice has no weight, the very values of the base.
+    for own, made in ((base.rotations, rotations), (base.locations, locations)):
+        rows = np.ix_(np.flatnonzero(span.weights == 0.0), bones)
+        made[rows] = own[span.frames][rows]
+    for chosen in span.easings:
         frames = chosen + span.frames.start
         weights = span.weights[chosen][:, None]
         own = base.rotations[frames][:, bones]
@@ -269,8 +272,7 @@ def _ease(
         center = window_middle(weights[:, 0])
         between = np.where(between[center, :, :1] < 0.0, -between, between)
         mixed = multiply(own, _power(between, weights))
-        # Where the splice has no weight yet, the very values of the base.
-        rotations[np.ix_(chosen, bones)] = np.where(weights[..., None] == 0.0, own, mixed)
+        rotations[np.ix_(chosen, bones)] = mixed
         still = base.locations[frames][:, bones]
         there = locations[np.ix_(chosen, bones)]
         locations[np.ix_(chosen, bones)] = still + weights[..., None] * (there - still)
