@@ -10,6 +10,7 @@ declared is no setting: it is worked out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -56,6 +57,10 @@ class Setting:
 def setting(label: str, description: str, *, default: Any, **more: Any) -> Any:
     """The field of a dataclass that is a setting; what ``more`` may say is in :class:`Setting`."""
     return field(default=default, metadata={_KEY: Setting(label, description, default, **more)})
+
+
+share_setting: Final = partial(setting, low=0.0, high=1.0, subtype="FACTOR")
+"""The same of a share, from 0 to 1."""
 
 
 def declared_settings(kind: type) -> dict[str, Setting]:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from functools import cached_property
 from io import BytesIO
 from typing import Any, Final, get_args, get_type_hints
 
@@ -36,23 +36,18 @@ class Number:
     """As in ``struct``."""
     count: int = 1
 
-    @property
-    def layout(self) -> str:
-        """As ``struct`` has it."""
-        return f"{self.count}{self.code}"
+    @cached_property
+    def _layout(self) -> struct.Struct:
+        return struct.Struct(f"<{self.count}{self.code}")
 
-    def check(self, values: tuple[Any, ...]) -> Any:
-        """The field's value from its numbers."""
+    def put(self, value: Any, out: bytearray) -> None:
+        out += self._layout.pack(*(value if self.count > 1 else (value,)))
+
+    def take(self, data: BytesIO) -> Any:
+        values = self._layout.unpack(_take(data, self._layout.size))
         if self.code == "d" and not all(map(math.isfinite, values)):
             raise MessageError("a number is not finite")
         return values if self.count > 1 else values[0]
-
-    def put(self, value: Any, out: bytearray) -> None:
-        out += struct.pack("<" + self.layout, *(value if self.count > 1 else (value,)))
-
-    def take(self, data: BytesIO) -> Any:
-        layout = "<" + self.layout
-        return self.check(struct.unpack(layout, _take(data, struct.calcsize(layout))))
 
 
 U8: Final = Number("B")
@@ -140,7 +135,7 @@ Codec = Number | Text | Many | Table
 
 
 class Record:
-    """Packs and reads the fields of one kind of message; at once where all sizes are fixed.
+    """Packs and reads the fields of one kind of message.
 
     Raises:
         MessageError: the bytes are no such message.
@@ -152,39 +147,16 @@ class Record:
             each.name: get_args(hints[each.name])[1] for each in fields(kind)
         }
         """By name of the field."""
-        self._numbers = [each for each in self.codecs.values() if isinstance(each, Number)]
-        self._struct: struct.Struct | None = None
-        if len(self._numbers) == len(self.codecs):
-            self._struct = struct.Struct("<" + "".join(each.layout for each in self._numbers))
 
     def pack(self, message: object) -> bytes:
-        values = [getattr(message, name) for name in self.codecs]
-        if self._struct is not None:
-            flat: list[Any] = []
-            for number, value in zip(self._numbers, values, strict=True):
-                if number.count > 1:
-                    flat.extend(value)
-                else:
-                    flat.append(value)
-            return self._struct.pack(*flat)
         out = bytearray()
-        for codec, value in zip(self.codecs.values(), values, strict=True):
-            codec.put(value, out)
+        for name, codec in self.codecs.items():
+            codec.put(getattr(message, name), out)
         return bytes(out)
 
     def unpack(self, data: bytes) -> tuple[Any, ...]:
-        if self._struct is not None:
-            if len(data) != self._struct.size:
-                raise MessageError("of another length")
-            return tuple(self._split(self._struct.unpack(data)))
         left = BytesIO(data)
         values = tuple(codec.take(left) for codec in self.codecs.values())
         if left.read(1):
             raise MessageError("too long")
         return values
-
-    def _split(self, flat: tuple[Any, ...]) -> Iterator[Any]:
-        at = 0
-        for number in self._numbers:
-            yield number.check(flat[at : at + number.count])
-            at += number.count

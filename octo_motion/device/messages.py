@@ -95,13 +95,9 @@ class FigureMessage(Message):
 
     @classmethod
     def of(cls, figure: Figure) -> FigureMessage:
-        return cls(
-            *(figure.names, tuple(map(int, figure.parents)), figure.anchors, figure.rest),
-            *(figure.lengths, figure.masses, figure.centres, figure.inertias),
-            *(figure.capsules, figure.radii, figure.limits),
-            *(figure.elements.stiffness, figure.elements.damping, figure.elements.flow),
-            figure.elements.yield_torque,
-        )
+        own = {**vars(figure), **vars(figure.elements)}
+        own["parents"] = tuple(map(int, figure.parents))
+        return cls(**{each.name: own[each.name] for each in fields(cls)})
 
     def figure(self) -> Figure:
         count = len(self.names)

@@ -27,7 +27,7 @@ from ...rotations import (
     rotate,
 )
 from ...rotations.components_first import cumulative_sum
-from ...settings import check_settings, setting
+from ...settings import check_settings, setting, share_setting
 from ...skeleton import Skeleton
 from ..rig import (
     ArmRest,
@@ -152,26 +152,20 @@ class GaitSettings:
     )
     weights: tuple[float, ...] = (0.4,)
     """Weights a of the joints, at even steps from the arm's root to its tip, each in (0, 1]."""
-    softness: float = setting(
+    softness: float = share_setting(
         "Softness",
         "How far a bend spreads over neighbouring joints: 0 leaves it where it falls",
         default=0.8,
-        low=0.0,
-        high=1.0,
-        subtype="FACTOR",
     )
     """0 leaves bends where CCD puts them."""
-    stretch_slack: float = setting(
+    stretch_slack: float = share_setting(
         "Give",
         "How far an arm may reach beyond its targets as it straightens, in lengths of a third of "
         "it: it straightens gently. 0 meets them exactly, and snaps straight",
         default=0.0,
         offered=0.08,
         stored_as="give",
-        low=0.0,
-        high=1.0,
         soft_high=0.3,
-        subtype="FACTOR",
     )
     lateral_bend: float = setting(
         "Sway",

@@ -17,7 +17,7 @@ import numpy as np
 from ...content_cache import ContentCache, content_key, part_of
 from ...errors import GroundError
 from ...rotations import Floats
-from ...settings import check_settings, setting
+from ...settings import check_settings, setting, share_setting
 
 _EDGE: Final = 1e-6
 """Share of a face by which it reaches beyond its edges, so that none falls between two."""
@@ -468,13 +468,10 @@ class StanceSettings:
         step=1,
         precision=3,
     )
-    lean: float = setting(
+    lean: float = share_setting(
         "Lean",
         "How far the body leans with the ground: 0 stays upright, 1 follows its slope",
         default=0.7,
-        low=0.0,
-        high=1.0,
-        subtype="FACTOR",
     )
     smoothing: float = setting(
         "Smoothing",

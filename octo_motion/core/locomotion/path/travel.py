@@ -26,7 +26,7 @@ from ...rotations import (
     rotate_in_plane,
     shortest_arc,
 )
-from ...settings import check_settings, setting
+from ...settings import check_settings, setting, share_setting
 from ...smoothing import smooth_step
 from ..gait import CYCLE
 from .route import Route
@@ -353,23 +353,17 @@ class TravelSettings:
             ),
         ),
     )
-    ease_in: float = setting(
+    ease_in: float = share_setting(
         "Ease In",
         "Share of the time spent speeding up from a standstill",
         default=0.0,
         offered=0.1,
-        low=0.0,
-        high=1.0,
-        subtype="FACTOR",
     )
-    ease_out: float = setting(
+    ease_out: float = share_setting(
         "Ease Out",
         "Share of the time spent slowing down to a standstill",
         default=0.0,
         offered=0.1,
-        low=0.0,
-        high=1.0,
-        subtype="FACTOR",
     )
     stride: float = 1.0
     """Metres travelled per gait cycle."""
@@ -393,13 +387,10 @@ class TravelSettings:
         precision=1,
         subtype="ANGLE",
     )
-    burst: float = setting(
+    burst: float = share_setting(
         "Burst",
         "Swimming: 0 glides evenly, 1 shoots ahead with each stroke and nearly stops",
         default=0.6,
-        low=0.0,
-        high=1.0,
-        subtype="FACTOR",
     )
     stroke_phase: float = 0.75 * np.pi
     """SWIM: phase of the middle of the power stroke. In the table β₁ falls from π/2 to π."""
