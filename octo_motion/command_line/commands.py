@@ -65,11 +65,7 @@ def _make(shot: ShotRequest) -> int:
 
 
 def _requested(options: argparse.Namespace) -> ShotRequest:
-    """The shot that the arguments ask for: a table of a job, put into other words.
-
-    Raises:
-        OctoMotionError: they make no sense.
-    """
+    """The shot that the arguments ask for: a table of a job, put into other words."""
     if not (options.file or bpy.data.filepath):
         raise OctoMotionError("No file is open.", "Give the .blend file to read.")
     read = _resolved(options.file or bpy.data.filepath)
@@ -94,11 +90,7 @@ def _requested(options: argparse.Namespace) -> ShotRequest:
 
 
 def _check_outputs(shot: ShotRequest, read: Path, *, overwrite: bool) -> None:
-    """Make sure that no file is lost.
-
-    Raises:
-        WriteError: an output is there already, or is read.
-    """
+    """Make sure that no file is lost: that no output is there already, or is read."""
     if len(set(shot.outputs)) < len(shot.outputs):
         raise WriteError("Two outputs have the same path.", "Give each its own.")
     for path in shot.outputs:

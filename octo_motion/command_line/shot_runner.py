@@ -245,10 +245,7 @@ def _filled(settings: Any, name: str, items: Sequence[Mapping[str, Any]]) -> Non
     """Give a list these items alone.
 
     What a library override has from its linked file cannot be removed: a reach is muted, a contact
-    says nothing any more.
-
-    Raises:
-        SettingsError: it can neither be removed nor left out.
+    says nothing any more, a place cannot be left out.
     """
     collection = getattr(settings, name)
     linked = linked_names(settings, name)
@@ -271,11 +268,7 @@ def _filled(settings: Any, name: str, items: Sequence[Mapping[str, Any]]) -> Non
 def _object(
     name: str, kind: str = "", instead: str = "Give a file that has one."
 ) -> bpy.types.Object:
-    """The object of that name and kind, of any kind without; ``instead`` helps where none is there.
-
-    Raises:
-        SettingsError: there is none, or it is of another kind.
-    """
+    """The object of that name and kind, of any without; ``instead`` helps where none is there."""
     fitting = [each for each in bpy.data.objects if kind in {"", each.type}]
     found = named(fitting, name)
     if found is not None:
@@ -328,11 +321,7 @@ def _is_posable(armature: bpy.types.Object) -> bool:
 
 
 def _pose(armature: bpy.types.Object, scene: bpy.types.Scene, script: Path) -> ShotSummary:
-    """Play a pose script on an armature; the context has its scene.
-
-    Raises:
-        OctoMotionError: the script or a step of it is wrong; the armature is as it was.
-    """
+    """Play a pose script on an armature; the context has its scene."""
     player = play_file(armature, scene, script)
     first, last = scene.frame_start, scene.frame_end
     message = f"played '{script.name}', {player.keys} bones keyed."

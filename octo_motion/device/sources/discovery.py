@@ -21,14 +21,7 @@ from typing import Final
 
 from ...core.errors import DeviceError
 from ..driver import DeviceLostError, Driver
-from ..hid import (
-    ForceDevice,
-    Found,
-    HidDriver,
-    SpaceMouse,
-    descriptor_fingerprint,
-    list_devices,
-)
+from ..hid import ForceDevice, Found, HidDriver, SpaceMouse, descriptor_fingerprint, list_devices
 from .haply import PORT as HAPLY_PORT
 from .haply import Haply
 from .network import Port

@@ -18,13 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SettingsError
-from ...rotations import (
-    Floats,
-    conjugate,
-    continuous,
-    from_rotation_vector,
-    multiply,
-)
+from ...rotations import Floats, conjugate, continuous, from_rotation_vector, multiply
 from ...smoothing import least_jerk
 
 _HELD: Final = 0.3

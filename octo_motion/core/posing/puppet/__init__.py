@@ -2,15 +2,7 @@
 """What a puppet is: bodies, joints, their limits and materials."""
 
 from .bone_roles import BODY, FOLLOW, SMALLEST, RigFacts, Roles, diagonal, find_roles
-from .build import (
-    FREE,
-    SIZE,
-    JointLimits,
-    PosedBones,
-    build_figure,
-    joints_of,
-    turned_bodies,
-)
+from .build import FREE, SIZE, JointLimits, PosedBones, build_figure, joints_of, turned_bodies
 from .figure import (
     Elements,
     Figure,

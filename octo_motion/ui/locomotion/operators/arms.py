@@ -24,14 +24,7 @@ from ....core.locomotion.rig import ArmChain, body_frame, chain_of, detect_arms,
 from ...declared_settings import assign
 from ...operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
-from ..reading import (
-    add_item,
-    body_axes,
-    bones_of,
-    placed_arms,
-    write_arms,
-    write_body,
-)
+from ..reading import add_item, body_axes, bones_of, placed_arms, write_arms, write_body
 from ..settings import AXES, locomotion_settings
 
 _SIDE_LETTERS: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": "-"}

@@ -43,11 +43,7 @@ from ..settings import (
 
 
 def _writable(context: bpy.types.Context) -> OCTO_MOTION_PG_locomotion:
-    """Settings that can be written.
-
-    Raises:
-        WriteError: the armature is linked.
-    """
+    """Settings that can be written."""
     armature = active_armature(context)
     writable_armature(armature)
     return locomotion_settings(armature)
@@ -89,11 +85,7 @@ def _active(collection: Any, index: int, what: str) -> Any:
 
 
 def _chosen_curve(settings: OCTO_MOTION_PG_locomotion) -> tuple[int, GaitCurve]:
-    """The pair that is chosen in the list, 0 for all, and its angles.
-
-    Raises:
-        GaitError: none is chosen.
-    """
+    """The pair that is chosen in the list, 0 for all, and its angles."""
     pair = 0
     if listed := used(settings.table.curves):
         pair = _active(listed, settings.table.active_curve, "pair").pair

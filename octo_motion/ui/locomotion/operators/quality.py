@@ -14,12 +14,7 @@ from ....core.errors import RigError, SettingsError
 from ....core.locomotion.metrics import TOLD
 from ...operator_base import ArmatureOperator
 from ...panel_base import ArmaturePanel, armature_in
-from ..settings import (
-    KIND_NAMES,
-    KINDS,
-    known_figures,
-    locomotion_settings,
-)
+from ..settings import KIND_NAMES, KINDS, known_figures, locomotion_settings
 
 _WORDS: Final = 0.7
 """Share of a row that a figure needs beside the button."""

@@ -25,13 +25,7 @@ from ....blender.animation import (
 from ....blender.rig import armature_data, may_play_otherwise, world_matrix
 from ....blender.scene import CARRIED, Contact, put_back, read_route, write_markers
 from ....core.errors import RouteError, WriteError
-from ....core.locomotion.metrics import (
-    Figure,
-    Played,
-    figures,
-    played_arm,
-    warnings_for_figures,
-)
+from ....core.locomotion.metrics import Figure, Played, figures, played_arm, warnings_for_figures
 from ....core.locomotion.motion import (
     Breathing,
     MotionJob,
