@@ -48,7 +48,7 @@ def test_any_name_has_a_file_of_its_own(name: str) -> None:
     assert path.parent == presets.user_folder()
     assert not set('<>:"/\\|?*') & set(path.name)
     assert path.stem not in {"", ".", ".."}
-    assert presets._name_of(path) == name
+    assert presets.name_of(path) == name
 
 
 @pytest.mark.parametrize("name", ["con", "NUL.x", "a/b", "..", "Größe ½", "100%", "%2f", " x ."])

@@ -131,6 +131,27 @@ def test_several_splices_onto_a_motion_file_in_one_command(folder: Path) -> None
     assert angle_between(again.rotations, result.rotations).max() < ROUNDING
 
 
+def test_saved_mapping_is_used_before_anything_is_guessed(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bpy.ops.octo_motion.import_clips(filepath=str(folder / "walk.bvh"))
+    bpy.ops.octo_motion.map_skeleton()
+    walker: Any = bpy.context.object
+    guessed = walker.octo_motion.splicing.landmarks.chest
+    # Told by nobody but the one who saved it.
+    own = walker.data.bones[guessed].parent.name
+    walker.octo_motion.splicing.landmarks.chest = own
+    bpy.ops.octo_motion.mapping_save(name="Walkers")
+    try:
+        arguments = ("--splice", "head", "throw.bvh", "-o", "out.blend")
+        assert run_here(folder, "splice", "walk.bvh", *arguments) == 0
+    finally:
+        bpy.ops.octo_motion.mapping_remove(name="Walkers")
+    told = capfd.readouterr().out
+    assert "Mapping of 'walk': Walkers (saved)." in told
+    assert opened(folder / "out.blend").octo_motion.splicing.landmarks.chest == own
+
+
 def test_job_makes_its_good_shots_and_tells_of_the_bad_ones(folder: Path) -> None:
     write(folder / "torn.bvh", (folder / "punch.bvh").read_text(encoding="utf-8")[:3000])
     write(folder / "pose.bvh", one_frame((folder / "punch.bvh").read_text(encoding="utf-8")))

@@ -1,6 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Presets and what the user's folder keeps."""
 
+from .saved_mappings import (
+    load_mapping,
+    load_mappings,
+    mapping_names,
+    remove_mapping,
+    save_mapping,
+)
 from .user_files import (
     SUFFIX,
     gait_names,
@@ -25,11 +32,16 @@ __all__ = [
     "has_gait",
     "load_calibrations",
     "load_gait",
+    "load_mapping",
+    "load_mappings",
+    "mapping_names",
     "read_gait_file",
     "remove_gait",
+    "remove_mapping",
     "sample_weight_curve",
     "save_calibrations",
     "save_gait",
+    "save_mapping",
     "user_gait_names",
     "write_gait",
 ]

@@ -104,7 +104,7 @@ def has_gait(name: str) -> bool:
 def user_gait_names() -> list[str]:
     """Names of the user's own gaits, sorted."""
     built_in = gait_presets()
-    names = (_name_of(path) for path in user_folder().glob(f"*{SUFFIX}"))
+    names = (name_of(path) for path in user_folder().glob(f"*{SUFFIX}"))
     return sorted((name for name in names if name not in built_in), key=str.casefold)
 
 
@@ -191,13 +191,18 @@ def write_gait(table: GaitTable, path: Path) -> None:
 
 
 def _path_of(name: str) -> Path:
-    """The file of a gait's name: any name has one, and no two names share one."""
+    return file_named(user_folder(), name)
+
+
+def file_named(folder: Path, name: str) -> Path:
+    """The file of a name: any name has one, and no two names share one."""
     safe = _UNSAFE.sub(lambda found: f"%{ord(found.group()):02x}", name)
     safe = _DEVICES.sub(lambda found: f"%{ord(found.group()[0]):02x}{found.group()[1:]}", safe)
-    return user_folder() / f"{safe}{SUFFIX}"
+    return folder / f"{safe}{SUFFIX}"
 
 
-def _name_of(path: Path) -> str:
+def name_of(path: Path) -> str:
+    """The name of a file that :func:`file_named` gave."""
     return _ESCAPE.sub(lambda found: chr(int(found.group(1), 16)), path.stem)
 
 

@@ -6,7 +6,15 @@ from __future__ import annotations
 from typing import Final
 
 from ..steps import own_classes
-from . import import_clips, landmark_table, properties, splice_operators, splice_panels, timing_drag
+from . import (
+    import_clips,
+    landmark_table,
+    mapping_operators,
+    properties,
+    splice_operators,
+    splice_panels,
+    timing_drag,
+)
 from .import_clips import draw_in_import_menu
 from .properties import (
     PARTS,
@@ -22,7 +30,7 @@ SETTINGS: Final = own_classes(properties)
 """What ``Object.octo_motion`` holds of splicing."""
 
 CLASSES: Final = (
-    *own_classes(landmark_table, import_clips, splice_operators, timing_drag),
+    *own_classes(landmark_table, mapping_operators, import_clips, splice_operators, timing_drag),
     *splice_panels.CLASSES,
 )
 """Operators and panels."""

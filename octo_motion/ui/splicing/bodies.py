@@ -3,17 +3,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 import bpy
 import numpy as np
 
 from ...blender.animation import read_clip
-from ...blender.rig import read_skeleton, world_matrix
+from ...blender.files import load_mappings
+from ...blender.rig import armature_data, read_skeleton, world_matrix
 from ...core.errors import OctoMotionError
 from ...core.skeleton import Skeleton
 from ...core.splicing.clip import average_pose
-from ...core.splicing.humanoid import LANDMARKS, OPTIONAL, Landmarks, map_skeleton, stature
+from ...core.splicing.humanoid import (
+    LANDMARKS,
+    OPTIONAL,
+    Landmarks,
+    map_skeleton,
+    recognised,
+    stature,
+)
 from .properties import read_landmarks, splicing_settings
 
 _LOOKS: Final = 50
@@ -32,27 +42,79 @@ def in_motion(armature: bpy.types.Object) -> Skeleton | None:
         return None
 
 
+@dataclass(frozen=True)
+class KnownBody:
+    """What is known of an armature's body."""
+
+    landmarks: Landmarks | None
+    """None where the table is empty and the skeleton is no humanoid."""
+    problem: str = ""
+    """Why there are none."""
+    found: bool = False
+    """Whether the table was empty and could be filled with them."""
+    mapping: str = ""
+    """The saved mapping that they are from."""
+    damaged: tuple[str, ...] = ()
+    """What is wrong with saved mappings that were looked at: sentences."""
+
+
 def known_landmarks(
     armature: bpy.types.Object, skeleton: Skeleton, moving: Skeleton | None
-) -> tuple[Landmarks | None, str, bool]:
-    """Landmarks of an armature: of its table, completed by what can be found.
+) -> KnownBody:
+    """Landmarks of an armature: of its table, completed by the saved mapping of its kind of
+    skeleton, and that by what can be found.
 
     Args:
         armature: the armature object.
         skeleton: its bones as they rest.
         moving: the same as they lie in a motion, if there is one.
-
-    Returns:
-        The landmarks, none where the table is empty and the skeleton is no humanoid; why that is
-        so; and whether the table was empty and could be filled with them.
     """
     bones = dict(read_landmarks(splicing_settings(armature).landmarks).bones)
-    if all(each in bones for each in LANDMARKS if each not in OPTIONAL):
-        return Landmarks(bones), "", False
-    found = map_skeleton(skeleton, moving)
-    if found.problem and not bones:
-        return None, found.problem, False
-    return Landmarks(dict(found.landmarks.bones) | bones), "", not bones
+    if is_complete(bones):
+        return KnownBody(Landmarks(bones))
+    saved = saved_landmarks(armature)
+    known = saved.bones | bones
+    if not is_complete(known):
+        found = map_skeleton(skeleton, moving)
+        if found.problem and not known:
+            return KnownBody(None, found.problem, damaged=saved.damaged)
+        known = dict(found.landmarks.bones) | known
+    return KnownBody(
+        Landmarks(known), found=not bones, mapping=saved.mapping, damaged=saved.damaged
+    )
+
+
+def is_complete(bones: Mapping[str, str]) -> bool:
+    """Whether bones by landmark have all that is required."""
+    return all(each in bones for each in LANDMARKS if each not in OPTIONAL)
+
+
+@dataclass(frozen=True)
+class SavedLandmarks:
+    """What the saved mappings tell of an armature."""
+
+    mapping: str = ""
+    """Name of the one of its kind of skeleton, "" if there is none."""
+    bones: dict[str, str] = field(default_factory=dict[str, str])
+    """Its bones by landmark."""
+    damaged: tuple[str, ...] = ()
+    """What is wrong with others: sentences."""
+
+
+def saved_landmarks(armature: bpy.types.Object) -> SavedLandmarks:
+    """What the saved mappings tell of an armature; quick enough to be asked while panels draw."""
+    mappings, damaged = load_mappings()
+    problems = tuple(str(each) for each in damaged)
+    found = recognised(mappings, parents_of(armature)) if mappings else None
+    if found is None:
+        return SavedLandmarks(damaged=problems)
+    return SavedLandmarks(found[0].name, dict(found[1].bones), problems)
+
+
+def parents_of(armature: bpy.types.Object) -> dict[str, str]:
+    """Name of the parent of each bone, "" of those without."""
+    bones = armature_data(armature).bones
+    return {bone.name: bone.parent.name if bone.parent else "" for bone in bones}
 
 
 def height_of(armature: bpy.types.Object) -> float | None:
@@ -61,7 +123,7 @@ def height_of(armature: bpy.types.Object) -> float | None:
         skeleton = read_skeleton(armature)
     except OctoMotionError:
         return None
-    landmarks, _, _ = known_landmarks(armature, skeleton, in_motion(armature))
+    landmarks = known_landmarks(armature, skeleton, in_motion(armature)).landmarks
     height = stature(skeleton, landmarks) if landmarks is not None else None
     if height is None:
         return None

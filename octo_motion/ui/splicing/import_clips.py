@@ -23,7 +23,9 @@ from ...core.errors import ClipError, OctoMotionError
 from ...core.splicing.clip import MOTION_SUFFIXES
 from ..modal_job import ModalJob
 from ..operator_base import window_manager
+from .bodies import saved_landmarks
 from .clip_places import Placing, place_clips, target_height
+from .properties import splicing_settings, write_landmarks
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -56,7 +58,11 @@ class ImportSession:
         self._placing = placing or Placing()
         self._target = target_height(context)
         self.placed = ""
-        """A sentence on how tall the clips are, "" if they are as in their files."""
+        """How tall the clips are, if not as in their files, and which saved mappings they have:
+        sentences, or "".
+        """
+        self.damaged: tuple[str, ...] = ()
+        """What is wrong with saved mappings that were looked at: sentences."""
         layer = context.view_layer
         assert layer is not None
         self._selected = [
@@ -102,7 +108,17 @@ class ImportSession:
             raise ClipError(f"'{path.name}' was not imported. {error.problem}", error.remedy + more)
         context = bpy.context
         self.clips, self.placed = place_clips(self.clips, context, self._placing, self._target)
-        _select([name for clip in self.clips for name in clip.armatures])
+        names = [name for clip in self.clips for name in clip.armatures]
+        mappings = dict[str, None]()
+        for armature in (bpy.data.objects[name] for name in names):
+            saved = saved_landmarks(armature)
+            if saved.mapping:
+                write_landmarks(splicing_settings(armature).landmarks, saved.bones)
+                mappings[saved.mapping] = None
+            self.damaged = saved.damaged
+        if mappings:
+            self.placed = f"{self.placed} Mapping: {', '.join(mappings)} (saved).".strip()
+        _select(names)
         return self
 
     def undo(self) -> None:
@@ -296,6 +312,8 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
             message += f", {len(session.refused)} refused"
         self.report({"INFO"}, f"{message}. {session.placed}".rstrip())
         # Blender's status bar keeps the last, which is to be the one that says most.
+        for each in session.damaged:
+            self.report({"WARNING"}, each)
         for clip in session.clips:
             for note in clip.notes:
                 self.report({"WARNING"}, f"'{clip.file}': {note}")

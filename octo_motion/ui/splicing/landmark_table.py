@@ -18,7 +18,8 @@ from ...core.errors import RigError
 from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
 from ..operator_base import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in
-from .bodies import in_motion
+from .bodies import SavedLandmarks, in_motion, is_complete, saved_landmarks
+from .mapping_operators import draw_mapping
 from .properties import PROPERTIES, read_landmarks, title, write_landmarks
 from .splice_operators import StackOperator
 
@@ -42,23 +43,34 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
+    saved: BoolProperty(
+        name="Use Saved Mappings",
+        description="Take the mapping that you have saved for this kind of skeleton, if there is "
+        "one, before anything is found anew",
+        default=True,
+        options={"SKIP_SAVE"},
+    )
+
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
+        saved = saved_landmarks(armature) if self.saved else SavedLandmarks()
         found = map_skeleton(read_skeleton(armature), in_motion(armature))
-        if found.problem:
+        if found.problem and not saved.bones:
             raise RigError(
                 f"'{armature.name}' has no landmarks. {found.problem}",
                 "Choose an armature with two arms, two legs and a head, or fill the table by hand.",
             )
-        bones = dict(found.landmarks.bones)
+        bones = dict(saved.bones) if is_complete(saved.bones) else {}
+        bones = bones or dict(found.landmarks.bones) | saved.bones
         if self.keep:
             bones |= read_landmarks(settings.landmarks).bones
         write_landmarks(settings.landmarks, bones)
-        self.report({"INFO"}, f"{len(bones)} of {len(LANDMARKS)} landmarks are set.")
+        whose = f" Mapping: {saved.mapping} (saved)." if saved.mapping else ""
+        self.report({"INFO"}, f"{len(bones)} of {len(LANDMARKS)} landmarks are set.{whose}")
         asked = [each for each in found.asked if each not in bones]
         if asked:
             names = ", ".join(title(each) for each in asked)
             self.report({"WARNING"}, f"Choose the bones of: {names}. {found.missing[asked[0]]}")
-        for note in found.notes:
+        for note in (*(() if saved.mapping else found.notes), *saved.damaged):
             self.report({"WARNING"}, note)
 
 
@@ -183,6 +195,7 @@ def draw_landmarks(
     row = layout.row(align=True)
     row.operator(OCTO_MOTION_OT_map_skeleton.bl_idname, icon="ARMATURE_DATA")
     row.operator(OCTO_MOTION_OT_landmarks_clear.bl_idname, text="", icon="X")
+    draw_mapping(layout, settings)
     row = layout.row(align=True)
     menu = OCTO_MOTION_MT_landmark_presets
     preset = OCTO_MOTION_OT_landmark_preset_add.bl_idname

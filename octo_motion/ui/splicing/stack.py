@@ -91,6 +91,10 @@ class Stack:
     """In the order of the list; none for one that is muted."""
     names: tuple[str, ...]
     """What the splices are called in the list."""
+    mappings: tuple[str, ...] = ()
+    """Whose landmarks are from saved mappings: sentences."""
+    damaged: tuple[str, ...] = ()
+    """What is wrong with saved mappings that could not be used: sentences."""
 
     @property
     def acting(self) -> list[Splice]:
@@ -146,14 +150,17 @@ class SpliceSummary:
     """How many were not muted."""
     warnings: tuple[str, ...] = ()
     """What one may not see on the armature, and why: sentences."""
+    mappings: tuple[str, ...] = ()
+    """Whose landmarks are from saved mappings: sentences."""
 
     @property
     def message(self) -> str:
-        """One sentence."""
+        """One sentence, and where landmarks are from."""
         if self.splices == 0:
             return f"'{self.action}': all splices are muted, so it is the base again."
         word = "splice" if self.splices == 1 else "splices"
-        return f"{self.splices} {word} on {self.frames} frames: '{self.action}'."
+        made = f"{self.splices} {word} on {self.frames} frames: '{self.action}'."
+        return " ".join([made, *self.mappings])
 
 
 # --- Reading -------------------------------------------------------------------------------------
@@ -179,13 +186,24 @@ def prepare_splices(armature: bpy.types.Object) -> Stack:
             splices.append(None if item.mute else _splice(reader, item, base))
         except OctoMotionError as error:
             raise ListedSpliceError(armature.name, number, item.name, error) from error
-    return Stack(armature.name, base, tuple(splices), tuple(settings.splices.keys()))
+    return Stack(
+        armature.name,
+        base,
+        tuple(splices),
+        tuple(settings.splices.keys()),
+        tuple(f"Mapping of '{whose}': {name} (saved)." for whose, name in reader.mappings.items()),
+        tuple(reader.damaged),
+    )
 
 
 class ClipReader:
     """Reads clips, each of them once."""
 
     def __init__(self) -> None:
+        self.mappings: dict[str, str] = {}
+        """Saved mappings that were used, by the armatures' names."""
+        self.damaged: dict[str, None] = {}
+        """What is wrong with saved mappings that could not be used: sentences."""
         self._sources: dict[tuple[Any, ...], Source] = {}
 
     def base(self, armature: bpy.types.Object) -> Source:
@@ -249,8 +267,12 @@ class ClipReader:
                 frames = np.linspace(clip.frames[0], clip.frames[-1], count)
                 clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
             known = known_landmarks(armature, clip.skeleton, average_pose(clip))
-            landmarks, problem, found = known
-            self._sources[key] = Source(clip, landmarks, armature.name, problem, found)
+            self.damaged |= dict.fromkeys(known.damaged)
+            if known.mapping:
+                self.mappings[armature.name] = known.mapping
+            self._sources[key] = Source(
+                clip, known.landmarks, armature.name, known.problem, known.found
+            )
         return self._sources[key]
 
 
@@ -396,7 +418,8 @@ def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
     if lost:
         verbs = "is scaled and loses its" if len(lost) == 1 else "are scaled and lose their"
         warnings.append(f"{_listed(lost)} {verbs} size: of what they carry a part is spliced.")
-    return SpliceSummary(action.name, len(clip), len(stack.acting), tuple(warnings))
+    warnings += stack.damaged
+    return SpliceSummary(action.name, len(clip), len(stack.acting), tuple(warnings), stack.mappings)
 
 
 def _listed(names: Iterable[str]) -> str:

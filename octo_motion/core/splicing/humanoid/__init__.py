@@ -13,6 +13,13 @@ from .correspondence import (
 from .counterparts import mirror_images, opposite
 from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks, mirrored
 from .mapping import map_skeleton
+from .saved_mapping import (
+    SavedMapping,
+    damaged_mapping,
+    mapping_from_json,
+    new_mapping,
+    recognised,
+)
 
 __all__ = [
     "LANDMARKS",
@@ -21,14 +28,19 @@ __all__ = [
     "SIDED",
     "Correspondence",
     "Landmarks",
+    "SavedMapping",
     "chain_length",
+    "damaged_mapping",
     "find_correspondence",
     "map_skeleton",
+    "mapping_from_json",
     "matched_bones",
     "matched_chains",
     "mirror_images",
     "mirrored",
+    "new_mapping",
     "opposite",
+    "recognised",
     "rest_alike",
     "stature",
 ]
