@@ -18,6 +18,7 @@ from .actions import (
     write_action,
 )
 from .clips import (
+    closes,
     further_channels,
     read_clip,
     scaled_channels,
@@ -49,6 +50,7 @@ __all__ = [
     "PoseValues",
     "animated_bones",
     "as_posed",
+    "closes",
     "curves_of",
     "displaced_bones",
     "further_channels",

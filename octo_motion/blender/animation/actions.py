@@ -40,6 +40,9 @@ _HANDLE_SLACK: Final = 1e-3
 """Share of a handle's length by which it may stray: each time that Blender aligns handles, it
 rounds them anew."""
 
+_TRAVELS: Final = 1e-4
+"""Difference between the first and last value of a place from which on a loop leads elsewhere."""
+
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
 
@@ -405,7 +408,12 @@ def _repeat(channelbag: bpy.types.ActionChannelbag, *, repeats: bool) -> None:
         for modifier in list(curve.modifiers):
             curve.modifiers.remove(modifier)
         if repeats:
-            curve.modifiers.new("CYCLES")
+            cycles = curve.modifiers.new("CYCLES")
+            first, last = (curve.keyframe_points[end].co[1] for end in (0, -1))
+            if curve.data_path.endswith("location") and abs(last - first) > _TRAVELS:
+                # What travels goes on from where a round has led.
+                assert isinstance(cycles, bpy.types.FModifierCycles)
+                cycles.mode_before = cycles.mode_after = "REPEAT_OFFSET"
 
 
 def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import bpy
@@ -16,6 +17,7 @@ from ...core.keyframes import Channel, RigChannels, rotation_property
 from ...core.rotations import (
     IDENTITY,
     Floats,
+    angle_between,
     from_matrix,
     from_mode_values,
     multiply,
@@ -44,6 +46,12 @@ _LEAST_SCALING: Final = 1e-6
 
 _ROUNDING: Final = 1e-4
 """Factors by which importers' scale keys are off one, or unequal, without meaning it."""
+
+_CLOSED: Final = np.radians(1.0)
+"""By which a bone may be off in the last frame of a cycle."""
+
+_ON_FRAME: Final = 0.01
+"""Frames by which keys may miss the ends of a cycle."""
 
 _APART: Final = frozenset({"ALIGNED", "AVERAGE", "NONE"})
 """Ways of a bone to inherit its parent's scale that leave its own axes straight."""
@@ -129,7 +137,8 @@ def write_clip(
     """Give an armature a clip as a new action, with keys on all bones.
 
     Each bone keeps its rotation mode, and turns the short way from frame to frame. The action
-    that the armature had is not changed. The object gets keys where the clip moves it.
+    that the armature had is not changed. The object gets keys where the clip moves it. A cyclic
+    clip that ends in the pose in which it begins repeats.
 
     Args:
         armature: an armature with the clip's bones.
@@ -172,6 +181,7 @@ def write_clip(
         channels,
         previous=previous,
         settings_note=note,
+        repeats=clip.cyclic and closes(clip.rotations),
     )
 
 
@@ -322,7 +332,8 @@ def _action_clip(
     times = _checked_frames(_action_range(action, curves) if frames is None else frames, frames)
     if visual:
         with assigned(armature, action, slot):
-            return _shown_clip(armature, skeleton, action.name, times, rate)
+            shown = _shown_clip(armature, skeleton, action.name, times, rate)
+        return replace(shown, cyclic=frames is None and _is_cyclic(action, curves, shown))
     unkeyed = unkeyed_pose(armature)
     rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
     world, own = _object_motion(armature, curves, times)
@@ -332,7 +343,29 @@ def _action_clip(
             "Repair or delete them, or choose another action.",
         )
     _check_scale(armature, world)
-    return Clip(action.name, skeleton, times, rate, rotations, locations, world, scales, own)
+    clip = Clip(action.name, skeleton, times, rate, rotations, locations, world, scales, own)
+    return replace(clip, cyclic=frames is None and _is_cyclic(action, curves, clip))
+
+
+def _is_cyclic(action: bpy.types.Action, curves: _Curves, clip: Clip) -> bool:
+    """Whether an action says that its range is a cycle, or its curves repeat just that."""
+    if action.use_frame_range and action.use_cyclic:
+        return len(clip) > 2
+    ends = clip.frames[[0, -1]]
+    repeated = [
+        key_range(curve)
+        for components in curves.values()
+        for curve in components.values()
+        if any(each.type == "CYCLES" and not each.mute for each in curve.modifiers)
+    ]
+    # One that goes on for more than a round serves to make it last.
+    alike = all(np.abs(ends - each).max() < _ON_FRAME for each in repeated)
+    return bool(repeated) and alike and closes(clip.rotations)
+
+
+def closes(rotations: Floats) -> bool:
+    """Whether the last of rotations (frames, bones, 4) are the first ones again."""
+    return len(rotations) > 2 and bool(angle_between(rotations[0], rotations[-1]).max() < _CLOSED)
 
 
 def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:

@@ -207,6 +207,9 @@ def lasting(action: bpy.types.Action, frames: int) -> bpy.types.Action:
     if start + frames - 1 > end:
         for curve in curves_of(copy):
             _repeat(curve, start, end)
+    # Cut elsewhere it is a cycle no more.
+    rounds = (frames - 1) / (end - start)
+    copy.use_cyclic = copy.use_cyclic and abs(rounds - round(rounds)) < _SAME
     copy.use_frame_range = True
     copy.frame_start, copy.frame_end = start, start + frames - 1
     copy.use_fake_user = True

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...blender.animation import (
     Channel,
+    closes,
     further_channels,
     read_clip,
     scaled_channels,
@@ -415,6 +416,11 @@ def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
         # What was used is what the table shows from now on.
         write_landmarks(settings.landmarks, stack.base.landmarks.bones)
     warnings = list(_warnings(stack, settings.splices))
+    if clip.cyclic and closes(stack.base.clip.rotations) and not closes(clip.rotations):
+        warnings.append(
+            f"'{stack.base.clip.name}' is a cycle, but '{action.name}' ends in another pose than "
+            "it begins in: it does not repeat."
+        )
     if lost:
         verbs = "is scaled and loses its" if len(lost) == 1 else "are scaled and lose their"
         warnings.append(f"{_listed(lost)} {verbs} size: of what they carry a part is spliced.")
