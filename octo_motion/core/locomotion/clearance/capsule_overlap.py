@@ -27,6 +27,9 @@ _PARALLEL: Final = 1e-10
 """Square of the sine of the angle between two segments that are as good as parallel."""
 _AT_ONCE: Final = 250_000
 """Distances that are looked at in one go: what the processor keeps at hand."""
+_FOR_ONE_THREAD: Final = 100_000
+"""Multiplications of a product of matrices for which numpy's linear algebra wakes no threads:
+beside other programs these wait for each other a hundred times as long as the product takes."""
 _ROUNDED: Final = 1e-4
 """Share of a distance in single precision by which it may be wrong."""
 _BUILT_SO: Final = 0.02
@@ -188,20 +191,50 @@ def near(
     one_more, own = np.ones_like(squares)[..., None], squares[..., None]
     first = np.concatenate([-2.0 * middles, own, one_more], axis=2)
     second = np.concatenate([middles, one_more, own], axis=2).transpose(0, 2, 1)
+    rows = max(1, _FOR_ONE_THREAD // (first.shape[2] * len(limit)))
     step = max(1, _AT_ONCE // limit.size)
     found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for begin in range(0, len(middles), step):
-        part = slice(begin, begin + step)
-        # Squared distances of all from all.
-        products = np.matmul(first[part], second[part])
-        # Several times faster than where a row, a column and a frame are found at once.
-        spots = np.flatnonzero(products <= limit)
-        frame, spot = np.divmod(spots, limit.size)
-        pair = place[spot]
-        square = np.maximum(products.ravel()[spots] - rounding, 0.0)
-        found.append((frame + begin, pair, (1.0 - _ROUNDED) * np.sqrt(square) - apart[pair]))
+        frames, spots, squares = _within(
+            first[begin : begin + step], second[begin : begin + step], limit, rows
+        )
+        pair = place[spots]
+        square = np.maximum(squares - rounding, 0.0)
+        found.append((frames + begin, pair, (1.0 - _ROUNDED) * np.sqrt(square) - apart[pair]))
     frames, pairs, least = (np.concatenate(each) for each in zip(*found, strict=True))
     return frames, pairs, least
+
+
+def _within(
+    first: np.ndarray, second: np.ndarray, limit: np.ndarray, rows: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the products of matrices (frames, capsules, n) and (frames, n, capsules) are within
+    their limits (capsules, capsules).
+
+    Those before the diagonal are not asked for.
+
+    Args:
+        first: the one.
+        second: the other.
+        limit: of each product.
+        rows: of a block that is worked out at once.
+
+    Returns:
+        Frame, place in the limits and product of each, in the order of frames and of places.
+    """
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    for begin in range(0, len(limit), rows):
+        products = np.matmul(first[:, begin : begin + rows], second[..., begin:])
+        own = limit[begin : begin + rows, begin:]
+        # Several times faster than where a row, a column and a frame are found at once.
+        spots = np.flatnonzero(products <= own)
+        frame, spot = np.divmod(spots, own.size)
+        row, column = np.divmod(spot, own.shape[1])
+        place = (row + begin) * len(limit) + column + begin
+        found.append((frame, place, products.ravel()[spots]))
+    frames, places, products = (np.concatenate(each) for each in zip(*found, strict=True))
+    order = np.argsort(frames, kind="stable")
+    return frames[order], places[order], products[order]
 
 
 def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Floats:

@@ -155,6 +155,17 @@ def chain_of(skeleton: Skeleton, names: Iterable[str]) -> tuple[str, ...]:
     return tuple(skeleton.names[bone] for bone in order)
 
 
+def median(values: Floats) -> float:
+    """Half of some numbers (count,) are above it, at least one.
+
+    numpy's own looks whether there are masks each time, for which it first loads all that it has
+    of masked arrays: a tenth of the time that a walk of 1000 frames takes.
+    """
+    ordered = np.sort(values)
+    half = len(ordered) // 2
+    return float(ordered[half] + ordered[-half - 1]) / 2.0
+
+
 def joint_positions(skeleton: Skeleton, bones: Sequence[str]) -> Floats:
     """Joints P₀ … Pₙ of an arm at rest, (bones + 1, 3), armature space.
 
@@ -170,7 +181,7 @@ def joint_positions(skeleton: Skeleton, bones: Sequence[str]) -> Floats:
         return np.concatenate([heads, tails])
     segments = np.diff(heads, axis=0)
     gaps = np.linalg.norm(tails[:-1] - heads[1:], axis=1)
-    if np.median(gaps) <= 0.1 * np.median(np.linalg.norm(segments, axis=1)):
+    if median(gaps) <= 0.1 * median(np.linalg.norm(segments, axis=1)):
         tip = tails[-1]
     else:
         tip = heads[-1] + segments[-1]

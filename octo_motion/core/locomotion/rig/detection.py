@@ -35,6 +35,7 @@ from .arm_chains import (
     body_rotation,
     is_driven,
     joint_positions,
+    median,
     mirror_distances,
     name_side,
     nearest_axis,
@@ -361,7 +362,7 @@ def _without_odd_one(
         [skeleton.heads[chain.bones[-1]] - skeleton.heads[chain.bones[0]] for chain in family]
     )
     elevations = np.arcsin(np.clip(normalized(directions) @ np.array(AXES[up], float), -1.0, 1.0))
-    odd = np.flatnonzero(np.abs(elevations - np.median(elevations)) > np.radians(60.0))
+    odd = np.flatnonzero(np.abs(elevations - median(elevations)) > np.radians(60.0))
     if len(odd) != 1 or len(family[odd[0]]) > 5:
         return family
     return family[: odd[0]] + family[odd[0] + 1 :]
@@ -381,7 +382,7 @@ def _is_large(skeleton: Skeleton, tree: BoneTree, family: tuple[BoneChain, ...])
     if not others:
         return True
     center = skeleton.heads[[chain.bones[0] for chain in family]].mean(axis=0)
-    distance = np.median(np.linalg.norm(skeleton.heads[others] - center, axis=1))
+    distance = median(np.linalg.norm(skeleton.heads[others] - center, axis=1))
     return bool(distance <= _LARGEST_REST * _typical_length(family))
 
 
@@ -440,7 +441,7 @@ def _is_named_like_a_body(skeleton: Skeleton, family: tuple[BoneChain, ...]) -> 
 
 
 def _typical_length(family: tuple[BoneChain, ...]) -> float:
-    return float(np.median([chain.length for chain in family]))
+    return median(np.array([chain.length for chain in family]))
 
 
 # Arm lengths: how far mirror images may lie apart, on average, for a rig to be symmetric.
