@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 
 from octo_motion.core.rotations import from_axis_angle, to_matrix
-from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS, OPTIONAL, read_names
+from octo_motion.core.splicing.clip.rest_pose import with_rest_pose
+from octo_motion.core.splicing.humanoid.body_height import stature
+from octo_motion.core.splicing.humanoid.landmarks import (
+    LANDMARKS,
+    OPTIONAL,
+    Landmarks,
+    read_names,
+)
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from tests.core.humanoids import PARENTS, humanoid, number_name
 from tests.core.rigs import body_with_arms, skeleton_of
@@ -436,3 +443,23 @@ def test_japanese_twist_bones_and_fingers_are_no_landmarks(name: str) -> None:
     (found,) = read_names([name])
     assert found.machinery
     assert found.weights == {}
+
+
+@given(seed=st.integers(0, 1000), scale=st.floats(1e-3, 1e3))
+def test_a_body_is_as_tall_whatever_its_rest_pose_is(seed: int, scale: float) -> None:
+    """Its thighs begin at 0.95, its head's joint is at 1.58, its ankles are at 0.1."""
+    body = humanoid({each: each for each in LANDMARKS}, scale=scale)
+    landmarks = Landmarks({each: each for each in LANDMARKS})
+    height = stature(body, landmarks)
+    assert height == pytest.approx(scale * (1.58 - 0.1) / 0.88, rel=0.005)
+    turns = np.random.default_rng(seed).normal(size=(len(body), 4))
+    turns /= np.linalg.norm(turns, axis=-1, keepdims=True)
+    assert stature(with_rest_pose(body, turns), landmarks) == pytest.approx(height, rel=1e-9)
+
+
+@pytest.mark.parametrize("lacking", ["head", "foot.L", "thigh.R"])
+def test_how_tall_a_body_is_cannot_be_told_without_legs_and_head(lacking: str) -> None:
+    body = humanoid({each: each for each in LANDMARKS})
+    bones = {each: each for each in LANDMARKS if each != lacking}
+    assert stature(body, Landmarks(bones)) is None
+    assert stature(body, Landmarks(bones | {lacking: "gone"})) is None

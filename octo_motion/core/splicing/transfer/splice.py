@@ -329,6 +329,7 @@ class SplicePreview:
             needed = level.needed(span, needed)
         rows = np.asarray(needed, dtype=np.intp)
         result = self._base.taken(rows)
-        for level, span in zip(self._levels, spans, strict=True):
-            result = level.onto(result, span.taken(rows))
+        for number, (level, span) in enumerate(zip(self._levels, spans, strict=True), self._number):
+            with numbered(number):
+                result = level.onto(result, span.taken(rows))
         return result.taken([needed.index(row)])
