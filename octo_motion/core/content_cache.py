@@ -17,12 +17,10 @@ _Record = TypeVar("_Record")
 
 
 def part_of(record: _Record, chosen: np.ndarray | slice, axis: Literal[0, -1] = -1) -> _Record:
-    """The same record, of whose arrays only some items are there; what is no array stays.
+    """The same record, a dataclass of arrays and of rows of arrays, of which only some items are
+    there: those of some numbers, or of a slice.
 
-    Args:
-        record: a dataclass of arrays, and of rows of arrays.
-        chosen: numbers of the items, or a slice of them.
-        axis: along which they are, the same for all of its arrays.
+    They are along the same axis of all its arrays; what is no array stays.
     """
     place = (..., chosen) if axis else chosen
 
@@ -54,11 +52,7 @@ _ALL: Final[weakref.WeakSet[ContentCache[Any]]] = weakref.WeakSet()
 
 
 class ContentCache(Generic[_Result]):
-    """The last few results of one function.
-
-    Args:
-        most: how many are kept; of more, the one that was not asked for longest goes.
-    """
+    """The last few results of one function; the one that was not asked for longest goes first."""
 
     def __init__(self, most: int = 8) -> None:
         self._most = most
@@ -66,11 +60,9 @@ class ContentCache(Generic[_Result]):
         _ALL.add(self)
 
     def get(self, key: bytes, make: Callable[[], _Result]) -> _Result:
-        """What was made for this key, else what is made now. It must not be changed afterwards.
-
-        Args:
-            key: from :func:`content_key`, of everything that the result depends on.
-            make: makes it; if it raises, nothing is kept.
+        """What was made for this key (:func:`content_key` of everything that the result depends
+        on), else what is made now; if that raises, nothing is kept. It must not be changed
+        afterwards.
         """
         if key in self._kept:
             self._kept.move_to_end(key)

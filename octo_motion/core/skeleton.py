@@ -84,14 +84,10 @@ class Skeleton:
         return from_matrix(self.rest_matrices[:, :3, :3])
 
     def pose(self, basis: Floats, locations: Floats | None = None) -> tuple[Floats, Floats]:
-        """Forward kinematics of rotations (and locations) given in each bone's rest frame.
+        """Forward kinematics of rotations (…, bones, 4), Blender's ``matrix_basis``, and locations
+        (…, bones, 3) in each bone's rest frame.
 
-        Args:
-            basis: (…, bones, 4) quaternions, what Blender calls ``matrix_basis``.
-            locations: (…, bones, 3) in the bone's rest frame, or none.
-
-        Returns:
-            Orientations (…, bones, 4) and heads (…, bones, 3) in armature space.
+        Orientations (…, bones, 4) and heads (…, bones, 3) are in armature space.
         """
         rotations = np.empty(basis.shape)
         heads = np.empty((*basis.shape[:-1], 3))

@@ -44,12 +44,8 @@ def blur_reach(width: int) -> int:
 
 
 def blurred(values: Floats, width: int, *, cyclic: bool = False) -> Floats:
-    """Means (frames, …) over neighbouring frames, three in a row: nearly a bell.
-
-    Args:
-        values: (frames, …)
-        width: frames to either side of each mean.
-        cyclic: whether the last frame is the first again.
+    """Means (frames, …) of values (frames, …) over so many neighbouring frames to either side,
+    three in a row: nearly a bell. Cyclic, the last frame is the first again.
     """
     result = values
     for _ in range(_PASSES):

@@ -25,15 +25,12 @@ _COARSE: Final = 1e-4
 
 
 class Curves:
-    """Curves with keys at given frames.
+    """Curves with keys at given frames, ``times`` (frames,), at least two.
 
-    Args:
-        times: (frames,) at least two.
-        keyed: (tracks, frames) where there are keys; among them the first and last frame.
-        smooth: (tracks, frames) keys whose handles stay in one line.
-        pinned: (tracks, frames) keys that keep their values.
-        loops: whether the handles at both ends stay in one line, too, where both are smooth.
-        held: (tracks, 2) slopes at both ends that stay as they are; none without.
+    There are keys where ``keyed`` (tracks, frames) says so, the first and last frame among them.
+    Those that are ``smooth`` (tracks, frames) keep their handles in one line, those that are
+    ``pinned`` (tracks, frames) their values. In a loop the handles at both ends stay in one line,
+    too, where both are smooth; slopes ``held`` (tracks, 2) at both ends stay as they are.
     """
 
     def __init__(
@@ -129,12 +126,8 @@ class Curves:
         return result
 
     def turned(self, other: Curves, before: Floats, after: Floats) -> Floats:
-        """How far handles of each key (keys,) have moved from another's choices to these.
-
-        Args:
-            other: curves with the same keys.
-            before: (4, other.size)
-            after: (4, size)
+        """How far handles of each key (keys,) have moved from the choices ``before`` (4,
+        other.size) of other curves with the same keys to these, ``after`` (4, size).
         """
         result = np.zeros(len(self.keys))
         for place, ends in ((1, self.begun), (2, self.begun + 1)):
@@ -173,12 +166,8 @@ class Curves:
         return (given.take(first, axis=1) + given.take(second, axis=1)) * self.free
 
     def coupled(self, one: int, two: int, weight: Singles) -> Singles:
-        """How much two choices of each span have to do with each other: (spans,).
-
-        Args:
-            one: number of the first among a span's choices.
-            two: of the second.
-            weight: (tracks, frames)
+        """How much two of the choices of each span, by number, have to do with each other (spans,),
+        where frames weigh so much (tracks, frames).
         """
         products = self._singles[one] * self._singles[two]
         return np.add.reduceat(products * weight.ravel(), self.heads)
@@ -206,11 +195,10 @@ class Curves:
         return v0 + self.lengths / 3.0 * s0, v1 - self.lengths / 3.0 * s1
 
     def played(self, chosen: Floats, times: Floats) -> Floats:
-        """Values (4, tracks, times) of keys and handles that are kept in single precision.
+        """Values (4, tracks, times) of keys and handles ``chosen`` (4, size) that are kept in
+        single precision.
 
-        Args:
-            chosen: (4, size)
-            times: (times,) ascending from the first frame to the last; need not be frames.
+        Times (times,) ascend from the first frame to the last; they need not be frames.
         """
         own, count = self._times, self.shape[1]
         place = np.searchsorted(own, times, side="right") - 1

@@ -29,13 +29,10 @@ _ENOUGH: Final = 1e-8
 
 
 def dense_keys(times: Floats, limb: Limb, every: int, *, loops: bool = False) -> list[BezierKeys]:
-    """A key on each frame, of the motion's own values.
+    """A key on each frame, of the motion's own values, where times (moments,), at least two, have a
+    frame at ``every`` so many of them, from the first to the last.
 
-    Args:
-        times: (moments,) at least two.
-        limb: at all of them.
-        every: at every how many of the moments there is a frame, from the first to the last.
-        loops: whether the motion goes on from its last frame to its first.
+    The limb is that of all moments. In a loop the motion goes on from its last frame to its first.
     """
     at = np.arange(0, len(times), every)
     targets = np.stack(

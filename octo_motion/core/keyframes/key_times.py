@@ -60,10 +60,8 @@ class _Spans:
 class Choice:
     """Key frames of limbs that are alike: as many tracks of the same kinds. Chains do not count.
 
-    Args:
-        times: (frames,) at least two.
-        limbs: their bounds are those that keys of the motion's own values are to keep to.
-        every: at every how many frames there may be a key.
+    Of times (frames,), at least two, there may be a key at ``every`` so many. The limbs' bounds are
+    those that keys of the motion's own values are to keep to.
     """
 
     def __init__(self, times: Floats, limbs: Sequence[Limb], every: int = 1) -> None:

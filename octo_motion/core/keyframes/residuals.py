@@ -24,14 +24,9 @@ def turns(kind: str) -> bool:
 
 
 def walked(chain: LimbChain, decoded: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """A chain from its root to its tip.
-
-    Args:
-        chain: its bones and the tracks that move them.
-        decoded: of each track its rotations (frames, 4) or its scales (frames, 3).
-
-    Returns:
-        Turn (bones, frames, 4) of each bone away from rest, and its step (bones, frames, 3).
+    """A chain from its root to its tip, its tracks decoded to rotations (frames, 4) or scales
+    (frames, 3): turn (bones, frames, 4) of each bone away from rest, and its step (bones, frames,
+    3).
     """
     frames = len(decoded[0])
     rest = np.broadcast_to((1.0, 0.0, 0.0, 0.0), (frames, 4))
@@ -66,14 +61,10 @@ class Residuals:
         self._ends = self._ends_of(self._exact)
 
     def measure(self, values: Sequence[Floats]) -> tuple[Floats, Floats]:
-        """Errors of other values of this limb.
+        """Errors of other values of this limb, of each track (frames, components).
 
-        Args:
-            values: of each track (frames, components).
-
-        Returns:
-            Of each track by itself (tracks, frames), and of the tip, of the joints that rest and of
-            what is carried (frames,).
+        They are of each track by itself (tracks, frames), and of the tip, of the joints that rest
+        and of what is carried (frames,).
         """
         limb, frames = self._limb, len(values[0])
         own = np.zeros((len(values), frames))
@@ -138,11 +129,7 @@ _APART: Final = 1e-5
 
 
 class LinearModel:
-    """A limb near its motion.
-
-    Args:
-        limb: at all frames that are fitted.
-    """
+    """A limb near its motion, at all frames that are fitted."""
 
     def __init__(self, limb: Limb) -> None:
         values = [track.values for track in limb.tracks]
@@ -183,22 +170,16 @@ class LinearModel:
         self._ridge: Singles = (_RIDGE * self._size * turning[:, None]).astype(np.float32)
 
     def errors(self, off: Singles) -> list[Singles]:
-        """Errors of each track (3, tracks, frames), and of ends of bones (3, ends, frames) where
-        there is a chain.
-
-        Args:
-            off: (4, tracks, frames) changes of values.
+        """Errors of each track (3, tracks, frames) whose values change by ``off`` (4, tracks,
+        frames), and of ends of bones (3, ends, frames) where there is a chain.
         """
         own = np.einsum("dctf,ctf->dtf", self._own, off)
         return [own] if self._ends is None else [own, self._ends.errors(own)]
 
     def pull(self, off: Singles, pulls: Sequence[Singles], weight: Singles) -> Singles:
-        """Transpose of :meth:`errors`, and what keeps changes small that are not seen.
-
-        Args:
-            off: (4, tracks, frames) changes of values.
-            pulls: like the errors.
-            weight: (tracks, frames) of each track's own error.
+        """Transpose of :meth:`errors` by ``pulls`` like the errors, and what keeps changes ``off``
+        of values (4, tracks, frames) small that are not seen; ``weight`` (tracks, frames) is that
+        of each track's own error.
         """
         own = pulls[0] if self._ends is None else pulls[0] + self._ends.pull(pulls[1])
         result = np.einsum("dctf,dtf->ctf", self._own, own)
@@ -210,11 +191,8 @@ class LinearModel:
         return (own * (self._size + self._ridge)).astype(np.float32, copy=False)
 
     def culprits(self, off: Singles, frames: Integers) -> Singles:
-        """How much each track has to do with the worst end's being off: (tracks, frames).
-
-        Args:
-            off: (4, tracks, frames) changes of values.
-            frames: which of the frames.
+        """How much each track has to do with the worst end's being off (tracks, frames) at some
+        frames, where values change by ``off`` (4, tracks, frames).
         """
         own, *rest = self.errors(off)
         if self._ends is None:
@@ -226,10 +204,8 @@ class LinearModel:
         return (own * self._ends.pull(only)).sum(axis=0)[:, frames]
 
     def turns_at_the_seam(self, frames: Integers) -> Booleans:
-        """Whether tracks (tracks,) have a corner where a loop goes on from its start.
-
-        Args:
-            frames: those of the motion's frames between which nothing is left out.
+        """Whether tracks (tracks,) have a corner where a loop goes on from its start, told from
+        those of its frames between which nothing is left out.
         """
         if len(frames) < _FEW:
             return np.ones(self.targets.shape[1], dtype=bool)
@@ -291,14 +267,12 @@ class _Ends:
 class _Carried:
     """How tracks move the bones of a chain: by what they do themselves and by those before.
 
-    Sums from bone to bone, for the matrix that they stand for is as large as the chain is long,
-    and numpy's linear algebra wakes threads for its products: beside other programs these wait for
-    each other many times as long as a sum takes.
+    Sums from bone to bone, for the matrix that they stand for is as large as the chain is long, and
+    numpy's linear algebra wakes threads for its products: beside other programs these wait for each
+    other many times as long as a sum takes.
 
-    Args:
-        moved: of each bone its track, −1 for none.
-        on: of each bone whether the one before takes it along.
-        tracks: number of all.
+    Of each bone ``moved`` is its track, −1 for none, and ``on`` whether the one before takes it
+    along; ``tracks`` are so many in all.
     """
 
     def __init__(self, moved: Sequence[int], on: Sequence[bool], tracks: int) -> None:

@@ -52,14 +52,11 @@ class Ends:
 
 
 class Search:
-    """All tracks of a limb.
+    """All tracks of a limb, at all moments at which it is looked at, at least two.
 
-    Args:
-        fine: what is keyed, at all moments at which it is looked at, at least two.
-        keyed: (columns, moments) where there are keys to begin with.
-        corners: (tracks, moments) where the motion itself has a corner.
-        loops: whether the motion goes on from its last frame to its first.
-        ends: slopes to keep at both ends; else they are as fits best.
+    There are keys to begin with where ``keyed`` (columns, moments) says so, and the motion itself
+    has ``corners`` (tracks, moments). In a loop it goes on from its last frame to its first. Slopes
+    at both ends are kept, or are as fits best.
     """
 
     def __init__(
@@ -298,14 +295,11 @@ _RIDGE: Final = 1e-3
 def fitted(
     curves: Curves, model: LinearModel, off: Singles, steps: int, *, bounded: bool
 ) -> Singles:
-    """By how much to change choices (4, size) to make errors smaller.
+    """By how much to change choices (4, size) to make errors smaller, in so many steps of conjugate
+    gradients.
 
-    Args:
-        curves: what is chosen for.
-        model: what they are to follow.
-        off: (4, tracks, frames) how far off they are.
-        steps: of conjugate gradients.
-        bounded: whether errors matter near the bounds and beyond, rather than all alike.
+    The curves are ``off`` (4, tracks, frames) from what they are to follow. Bounded, errors matter
+    near the bounds and beyond, rather than all alike.
     """
     errors = model.errors(off)
     pulls, stiff = [], []
@@ -346,11 +340,8 @@ def fitted(
 
 
 def _eased(curves: Curves, weight: Singles) -> Callable[[Singles], Singles]:
-    """What nearly solves the system of tracks by themselves: the choices of some keys at a time.
-
-    Args:
-        curves: what is chosen for.
-        weight: (tracks, frames) of each value by itself.
+    """What nearly solves the system of tracks by themselves, whose values weigh so much (tracks,
+    frames): the choices of some keys at a time.
     """
     blocks = -(-curves.size // _BLOCK)
     matrix = np.zeros((blocks, _BLOCK, _BLOCK), dtype=np.float32)

@@ -34,13 +34,8 @@ _SEAM: Final = 3
 def searched(
     fine: Fine, keyed: Booleans, corners: Booleans, *, loops: bool = False
 ) -> Generator[float, None, list[BezierKeys]]:
-    """The keys of each track of a limb, in steps that yield the share that is done.
-
-    Args:
-        fine: what is keyed, at all moments at which it is looked at, at least two.
-        keyed: (columns, moments) where there are keys to begin with.
-        corners: (tracks, moments) where the motion itself has a corner.
-        loops: whether the motion goes on from its last frame to its first.
+    """The keys of each track of a limb, in steps that yield the share that is done; what is given
+    is as :class:`search.Search` has it.
     """
     cuts = _cuts(fine, keyed)
     if len(cuts) == 2:
@@ -114,11 +109,10 @@ def _turned_at_the_seam(fine: Fine) -> Booleans:
 
 
 def _joined(parts: Sequence[BezierKeys], smooth: Booleans) -> BezierKeys:
-    """The keys of a track from stretch to stretch.
+    """The keys of a track from stretch to stretch, whose parts' last keys are the first ones of the
+    next.
 
-    Args:
-        parts: of each stretch; the last key of one is the first one of the next.
-        smooth: (parts − 1,) of each such key whether its handles lie on one line.
+    ``smooth`` (parts − 1,) says of each such key whether its handles lie on one line.
     """
     *before, last = parts
     first, *after = parts

@@ -140,12 +140,7 @@ class Fine:
 
 
 def with_halves(times: Floats, limb: Limb) -> Fine:
-    """A limb on frames and half way between them.
-
-    Args:
-        times: (frames,) at least two.
-        limb: at the frames.
-    """
+    """A limb on times (frames,), at least two, and half way between them."""
 
     def closer(bound: Floats) -> Floats:
         """Bounds half way, which are those of both frames."""
@@ -166,10 +161,7 @@ def with_halves(times: Floats, limb: Limb) -> Fine:
 def looked_at(times: Floats, limb: Limb, every: int) -> Fine:
     """A limb at all moments that matter: between frames, too, where something hangs on it.
 
-    Args:
-        times: (moments,) at least two.
-        limb: at those moments.
-        every: at every how many of them there is a frame, from the first to the last.
+    Of times (moments,), at least two, ``every`` so many is a frame, from the first to the last.
     """
     if every == 1 and (limb.chain is not None or limb.lever > 0.0):
         return with_halves(times, limb)

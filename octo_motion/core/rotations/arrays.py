@@ -150,16 +150,11 @@ def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
 
 
 def slerp_in_sense(first: Floats, second: Floats, share: Floats, sense: Floats) -> Floats:
-    """Between two orientations (…, 4), turning the way round that is nearer to a given one.
+    """Between two orientations (…, 4), by shares (…,) 0…1, turning the way round that is nearer to
+    a given one: ``sense`` (…, 3), a rotation vector in the first orientation's frame.
 
     Half a turn is as short the one way as the other, and must not be taken now this way and now
     that.
-
-    Args:
-        first: (…, 4)
-        second: (…, 4)
-        share: (…,) 0…1
-        sense: (…, 3) the way round, as a rotation vector in the first orientation's frame.
     """
     turn = rotation_vector_between(first, second)
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)

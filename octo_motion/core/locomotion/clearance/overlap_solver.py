@@ -44,12 +44,10 @@ def turned_towards(
 ) -> Floats:
     """Directions (chains, segments, 3) that bring joints nearer to where they are to go.
 
-    Args:
-        directions: (chains, segments, 3) unit, or zero for segments of no length, which stay so.
-        lengths: (chains, segments)
-        free: (chains, segments) how far each is free to turn, 0…1; at 0 it stays as it is.
-        goals: (chains, segments, 3) by how much the joint after each segment is to move.
-        weights: (chains, segments) how much that matters.
+    They are unit vectors, or zero for segments of no length, which stay so; lengths are (chains,
+    segments). Each segment is ``free`` to turn (chains, segments), 0…1; at 0 it stays as it is. The
+    joint after it is to move by ``goals`` (chains, segments, 3), which matters by ``weights``
+    (chains, segments).
     """
     count = lengths.shape[1]
     ease = np.sqrt(free)

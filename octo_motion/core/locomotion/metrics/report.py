@@ -426,13 +426,9 @@ def resting(joints: Floats, over: Floats, body: Floats, rate: float) -> np.ndarr
     """Which joints of an arm rest (frames, joints).
 
     A joint rests while it and its neighbours on the arm lie on the ground and it is slow, both from
-    the frame before and to the next.
-
-    Args:
-        joints: (frames, joints, 3) as they are played, arm lengths.
-        over: (frames, joints) how high their skin is over the ground, arm lengths.
-        body: (frames, 3) where the body is, arm lengths.
-        rate: frames per second.
+    the frame before and to the next. Joints (frames, joints, 3) as they are played, how high their
+    skin is ``over`` the ground (frames, joints), and where the body is (frames, 3) are in arm
+    lengths; ``rate`` is in frames per second.
     """
     steps = np.linalg.norm(np.diff(joints, axis=0), axis=-1)
     going = np.linalg.norm(np.diff(body, axis=0), axis=-1)
@@ -445,15 +441,11 @@ def resting(joints: Floats, over: Floats, body: Floats, rate: float) -> np.ndarr
 
 
 def drifts(joints: Floats, rests: np.ndarray, rate: float) -> Floats:
-    """How far joints are from where they are in the middle of their hold (frames, joints).
+    """How far joints (frames, joints, 3), as they are played at a rate per second, are from where
+    they are in the middle of their hold (frames, joints), by which of them rest (frames, joints).
 
     0 where a joint does not rest, rests for less than an eye takes for a hold, or comes to rest or
     leaves, where skin rolls on and off.
-
-    Args:
-        joints: (frames, joints, 3) as they are played.
-        rests: (frames, joints) which rest.
-        rate: frames per second.
     """
     # Joint by joint, with a frame between that does not rest.
     row = np.pad(rests, ((1, 1), (0, 0))).T.ravel()

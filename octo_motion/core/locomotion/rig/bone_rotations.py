@@ -149,16 +149,14 @@ def _sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Flo
 def rotate_bones(
     rests: Sequence[ArmRest], directions: Floats, bank: Floats, facing: Facing | None = None
 ) -> Floats:
-    """Rotations (frames, arms, bones, 4) in each bone's rest frame (Blender's ``matrix_basis``).
+    """Rotations (frames, arms, bones, 4) in each bone's rest frame (Blender's ``matrix_basis``) of
+    arms of as many bones, their segments along unit ``directions`` (bones, 3, frames, arms),
+    armature space.
 
-    Args:
-        rests: the arms, all of as many bones.
-        directions: (bones, 3, frames, arms) unit vectors along the segments, armature space.
-        bank: (bones, frames, arms) radians by which each bone is twisted about its own segment,
-            against the bone before.
-        facing: which way a side of the arms turns besides. A bone that faces askew by θ is turned
-            by sin θ (1 + cos θ) / 2: nothing for one that faces right, and hardly anything for one
-            that faces nearly away, which would have no better side to turn to. So it never flips.
+    Each bone is twisted by ``bank`` (bones, frames, arms), radians, about its own segment, against
+    the bone before. Of the way that a side of the arms is to face, a bone that faces askew by θ is
+    turned by sin θ (1 + cos θ) / 2: nothing for one that faces right, and hardly anything for one
+    that faces nearly away, which would have no better side to turn to. So it never flips.
     """
     bones, _, frames, arms = directions.shape
     batch = frames * arms
