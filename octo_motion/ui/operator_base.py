@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
@@ -11,6 +11,7 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bpy.props import EnumProperty
 
+from ..blender.animation import renumber_keys
 from ..blender.rig import active_armature, linked_names
 from ..core.errors import OctoMotionError, RigError
 
@@ -156,7 +157,9 @@ class RemoveOperator(ItemOperator):
                 f"'{name}' is in the linked file and cannot be removed here.", kind.instead
             )
         items, number = getattr(settings, kind.items), getattr(settings, kind.active)
+        behind = {each: each - 1 for each in range(number + 1, len(items))}
         items.remove(number)
+        _keys_follow(settings, kind, {number: None, **behind})
         setattr(settings, kind.active, max(0, min(number, len(items) - 1)))
 
 
@@ -186,12 +189,23 @@ class MoveOperator(ItemOperator):
                 f"'{name}' is in the linked file, where the order of its {kind.items} is set.",
                 f"Move {kind.items} that were added in this file, or change the order there.",
             )
-        target = self._target(settings)
-        getattr(settings, kind.items).move(getattr(settings, kind.active), target)
+        number, target = getattr(settings, kind.active), self._target(settings)
+        getattr(settings, kind.items).move(number, target)
+        _keys_follow(settings, kind, {number: target, target: number})
         setattr(settings, kind.active, target)
 
     def _target(self, settings: Any) -> int:
         return getattr(settings, self.KIND.active) + (-1 if self.direction == "UP" else 1)
+
+
+def _keys_follow(settings: Any, kind: ListKind, places: Mapping[int, int | None]) -> None:
+    """Keys of a list's settings stay with their items: in the action that is seen, and those that
+    the settings name.
+    """
+    data = settings.id_data.animation_data
+    actions = [None if data is None else data.action]
+    actions += [getattr(settings, name, None) for name in ("base", "result")]
+    renumber_keys(actions, settings.path_from_id(kind.items), places)
 
 
 # --- What operators share that keep settings of an armature as a preset, Blender's own kind -------

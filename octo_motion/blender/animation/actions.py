@@ -645,6 +645,31 @@ def shown_curves(
     return (each for each in curves_of(action, slot) if not (each.mute or each.is_empty))
 
 
+def renumber_keys(
+    actions: Iterable[bpy.types.Action | None], path: str, places: Mapping[int, int | None]
+) -> None:
+    """Let keys of the items of a list follow them to other places, as data paths have numbers.
+
+    Keys of an item that is gone go with it. Linked actions stay as they are.
+
+    Args:
+        actions: in which keys may be.
+        path: of the list.
+        places: by the number that an item had, the one that it has; none of one that is gone.
+    """
+    for action in {each for each in actions if each is not None and each.library is None}:
+        for channelbag in channelbags_of(action):
+            for curve in list(channelbag.fcurves):
+                number, _, rest = curve.data_path.removeprefix(f"{path}[").partition("]")
+                if not curve.data_path.startswith(f"{path}[") or not number.isdigit():
+                    continue
+                place = places.get(int(number), int(number))
+                if place is None:
+                    channelbag.fcurves.remove(curve)
+                elif place != int(number):
+                    curve.data_path = f"{path}[{place}]{rest}"
+
+
 def channelbags_of(
     action: bpy.types.Action, slot: bpy.types.ActionSlot | None = None
 ) -> Iterator[bpy.types.ActionChannelbag]:

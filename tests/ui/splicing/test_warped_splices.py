@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.blender.animation.actions import curves_of
 from octo_motion.ui.splicing.stack import prepare_splices
 from octo_motion.ui.splicing.timing_drag import DragSession
 from tests.referee.recording import Floats, moments, record
@@ -145,3 +146,29 @@ def test_files_and_scripts_that_know_nothing_of_it_fade_in_frames():
     OPERATORS.splice_build()
     note = json.loads(hero.animation_data.action["octo_motion_generated"]["note"])
     assert note["splices"][0]["fade_unit"] == "FRAMES"
+
+
+def test_keys_of_a_rate_stay_with_their_splice_when_the_list_changes():
+    hero, source, item = two_bodies()
+    item.name = "first"
+    select(source, hero)
+    OPERATORS.splice_add(part="HEAD")
+    stack = stack_of(hero)
+    stack.splices[1].keyframe_insert("rate", frame=3)
+
+    def keyed() -> list[str]:
+        curves = [each for each in curves_of(hero.animation_data.action) if not each.is_empty]
+        paths = {each.data_path for each in curves if each.data_path.endswith(".rate")}
+        return [hero.path_resolve(path.removesuffix(".rate")).name for path in paths]
+
+    name = stack.splices[1].name
+    assert keyed() == [name]
+    OPERATORS.splice_move(direction="UP")
+    assert stack.splices[0].name == name
+    assert keyed() == [name]
+    stack.active_splice = 1
+    OPERATORS.splice_remove()
+    assert keyed() == [name]
+    stack.active_splice = 0
+    OPERATORS.splice_remove()
+    assert keyed() == []
