@@ -24,7 +24,7 @@ _ROUNDING: Final = 1e-5
 """Factors that are no nearer to one than this are meant."""
 
 _SPARE: Final = 0.25
-"""Room between two clips that stand side by side, in heights of the tallest."""
+"""Room between two clips that stand side by side, in heights of the taller one."""
 
 _STANDING: Final = 0.05
 """Of a body's height, what it may be above or below the ground and stand on it all the same."""
@@ -127,14 +127,14 @@ def _row(rooms: Sequence[Floats]) -> list[Floats]:
     ways, the first one at the origin, and stand on the ground.
     """
     heights = [float(np.ptp(room[0, :, 2])) for room in rooms]
-    spare = _SPARE * max(heights)
     moves: list[Floats] = []
-    end = 0.0
+    end = before = 0.0
     for room, height in zip(rooms, heights, strict=True):
         begins = 0.5 * (room[0].min(axis=0) + room[0].max(axis=0))
         least, most = room[..., 0].min(), room[..., 0].max()
+        spare = _SPARE * max(before, height)
         across = end + spare - least if moves else -begins[0]
-        end = across + most
+        end, before = across + most, height
         lowest = room[..., 2].min()
         # A file that has its own ground near enough keeps it: soles are below their joints.
         down = 0.0 if abs(lowest) < _STANDING * height else -lowest

@@ -307,6 +307,16 @@ def test_several_clips_stand_in_a_row_and_never_in_one_another(tmp_path: Path) -
     assert abs(joint_of(bodies[0], "Hips")[0]) < 0.1
 
 
+def test_what_is_large_moves_its_neighbours_apart_and_no_others(tmp_path: Path) -> None:
+    paths = [write_bvh(tmp_path / f"{name}.bvh", WAVE) for name in ("walk", "wave")]
+    snake = tmp_path / "snake.bvh"
+    snake.write_text(SNAKE.replace("OFFSET 0 0 30", "OFFSET 0 90 0"), encoding="utf-8")
+    one, other, large = import_all(*paths, snake)
+    assert np.ptp(joints_in_world(large, 1.0)[..., 2]) > 50.0
+    assert 0.2 < box(other)[0, 0] - box(one)[1, 0] < 1.0
+    assert box(large)[0, 0] - box(other)[1, 0] > 10.0
+
+
 def test_a_file_with_its_own_ground_keeps_it(tmp_path: Path) -> None:
     """Its lowest joint is a little off the ground, where its sole is."""
     paths = [
