@@ -18,6 +18,7 @@ from .actions import (
     writable_object,
     write_action,
 )
+from .clip_sources import actions_for, still_clip
 from .clips import (
     closes,
     further_channels,
@@ -49,6 +50,7 @@ __all__ = [
     "Keyed",
     "PoseKeys",
     "PoseValues",
+    "actions_for",
     "animated_bones",
     "as_posed",
     "closes",
@@ -75,6 +77,7 @@ __all__ = [
     "setting_values",
     "show_pose",
     "standing_of",
+    "still_clip",
     "time_kept",
     "unedited_with_note",
     "writable_armature",

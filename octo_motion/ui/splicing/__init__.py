@@ -11,6 +11,7 @@ from . import (
     landmark_table,
     mapping_operators,
     properties,
+    retarget_operators,
     splice_operators,
     splice_panels,
     timing_drag,
@@ -30,7 +31,14 @@ SETTINGS: Final = own_classes(properties)
 """What ``Object.octo_motion`` holds of splicing."""
 
 CLASSES: Final = (
-    *own_classes(landmark_table, mapping_operators, import_clips, splice_operators, timing_drag),
+    *own_classes(
+        landmark_table,
+        mapping_operators,
+        import_clips,
+        splice_operators,
+        timing_drag,
+        retarget_operators,
+    ),
     *splice_panels.CLASSES,
 )
 """Operators and panels."""

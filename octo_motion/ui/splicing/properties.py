@@ -270,7 +270,47 @@ class SpliceItem(bpy.types.PropertyGroup):
         description="Legs bring the clip's way through the world with them, so that feet do not "
         "skate",
     )
+    foot_lock: props.BoolProperty(
+        name="Foot Lock",
+        description="With travel, feet that stand in the clip stand here as well, on the ground of "
+        "the base: legs of other proportions would slide. The preview of dragging leaves it out",
+        default=True,
+    )
     mute: props.BoolProperty(name="Mute", description="Leave this splice out")
+
+
+def _is_mesh(_: Any, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "MESH"
+
+
+class OCTO_MOTION_PG_retarget(bpy.types.PropertyGroup):
+    """How whole clips are retargeted onto the armature."""
+
+    mode: props.EnumProperty(
+        name="Hands",
+        description="Where hands go on a body of other proportions. Feet go where they stand",
+        items=MODES,
+    )
+    travel: props.BoolProperty(
+        name="Travel",
+        description="Go through the world as the clip does, with strides of this body's size. Off, "
+        "the body stays where the armature is, as games want it",
+        default=True,
+    )
+    foot_lock: props.BoolProperty(
+        name="Foot Lock",
+        description="Feet that stand in the clip stand here as well: they neither slide nor hover "
+        "nor sink. Where a leg is too short, the pelvis comes down",
+        default=True,
+    )
+    ground: props.PointerProperty(
+        name="Ground",
+        description="Mesh on which locked feet stand: slopes, stairs, rough ground. If empty it is "
+        "level, at the height at which the armature stands in its own action, or at rest",
+        type=bpy.types.Object,
+        poll=_is_mesh,
+    )
+    visual: _as_shown("As Shown", "clip")
 
 
 class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
@@ -289,6 +329,11 @@ class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
         "Result",
         "The action that was built last. It is made anew in place until you edit it; then it is "
         "yours, and the next one is a new action",
+    )
+    retarget: props.PointerProperty(
+        name="Retarget",
+        description="How whole clips are retargeted onto this armature",
+        type=OCTO_MOTION_PG_retarget,
     )
     landmarks: props.PointerProperty(
         name="Landmarks",

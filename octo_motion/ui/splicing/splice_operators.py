@@ -160,7 +160,7 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Ask for a source if the selection names none."""
-        if self.action or self.source or _other_armatures(context):
+        if self.action or self.source or other_armatures(context):
             return self.execute(context)
         return window_manager(context).invoke_props_dialog(self)
 
@@ -197,7 +197,7 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
                     f"There is no armature '{self.source}'.", "Choose the armature of the clip."
                 )
             return found
-        others = _other_armatures(context)
+        others = other_armatures(context)
         if len(others) > 1:
             raise ClipError(
                 f"{len(others)} other armatures are selected.",
@@ -262,7 +262,8 @@ class OCTO_MOTION_OT_splice_move(MoveOperator, bpy.types.Operator):
     KIND = _SPLICES
 
 
-def _other_armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
+def other_armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Selected armatures beside the active one."""
     active = active_armature(context)
     layer = context.view_layer
     assert layer is not None

@@ -10,6 +10,7 @@ import bpy
 from ..panel_base import ArmaturePanel, armature_in, draw_list
 from .landmark_table import draw_landmarks
 from .properties import part_kind, splicing_settings
+from .retarget_operators import OCTO_MOTION_OT_retarget, OCTO_MOTION_OT_retarget_files
 from .splice_operators import (
     OCTO_MOTION_OT_splice_add,
     OCTO_MOTION_OT_splice_build,
@@ -94,6 +95,9 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
             layout.prop(item, "with_clavicle")
         if kind.travels:
             layout.prop(item, "with_travel")
+            lock = layout.column()
+            lock.active = item.with_travel
+            lock.prop(item, "foot_lock")
         if len(kind.seen_from) > 1:
             seen = layout.row()
             seen.active = not item.with_travel
@@ -129,6 +133,33 @@ class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):
         layout.row().prop(item, "after", expand=True)
 
 
+class OCTO_MOTION_PT_retarget(_Panel, bpy.types.Panel):
+    bl_label = "Retarget"
+    bl_parent_id = "OCTO_MOTION_PT_splicing"
+
+    def show(self, layout: Any, settings: Any) -> None:
+        retarget = settings.retarget
+        layout.row().prop(retarget, "mode", expand=True)
+        layout.prop(retarget, "travel")
+        lock = layout.column()
+        lock.active = retarget.travel
+        lock.prop(retarget, "foot_lock")
+        ground = lock.column()
+        ground.active = retarget.foot_lock
+        ground.prop(retarget, "ground")
+        layout.prop(retarget, "visual")
+        column = layout.column(align=True)
+        column.operator_context = "INVOKE_DEFAULT"
+        column.operator(OCTO_MOTION_OT_retarget.bl_idname, icon="ARMATURE_DATA")
+        every = column.operator(
+            OCTO_MOTION_OT_retarget.bl_idname, icon="DUPLICATE", text="Retarget All Actions"
+        )
+        every.all_actions = True
+        column.operator(
+            OCTO_MOTION_OT_retarget_files.bl_idname, icon="FILE_FOLDER", text="Retarget Files…"
+        )
+
+
 class OCTO_MOTION_PT_landmarks(_Panel, bpy.types.Panel):
     bl_label = "Landmarks"
     bl_parent_id = "OCTO_MOTION_PT_splicing"
@@ -152,5 +183,6 @@ CLASSES: Final = (
     OCTO_MOTION_PT_splicing,
     OCTO_MOTION_PT_splice,
     OCTO_MOTION_PT_splice_timing,
+    OCTO_MOTION_PT_retarget,
     OCTO_MOTION_PT_landmarks,
 )

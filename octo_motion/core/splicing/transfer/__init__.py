@@ -15,6 +15,7 @@ from .parts import (
 from .retarget import MappedClip
 from .splice import LimbGoal, Splice, SpliceError, SplicePreview, build_splices, numbered
 from .timing_suggestions import Suggestion, suggest_timings
+from .whole_body import WholeBody, rests_standing, retarget_clip
 
 __all__ = [
     "CHAIN",
@@ -27,6 +28,7 @@ __all__ = [
     "SpliceError",
     "SplicePreview",
     "Suggestion",
+    "WholeBody",
     "bones_beneath",
     "build_splices",
     "chain_part",
@@ -34,5 +36,7 @@ __all__ = [
     "opposite_part",
     "part_bones",
     "part_named",
+    "rests_standing",
+    "retarget_clip",
     "suggest_timings",
 ]

@@ -20,7 +20,7 @@ from ..humanoid import Landmarks
 from .parts import ARM, LEG
 from .retarget import MappedClip
 
-_RIGID: Final = 0.02
+_RIGID: Final = 0.08
 """Of a bone's length: how much it may seem to stretch over a clip, and still end where the next one
 begins."""
 

@@ -21,10 +21,13 @@ from ...rotations import (
     conjugate,
     from_matrix,
     multiply,
+    normalized,
     rotate,
 )
+from ...skeleton import Skeleton
 from ...smoothing import blurred
 from ..clip import Clip, posture_of, sample_clip
+from ..humanoid import Landmarks, chain_length
 from .foot_contacts import (
     Stance,
     ball_places,
@@ -44,7 +47,7 @@ from .leg_travel import (
     write_hips,
 )
 from .loop_rounds import Rounds, is_loop
-from .parts import PARTS
+from .parts import LEG, PARTS
 from .rehung import whole_limbs
 from .retarget import (
     MappedClip,
@@ -58,6 +61,13 @@ from .splice import LimbGoal
 
 _PARTS: Final = ("legs", "trunk", "left_arm", "right_arm", "head")
 """In the order in which they are put on: each hangs on those before it."""
+
+_STANDING: Final = ("upper_arm", "thigh", "shin", "foot")
+_WIDE: Final = ("upper_arm", "thigh")
+_STRAIGHT: Final = 0.85
+"""Of its bones: how long a leg is from hip to ankle at least when somebody stands."""
+_UPRIGHT: Final = 0.85
+"""Cosine of how far legs are off the trunk then, and the shoulders off the hips."""
 
 _FOLLOWED: Final = 0.2
 """Seconds over which the body follows the ground, a third of it to either side."""
@@ -84,17 +94,22 @@ class WholeBody:
 
 
 def retarget_clip(
-    base: MappedClip, still: Clip, source: MappedClip, settings: WholeBody | None = None
+    base: MappedClip,
+    still: Clip,
+    source: MappedClip,
+    settings: WholeBody | None = None,
+    standing: MappedClip | None = None,
 ) -> Clip:
     """A whole clip on another body, over all frames of a clip of that body that does nothing.
 
     Args:
-        base: a clip of the body that gets it, by which the two are compared and of which the height
-            is at which it stands; it may be the same as the next.
+        base: a clip of the body that gets it, by which the two are compared; it may be the same as
+            the next.
         still: of its skeleton, at rest where nothing is carried over, as many frames as the source
             has; it says where its object stands, and at what frames the result is.
         source: the clip.
         settings: how, as usual if not given.
+        standing: a clip of that body that tells at which height it stands; the base if not given.
 
     Raises:
         ClipError: a landmark is missing, or the hips cannot leave their parent.
@@ -104,8 +119,33 @@ def retarget_clip(
     joined, hung = whole_limbs(base)
     source, _ = whole_limbs(source)
     before = still if hung is None else hung.into(still)
-    result = _on_whole_limbs(joined, before, source, settings)
+    stands = whole_limbs(standing)[0] if standing is not None else joined
+    result = _on_whole_limbs(joined, before, source, settings, stands)
     return result if hung is None else hung.back(result, before, still)
+
+
+def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
+    """Whether a skeleton's rest pose is one of somebody who stands: with straight legs below the
+    trunk, and both sides where they belong. Which way up is in its file does not count.
+    """
+    names = ("hips", "head", *(f"{each}.{side}" for each in _STANDING for side in "LR"))
+    if landmarks is None:
+        return False
+    bones = [skeleton.index.get(landmarks.get(name) or "", -1) for name in names]
+    if min(bones) < 0:
+        return False
+    heads = dict(zip(names, skeleton.heads[bones], strict=True))
+    up = normalized(heads["head"] - heads["hips"])
+    across = [normalized(heads[f"{each}.L"] - heads[f"{each}.R"]) for each in _WIDE]
+    if float(across[0] @ across[1]) < _UPRIGHT or abs(float(up @ across[1])) > 1.0 - _UPRIGHT:
+        return False
+    for side in "LR":
+        way = heads[f"foot.{side}"] - heads[f"thigh.{side}"]
+        chain = chain_length(skeleton, [bones[names.index(f"{e}.{side}")] for e in LEG.limb or ()])
+        length = float(np.linalg.norm(way))
+        if length < _STRAIGHT * chain or float(-way @ up) < _UPRIGHT * length:
+            return False
+    return True
 
 
 def _check_frames(still: Clip, source: MappedClip) -> None:
@@ -113,7 +153,9 @@ def _check_frames(still: Clip, source: MappedClip) -> None:
         raise ClipError("The two clips differ in length.", "Give the clip at rest as many frames.")
 
 
-def _on_whole_limbs(base: MappedClip, still: Clip, source: MappedClip, settings: WholeBody) -> Clip:
+def _on_whole_limbs(
+    base: MappedClip, still: Clip, source: MappedClip, settings: WholeBody, stands: MappedClip
+) -> Clip:
     ours, theirs = compared(base, source)
     rests = ours.rests if isinstance(ours, ReferredClip) else None
     before = still if rests is None else rests.into(still)
@@ -124,7 +166,7 @@ def _on_whole_limbs(base: MappedClip, still: Clip, source: MappedClip, settings:
             PARTS[name], ours, theirs, clavicle=True, seen_from="pelvis" if name == "legs" else ""
         )
     ]
-    mover = _Mover(ours, theirs, retargets, settings)
+    mover = _Mover((ours, theirs), retargets, settings, stands)
     result = mover.onto(before)
     return result if rests is None else rests.back(result, before, still)
 
@@ -134,11 +176,12 @@ class _Mover:
 
     def __init__(
         self,
-        base: MappedClip,
-        source: MappedClip,
+        clips: tuple[MappedClip, MappedClip],
         retargets: list[Retarget],
         settings: WholeBody,
+        stands: MappedClip,
     ) -> None:
+        base, source = clips
         self._base, self._source = base, source
         self._retargets = retargets
         self._settings = settings
@@ -147,7 +190,7 @@ class _Mover:
         self._moment = sample_clip(clip, clip.frames)
         self._paths = foot_paths(source, self._moment, clip.frames)
         self._balls = _answering_balls(retargets, self._ratio * source.clip.scale / base.clip.scale)
-        self._stands = find_stance(own_paths(base, self._balls))
+        self._stands = find_stance(own_paths(stands, self._balls))
         if settings.ground is not None:
             self._stands = _above_soles(self._stands, base)
         self._width = max(1, round(_FOLLOWED * self._paths.rate))

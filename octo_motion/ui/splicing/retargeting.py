@@ -1,0 +1,349 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole clips onto an armature, from settings to keys: read → plain arrays → compute → write."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final, cast
+
+import bpy
+import numpy as np
+
+from ...blender.animation import (
+    actions_for,
+    is_generated,
+    may_replace,
+    note_of,
+    still_clip,
+    writable_armature,
+    write_clip,
+)
+from ...blender.scene import import_clip, read_triangles, remove_clips
+from ...core.errors import ClipError, OctoMotionError, WriteError
+from ...core.locomotion.ground import Ground, sample_ground
+from ...core.rotations import Floats
+from ...core.splicing.clip import Clip
+from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
+from ...core.splicing.transfer import (
+    LimbGoal,
+    MappedClip,
+    WholeBody,
+    rests_standing,
+    retarget_clip,
+)
+from .properties import splicing_settings, write_landmarks
+from .splice_operators import own_action
+from .stack import ClipReader, Source, is_source, known_landmarks, local_object
+
+_GROUND_SPACING: Final = 0.02
+"""Of the body's height: metres between samples of a ground."""
+
+_GROUND_REACH: Final = 0.8
+"""Of the body's height, to all sides of its way."""
+
+
+@dataclass(frozen=True, eq=False)
+class RetargetJob:
+    """One clip for an armature, as plain data; see :func:`prepare_retarget`."""
+
+    armature: str
+    """Names of objects: references do not outlive a modal operator's tick."""
+    base: MappedClip
+    """By what the body is compared."""
+    standing: MappedClip
+    """That tells at which height it stands."""
+    found: bool
+    """Whether the base's landmarks were found just now."""
+    still: Clip
+    source: Source
+    settings: WholeBody
+    triangles: Floats | None = None
+    """(faces, 3, 3) of the ground, world, none without."""
+
+    def compute(self) -> Clip:
+        """The clip on the armature's body.
+
+        Raises:
+            ClipError: a bone or landmark is missing.
+            GroundError: it leaves the ground.
+        """
+        settings = self.settings
+        if self.triangles is not None:
+            settings = replace(settings, ground=self._ground())
+        return retarget_clip(self.base, self.still, self.source, settings, self.standing)
+
+    def _ground(self) -> Ground:
+        """The ground under its way."""
+        plain = replace(self.settings, foot_lock=False)
+        clip = retarget_clip(self.base, self.still, self.source, plain, self.standing)
+        assert self.triangles is not None
+        _, heads = clip.posed()
+        hips = heads[:, clip.skeleton.index[self.base.humanoid()["hips"]]]
+        size = float(np.ptp(heads[0, :, 2]))
+        return sample_ground(
+            self.triangles,
+            hips,
+            np.ones(len(hips), dtype=bool),
+            reach=_GROUND_REACH * size,
+            spacing=_GROUND_SPACING * size,
+            headroom=0.5 * size,
+        )
+
+
+@dataclass(frozen=True)
+class Retargeted:
+    """What was made of one clip."""
+
+    action: str
+    frames: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def message(self) -> str:
+        """One sentence."""
+        return f"{self.frames} frames: '{self.action}'."
+
+
+def prepare_retarget(
+    armature: bpy.types.Object,
+    source: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: str = "",
+    reader: ClipReader | None = None,
+) -> RetargetJob:
+    """Read all that a clip on an armature needs. Nothing is changed.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    writable_armature(armature)
+    if source == armature:
+        raise ClipError(
+            f"'{armature.name}' is both source and target.",
+            "Select the armature with the clip, then Shift click the one that gets it.",
+        )
+    reader = reader or ClipReader()
+    settings = splicing_settings(armature).retarget
+    clip = reader.source(source, action, slot, visual=settings.visual)
+    moving = _own_motion(armature, reader)
+    base, found = _base(armature, moving)
+    for each, name in ((base, armature.name), (clip, source.name)):
+        _check_landmarks(each, name)
+    goal = cast("LimbGoal", settings.mode.lower())
+    return RetargetJob(
+        armature.name,
+        base,
+        base if moving is None else moving,
+        found,
+        still_clip(armature, clip.clip.frames, clip.clip.rate),
+        clip,
+        WholeBody(goal, travel=settings.travel, foot_lock=settings.foot_lock),
+        _triangles(settings),
+    )
+
+
+def _triangles(settings: Any) -> Floats | None:
+    if settings.ground is None or not (settings.travel and settings.foot_lock):
+        return None
+    triangles, _ = read_triangles(settings.ground, bpy.context.evaluated_depsgraph_get())
+    return triangles
+
+
+def _base(armature: bpy.types.Object, moving: Source | None) -> tuple[MappedClip, bool]:
+    """By what a body is compared: its rest pose if that is one of somebody who stands, else a
+    motion of its own; and whether its landmarks were found just now.
+    """
+    still = still_clip(armature, np.array([1.0]), 24.0)
+    landmarks, _, found = known_landmarks(armature, still)
+    if moving is None or (landmarks is not None and rests_standing(still.skeleton, landmarks)):
+        return MappedClip(still, landmarks), found
+    return moving, moving.found
+
+
+def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:
+    """A motion of the armature's own, none if there is none: the base of its splices, its action,
+    or any other that fits. What was retargeted tells nothing of its own.
+    """
+    settings = splicing_settings(armature)
+    own = own_action(armature)
+    choices: list[tuple[bpy.types.Action, str]] = []
+    if settings.base is not None:
+        choices.append((settings.base, settings.base_slot))
+    choices += [own] if own is not None else []
+    choices += [(each, "") for each in sorted(actions_for(armature), key=_busy)]
+    for action, slot in choices:
+        if is_generated(action):
+            continue
+        with suppress(ClipError):
+            source = reader.source(armature, action, slot, visual=False)
+            if source.landmarks is not None:
+                return source
+    return None
+
+
+def _busy(action: bpy.types.Action) -> bool:
+    """Whether an action's name does not say that somebody stands there."""
+    name = action.name.casefold()
+    return not any(word in name for word in ("idle", "stand", "pose"))
+
+
+def _check_landmarks(mapped: MappedClip, name: str) -> None:
+    remedy = (
+        f"Make '{name}' active, click Find Landmarks in the panel Splicing > Landmarks and choose "
+        "there what it cannot find."
+    )
+    bones = mapped.skeleton.index
+    known = {} if mapped.landmarks is None else mapped.landmarks.bones
+    missing = [each for each in LANDMARKS if each not in OPTIONAL and known.get(each) not in bones]
+    if missing:
+        listed = ", ".join(each.replace("_", " ") for each in missing[:3])
+        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+        raise ClipError(f"'{name}' has no landmarks: {listed}{more} are not known.", remedy)
+
+
+def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retargeted:
+    """Give the armature the clip as an action, in place of what was made of the same one before.
+
+    Raises:
+        WriteError: the object is gone, or has become read-only.
+    """
+    armature = local_object(job.armature)
+    writable_armature(armature)
+    settings = splicing_settings(armature)
+    note = {"retargeted": {"source": job.source.armature, "action": job.source.clip.name}}
+    text = json.dumps(note, sort_keys=True)
+    action = write_clip(
+        armature,
+        clip,
+        name=name or f"{job.source.clip.name} Retargeted",
+        note=text,
+        previous=_previous(armature, text),
+    )
+    if job.found and job.base.landmarks is not None:
+        # What was used is what the table shows from now on.
+        write_landmarks(settings.landmarks, job.base.landmarks.bones)
+    return Retargeted(action.name, len(clip), tuple(_warnings(job)))
+
+
+def _previous(armature: bpy.types.Object, note: str) -> bpy.types.Action | None:
+    """What was made of the same clip before and nobody has edited, unless it is spliced from."""
+    return next(
+        (
+            action
+            for action in bpy.data.actions
+            if note_of(action) == note and may_replace(action, armature) and not is_source(action)
+        ),
+        None,
+    )
+
+
+def _warnings(job: RetargetJob) -> Iterator[str]:
+    skeleton = job.still.skeleton
+    assert job.base.landmarks is not None
+    moved = [bone for bone in job.base.landmarks.bones.values() if bone in skeleton.index]
+    held = [bone for bone in moved if skeleton.constrained[skeleton.index[bone]]]
+    if held:
+        listed = ", ".join(f"'{each}'" for each in held[:3])
+        yield (
+            f"Constraints or drivers act on {listed}{' and others' if held[3:] else ''}: mute them "
+            "if the clip does not show."
+        )
+
+
+# --- Many clips -----------------------------------------------------------------------------------
+
+
+class RetargetSession:
+    """Many clips onto one armature, worked out one by one and written together: what is stopped on
+    the way leaves nothing behind.
+
+    Args:
+        armature: that gets them.
+        clips: of each, what it is called, and what to call for it: it reads the clip, and gives the
+            job. What is refused by that is left out and told.
+    """
+
+    def __init__(
+        self, armature: bpy.types.Object, clips: Sequence[tuple[str, Callable[[], RetargetJob]]]
+    ) -> None:
+        if not clips:
+            raise ClipError("There is no clip to retarget.", "Choose one or more.")
+        self.armature = armature.name
+        self.refused: list[tuple[str, OctoMotionError]] = []
+        self.made: list[Retargeted] = []
+        self._clips = clips
+        self._results: list[tuple[str, RetargetJob, Clip]] = []
+
+    @property
+    def current(self) -> str:
+        """The clip whose turn it is, for people."""
+        count = len(self._clips)
+        number = min(len(self._results) + len(self.refused), count - 1)
+        return f"'{self._clips[number][0]}' ({number + 1} of {count})"
+
+    def steps(self) -> Iterator[float]:
+        """Work them out; yields the share of the work that is done."""
+        for number, (name, prepare) in enumerate(self._clips, 1):
+            try:
+                job = prepare()
+                self._results.append((name, job, job.compute()))
+            except WriteError:
+                raise
+            except OctoMotionError as error:
+                self.refused.append((name, error))
+            yield number / len(self._clips)
+
+    def end(self) -> RetargetSession:
+        """Write what was worked out; the first clip is the armature's action then.
+
+        Raises:
+            OctoMotionError: all were refused, or the armature has become read-only.
+        """
+        if not self._results:
+            name, error = self.refused[0]
+            more = f" {len(self.refused) - 1} more were refused." if self.refused[1:] else ""
+            raise ClipError(f"'{name}': {error.problem}", error.remedy + more)
+        # The first one last: that is the one that the armature has in the end.
+        for name, job, clip in self._results[::-1]:
+            self.made.append(write_retargeted_clip(job, clip, name))
+            bpy.data.actions[self.made[-1].action].use_fake_user = True
+        self.made.reverse()
+        return self
+
+    @property
+    def message(self) -> str:
+        """What was made, in a sentence."""
+        count, frames = len(self.made), sum(each.frames for each in self.made)
+        names = ", ".join(f"'{each.action}'" for each in self.made[:3])
+        more = " …" if self.made[3:] else ""
+        refused = f" {len(self.refused)} refused." if self.refused else ""
+        word = "clip" if count == 1 else "clips"
+        return f"{count} {word}, {frames} frames: {names}{more}.{refused}"
+
+
+def file_clip(
+    armature: str, path: Path, frame_start: int, landmarks: dict[str, str] | None = None
+) -> Callable[[], RetargetJob]:
+    """A clip of a file for :class:`RetargetSession`: imported, read, and taken away again."""
+
+    def prepare() -> RetargetJob:
+        imported = import_clip(path, bpy.context, frame_start)
+        try:
+            source = bpy.data.objects[imported.armatures[0]]
+            if len(imported.armatures) > 1:
+                raise ClipError(
+                    f"The file has {len(imported.armatures)} armatures.",
+                    "Import it, and choose the armature there.",
+                )
+            if landmarks:
+                write_landmarks(splicing_settings(source).landmarks, landmarks)
+            action = bpy.data.actions[imported.actions[0]]
+            return prepare_retarget(local_object(armature), source, action)
+        finally:
+            remove_clips([imported])
+
+    return prepare
