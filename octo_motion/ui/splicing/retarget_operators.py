@@ -18,7 +18,13 @@ from ...core.errors import ClipError, OctoMotionError
 from ...core.splicing.clip import MOTION_SUFFIXES
 from ..modal_job import ModalJob
 from ..operator_base import window_manager, without_armature
-from .retargeting import RetargetJob, RetargetSession, file_clip, prepare_retarget
+from .retargeting import (
+    RetargetJob,
+    RetargetSession,
+    check_source,
+    file_clip,
+    prepare_retarget,
+)
 from .splice_operators import other_armatures, own_action
 from .stack import ClipReader
 
@@ -114,7 +120,7 @@ class OCTO_MOTION_OT_retarget(_RetargetOperator, bpy.types.Operator):
 
         def prepare(action: str, slot: str) -> RetargetJob:
             first, second = (bpy.data.objects[name] for name in names)
-            return prepare_retarget(first, second, bpy.data.actions[action], slot, reader)
+            return prepare_retarget(first, second, bpy.data.actions[action], slot, reader=reader)
 
         chosen = self._actions(source)
         clips = [
@@ -151,6 +157,7 @@ def source_armature(
         found = bpy.data.objects.get(name)
         if found is None or found.type != "ARMATURE":
             raise ClipError(f"There is no armature '{name}'.", "Choose the armature of the clip.")
+        check_source(armature, found)
         return found
     others = other_armatures(context)
     if len(others) == 1:
@@ -234,8 +241,10 @@ class OCTO_MOTION_OT_retarget_files(_RetargetOperator, bpy.types.Operator):
     def session(self, context: bpy.types.Context) -> RetargetSession:
         armature = active_armature(context)
         writable_armature(armature)
+        reader = ClipReader()
         clips: list[tuple[str, Callable[[], RetargetJob]]] = [
-            (path.stem, file_clip(armature.name, path, self.frame_start)) for path in self._paths()
+            (path.stem, file_clip(armature.name, path, self.frame_start, reader))
+            for path in self._paths()
         ]
         return RetargetSession(armature, clips)
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +14,6 @@ import bpy
 import numpy as np
 
 from ...blender.animation import (
-    actions_for,
     is_generated,
     may_replace,
     note_of,
@@ -26,7 +25,7 @@ from ...blender.scene import import_clip, read_triangles, remove_clips
 from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.locomotion.ground import Ground, sample_ground
 from ...core.rotations import Floats
-from ...core.splicing.clip import Clip
+from ...core.splicing.clip import Clip, average_pose
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
 from ...core.splicing.transfer import (
     LimbGoal,
@@ -35,9 +34,10 @@ from ...core.splicing.transfer import (
     rests_standing,
     retarget_clip,
 )
-from .properties import splicing_settings, write_landmarks
+from .bodies import known_landmarks
+from .properties import splicing_settings, title, write_landmarks
 from .splice_operators import own_action
-from .stack import ClipReader, Source, is_source, known_landmarks, local_object
+from .stack import ClipReader, Source, is_source, local_object
 
 _GROUND_SPACING: Final = 0.02
 """Of the body's height: metres between samples of a ground."""
@@ -113,23 +113,29 @@ def prepare_retarget(
     source: bpy.types.Object,
     action: bpy.types.Action,
     slot: str = "",
+    *,
     reader: ClipReader | None = None,
+    own: ClipReader | None = None,
 ) -> RetargetJob:
     """Read all that a clip on an armature needs. Nothing is changed.
+
+    Args:
+        armature: that gets it.
+        source: the armature of the clip.
+        action: the clip.
+        slot: identifier of its slot, "" for the one that fits.
+        reader: of clips, where several are read.
+        own: of the armature's own motions, likewise.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
     writable_armature(armature)
-    if source == armature:
-        raise ClipError(
-            f"'{armature.name}' is both source and target.",
-            "Select the armature with the clip, then Shift click the one that gets it.",
-        )
+    check_source(armature, source)
     reader = reader or ClipReader()
     settings = splicing_settings(armature).retarget
     clip = reader.source(source, action, slot, visual=settings.visual)
-    moving = _own_motion(armature, reader)
+    moving = _own_motion(armature, own or reader)
     base, found = _base(armature, moving)
     for each, name in ((base, armature.name), (clip, source.name)):
         _check_landmarks(each, name)
@@ -146,6 +152,19 @@ def prepare_retarget(
     )
 
 
+def check_source(armature: bpy.types.Object, source: bpy.types.Object) -> None:
+    """Whether a clip's armature is another than the one that gets it.
+
+    Raises:
+        ClipError: it is the same.
+    """
+    if source == armature:
+        raise ClipError(
+            f"'{armature.name}' is both source and target.",
+            "Select the armature with the clip, then Shift click the one that gets it.",
+        )
+
+
 def _triangles(settings: Any) -> Floats | None:
     if settings.ground is None or not (settings.travel and settings.foot_lock):
         return None
@@ -158,7 +177,9 @@ def _base(armature: bpy.types.Object, moving: Source | None) -> tuple[MappedClip
     motion of its own; and whether its landmarks were found just now.
     """
     still = still_clip(armature, np.array([1.0]), 24.0)
-    landmarks, _, found = known_landmarks(armature, still)
+    landmarks, _, found = known_landmarks(
+        armature, still.skeleton, None if moving is None else average_pose(moving.clip)
+    )
     if moving is None or (landmarks is not None and rests_standing(still.skeleton, landmarks)):
         return MappedClip(still, landmarks), found
     return moving, moving.found
@@ -166,7 +187,7 @@ def _base(armature: bpy.types.Object, moving: Source | None) -> tuple[MappedClip
 
 def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:
     """A motion of the armature's own, none if there is none: the base of its splices, its action,
-    or any other that fits. What was retargeted tells nothing of its own.
+    or one of its NLA tracks. What was retargeted tells nothing of its own.
     """
     settings = splicing_settings(armature)
     own = own_action(armature)
@@ -174,7 +195,9 @@ def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None
     if settings.base is not None:
         choices.append((settings.base, settings.base_slot))
     choices += [own] if own is not None else []
-    choices += [(each, "") for each in sorted(actions_for(armature), key=_busy)]
+    tracks = armature.animation_data.nla_tracks if armature.animation_data is not None else ()
+    strips = [strip.action for track in tracks for strip in track.strips]
+    choices += [(each, "") for each in sorted(filter(None, strips), key=_busy)]
     for action, slot in choices:
         if is_generated(action):
             continue
@@ -200,9 +223,10 @@ def _check_landmarks(mapped: MappedClip, name: str) -> None:
     known = {} if mapped.landmarks is None else mapped.landmarks.bones
     missing = [each for each in LANDMARKS if each not in OPTIONAL and known.get(each) not in bones]
     if missing:
-        listed = ", ".join(each.replace("_", " ") for each in missing[:3])
-        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
-        raise ClipError(f"'{name}' has no landmarks: {listed}{more} are not known.", remedy)
+        problem = getattr(mapped, "problem", "") or (
+            f"It is not known which bone is the {title(missing[0])}."
+        )
+        raise ClipError(f"'{name}' has no landmarks. {problem}", remedy)
 
 
 def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retargeted:
@@ -326,11 +350,28 @@ class RetargetSession:
 
 
 def file_clip(
-    armature: str, path: Path, frame_start: int, landmarks: dict[str, str] | None = None
+    armature: str,
+    path: Path,
+    frame_start: int,
+    reader: ClipReader,
+    landmarks: Mapping[str, str] | None = None,
 ) -> Callable[[], RetargetJob]:
-    """A clip of a file for :class:`RetargetSession`: imported, read, and taken away again."""
+    """A clip of a file for :class:`RetargetSession`: imported, read, and taken away again.
+
+    Args:
+        armature: name of the object that gets it.
+        path: the file.
+        frame_start: where its first frame goes.
+        reader: of the armature's own motions, the same for all clips.
+        landmarks: bone names of the file's body by landmark, if they are known.
+    """
 
     def prepare() -> RetargetJob:
+        layer = bpy.context.view_layer
+        assert layer is not None
+        active = layer.objects.active
+        kept = active.name if active is not None else ""
+        chosen = {each.name for each in layer.objects if each.select_get(view_layer=layer)}
         imported = import_clip(path, bpy.context, frame_start)
         try:
             source = bpy.data.objects[imported.armatures[0]]
@@ -342,8 +383,12 @@ def file_clip(
             if landmarks:
                 write_landmarks(splicing_settings(source).landmarks, landmarks)
             action = bpy.data.actions[imported.actions[0]]
-            return prepare_retarget(local_object(armature), source, action)
+            return prepare_retarget(local_object(armature), source, action, own=reader)
         finally:
             remove_clips([imported])
+            layer.update()
+            for each in layer.objects:
+                each.select_set(each.name in chosen, view_layer=layer)
+            layer.objects.active = layer.objects.get(kept)
 
     return prepare

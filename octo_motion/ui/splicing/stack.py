@@ -305,6 +305,7 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
         goal=cast("LimbGoal", item.mode.lower()),
         # The panel offers it for legs alone.
         travel=item.with_travel and part.kind is not None and part.kind.travels,
+        foot_lock=item.foot_lock,
         clavicle=item.with_clavicle,
         seen_from=item.seen_from.lower(),
         mirror=item.mirror,

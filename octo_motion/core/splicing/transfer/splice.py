@@ -50,6 +50,7 @@ from .retarget import (
     find_retargets,
     write_retargeted,
 )
+from .travel_lock import TravelLock
 
 LimbGoal = Literal["direction", "exact"]
 
@@ -70,6 +71,8 @@ class Splice:
     clavicle: bool = True
     """Whether an arm takes its clavicle along, where both skeletons have one; the source's joint
     is the shoulder."""
+    foot_lock: bool = False
+    """Whether feet stand where the clip's do, with travel."""
     seen_from: SeenFrom = ""
     """From where legs are seen: the pelvis if empty, the chest in the source."""
     mirror: bool = False
@@ -144,13 +147,18 @@ def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Spl
 
 
 def _made_ready(
-    base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], first: int = 0
+    base: Clip,
+    landmarks: Landmarks | None,
+    splices: Sequence[Splice],
+    first: int = 0,
+    *,
+    in_sight: bool = False,
 ) -> list[Splicer]:
     """Splices of which the first has this number."""
     ready: list[Splicer] = []
     for number, splice in enumerate(splices, first):
         with numbered(number):
-            ready.append(Splicer(base, landmarks, splice))
+            ready.append(Splicer(base, landmarks, splice, in_sight=in_sight))
     return ready
 
 
@@ -161,8 +169,13 @@ class Splicer:
     for where legs have led to by then, and for the way round that easing takes.
     """
 
-    def __init__(self, base: Clip, landmarks: Landmarks | None, splice: Splice) -> None:
-        """Match the two skeletons; ClipError if a bone or landmark is missing."""
+    def __init__(
+        self, base: Clip, landmarks: Landmarks | None, splice: Splice, *, in_sight: bool = False
+    ) -> None:
+        """Match the two skeletons; ClipError if a bone or landmark is missing.
+
+        ``in_sight``: for single frames, whose feet are not held: that would hang on all others.
+        """
         if splice.travel and not (splice.part.kind is not None and splice.part.kind.travels):
             raise ClipError(
                 f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
@@ -179,6 +192,9 @@ class Splicer:
         self._travel = None
         if splice.travel:
             self._travel = LegTravel(self._retargets[0], ground_height(mapped))
+        self._lock = None
+        if splice.travel and splice.foot_lock and not in_sight:
+            self._lock = TravelLock(self._retargets, splice.part.sides)
 
     def window(self, timing: Timing) -> SpliceWindow:
         """What a timing means for the base; ClipError if it makes no sense."""
@@ -229,7 +245,9 @@ class Splicer:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
             self._travel.move(base, span, whole, rotations, locations)
         scales = _scaled(base, self._clip, span, self._retargets)
-        return replace(base, rotations=rotations, locations=locations, scales=scales)
+        result = replace(base, rotations=rotations, locations=locations, scales=scales)
+        lock = self._lock
+        return lock.onto(result, span) if lock is not None and lock.needed else result
 
 
 def _scaled(
@@ -309,7 +327,7 @@ class SplicePreview:
         self._number = number
         self._base = build_splices(base, landmarks, splices[:number])
         # Made ready on the stack's own base: it tells the ground.
-        self._levels = _made_ready(base, landmarks, splices[number:], number)
+        self._levels = _made_ready(base, landmarks, splices[number:], number, in_sight=True)
         self._above: list[SpliceWindow] = []
         for above, each in enumerate(self._levels[1:], number + 1):
             with numbered(above):

@@ -9,16 +9,13 @@ before and behind, so that it stays one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from ...errors import ClipError
 from ...rotations import (
     Floats,
-    conjugate,
     from_matrix,
     multiply,
     normalized,
@@ -30,10 +27,8 @@ from ..clip import Clip, posture_of, sample_clip
 from ..humanoid import Landmarks, chain_length
 from .foot_contacts import (
     Stance,
-    ball_places,
     find_contacts,
     find_stance,
-    foot_bones,
     foot_paths,
     own_paths,
 )
@@ -58,6 +53,7 @@ from .retarget import (
     write_retargeted,
 )
 from .splice import LimbGoal
+from .travel_lock import answering_balls, size_ratio
 
 _PARTS: Final = ("legs", "trunk", "left_arm", "right_arm", "head")
 """In the order in which they are put on: each hangs on those before it."""
@@ -115,7 +111,7 @@ def retarget_clip(
         ClipError: a landmark is missing, or the hips cannot leave their parent.
     """
     settings = settings or WholeBody()
-    _check_frames(still, source)
+    assert len(still) == len(source.clip)
     joined, hung = whole_limbs(base)
     source, _ = whole_limbs(source)
     before = still if hung is None else hung.into(still)
@@ -146,11 +142,6 @@ def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
         if length < _STRAIGHT * chain or float(-way @ up) < _UPRIGHT * length:
             return False
     return True
-
-
-def _check_frames(still: Clip, source: MappedClip) -> None:
-    if len(still) != len(source.clip):
-        raise ClipError("The two clips differ in length.", "Give the clip at rest as many frames.")
 
 
 def _on_whole_limbs(
@@ -185,11 +176,11 @@ class _Mover:
         self._base, self._source = base, source
         self._retargets = retargets
         self._settings = settings
-        self._ratio = leg_length(base) * base.clip.scale / (leg_length(source) * source.clip.scale)
+        self._ratio = size_ratio(retargets[0])
         clip = source.clip
         self._moment = sample_clip(clip, clip.frames)
         self._paths = foot_paths(source, self._moment, clip.frames)
-        self._balls = _answering_balls(retargets, self._ratio * source.clip.scale / base.clip.scale)
+        self._balls = answering_balls(retargets[:2], "LR")
         self._stands = find_stance(own_paths(stands, self._balls))
         if settings.ground is not None:
             self._stands = _above_soles(self._stands, base)
@@ -254,23 +245,6 @@ class _Mover:
             contacts, self._stands, steps, self._settings.ground, self._balls, cyclic=loops
         )
         return lock_feet(self._base, result, footing)
-
-
-def _answering_balls(retargets: Sequence[Retarget], size: float) -> Floats | None:
-    """Where the balls of feet without toes are, (2, 3): where they are on a clip's that have them,
-    at their size; none where they are as usual.
-    """
-    base, source = retargets[0].base, retargets[0].splice
-    found, others = ball_places(base), ball_places(source)
-    for side, name in enumerate("LR"):
-        *_, foot, toe = foot_bones(base, name)
-        *_, answer, other_toe = foot_bones(source, name)
-        constant = retargets[side].match.constants.get(foot)
-        if toe >= 0 or other_toe < 0 or retargets[side].match.pairs.get(foot) != answer:
-            return None
-        assert constant is not None
-        found[side] = size * rotate(conjugate(constant), others[side])
-    return found
 
 
 def _above_soles(stands: Stance, base: MappedClip) -> Stance:

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Feet of legs that are spliced with their travel stand where those of their clip do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from ...rotations import Floats, conjugate, rotate
+from ..clip import Clip, SpliceWindow
+from .foot_contacts import (
+    FootContacts,
+    ball_places,
+    find_contacts,
+    find_stance,
+    foot_bones,
+    own_paths,
+)
+from .foot_lock import Footing, lock_feet, steps_of
+from .leg_travel import leg_length
+from .retarget import Retarget
+
+_ALIKE: Final = 1e-3
+"""By how much legs may differ in length and travel as far."""
+
+
+class TravelLock:
+    """What does not hang on the timing.
+
+    Args:
+        retargets: of the legs, or of one of them.
+        sides: on which they are, "L" and "R".
+
+    Raises:
+        ClipError: a landmark is missing.
+    """
+
+    def __init__(self, retargets: Sequence[Retarget], sides: Sequence[str]) -> None:
+        base, splice = retargets[0].base, retargets[0].splice
+        ratio = size_ratio(retargets[0])
+        alike = all(each.match.same_body for each in retargets) and abs(ratio - 1.0) < _ALIKE
+        self.needed = not alike
+        """Whether there is anything to do: feet of a body like the clip's stand as there."""
+        if alike:
+            return
+        self._base = base
+        self._balls = answering_balls(retargets, sides)
+        self._stands = find_stance(own_paths(base, self._balls))
+        paths = own_paths(splice)
+        contacts = find_contacts(paths)
+        contacts.held[:, [name not in sides for name in "LR"]] = False
+        self._contacts = contacts
+        self._steps = steps_of(paths, contacts, find_stance(paths), ratio)
+        self._frames = splice.clip.frames
+
+    def onto(self, result: Clip, span: SpliceWindow) -> Clip:
+        """The result of a splice with its feet held where the splice acts."""
+        last = len(self._frames) - 1
+        places = np.interp(span.splice_frames, self._frames, np.arange(last + 1.0))
+        rows = np.clip(np.round(places), 0, last).astype(np.intp)
+        acting = np.arange(span.frames.start, span.frames.stop)
+        footing = Footing(
+            FootContacts(self._contacts.held[rows]),
+            self._stands,
+            self._steps[rows],
+            balls=self._balls,
+        )
+        locked = lock_feet(self._base, result.taken(acting), footing, span.weights)
+        rotations, locations = result.rotations.copy(), result.locations.copy()
+        rotations[acting], locations[acting] = locked.rotations, locked.locations
+        return replace(result, rotations=rotations, locations=locations)
+
+
+def size_ratio(retarget: Retarget) -> float:
+    """How much longer the base's legs are than the clip's, in the world."""
+    ours, theirs = retarget.base, retarget.splice
+    return leg_length(ours) * ours.clip.scale / (leg_length(theirs) * theirs.clip.scale)
+
+
+def answering_balls(retargets: Sequence[Retarget], sides: Sequence[str]) -> Floats:
+    """Where the balls of the base's feet are as seen from their bones, (2, 3): of feet without toes
+    where the clip's are, at their size.
+    """
+    base, source = retargets[0].base, retargets[0].splice
+    found, others = ball_places(base), ball_places(source)
+    size = size_ratio(retargets[0]) * source.clip.scale / base.clip.scale
+    for retarget, name in zip(retargets, sides, strict=True):
+        *_, foot, toe = foot_bones(base, name)
+        *_, answer, other_toe = foot_bones(source, name)
+        constant = retarget.match.constants.get(foot)
+        if toe < 0 <= other_toe and constant is not None and retarget.match.pairs[foot] == answer:
+            side = "LR".index(name)
+            found[side] = size * rotate(conjugate(constant), others[side])
+    return found
