@@ -52,12 +52,10 @@ class RetargetJob:
 
     armature: str
     """Names of objects: references do not outlive a modal operator's tick."""
-    base: MappedClip
+    base: Source
     """By what the body is compared."""
     standing: MappedClip
     """That tells at which height it stands."""
-    found: bool
-    """Whether the base's landmarks were found just now."""
     still: Clip
     source: Source
     settings: WholeBody
@@ -136,15 +134,14 @@ def prepare_retarget(
     settings = splicing_settings(armature).retarget
     clip = reader.source(source, action, slot, visual=settings.visual)
     moving = _own_motion(armature, own or reader)
-    base, found = _base(armature, moving)
-    for each, name in ((base, armature.name), (clip, source.name)):
-        _check_landmarks(each, name)
+    base = _base(armature, moving)
+    for each in (base, clip):
+        _check_landmarks(each)
     goal = cast("LimbGoal", settings.mode.lower())
     return RetargetJob(
         armature.name,
         base,
         base if moving is None else moving,
-        found,
         still_clip(armature, clip.clip.frames, clip.clip.rate),
         clip,
         WholeBody(goal, travel=settings.travel, foot_lock=settings.foot_lock),
@@ -172,17 +169,16 @@ def _triangles(settings: Any) -> Floats | None:
     return triangles
 
 
-def _base(armature: bpy.types.Object, moving: Source | None) -> tuple[MappedClip, bool]:
+def _base(armature: bpy.types.Object, moving: Source | None) -> Source:
     """By what a body is compared: its rest pose if that is one of somebody who stands, else a
-    motion of its own; and whether its landmarks were found just now.
+    motion of its own.
     """
     still = still_clip(armature, np.array([1.0]), 24.0)
-    landmarks, _, found = known_landmarks(
-        armature, still.skeleton, None if moving is None else average_pose(moving.clip)
-    )
-    if moving is None or (landmarks is not None and rests_standing(still.skeleton, landmarks)):
-        return MappedClip(still, landmarks), found
-    return moving, moving.found
+    lies = None if moving is None else average_pose(moving.clip)
+    known = known_landmarks(armature, still.skeleton, lies)
+    if moving is None or rests_standing(still.skeleton, known.landmarks):
+        return Source(still, known.landmarks, armature.name, known.problem, known.found)
+    return moving
 
 
 def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:
@@ -214,19 +210,18 @@ def _busy(action: bpy.types.Action) -> bool:
     return not any(word in name for word in ("idle", "stand", "pose"))
 
 
-def _check_landmarks(mapped: MappedClip, name: str) -> None:
-    remedy = (
-        f"Make '{name}' active, click Find Landmarks in the panel Splicing > Landmarks and choose "
-        "there what it cannot find."
-    )
-    bones = mapped.skeleton.index
-    known = {} if mapped.landmarks is None else mapped.landmarks.bones
+def _check_landmarks(source: Source) -> None:
+    """Ask for what cannot be told, with the name of whose it is."""
+    bones = source.skeleton.index
+    known = {} if source.landmarks is None else source.landmarks.bones
     missing = [each for each in LANDMARKS if each not in OPTIONAL and known.get(each) not in bones]
     if missing:
-        problem = getattr(mapped, "problem", "") or (
-            f"It is not known which bone is the {title(missing[0])}."
+        problem = source.problem or f"It is not known which bone is the {title(missing[0])}."
+        raise ClipError(
+            f"'{source.armature}' has no landmarks. {problem}",
+            f"Make '{source.armature}' active, click Find Landmarks in the panel Splicing > "
+            "Landmarks and choose there what it cannot find.",
         )
-        raise ClipError(f"'{name}' has no landmarks. {problem}", remedy)
 
 
 def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retargeted:
@@ -247,7 +242,7 @@ def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retar
         note=text,
         previous=_previous(armature, text),
     )
-    if job.found and job.base.landmarks is not None:
+    if job.base.found and job.base.landmarks is not None:
         # What was used is what the table shows from now on.
         write_landmarks(settings.landmarks, job.base.landmarks.bones)
     return Retargeted(action.name, len(clip), tuple(_warnings(job)))
