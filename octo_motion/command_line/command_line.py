@@ -47,10 +47,24 @@ same keys each time, on the same computer. The file that is read stays as it is,
 is given; an output is written whole or not at all.
 """
 
+_RETARGET: Final = """\
+Put whole clips onto one armature, each as an action with the name of its file, and save the result
+as a new file.
+
+FILE is a .blend file with the armature, or a motion file. --clips is a motion file (.bvh, .fbx,
+.glb, .gltf), or a folder, of which all are taken. What is read stays as it is.
+
+  retarget hero.blend --clips walks --clips throw.bvh -o hero_clips.blend
+
+Settings have the names that scripts use: Object.octo_motion.splicing.retarget.NAME;
+landmarks.NAME=BONE says which bone of the armature is which, where it cannot be told.
+"""
+
 _ABOUT: Final = {
     "generate": ("let the armature of one file walk or swim", _GENERATE),
     "splice": ("put parts of other motions onto one motion", _SPLICE),
     "pose": ("pose an armature by a script", _POSE),
+    "retarget": ("put whole clips onto one armature", _RETARGET),
 }
 _BAKE: Final = """\
 Make many shots from a job file, each in a process of its own.
@@ -96,6 +110,12 @@ radians, texts may be in degrees.
       { part = "right_arm", clip = "clips/throw.bvh", base_start = 20, after = "stop" },
       { part = "left_arm", clip = "clips/punch.bvh", base_start = 60, mode = "exact" },
   ]
+
+  [[shots]]
+  name = "hero_clips"
+  kind = "retarget"                 # whole clips onto this one, each as an action
+  file = "hero.blend"
+  clips = ["clips", "more/throw.bvh"]   # files, and folders of files
 """
 
 

@@ -28,6 +28,7 @@ from ..ui.locomotion import (
 from ..ui.posing import play_file
 from .job_report import ShotSummary, check_limits
 from .outputs import blender_said, check_export, export
+from .retarget_runner import retarget
 from .schema import set_values
 from .shot_schema import NewRoute, ShotRequest, frame_rate, is_motion
 from .splice_runner import Clips, has_splices, import_base, named, splice
@@ -58,7 +59,8 @@ def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
         LimitError: the motion is not as good as it has to be; nothing has been written.
     """
     clips = Clips()
-    motion = shot.file if shot.kind == "splice" and shot.file and is_motion(shot.file) else None
+    takes_motion = shot.kind in {"splice", "retarget"}
+    motion = shot.file if takes_motion and shot.file and is_motion(shot.file) else None
     if motion is not None:
         armature, clips = import_base(motion, shot.fps)
         compress, scene = False, armature.users_scene[0]
@@ -75,6 +77,8 @@ def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
             check_export(path, armature, scene)
         if shot.kind == "splice":
             summary = splice(armature, shot, clips, motion)
+        elif shot.kind == "retarget":
+            summary = retarget(armature, shot)
         elif shot.script is not None:
             summary = _pose(armature, scene, shot.script)
         else:
@@ -99,7 +103,7 @@ def _find(shot: ShotRequest) -> tuple[bpy.types.Object, bpy.types.Scene]:
     if shot.octopus is not None:
         shape, with_mesh = shot.octopus.shape, shot.octopus.with_mesh
         return add_octopus(bpy.context, shape, Matrix(), with_skin=with_mesh), scene
-    fits = {"generate": _has_arms, "splice": has_splices, "pose": _is_posable}[shot.kind]
+    fits = {"generate": _has_arms, "splice": has_splices}.get(shot.kind, _is_posable)
     armature = find_armature(shot.armature, scene, fits)
     if armature.name in scene.objects:
         return armature, scene

@@ -104,7 +104,7 @@ class ShotRequest:
     frames: int | None = None
     """Frames that the base is to last, repeated or cut; as long as it is if not given."""
     splices: list[NewSplice] | None = None
-    """In order, or none for the list that the file has."""
+    """In order, or none for the list that the file has; of a shot that retargets, its clips."""
     settings: Settings = field(default_factory=dict)
     limits: dict[str, float] = field(default_factory=dict)
     """How bad the figures of its motion may be, by name; see ``check_limits``."""
@@ -218,6 +218,26 @@ def _exports(given: Any, reading: Reading) -> tuple[Path, ...] | None:
         raise Unfit("a path or a list of paths")
     paths = tuple(read_value("export", _export, each, reading) for each in listed)
     return None if None in paths else paths
+
+
+def _clips(given: Any, reading: Reading) -> tuple[Path, ...] | None:
+    """A motion file, or a folder of such files, or a list of them."""
+    listed = [given] if isinstance(given, str) else given
+    if not isinstance(listed, list) or not all(isinstance(each, str) for each in listed):
+        raise Unfit("a path or a list of paths")
+    paths: list[Path] = []
+    for each in listed:
+        path = reading.resolve(each)
+        if not path.is_dir():
+            # Without an ending it is a folder that is not there yet: that is told before all runs.
+            suffixes = MOTION_SUFFIXES if path.suffix else ()
+            paths.append(File("motion file", suffixes)(each, reading))
+            continue
+        found = sorted(file for file in path.iterdir() if is_motion(file) and file.is_file())
+        if not found:
+            raise SettingsError(f"The folder '{each}' has no motion files.")
+        paths += found
+    return tuple(dict.fromkeys(paths))
 
 
 def _points(given: Any, reading: Reading) -> Points:
@@ -375,7 +395,7 @@ def _kind(own: dict[str, Key], exported: str) -> dict[str, Key]:
     output = Option("the .blend file to write", "FILE", ("-o", "--output"))
     return {
         "name": Key(Text()),
-        "kind": Key(Choice(("generate", "splice", "pose"), "kind")),
+        "kind": Key(Choice(("generate", "splice", "pose", "retarget"), "kind")),
         **own,
         "fps": Key(Number(1.0, HIGHEST_FPS), Option("frames per second of the scene", "FPS")),
         "output": Key(File("format to save to", (".blend",)), output),
@@ -451,6 +471,27 @@ KINDS: Final[dict[str, dict[str, Key]]] = {
         },
         "the figure",
     ),
+    "retarget": _kind(
+        {
+            "file": _file("the .blend file, or motion file, with the armature that gets the clips"),
+            "armature": _named("default: the only one, or the active one"),
+            "clips": Key(
+                _clips,
+                Option(
+                    "a motion file, or a folder of such files; may be repeated",
+                    "FILE",
+                    ("--clips",),
+                    collect=list,
+                    required=True,
+                ),
+            ),
+            "ground": _named("the mesh to stand on; default: level ground"),
+            "settings": _settings(
+                "retarget", "a setting, such as foot_lock=false or landmarks.chest=Spine2"
+            ),
+        },
+        "the armature and what hangs on it",
+    ),
 }
 """The keys of each kind of shot."""
 
@@ -479,7 +520,7 @@ def read_shot(given: Mapping[str, Any], reading: Reading) -> ShotRequest:
         {name: key.kind for name, key in KINDS[kind].items()},
         what="key",
         needed=("name",),
-        finish={"generate": _check_generate, "splice": _check_splice, "pose": _check_pose}[kind],
+        finish=_CHECKS[kind],
     )
     values = table(own, reading)
     if "output" not in values and values.get("export", ()) == ():
@@ -521,6 +562,24 @@ def _check_pose(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
     if "script" not in values:
         reading.fault('It poses nothing: give script = "….json", a pose script.')
     return values
+
+
+def _check_retarget(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
+    values = dict(values)
+    if "file" not in values and not reading.has_open_file:
+        reading.fault('It has no armature: give file, "….blend" or a motion file.')
+    clips = values.pop("clips", ())
+    if clips == ():
+        reading.fault("It retargets nothing: give clips, a folder or a list of motion files.")
+    return {**values, "splices": [NewSplice(clip=path) for path in clips or ()]}
+
+
+_CHECKS: Final = {
+    "generate": _check_generate,
+    "splice": _check_splice,
+    "pose": _check_pose,
+    "retarget": _check_retarget,
+}
 
 
 def _check_creature(values: Mapping[str, Any], reading: Reading) -> None:

@@ -15,7 +15,13 @@ from ..core.errors import ClipError, OctoMotionError, SettingsError
 from ..core.locomotion.gait import gait_to_json
 from ..core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ..ui.locomotion import ChangeItem, ContactItem, OCTO_MOTION_PG_locomotion, ReachItem
-from ..ui.splicing import PARTS, OCTO_MOTION_PG_landmarks, OCTO_MOTION_PG_splicing, SpliceItem
+from ..ui.splicing import (
+    PARTS,
+    OCTO_MOTION_PG_landmarks,
+    OCTO_MOTION_PG_retarget,
+    OCTO_MOTION_PG_splicing,
+    SpliceItem,
+)
 from .schema import Choice, Kind, Known, Number, Reading, Text, flag, point
 from .shot_schema import ShotRequest, gait_name, is_motion, read_shot
 
@@ -32,6 +38,10 @@ def known() -> Known:
         {
             "generate": dict(_settings(OCTO_MOTION_PG_locomotion)),
             "splice": dict(_settings(OCTO_MOTION_PG_splicing)),
+            "retarget": {
+                **dict(_settings(OCTO_MOTION_PG_retarget)),
+                **dict(_settings(OCTO_MOTION_PG_landmarks, "landmarks.")),
+            },
             "splices": {
                 "name": Text(may_be_empty=True),
                 **dict(_settings(SpliceItem)),

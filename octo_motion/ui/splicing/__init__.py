@@ -20,10 +20,12 @@ from .import_clips import draw_in_import_menu
 from .properties import (
     PARTS,
     OCTO_MOTION_PG_landmarks,
+    OCTO_MOTION_PG_retarget,
     OCTO_MOTION_PG_splicing,
     SpliceItem,
     splicing_settings,
 )
+from .retargeting import RetargetSession, file_clip
 from .splice_operators import add_splice, name_splice, own_action
 from .stack import ClipReader, prepare_splices, write_splices
 
@@ -49,10 +51,13 @@ __all__ = [
     "SETTINGS",
     "ClipReader",
     "OCTO_MOTION_PG_landmarks",
+    "OCTO_MOTION_PG_retarget",
     "OCTO_MOTION_PG_splicing",
+    "RetargetSession",
     "SpliceItem",
     "add_splice",
     "draw_in_import_menu",
+    "file_clip",
     "name_splice",
     "own_action",
     "prepare_splices",

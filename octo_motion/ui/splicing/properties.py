@@ -273,7 +273,7 @@ class SpliceItem(bpy.types.PropertyGroup):
     foot_lock: props.BoolProperty(
         name="Foot Lock",
         description="With travel, feet that stand in the clip stand here as well, on the ground of "
-        "the base: legs of other proportions would slide. The preview of dragging leaves it out",
+        "the base: legs of other proportions would slide",
         default=True,
     )
     mute: props.BoolProperty(name="Mute", description="Leave this splice out")

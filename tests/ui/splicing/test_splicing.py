@@ -1124,7 +1124,7 @@ def drawn() -> dict[str, list[str]]:
 def test_the_panel_is_there_for_armatures_alone_and_closed_at_first() -> None:
     assert drawn() == {}
     hero, _ = hero_and_source()
-    assert set(drawn()) == {"splicing", "landmarks"}
+    assert set(drawn()) == {"splicing", "retarget", "landmarks"}
     OPERATORS.splice_add()
     assert set(drawn()) == {"splicing", "splice", "splice_timing", "landmarks"}
     assert all(panel.bl_options == {"DEFAULT_CLOSED"} for panel in splice_panels.CLASSES)

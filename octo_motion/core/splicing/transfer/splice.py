@@ -50,7 +50,7 @@ from .retarget import (
     find_retargets,
     write_retargeted,
 )
-from .travel_lock import TravelLock
+from .travel_lock import SIGHT, TravelLock
 
 LimbGoal = Literal["direction", "exact"]
 
@@ -147,18 +147,13 @@ def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Spl
 
 
 def _made_ready(
-    base: Clip,
-    landmarks: Landmarks | None,
-    splices: Sequence[Splice],
-    first: int = 0,
-    *,
-    in_sight: bool = False,
+    base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], first: int = 0
 ) -> list[Splicer]:
     """Splices of which the first has this number."""
     ready: list[Splicer] = []
     for number, splice in enumerate(splices, first):
         with numbered(number):
-            ready.append(Splicer(base, landmarks, splice, in_sight=in_sight))
+            ready.append(Splicer(base, landmarks, splice))
     return ready
 
 
@@ -169,13 +164,8 @@ class Splicer:
     for where legs have led to by then, and for the way round that easing takes.
     """
 
-    def __init__(
-        self, base: Clip, landmarks: Landmarks | None, splice: Splice, *, in_sight: bool = False
-    ) -> None:
-        """Match the two skeletons; ClipError if a bone or landmark is missing.
-
-        ``in_sight``: for single frames, whose feet are not held: that would hang on all others.
-        """
+    def __init__(self, base: Clip, landmarks: Landmarks | None, splice: Splice) -> None:
+        """Match the two skeletons; ClipError if a bone or landmark is missing."""
         if splice.travel and not (splice.part.kind is not None and splice.part.kind.travels):
             raise ClipError(
                 f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
@@ -193,8 +183,9 @@ class Splicer:
         if splice.travel:
             self._travel = LegTravel(self._retargets[0], ground_height(mapped))
         self._lock = None
-        if splice.travel and splice.foot_lock and not in_sight:
-            self._lock = TravelLock(self._retargets, splice.part.sides)
+        if splice.travel and splice.foot_lock:
+            lock = TravelLock(self._retargets, splice.part.sides)
+            self._lock = lock if lock.needed else None
 
     def window(self, timing: Timing) -> SpliceWindow:
         """What a timing means for the base; ClipError if it makes no sense."""
@@ -207,6 +198,15 @@ class Splicer:
         needed = set(rows)
         for row in tuple(needed):
             needed.update(span.easing(row))
+        if self._lock is not None:
+            sight = round(SIGHT * self._base.rate)
+            for row in tuple(needed):
+                first, last = (
+                    max(row - sight, span.frames.start),
+                    min(row + sight, span.frames.stop - 1),
+                )
+                if span.frames.start <= row < span.frames.stop:
+                    needed.update(range(first, last + 1))
         if self._travel is not None and max(needed, default=0) >= span.frames.start:
             needed |= {span.frames.start, span.frames.stop - 1} if len(span.weights) else set()
         return sorted(needed)
@@ -247,7 +247,7 @@ class Splicer:
         scales = _scaled(base, self._clip, span, self._retargets)
         result = replace(base, rotations=rotations, locations=locations, scales=scales)
         lock = self._lock
-        return lock.onto(result, span) if lock is not None and lock.needed else result
+        return result if lock is None else lock.onto(result, span)
 
 
 def _scaled(
@@ -327,7 +327,7 @@ class SplicePreview:
         self._number = number
         self._base = build_splices(base, landmarks, splices[:number])
         # Made ready on the stack's own base: it tells the ground.
-        self._levels = _made_ready(base, landmarks, splices[number:], number, in_sight=True)
+        self._levels = _made_ready(base, landmarks, splices[number:], number)
         self._above: list[SpliceWindow] = []
         for above, each in enumerate(self._levels[1:], number + 1):
             with numbered(above):

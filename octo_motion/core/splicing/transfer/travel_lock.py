@@ -23,6 +23,12 @@ from .foot_lock import Footing, lock_feet, steps_of
 from .leg_travel import leg_length
 from .retarget import Retarget
 
+SIGHT: Final = 2.0
+"""Seconds before and after a frame on which its feet hang, as far as one can see."""
+
+_GAP: Final = 1.5
+"""Of the usual step between frames: more is a gap."""
+
 _ALIKE: Final = 1e-3
 """By how much legs may differ in length and travel as far."""
 
@@ -57,20 +63,28 @@ class TravelLock:
         self._frames = splice.clip.frames
 
     def onto(self, result: Clip, span: SpliceWindow) -> Clip:
-        """The result of a splice with its feet held where the splice acts."""
+        """The result of a splice with its feet held where the splice acts.
+
+        Of its frames some may be missing: what lies between gaps is looked at by itself.
+        """
         last = len(self._frames) - 1
         places = np.interp(span.splice_frames, self._frames, np.arange(last + 1.0))
         rows = np.clip(np.round(places), 0, last).astype(np.intp)
         acting = np.arange(span.frames.start, span.frames.stop)
-        footing = Footing(
-            FootContacts(self._contacts.held[rows]),
-            self._stands,
-            self._steps[rows],
-            balls=self._balls,
-        )
-        locked = lock_feet(self._base, result.taken(acting), footing, span.weights)
         rotations, locations = result.rotations.copy(), result.locations.copy()
-        rotations[acting], locations[acting] = locked.rotations, locked.locations
+        steps = np.diff(result.frames[acting])
+        gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1 if len(steps) else []
+        for chosen in np.split(np.arange(len(acting)), gaps):
+            held = rows[chosen]
+            footing = Footing(
+                FootContacts(self._contacts.held[held]),
+                self._stands,
+                self._steps[held],
+                balls=self._balls,
+            )
+            there = acting[chosen]
+            locked = lock_feet(self._base, result.taken(there), footing, span.weights[chosen])
+            rotations[there], locations[there] = locked.rotations, locked.locations
         return replace(result, rotations=rotations, locations=locations)
 
 
