@@ -1126,7 +1126,7 @@ def test_the_panel_is_there_for_armatures_alone_and_closed_at_first() -> None:
     hero, _ = hero_and_source()
     assert set(drawn()) == {"splicing", "retarget", "landmarks"}
     OPERATORS.splice_add()
-    assert set(drawn()) == {"splicing", "splice", "splice_timing", "landmarks"}
+    assert set(drawn()) == {"splicing", "splice", "splice_timing", "retarget", "landmarks"}
     assert all(panel.bl_options == {"DEFAULT_CLOSED"} for panel in splice_panels.CLASSES)
     assert "with_travel" not in drawn()["splice"]
     assert "with_clavicle" in drawn()["splice"]
