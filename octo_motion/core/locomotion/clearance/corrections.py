@@ -429,12 +429,9 @@ def raise_between_frames(
 ) -> Poses:
     """The same motion, without arms that dip into the ground between frames.
 
-    Args:
-        course: arms and ground.
-        poses: of all frames; they are left as they are.
-        joints: of each arm (frames, joints, 3) then, world.
-        again: poses of some frames (n,), with arms (n, arms) so many arm lengths higher, and the
-            joints of each arm; of arms that are nowhere higher it need say nothing.
+    Poses of all frames are left as they are; joints of each arm are (frames, joints, 3). ``again``
+    makes poses of some frames (n,), with arms (n, arms) so many arm lengths higher, and the joints
+    of each arm; of arms that are nowhere higher it need say nothing.
     """
     if len(poses.rotations) < 2:
         return poses

@@ -143,14 +143,9 @@ def parted(
     """Joints (frames, arms, joints, 3) of arms that have made way; none if nobody has to.
 
     The result at a frame hangs on the frames within some reach of it, and on no state: the same
-    motion gives the same result.
-
-    Args:
-        crowd: the arms.
-        still: parts of the body, one frame each.
-        floor: what is below, or nothing.
-        width: of the means over frames that make it smooth (``smoothing.blurred``).
-        cyclic: whether the last frame is the first again.
+    motion gives the same result. Parts of the body that are ``still`` have one frame each;
+    ``width`` is that of the means over frames that make it smooth (``smoothing.blurred``); cyclic,
+    the last frame is the first again.
     """
     every = np.arange(len(crowd.joints))
     if not len(every):

@@ -425,17 +425,12 @@ class GaitPoser:
     def asked(
         self, phases: Floats, turn: Floats, cycle_period: Sequence[int] | None = None
     ) -> tuple[Floats, Floats]:
-        """What the gait asks of the arms at some frames.
+        """What the gait asks of the arms at their own phases (frames, arms), radians; ``turn`` is
+        as of :meth:`pose`. Random additions come again after each arm's cycles, if that is not the
+        same for all.
 
-        Args:
-            phases: (frames, arms) of the arms themselves, radians.
-            turn: as of :meth:`pose`.
-            cycle_period: each arm's cycles after which random additions come again, if that is not
-                the same for all.
-
-        Returns:
-            Angles (frames, arms, links, 3), turns anticlockwise for every arm, and by how much the
-            arms steer (frames, arms), radians.
+        Angles (frames, arms, links, 3), turns anticlockwise for every arm, and by how much the arms
+        steer (frames, arms), radians.
         """
         settings = self.settings
         steady = settings.smoothing_cycles

@@ -60,20 +60,16 @@ class GaitCurve:
         return knot, (inside - start) / (end - start)
 
     def rounding(self, phase: Floats, smoothing_cycles: float) -> Floats:
-        """What rounds corners off at phases (…): evens out what is linear between knots over time.
+        """What rounds corners off at phases (…), radians: evens out what is linear between knots
+        over time.
 
         The mean of a straight line over a window is the line itself. So the weighted mean over so
-        many cycles before and after, with weights that fall off evenly to nothing, differs from
-        what has corners by one such part for each corner: h (1 − |t| / h)³ / 6 of its change of
-        slope, at a time t away within a window of h.
+        many cycles before and after, half at most, with weights that fall off evenly to nothing,
+        differs from what has corners by one such part for each corner: h (1 − |t| / h)³ / 6 of its
+        change of slope, at a time t away within a window of h.
 
-        Args:
-            phase: radians.
-            smoothing_cycles: cycles, half at most.
-
-        Returns:
-            (…, knots − 1) radians, for the change of slope at each knot but the last, which is
-            the first again.
+        (…, knots − 1) radians, for the change of slope at each knot but the last, which is the
+        first again.
         """
         within = smoothing_cycles * CYCLE
         away = phase[..., None] - self.phases[:-1]

@@ -64,14 +64,9 @@ def reduced(
 ) -> Generator[float, None, list[Channel]]:
     """The channels with few keys, grouped by arm, in steps that yield the share that is done.
 
-    Args:
-        frames: (moments,) at which the channels have their values.
-        creature: its arms are those of the channels, in their order.
-        motion: the channels.
-        tolerances: how far they may be off.
-        every: at every how many of these moments there is a frame, from the first to the last.
-        dense: whether there is a key on every frame all the same.
-        loops: whether the motion goes on from its last frame to its first.
+    The creature's arms are those of the channels, in their order, whose values are those of frames
+    (moments,); of these ``every`` so many is a frame, from the first to the last. Dense, there is a
+    key on every frame all the same; in a loop the motion goes on from its last frame to its first.
 
     Raises:
         SettingsError: without tolerance, no key can be left out.

@@ -592,11 +592,9 @@ class SegmentedMotion:
     def _stops(
         self, change: int, moments: np.ndarray, lift: Floats | None, *, leaving: bool
     ) -> tuple[list[tuple[int, np.ndarray, np.ndarray, slice]], Floats, Floats]:
-        """Where arms that go over at a change come to rest.
-
-        Returns:
-            For each arm, which of all moments it does so at, which of its own stops that is, and
-            where these are among all; the distances of all stops, and how much higher they are.
+        """Where arms that go over at a change come to rest: for each arm, which of all moments it
+        does so at, which of its own stops that is, and where these are among all; the distances of
+        all stops, and how much higher they are.
         """
         transitions = self.plan.transitions
         assert transitions is not None

@@ -253,17 +253,11 @@ def _held_angle(
     lap: float,
     cyclic: bool,  # noqa: FBT001
 ) -> Floats:
-    """An angle that keeps to the wanted one where that holds, and comes back to it elsewhere.
+    """An angle (n,), radians, unwrapped, that keeps to the wanted one (n,), any branch, where that
+    holds, and comes back to it elsewhere, by ``pace`` of the way with each step.
 
-    Args:
-        wanted: (n,) radians, any branch.
-        level: (n,) sine of the angle between travel and the vertical, the hold of ``wanted``.
-        pace: one step's share of the way back.
-        lap: radians to be gained, up to whole turns, over a closed route.
-        cyclic: whether the route is closed.
-
-    Returns:
-        (n,) radians, unwrapped.
+    ``level`` (n,) is the sine of the angle between travel and the vertical, the hold of ``wanted``;
+    ``lap`` radians are to be gained, up to whole turns, over a closed route.
     """
     if np.max(level) < 1e-6:
         # Straight up or down: nothing is wanted.

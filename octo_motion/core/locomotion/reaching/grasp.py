@@ -493,12 +493,9 @@ class Reaching:
     ) -> tuple[tuple[str, ...], tuple[Carried, ...]]:
         """Let arms reach, in place; what they do in words, and the objects that they carry.
 
-        Args:
-            times: (frames,) of the motion.
-            rotations: (frames, bones, 4) of all arms, one after the other.
-            travelling: where the armature is.
-            strains: (frames, bones) by how much bones are longer than at rest; an arm that
-                reaches is as long as at rest, and what it has here is taken back in place.
+        At times (frames,) of the motion, rotations (frames, bones, 4) and strains (frames, bones),
+        by how much bones are longer than at rest, are of all arms, one after the other. An arm that
+        reaches is as long as at rest, and what it has here is taken back in place.
 
         Raises:
             OctoMotionError: an object is out of reach at a frame, which is named; two reaches of

@@ -260,18 +260,12 @@ class Skins:
 
 
 def wind(skins: Skins, lengths: Floats, start: WindingStart, winding: Winding) -> Coil:
-    """Wind the segments from a joint on about an object.
+    """Wind the segments (segments,) from a joint on about an object, lengths in its profile's unit.
 
-    Where the arm comes from decides where it touches: on the line that only just passes the
-    object. Bones are straight, so joints lie as far out as it takes for the middle of each bone to
-    be where the skin lies on the object. From turn to turn the coil climbs by an arm's diameter,
-    to the side that has more room, as long as there is object.
-
-    Args:
-        skins: the object, and the arm's skin.
-        lengths: (segments,) of the arm, in the profile's unit.
-        start: where the coil begins.
-        winding: which way.
+    Where the arm comes from decides where it touches: on the line that only just passes the object.
+    Bones are straight, so joints lie as far out as it takes for the middle of each bone to be where
+    the skin lies on the object. From turn to turn the coil climbs by an arm's diameter, to the side
+    that has more room, as long as there is object.
 
     Raises:
         RigError: the arm starts within the object.
