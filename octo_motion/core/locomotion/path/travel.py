@@ -677,11 +677,6 @@ def stroke_distance(phase: ArrayLike, burst: float, stroke_phase: float) -> Floa
     return (1.0 - burst) * turned + burst * (pushed - fading)
 
 
-def stroke_speed(phase: ArrayLike, burst: float, stroke_phase: float) -> Floats:
-    """Derivative of :func:`stroke_distance` by the phase ``(…,)``: mean 1, always positive."""
-    return (1.0 - burst) + burst * _speed(np.asarray(phase, dtype=np.float64) - stroke_phase)
-
-
 def phase_at_distance(distance: float, burst: float, stroke_phase: float) -> float:
     """Inverse of :func:`stroke_distance` for one distance, by bisection."""
     low, high = distance - CYCLE, distance + CYCLE

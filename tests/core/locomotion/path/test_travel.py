@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from octo_motion.core.errors import SettingsError
+from octo_motion.core.locomotion.path import travel as module
 from octo_motion.core.locomotion.path.route import Route
 from octo_motion.core.locomotion.path.travel import (
     Travel,
@@ -20,7 +21,6 @@ from octo_motion.core.locomotion.path.travel import (
     plan_travel,
     strides,
     stroke_distance,
-    stroke_speed,
     unhurried,
 )
 from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, multiply, rotate
@@ -220,6 +220,11 @@ def test_each_whole_stroke_of_a_swim_covers_exactly_one_stride(burst: float) -> 
     np.testing.assert_allclose(
         np.interp(CYCLE * whole, travel.phase, travel.distance), 0.8 * whole, atol=1e-5
     )
+
+
+def stroke_speed(phase: Floats, burst: float, stroke_phase: float) -> Floats:
+    """Derivative of a stroke's distance by the phase, mean 1."""
+    return (1.0 - burst) + burst * module._speed(phase - stroke_phase)
 
 
 @pytest.mark.parametrize("stroke_phase", [0.0, 0.75 * np.pi, 5.0])
