@@ -167,7 +167,7 @@ def _move(armature: Any, frames: int, seed: int) -> None:
 def _run(frames: int) -> Result:
     import bpy
 
-    from octo_motion.blender.animation import actions, clips
+    from octo_motion.blender.animation import actions, spliced_action
     from octo_motion.ui.splicing import stack
     from tests.bench.case import peak_megabytes
     from tests.bench.stopwatch import Place, Stopwatch
@@ -179,8 +179,10 @@ def _run(frames: int) -> Result:
             (stack.Splice, "retargets"),
         ],
         "compute": [(stack.Stack, "compute")],
-        "values of the channels": [(clips, "read_channels"), (clips, "_location_channels")],
-        "write keys": [(actions, "_write_curves")],
+        "keys of what is changed": [(spliced_action, "_changed"), (spliced_action, "stretch_keys")],
+        "write keys": [
+            (spliced_action, each) for each in ("copy_curve", "write_stretches", "write_kept_keys")
+        ],
         "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
     }
     bpy.ops.wm.read_factory_settings(use_empty=True)

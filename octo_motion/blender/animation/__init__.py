@@ -22,8 +22,9 @@ from .clip_sources import actions_for, still_clip
 from .clips import (
     closes,
     further_channels,
+    is_recorded,
     read_clip,
-    scaled_channels,
+    resized_bones,
     scene_rate,
     setting_values,
     write_clip,
@@ -43,13 +44,16 @@ from .poses import (
     standing_of,
 )
 from .scene_playback import play_bones, time_kept
+from .spliced_action import STEP, SplicedMotion, write_spliced
 
 __all__ = [
     "SCALE",
+    "STEP",
     "Channel",
     "Keyed",
     "PoseKeys",
     "PoseValues",
+    "SplicedMotion",
     "actions_for",
     "animated_bones",
     "as_posed",
@@ -59,6 +63,7 @@ __all__ = [
     "further_channels",
     "is_edited",
     "is_generated",
+    "is_recorded",
     "key_counts",
     "key_points",
     "lasting",
@@ -70,9 +75,9 @@ __all__ = [
     "read_clip",
     "read_object_channels",
     "renumber_keys",
+    "resized_bones",
     "rest_bones",
     "restore_pose",
-    "scaled_channels",
     "scene_rate",
     "setting_values",
     "show_pose",
@@ -84,4 +89,5 @@ __all__ = [
     "writable_object",
     "write_action",
     "write_clip",
+    "write_spliced",
 ]

@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from operator import itemgetter
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -170,14 +170,7 @@ def write_action(
         WriteError: the object is read-only, or in NLA tweak mode. Nothing has changed then.
     """
     times = _checked(frames, channels)
-    writable_object(obj)
-    data = obj.animation_data or obj.animation_data_create()
-    assert data is not None
-    assigned = data.action
-    if previous is not None and (replaceable or may_replace(previous, obj)):
-        action = previous
-    else:
-        action = _new_action(obj, name)
+    action = generated_action(obj, name, previous, replaceable=replaceable)
     # Actions made here have one layer, one strip and one slot; with more, they count as edited.
     (slot,) = action.slots
     channelbag = own_channelbag(action, slot)
@@ -186,20 +179,67 @@ def write_action(
     action.use_cyclic = repeats
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(times[0]), float(times[-1])
-    data.action = action
-    data.action_slot = slot
-    if assigned is not None and assigned.library is None and assigned.users == 0:
-        assigned.use_fake_user = True
+    _assign(obj, action)
     _mark(action, obj, settings_note, digests, handles)
     action[MARK]["frames"] = len(times)
     return action
+
+
+def generated_action(
+    obj: bpy.types.Object,
+    name: str,
+    previous: bpy.types.Action | None,
+    *,
+    replaceable: bool = False,
+) -> bpy.types.Action:
+    """The action to write for an object: ``previous``, if it may be replaced, else a new one.
+
+    Args:
+        obj: the object to animate.
+        name: name of a new action.
+        previous: the action to write anew, or none.
+        replaceable: whether :func:`may_replace` has just said yes of ``previous``.
+
+    Raises:
+        WriteError: the object is read-only, or in NLA tweak mode.
+    """
+    writable_object(obj)
+    if previous is not None and (replaceable or may_replace(previous, obj)):
+        return previous
+    return _new_action(obj, name)
+
+
+def assign_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_note: str) -> None:
+    """Give an object an action that was written into one of :func:`generated_action`, and mark it
+    as it is now.
+    """
+    _assign(obj, action)
+    handles = {
+        (path, index): _handles(curve)
+        for path, index, _, curve in _listed(action)
+        if _has_own_handles(curve)
+    }
+    _mark(action, obj, settings_note, None, handles)
+
+
+def _assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
+    """Assign an action with its slot. The one before is saved from being purged if nothing else
+    uses it.
+    """
+    data = obj.animation_data or obj.animation_data_create()
+    assert data is not None
+    before = data.action
+    data.action = action
+    (data.action_slot,) = action.slots
+    if before is not None and before.library is None and before.users == 0:
+        before.use_fake_user = True
 
 
 def _mark(
     action: bpy.types.Action,
     obj: bpy.types.Object,
     settings_note: str,
-    digests: Mapping[tuple[str, int], bytes],
+    digests: Mapping[tuple[str, int], bytes] | None,
     handles: Mapping[tuple[str, int], np.ndarray],
 ) -> None:
     action[MARK] = {
@@ -209,7 +249,7 @@ def _mark(
         "fingerprint": _fingerprint(action, digests),
         "note": settings_note,
         "keys": key_count(action),
-        "curves": len(digests),
+        "curves": sum(len(each.fcurves) for each in channelbags_of(action)),
     }
     if handles:
         ordered = [handles[place] for place in sorted(handles)]
@@ -408,12 +448,17 @@ def _repeat(channelbag: bpy.types.ActionChannelbag, *, repeats: bool) -> None:
         for modifier in list(curve.modifiers):
             curve.modifiers.remove(modifier)
         if repeats:
-            cycles = curve.modifiers.new("CYCLES")
-            first, last = (curve.keyframe_points[end].co[1] for end in (0, -1))
-            if curve.data_path.endswith("location") and abs(last - first) > _TRAVELS:
-                # What travels goes on from where a round has led.
-                assert isinstance(cycles, bpy.types.FModifierCycles)
-                cycles.mode_before = cycles.mode_after = "REPEAT_OFFSET"
+            add_cycles(curve)
+
+
+def add_cycles(curve: bpy.types.FCurve) -> None:
+    """Let a curve repeat what lies between its first key and its last."""
+    cycles = curve.modifiers.new("CYCLES")
+    first, last = (curve.keyframe_points[end].co[1] for end in (0, -1))
+    if curve.data_path.endswith("location") and abs(last - first) > _TRAVELS:
+        # What travels goes on from where a round has led.
+        assert isinstance(cycles, bpy.types.FModifierCycles)
+        cycles.mode_before = cycles.mode_after = "REPEAT_OFFSET"
 
 
 def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray) -> bytes:
@@ -479,9 +524,15 @@ def _kind_of(keys: bpy.types.FCurveKeyframePoints) -> tuple[str, str]:
 
 
 def _has_own_handles(curve: bpy.types.FCurve) -> bool:
-    """Whether its handles were set, rather than left to Blender, or to nobody."""
-    interpolation, handles_are = _kind_of(curve.keyframe_points)
-    return interpolation == "BEZIER" and handles_are != "AUTO"
+    """Whether it has handles that matter and were set, rather than left to Blender."""
+    keys = curve.keyframe_points
+    kinds = np.empty((3, len(keys)), dtype=_ENUMERATION)
+    keys.foreach_get("interpolation", kinds[0])
+    if not (kinds[0] == enum_value("interpolation", "BEZIER")).any():
+        return False
+    keys.foreach_get("handle_left_type", kinds[1])
+    keys.foreach_get("handle_right_type", kinds[2])
+    return bool((kinds[1:] != enum_value("handle_left_type", "AUTO")).any())
 
 
 def _handles(curve: bpy.types.FCurve) -> np.ndarray:
@@ -561,7 +612,8 @@ def _fingerprint(
     for path, index, state, curve in _listed(action):
         keys = curve.keyframe_points
         count = len(keys)
-        digest.update(f"({path!r}, {index}, {state}({count}, {len(curve.modifiers)})".encode())
+        modifiers = f"{len(curve.modifiers)}{_modifier_settings(curve)}"
+        digest.update(f"({path!r}, {index}, {state}({count}, {modifiers})".encode())
         if known is not None:
             digest.update(known[path, index])
             continue
@@ -591,6 +643,32 @@ def _listed(action: bpy.types.Action) -> list[tuple[str, int, str, bpy.types.FCu
         paths = [curve.data_path for curve in curves]
         found.extend(zip(paths, index.tolist(), texts, curves, strict=True))
     return sorted(found, key=itemgetter(0, 1))
+
+
+_AS_GENERATED: Final = frozenset({("mode_before", "REPEAT"), ("mode_after", "REPEAT")})
+"""What a new Cycles modifier has, as generated loops have it, though its properties' defaults are
+others."""
+
+
+def _modifier_settings(curve: bpy.types.FCurve) -> str:
+    """What of a curve's modifiers is not as it is in new ones; "" if nothing is."""
+    found: list[str] = []
+    for number, modifier in enumerate(curve.modifiers):
+        for definition in modifier.bl_rna.properties:
+            name = definition.identifier
+            if definition.is_readonly or name in ("name", "show_expanded", "active"):
+                continue
+            value: Any = getattr(modifier, name)
+            default: Any = getattr(definition, "default", None)
+            if getattr(definition, "is_array", False):
+                value, default = tuple(value), None
+            if value != default and (name, value) not in _AS_GENERATED:
+                found.append(f"{number} {name} {value!r}")
+        found.extend(
+            f"{number} {point.frame} {point.min} {point.max}"
+            for point in getattr(modifier, "control_points", ())
+        )
+    return "".join(found)
 
 
 @cache

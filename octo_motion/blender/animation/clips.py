@@ -37,7 +37,7 @@ from .actions import (
     writable_armature,
     write_action,
 )
-from .fcurves import evaluate_fcurve, key_range
+from .fcurves import evaluate_fcurve, goes_straight, key_range
 from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, unkeyed_pose
 from .scene_playback import assigned, shown_poses
 
@@ -146,8 +146,7 @@ def write_clip(
         name: name of the new action, the clip's if empty.
         note: what the clip was made from, kept with the action.
         previous: an action written here before, to be written anew if nobody has edited it.
-        besides: what else the action moves, and what it moves otherwise than the clip; see
-            :func:`further_channels` and :func:`scaled_channels`.
+        besides: what else the action moves; see :func:`further_channels`.
 
     Returns:
         The action, assigned to the armature.
@@ -157,21 +156,8 @@ def write_clip(
         WriteError: it is read-only, or in NLA tweak mode.
     """
     writable_armature(armature)
-    skeleton = clip.skeleton
-    known = read_channels(armature, skeleton.names)
-    channels = known.rotations(skeleton.names, clip.rotations)
-    channels += _location_channels(armature, clip, known)
-    assert armature.pose is not None
-    scales = np.ones(clip.locations.shape) if clip.scales is None else clip.scales
-    channels += [
-        Channel(bone.path_from_id("scale"), scales[:, number], bone.name)
-        for bone in armature.pose.bones
-        if (number := skeleton.index.get(bone.name)) is not None
-        and (bone.scale[:] != (1.0, 1.0, 1.0) or (scales[:, number] != 1.0).any())
-    ]
+    channels = bone_channels(armature, clip, clip.skeleton.names)
     channels += _object_channels(armature, clip)
-    besides_paths = {each.data_path for each in besides}
-    channels = [each for each in channels if each.data_path not in besides_paths]
     channels += besides
     keep_unkeyed_pose(armature)
     return write_action(
@@ -183,6 +169,40 @@ def write_clip(
         settings_note=note,
         repeats=clip.cyclic and closes(clip.rotations),
     )
+
+
+def is_recorded(
+    armature: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.ActionSlot | None
+) -> bool:
+    """Whether an action has poses at whole frames, and nothing of its own in between.
+
+    Straight curves of angles from one to the next are what the file's format or its rest pose makes
+    of it, and may lead far off the shortest way: so nothing is read from them.
+    """
+    curves = _curves_of(action, slot or slot_of(armature, action), read_skeleton(armature))
+    return all(goes_straight(each) for own in curves.values() for each in own.values())
+
+
+def bone_channels(armature: bpy.types.Object, clip: Clip, bones: Collection[str]) -> list[Channel]:
+    """Channels of some bones of a clip: rotations, and locations and scales where there are any.
+
+    Raises:
+        RigError: the object is no armature, or lacks a bone.
+    """
+    skeleton = clip.skeleton
+    numbers = [number for number, name in enumerate(skeleton.names) if name in bones]
+    names = [skeleton.names[number] for number in numbers]
+    known = read_channels(armature, names)
+    channels = known.rotations(names, clip.rotations[:, numbers])
+    channels += _location_channels(armature, clip, known, numbers)
+    scales = np.ones(clip.locations.shape) if clip.scales is None else clip.scales
+    for bone in pose_of(armature).bones:
+        if bone.name not in known.paths:
+            continue
+        own = scales[:, skeleton.index[bone.name]]
+        if bone.scale[:] != (1.0, 1.0, 1.0) or (own != 1.0).any():
+            channels.append(known.scale(bone.name, own))
+    return channels
 
 
 def further_channels(
@@ -205,7 +225,7 @@ def further_channels(
     """
     bones = armature_data(armature).bones
     found: dict[str, dict[int, bpy.types.FCurve]] = defaultdict(dict)
-    for curve in shown_curves(action, slot or _slot_for(armature, action)):
+    for curve in shown_curves(action, slot or slot_of(armature, action)):
         name, channel = bone_and_property(curve.data_path)
         if not (channel in _POSED and name in bones if name else channel in _PLACED):
             found[curve.data_path][curve.array_index] = curve
@@ -251,7 +271,7 @@ def setting_values(
     data = armature.animation_data
     places = [] if data is None or data.action is None else [(data.action, data.action_slot)]
     if action is not None:
-        places.append((action, slot or _slot_for(armature, action)))
+        places.append((action, slot or slot_of(armature, action)))
     for each, own in places:
         for curve in () if own is None else shown_curves(each, own):
             if curve.data_path == path:
@@ -259,13 +279,13 @@ def setting_values(
     return None
 
 
-def scaled_channels(
+def resized_bones(
     armature: bpy.types.Object,
     action: bpy.types.Action,
     slot: bpy.types.ActionSlot | None,
     frames: Floats,
     changed: Collection[str],
-) -> tuple[list[Channel], list[str]]:
+) -> tuple[list[str], list[str]]:
     """Bones that are scaled and carry others, of which a clip has the places, not the size.
 
     Where none of what they carry is changed, all of it can be as the action has it.
@@ -278,38 +298,29 @@ def scaled_channels(
         changed: names of the bones that no longer move as the action says.
 
     Returns:
-        Channels to write in place of the clip's, and names of the bones that lose their size.
+        Names of the bones that lose their size, and of these and all that they carry.
     """
     skeleton = read_skeleton(armature)
-    curves = _curves_of(action, slot or _slot_for(armature, action), skeleton)
+    curves = _curves_of(action, slot or slot_of(armature, action), skeleton)
     unkeyed = unkeyed_pose(armature)
-    modes = _rotation_modes(armature, skeleton)
 
-    def values(name: str, channel: str) -> Floats:
-        otherwise = unkeyed.get((name, channel), AT_REST[channel])
-        return _values(curves, name, channel, otherwise, frames)
+    def size(name: str) -> Floats:
+        otherwise = unkeyed.get((name, "scale"), AT_REST["scale"])
+        return _values(curves, name, "scale", otherwise, frames)
 
-    off = np.array([np.abs(values(name, "scale") - 1.0).max() for name in skeleton.names])
+    off = np.array([np.abs(size(name) - 1.0).max() for name in skeleton.names])
     scaled = off > _ROUNDING
-    channels: list[Channel] = []
     lost: list[str] = []
-    done: set[int] = set()
+    done: dict[int, bool] = {}
     for number in np.flatnonzero(scaled & ~_stretches_apart(armature, skeleton, scaled)).tolist():
         if number in done:
             continue
         carried = bones_beneath(skeleton, [number])
-        done.update(carried)
-        names = [skeleton.names[each] for each in carried]
-        if any(name in changed for name in names):
+        loses = any(skeleton.names[each] in changed for each in carried)
+        done |= dict.fromkeys(carried, loses)
+        if loses:
             lost.append(skeleton.names[number])
-            continue
-        assert armature.pose is not None
-        channels += [
-            Channel(armature.pose.bones[name].path_from_id(channel), values(name, channel), name)
-            for name in names
-            for channel in ("location", rotation_property(modes[name]), "scale")
-        ]
-    return channels, lost
+    return lost, [skeleton.names[each] for each, loses in done.items() if loses]
 
 
 def _action_clip(
@@ -322,7 +333,7 @@ def _action_clip(
     frames: ArrayLike | None,
     rate: float,
 ) -> Clip:
-    slot = slot or _slot_for(armature, action)
+    slot = slot or slot_of(armature, action)
     curves = _curves_of(action, slot, skeleton)
     if not curves:
         raise ClipError(
@@ -385,23 +396,25 @@ def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
     return read_object_channels(armature).own_channels(moved[:, :3, 3], turns)
 
 
-def _location_channels(armature: bpy.types.Object, clip: Clip, known: RigChannels) -> list[Channel]:
+def _location_channels(
+    armature: bpy.types.Object, clip: Clip, known: RigChannels, numbers: Sequence[int]
+) -> list[Channel]:
     """Locations of roots, and of all bones that are not, or would not stay, where rest has them."""
     skeleton = clip.skeleton
     size = np.ptp(skeleton.heads, axis=0).max() + skeleton.lengths.max()
-    assert armature.pose is not None
+    bones = pose_of(armature).bones
     channels: list[Channel] = []
-    for number, name in enumerate(skeleton.names):
+    for number in numbers:
         if skeleton.connected[number]:
             continue
-        bone = armature.pose.bones[name]
+        name = skeleton.names[number]
         values = clip.locations[:, number]
-        at_rest = bone.location[:] == (0.0, 0.0, 0.0) and np.abs(values).max() < _STILL * size
+        still = bones[name].location[:] == (0.0, 0.0, 0.0)
+        at_rest = still and np.abs(values).max() < _STILL * size
         if at_rest and skeleton.parents[number] >= 0:
             continue
-        if not bone.bone.use_local_location:
-            values = values @ _location_axes(skeleton, number).T
-        channels.append(known.location(name, values))
+        axes = location_axes(armature, skeleton, number)
+        channels.append(known.location(name, values @ axes.T))
     return channels
 
 
@@ -448,7 +461,7 @@ def _is_within(obj: bpy.types.Object, layer: bpy.types.LayerCollection) -> bool:
     return own or any(_is_within(obj, each) for each in layer.children)
 
 
-def _slot_for(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types.ActionSlot:
+def slot_of(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types.ActionSlot:
     """The slot that Blender would give the armature, or the only one with its bones."""
     data = armature.animation_data
     slots = [slot for slot in action.slots if slot.target_id_type in ("OBJECT", "UNSPECIFIED")]
@@ -575,7 +588,6 @@ def _bone_motion(
     rotations = np.broadcast_to(IDENTITY, (*shape, 4)).copy()
     locations = np.zeros((*shape, 3))
     scales = np.ones((*shape, 3))
-    bones = armature_data(armature).bones
     modes = _rotation_modes(armature, skeleton)
     present = {*curves, *unkeyed}
 
@@ -586,9 +598,7 @@ def _bone_motion(
     for number, name in enumerate(skeleton.names):
         if (name, "location") in present and not skeleton.connected[number]:
             moved = values(name, "location")
-            if not bones[name].use_local_location:
-                moved = moved @ _location_axes(skeleton, number)
-            locations[:, number] = moved
+            locations[:, number] = moved @ location_axes(armature, skeleton, number)
         if (name, "scale") in present:
             scales[:, number] = values(name, "scale")
     for mode in set(modes.values()):
@@ -641,10 +651,12 @@ def _beneath(skeleton: Skeleton, chosen: np.ndarray) -> np.ndarray:
     return inside
 
 
-def _location_axes(skeleton: Skeleton, bone: int) -> Floats:
-    """A bone's own axes (3, 3), as columns, seen along those in which its location is given when
-    it is not local: its parent's, or the armature's.
+def location_axes(armature: bpy.types.Object, skeleton: Skeleton, bone: int) -> Floats:
+    """A bone's own axes (3, 3), as columns, seen along those in which its location is given: its
+    own, or, where it is not local, its parent's or the armature's.
     """
+    if armature_data(armature).bones[skeleton.names[bone]].use_local_location:
+        return np.eye(3)
     axes = skeleton.rest_matrices[bone, :3, :3]
     parent = skeleton.parents[bone]
     return axes if parent < 0 else skeleton.rest_matrices[parent, :3, :3].T @ axes

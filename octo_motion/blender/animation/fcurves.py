@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import bpy
 import numpy as np
 
 from ...core.errors import ClipError
-from ...core.keyframes import BezierKeys
+from ...core.keyframes import BezierKeys, segment_values
 from ...core.rotations import Floats
 from .actions import curves_of, enum_value, key_points
+
+_WHOLE: Final = 1e-3
+"""Frames by which importers miss whole ones."""
 
 _ON_KEY: Final = 1e-4
 """Frames by which Blender lets a time miss a key and still takes the key's value."""
@@ -21,28 +26,33 @@ _ON_KEY: Final = 1e-4
 def evaluate_fcurve(curve: bpy.types.FCurve, frames: Floats) -> Floats:
     """The values (frames,) of one F-curve at these frames, subframes included.
 
-    Straight and stepped keys are read in bulk, and so are values that are asked for where a key is.
-    Whatever else there is (between Bézier and eased keys, modifiers, sampled curves) Blender
-    evaluates itself.
+    Straight, stepped and Bézier keys are read in bulk. Whatever else there is (between eased keys,
+    modifiers, sampled curves) Blender evaluates itself.
     """
-    keys = _plain_keys(curve)
+    keys = _readable_keys(curve)
     if keys is None:
-        values = _at_keys(curve, frames)
-        if values is not None:
-            return values
         return np.array([curve.evaluate(float(frame)) for frame in frames])
-    times, values, steps = keys
+    times, values, kinds = keys
+    straight = (kinds == enum_value("interpolation", "LINEAR")).all()
+    if straight and curve.extrapolation == "CONSTANT":
+        return np.interp(frames, times, values)
+    asked = _at_keys(times, values, frames)
+    if asked is not None:
+        return asked
     result = np.interp(frames, times, values)
-    if steps.any():
-        at = np.searchsorted(times, frames + _ON_KEY, side="right") - 1
-        held = (at >= 0) & steps[np.maximum(at, 0)]
-        result[held] = values[at[held]]
+    at = np.searchsorted(times, frames + _ON_KEY, side="right") - 1
+    own = np.where(at >= 0, kinds[np.maximum(at, 0)], enum_value("interpolation", "LINEAR"))
+    held = own == enum_value("interpolation", "CONSTANT")
+    result[held] = values[at[held]]
+    within = (at < len(times) - 1) & (np.abs(times[np.maximum(at, 0)] - frames) > _ON_KEY)
+    curved = within & (own == enum_value("interpolation", "BEZIER"))
+    if curved.any():
+        result[curved] = segment_values(_segments(curve)[at[curved]], frames[curved])
+    strange = within & ~np.isin(own, _read_in_bulk())
     if curve.extrapolation == "LINEAR" and len(times) > 1:
-        # A stepped end goes on level, as the step itself does.
-        for outside, first, second in ((frames < times[0], 0, 1), (frames > times[-1], -1, -2)):
-            if not steps[first]:
-                slope = (values[second] - values[first]) / (times[second] - times[first])
-                result[outside] = values[first] + slope * (frames[outside] - times[first])
+        strange |= (frames < times[0]) | (frames > times[-1])
+    for place in np.flatnonzero(strange):
+        result[place] = curve.evaluate(float(frames[place]))
     return result
 
 
@@ -52,30 +62,45 @@ def key_range(curve: bpy.types.FCurve) -> tuple[float, float]:
     return float(start), float(end)
 
 
-def _plain_keys(curve: bpy.types.FCurve) -> tuple[Floats, Floats, np.ndarray] | None:
-    """Times, values and whether each key holds its value until the next, all (keys,)."""
+def goes_straight(curve: bpy.types.FCurve) -> bool:
+    """Whether a curve goes straight from whole frame to whole frame, as recorded motions do."""
+    keys = _readable_keys(curve)
+    if keys is None:
+        return False
+    times, _, kinds = keys
+    straight = (kinds == enum_value("interpolation", "LINEAR")).all()
+    return bool(straight and np.abs(times - np.round(times)).max() < _WHOLE)
+
+
+@cache
+def _read_in_bulk() -> tuple[int, ...]:
+    return tuple(enum_value("interpolation", each) for each in ("CONSTANT", "LINEAR", "BEZIER"))
+
+
+def _readable_keys(curve: bpy.types.FCurve) -> tuple[Floats, Floats, np.ndarray] | None:
+    """Times, values and kinds of interpolation, all (keys,), where nothing but keys counts."""
     count = len(curve.keyframe_points)
     if count == 0 or len(curve.modifiers):
         return None
     kinds = np.empty(count, dtype=np.uint8)
     curve.keyframe_points.foreach_get("interpolation", kinds)
-    steps = kinds == enum_value("interpolation", "CONSTANT")
-    # The last key's own interpolation matters to extrapolation only.
-    if not (steps | (kinds == enum_value("interpolation", "LINEAR"))).all():
-        return None
     times, values = key_points(curve).T.astype(np.float64)
     if (np.diff(times) <= _ON_KEY).any():
         return None
-    return times, values, steps
+    return times, values, kinds
 
 
-def _at_keys(curve: bpy.types.FCurve, frames: Floats) -> Floats | None:
+def _segments(curve: bpy.types.FCurve) -> Floats:
+    """From each key to the next one (keys − 1, 4, 2): key, handle, handle, key."""
+    keys, left, right = (
+        key_points(curve, name).astype(np.float64) for name in ("co", "handle_left", "handle_right")
+    )
+    return np.stack([keys[:-1], right[:-1], left[1:], keys[1:]], axis=1)
+
+
+def _at_keys(times: Floats, values: Floats, frames: Floats) -> Floats | None:
     """Values at frames that have keys, all of them; else none."""
-    count = len(curve.keyframe_points)
-    if count == 0 or len(curve.modifiers) or not len(frames):
-        return None
-    times, values = key_points(curve).T.astype(np.float64)
-    if (np.diff(times) <= 2.0 * _ON_KEY).any():
+    if not len(frames) or (np.diff(times) <= 2.0 * _ON_KEY).any():
         return None
     nearest = np.searchsorted(0.5 * (times[1:] + times[:-1]), frames)
     return values[nearest] if np.all(np.abs(times[nearest] - frames) <= 1e-6) else None
@@ -92,7 +117,7 @@ _KINDS: Final = (
 )
 _FLAGS: Final = ("select_control_point", "select_left_handle", "select_right_handle")
 
-_SAME_FRAME: Final = 0.01
+SAME_FRAME: Final = 0.01
 """Frames by which keys must be apart."""
 
 
@@ -125,6 +150,14 @@ class KeyArrays:
         return KeyArrays({name: values[rows] for name, values in self.values.items()})
 
 
+def joined(parts: Sequence[KeyArrays]) -> KeyArrays:
+    """Keys one after the other."""
+    names = parts[0].values
+    return KeyArrays(
+        {name: np.concatenate([each.values[name] for each in parts]) for name in names}
+    )
+
+
 def read_keys(curve: bpy.types.FCurve) -> KeyArrays:
     """All keys of a curve."""
     keys = KeyArrays.zeros(len(curve.keyframe_points))
@@ -140,8 +173,15 @@ def write_keys(curve: bpy.types.FCurve, keys: KeyArrays) -> None:
     if len(keys):
         points.add(len(keys))
     for name, each in keys.values.items():
-        points.foreach_set(name, np.ascontiguousarray(each).ravel())
+        # Most of it is as new keys have it, and need not be said again.
+        if name in _VECTORS or (len(keys) and (each != _as_new(points[0], name)).any()):
+            points.foreach_set(name, np.ascontiguousarray(each).ravel())
     curve.update()
+
+
+def _as_new(key: bpy.types.Keyframe, name: str) -> float:
+    value = getattr(key, name)
+    return enum_value(name, value) if name in _KINDS else value
 
 
 def bezier_arrays(keys: BezierKeys, component: int) -> KeyArrays:
@@ -165,17 +205,9 @@ def replace_stretch(curve: bpy.types.FCurve, keys: KeyArrays) -> None:
     """Put keys into a curve in place of those that it has between the first and last of them."""
     before = read_keys(curve)
     start, end = float(keys.frames[0]), float(keys.frames[-1])
-    early = before.chosen(before.frames < start - _SAME_FRAME)
-    late = before.chosen(before.frames > end + _SAME_FRAME)
-    write_keys(
-        curve,
-        KeyArrays(
-            {
-                name: np.concatenate([early.values[name], keys.values[name], late.values[name]])
-                for name in keys.values
-            }
-        ),
-    )
+    early = before.chosen(before.frames < start - SAME_FRAME)
+    late = before.chosen(before.frames > end + SAME_FRAME)
+    write_keys(curve, joined([early, keys, late]))
 
 
 # --- Actions that go on: a walk of one cycle as long as it is wanted ------------------------------

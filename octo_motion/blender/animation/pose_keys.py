@@ -17,7 +17,15 @@ import bpy
 import numpy as np
 
 from ...core.errors import WriteError
-from ...core.keyframes import LOCATION, Channel, Limb, Track, reduce_keys, rotation_property
+from ...core.keyframes import (
+    LOCATION,
+    Channel,
+    Limb,
+    Track,
+    going_on_from,
+    reduce_keys,
+    rotation_property,
+)
 from ...core.rotations import Floats
 from ..rig import carrying_axes
 from .actions import (
@@ -441,15 +449,7 @@ def _going_on(
     if len(curves) < values.shape[1]:
         return channel
     before = np.array([curves[each].evaluate(start) for each in range(values.shape[1])])
-    if mode == "QUATERNION":
-        same = values if before @ values[0] >= 0.0 else -values
-    elif mode == "AXIS_ANGLE":
-        same = values if before[1:] @ values[0, 1:] >= 0.0 else -values
-        rounds = np.round((before[0] - same[0, 0]) / (2.0 * np.pi))
-        same = same + np.array([2.0 * np.pi * rounds, 0.0, 0.0, 0.0])
-    else:
-        same = values + 2.0 * np.pi * np.round((before - values[0]) / (2.0 * np.pi))
-    return replace(channel, values=same)
+    return replace(channel, values=going_on_from(values, mode, before))
 
 
 def _placed(bone: bpy.types.Bone, locations: Floats) -> Floats:

@@ -46,6 +46,7 @@ class Channel:
 
 OBJECT_GROUP: Final = "Object Transforms"
 """Where Blender's own keying puts an object's channels."""
+_TURN: Final = 2.0 * np.pi
 _UNUSED: Final = 1e-5
 """Scales that differ from 1 by less need no keys."""
 
@@ -70,6 +71,32 @@ def in_rotation_mode(quaternions: Floats, mode: str) -> Floats:
     if mode == "AXIS_ANGLE":
         return continuous_axis_angle(quaternions)
     return continuous_euler(to_euler(quaternions, mode), mode)
+
+
+def going_on_from(values: Floats, mode: str, start: Floats) -> Floats:
+    """The same rotations as continuous values (frames, components) that begin next to others.
+
+    A rotation has many values in each mode: a quaternion with either sign, angles and whole turns
+    more, three Euler angles and the triple on the other side of the pole. Curves that go on from
+    a key have to go on from its values, or the way there would lead through a turn.
+
+    Args:
+        values: (frames, components) of :func:`in_rotation_mode`.
+        mode: the rotation mode.
+        start: (components,) values to go on from.
+    """
+    if mode == "QUATERNION":
+        return values if start @ values[0] >= 0.0 else -values
+    if mode == "AXIS_ANGLE":
+        same = values if start[1:] @ values[0, 1:] >= 0.0 else -values
+        whole = np.array([1.0, 0.0, 0.0, 0.0])
+        return same + whole * _TURN * np.round((start[0] - same[0, 0]) / _TURN)
+    i, j, k = ("XYZ".index(letter) for letter in mode)
+    other = values.copy()
+    other[:, (i, k)] += np.pi
+    other[:, j] = np.pi - other[:, j]
+    found = [each + _TURN * np.round((start - each[0]) / _TURN) for each in (values, other)]
+    return min(found, key=lambda each: float(np.abs(each[0] - start).sum()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,7 @@ from .stack import (
     SpliceSummary,
     Stack,
     prepare_splices,
+    read_between,
     suggestions,
     write_splices,
 )
@@ -330,7 +331,7 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         number = settings.active_splice
-        stack = prepare_splices(armature)
+        stack = prepare_splices(armature, between=False)
         found = suggestions(stack, number, MOST_SUGGESTIONS)
         chosen = found[min(self.choice, len(found)) - 1]
         starts = chosen.base_start, settings.splices[number].splice_start
@@ -356,11 +357,12 @@ def build_retimed(
     Raises:
         OctoMotionError: something is wrong that the user can put right; nothing has changed.
     """
-    stack = (prepared or prepare_splices(armature)).retimed(number, *starts)
-    clip = stack.compute()
+    prepared = prepared or prepare_splices(armature, between=False)
+    stack = read_between(prepared.retimed(number, *starts))
+    motion = stack.compute()
     for name, start in zip(("base_start", "splice_start"), starts, strict=True):
         assign(settings.splices[number], name, start)
-    return write_splices(stack, clip)
+    return write_splices(stack, motion)
 
 
 def report_built(operator: bpy.types.Operator, made: SpliceSummary, message: str = "") -> None:

@@ -17,17 +17,27 @@ import bpy
 import numpy as np
 
 from ...blender.animation import (
-    Channel,
+    STEP,
+    SplicedMotion,
     closes,
     further_channels,
+    is_recorded,
     read_clip,
-    scaled_channels,
+    resized_bones,
     writable_armature,
     write_clip,
+    write_spliced,
 )
 from ...blender.rig import armature_data
 from ...core.errors import ClipError, OctoMotionError, WriteError
-from ...core.splicing.clip import Clip, average_pose, splice_window
+from ...core.splicing.clip import (
+    Clip,
+    average_pose,
+    clip_at,
+    moments_within,
+    splice_span,
+    splice_window,
+)
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
 from ...core.splicing.transfer import (
     CHAIN,
@@ -40,6 +50,7 @@ from ...core.splicing.transfer import (
     Suggestion,
     build_splices,
     chain_part,
+    numbered,
     opposite_part,
     part_bones,
     part_named,
@@ -48,12 +59,13 @@ from ...core.splicing.transfer import (
 from ..declared_settings import plain
 from .bodies import known_landmarks
 from .properties import splicing_settings, write_landmarks
-from .timing_settings import is_slowed, read_timing
+from .timing_settings import read_timing
 
-_FINER: Final = 4
-"""Samples per frame of a clip that is slowed down, …"""
-_MOST: Final = 20_000
-"""… and how many of them at most."""
+_FINEST: Final = 4
+"""Moments per frame of what is played, …"""
+_FINE: Final = 2
+"""… and of a motion that would have more than so many:"""
+_MANY: Final = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,20 +108,36 @@ class Stack:
     """Whose landmarks are from saved mappings: sentences."""
     damaged: tuple[str, ...] = ()
     """What is wrong with saved mappings that could not be used: sentences."""
+    finer: Clip | None = None
+    """The base at the moments that matter, see :func:`read_between`; none where it can only be read
+    on whole frames."""
+    anew: tuple[str, ...] = ()
+    """Bones that cannot keep the base's curves, …"""
+    resized: tuple[str, ...] = ()
+    """… because these above them are scaled, and lose their size."""
 
     @property
     def acting(self) -> list[Splice]:
         """Those that are not muted."""
         return [splice for splice in self.splices if splice is not None]
 
-    def compute(self) -> Clip:
-        """The whole result.
+    def compute(self) -> SplicedMotion:
+        """The result beside the base.
 
         Raises:
             ListedSpliceError: a bone or landmark is missing, or a timing makes no sense.
         """
+        base, marks = self.base.clip, self.base.landmarks
+        first, last = float(base.frames[0]), float(base.frames[-1])
+        anew = None
         with self.naming():
-            return build_splices(self.base.clip, self.base.landmarks, self.acting)
+            if self.finer is None or self.anew:
+                anew = build_splices(base, marks, self.acting)
+            if self.finer is None:
+                assert anew is not None
+                return SplicedMotion(base, anew, first, last, anew, base.skeleton.names)
+            result = build_splices(base, marks, self.acting, self.finer)
+        return SplicedMotion(self.finer, result, first, last, anew, self.anew)
 
     def preview(self, number: int) -> SplicePreview:
         """The result at single frames, while this splice of the list is timed; none that is muted.
@@ -132,13 +160,13 @@ class Stack:
             raise ListedSpliceError(self.armature, number, self.names[number], error) from error
 
     def retimed(self, number: int, base_start: float, splice_start: float) -> Stack:
-        """The same with another start of one splice."""
+        """The same with another start of one splice; what lies between frames is to be read."""
         splices = list(self.splices)
         splice = splices[number]
         if splice is not None:
             timing = replace(splice.timing, base_start=base_start, splice_start=splice_start)
             splices[number] = replace(splice, timing=timing)
-        return replace(self, splices=tuple(splices))
+        return replace(self, splices=tuple(splices), finer=None, anew=(), resized=())
 
 
 @dataclass(frozen=True)
@@ -167,8 +195,12 @@ class SpliceSummary:
 # --- Reading -------------------------------------------------------------------------------------
 
 
-def prepare_splices(armature: bpy.types.Object) -> Stack:
+def prepare_splices(armature: bpy.types.Object, *, between: bool = True) -> Stack:
     """Read all that the stack of an armature needs. Nothing is changed.
+
+    Args:
+        armature: the armature object.
+        between: whether the base is read between frames as well, to be built.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -187,7 +219,7 @@ def prepare_splices(armature: bpy.types.Object) -> Stack:
             splices.append(None if item.mute else _splice(reader, item, base))
         except OctoMotionError as error:
             raise ListedSpliceError(armature.name, number, item.name, error) from error
-    return Stack(
+    stack = Stack(
         armature.name,
         base,
         tuple(splices),
@@ -195,6 +227,50 @@ def prepare_splices(armature: bpy.types.Object) -> Stack:
         tuple(f"Mapping of '{whose}': {name} (saved)." for whose, name in reader.mappings.items()),
         tuple(reader.damaged),
     )
+    return read_between(stack) if between else stack
+
+
+def read_between(stack: Stack) -> Stack:
+    """Read the base where its splices act, between frames as well: what is spliced is to be right
+    there too. As shown, a base is read on whole frames alone, and all its bones get keys.
+
+    Raises:
+        OctoMotionError: it has become something that cannot be read.
+    """
+    armature = local_object(stack.armature)
+    settings = splicing_settings(armature)
+    if settings.visual or settings.base is None:
+        return stack
+    base = stack.base.clip
+    spans = []
+    for number, each in enumerate(stack.acting):
+        with stack.naming(), numbered(number):
+            start, end = splice_span(each.timing, base, each.clip)
+        # Where legs have led to stays so until the end.
+        spans.append((start, np.inf if each.travel else end))
+    moments = moments_within(base, spans, _finer(len(base)), STEP)
+    if any(each.travel and each.foot_lock for each in stack.acting):
+        # Feet are found to stand, and are held, from whole frame to whole frame.
+        moments = base.frames
+    slot = _slot(settings.base, settings.base_slot)
+    finer = base
+    if len(moments) and is_recorded(armature, settings.base, slot):
+        finer = clip_at(base, moments)
+    elif len(moments):
+        finer = read_clip(armature, settings.base, slot, frames=moments)
+    finer = replace(finer, cyclic=base.cyclic)
+    changed = {bone for each in stack.acting for bone in _changed(stack.base, each)}
+    lost, anew = resized_bones(armature, settings.base, slot, base.frames, changed)
+    return replace(stack, finer=finer, anew=tuple(anew), resized=tuple(lost))
+
+
+def _finer(frames: int) -> int:
+    """How many moments per frame are looked at."""
+    return _FINEST if _FINEST * frames <= _MANY else _FINE
+
+
+def _slot(action: bpy.types.Action, identifier: str) -> bpy.types.ActionSlot | None:
+    return action.slots.get(identifier) if identifier else None
 
 
 class ClipReader:
@@ -223,8 +299,8 @@ class ClipReader:
             _check_mixing(armature)
         return self.source(armature, settings.base, settings.base_slot, visual=settings.visual)
 
-    def item(self, item: Any, *, slowed: bool) -> Source:
-        """The clip of a splice; of one that is ``slowed`` what it does between its frames as well.
+    def item(self, item: Any) -> Source:
+        """The clip of a splice.
 
         Raises:
             OctoMotionError: it is gone, or cannot be read.
@@ -234,8 +310,9 @@ class ClipReader:
             raise ClipError("Its source armature is gone, or was never chosen.", remedy)
         if item.action is None:
             raise ClipError("Its action is gone, or was never chosen.", remedy)
-        # To play the scene takes longer.
-        between = slowed and not item.visual
+        # What a clip does between its frames is seen where it is slowed down, and between those of
+        # the result. To play the scene takes longer.
+        between = not item.visual
         return self.source(item.source, item.action, item.slot, visual=item.visual, between=between)
 
     def source(
@@ -262,8 +339,8 @@ class ClipReader:
                         "Choose one of its slots in the panel Splicing, or leave the slot empty.",
                     )
             clip = read_clip(armature, action, chosen, visual=visual)
-            finer = min(_FINER, _MOST // len(clip)) if between else 1
-            if finer > 1:
+            if between and not is_recorded(armature, action, chosen):
+                finer = _finer(len(clip))
                 count = finer * (len(clip) - 1) + 1
                 frames = np.linspace(clip.frames[0], clip.frames[-1], count)
                 clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
@@ -295,7 +372,7 @@ def _check_mixing(armature: bpy.types.Object) -> None:
 
 def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
     timing = read_timing(splicing_settings(item.id_data), item, base.clip)
-    source = reader.item(item, slowed=is_slowed(timing))
+    source = reader.item(item)
     part = _part(item, base, source)
     splice = Splice(
         part=part,
@@ -384,7 +461,7 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
 # --- Writing -------------------------------------------------------------------------------------
 
 
-def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
+def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
     """Give the armature the result, in place of the one that was built before.
 
     Raises:
@@ -397,18 +474,9 @@ def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
     if previous is not None and is_source(previous):
         # Someone splices from it: it stays as it is.
         previous = None
-    besides, lost = _besides(armature, stack, clip)
     kept, settings.result = settings.result, None
     try:
-        action = write_clip(
-            armature,
-            clip,
-            name=f"{stack.base.clip.name} Spliced",
-            # What it was made from.
-            note=json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True),
-            previous=previous,
-            besides=besides,
-        )
+        action = _write(armature, stack, motion, previous)
     except BaseException:
         settings.result = kept
         raise
@@ -417,16 +485,41 @@ def write_splices(stack: Stack, clip: Clip) -> SpliceSummary:
         # What was used is what the table shows from now on.
         write_landmarks(settings.landmarks, stack.base.landmarks.bones)
     warnings = list(_warnings(stack, settings.splices))
-    if clip.cyclic and closes(stack.base.clip.rotations) and not closes(clip.rotations):
+    was_closed = stack.base.clip.cyclic and closes(stack.base.clip.rotations)
+    if was_closed and not closes(motion.result.rotations):
         warnings.append(
             f"'{stack.base.clip.name}' is a cycle, but '{action.name}' ends in another pose than "
             "it begins in: it does not repeat."
         )
+    lost = stack.resized
     if lost:
         verbs = "is scaled and loses its" if len(lost) == 1 else "are scaled and lose their"
         warnings.append(f"{_listed(lost)} {verbs} size: of what they carry a part is spliced.")
     warnings += stack.damaged
-    return SpliceSummary(action.name, len(clip), len(stack.acting), tuple(warnings), stack.mappings)
+    frames = len(stack.base.clip)
+    return SpliceSummary(action.name, frames, len(stack.acting), tuple(warnings), stack.mappings)
+
+
+def _write(
+    armature: bpy.types.Object,
+    stack: Stack,
+    motion: SplicedMotion,
+    previous: bpy.types.Action | None,
+) -> bpy.types.Action:
+    settings = splicing_settings(armature)
+    name = f"{stack.base.clip.name} Spliced"
+    # What it was made from.
+    note = json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True)
+    base, slot = settings.base, None
+    if base is not None:
+        slot = _slot(base, settings.base_slot)
+    if stack.finer is None or base is None:
+        frames = motion.result.frames
+        besides = [] if base is None else further_channels(armature, base, slot, frames)
+        return write_clip(
+            armature, motion.result, name=name, note=note, previous=previous, besides=besides
+        )
+    return write_spliced(armature, base, slot, motion, name=name, note=note, previous=previous)
 
 
 def _listed(names: Iterable[str]) -> str:
@@ -468,22 +561,6 @@ def _constrained(base: Source, splice: Splice) -> list[str]:
         known = set(base.landmarks.bones.values())
         bones = tuple(each for each in bones if each in known)
     return [each for each in bones if skeleton.constrained[skeleton.index[each]]]
-
-
-def _besides(
-    armature: bpy.types.Object, stack: Stack, clip: Clip
-) -> tuple[list[Channel], list[str]]:
-    """What the base moves besides the body, as it does; and bones that lose their size."""
-    settings = splicing_settings(armature)
-    if settings.base is None:
-        return [], []
-    slot = settings.base.slots.get(settings.base_slot) if settings.base_slot else None
-    found = further_channels(armature, settings.base, slot, clip.frames)
-    if settings.visual:
-        return found, []
-    changed = {bone for each in stack.acting for bone in _changed(stack.base, each)}
-    scaled, lost = scaled_channels(armature, settings.base, slot, clip.frames, changed)
-    return found + scaled, lost
 
 
 def _changed(base: Source, splice: Splice) -> tuple[str, ...]:

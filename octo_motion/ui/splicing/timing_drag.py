@@ -233,7 +233,8 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         try:
             writable_armature(armature)
             _check_shown(active_splice(settings))
-            self._session = DragSession(prepare_splices(armature), settings.active_splice, scene)
+            stack = prepare_splices(armature, between=False)
+            self._session = DragSession(stack, settings.active_splice, scene)
             self._session.show()
         except OctoMotionError as error:
             return self._fail(context, error)

@@ -50,12 +50,6 @@ def read_timing(settings: Any, item: Any, base: Clip) -> Timing:
     )
 
 
-def is_slowed(timing: Timing) -> bool:
-    """Whether what a clip does between its frames is seen."""
-    rates = timing.rate if timing.rates is None else timing.rates.rates.min()
-    return bool(timing.markers or rates < 1.0)
-
-
 def fades(item: Any, rate: float) -> tuple[float, float]:
     """How long a splice comes and goes, in frames of a base with this rate per second."""
     if item.fade_unit == "SECONDS":

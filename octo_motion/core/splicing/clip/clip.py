@@ -220,6 +220,28 @@ def sample_scales(
     return values + seam_shifts(clip.scales[_SEAM][:, own], clip.frames[_SEAM], seams, seam_speeds)
 
 
+def clip_at(clip: Clip, frames: Floats) -> Clip:
+    """A clip on other frames (frames,), within its own: from frame to frame the shortest way."""
+    before, after, share = _between(clip, frames)
+    part = share[:, None, None]
+
+    def mixed(values: Floats) -> Floats:
+        return values[before] + part * (values[after] - values[before])
+
+    world = mixed(clip.world)
+    turns, _, scale = sample_world(clip, frames)
+    world[:, :3, :3] = scale * to_matrix(turns)
+    return replace(
+        clip,
+        frames=frames,
+        rotations=slerp(clip.rotations[before], clip.rotations[after], part[..., 0]),
+        locations=mixed(clip.locations),
+        world=world,
+        scales=None if clip.scales is None else mixed(clip.scales),
+        own=None if clip.own is None else mixed(clip.own),
+    )
+
+
 def sample_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
     """The armature object at any times: rotations (frames, 4), places (frames, 3), and scale."""
     before, after, share = _between(clip, frames)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal
@@ -80,6 +81,9 @@ class SpliceWindow:
     seam_speeds: Floats
     """(window,) frames of the clip: how much a frame takes on of the step in speed, so that the two
     rounds meet at one speed as well."""
+    ends: tuple[int, int]
+    """The first and the last of these frames that are the base's own, and no moments between: there
+    a way through the world begins and ends."""
 
     def easing(self, row: int) -> list[int]:
         """The base's frames from this one to the middle of the easing in which it lies."""
@@ -106,6 +110,7 @@ class SpliceWindow:
         """Of some of the base's frames, ascending, as if the base had no others."""
         start, stop = np.searchsorted(rows, (self.frames.start, self.frames.stop))
         chosen = rows[start:stop] - self.frames.start
+        first, last = np.searchsorted(chosen, self.ends)
         return SpliceWindow(
             slice(int(start), int(stop)),
             self.looks[chosen],
@@ -115,6 +120,7 @@ class SpliceWindow:
             self.rounds[chosen],
             self.seams[chosen],
             self.seam_speeds[chosen],
+            (int(first), min(int(last), len(chosen) - 1)),
         )
 
 
@@ -152,7 +158,14 @@ def splice_span(timing: Timing, base: Clip, splice: Clip) -> tuple[float, float]
     return start, float(min(end, start + base.cycle))
 
 
-def splice_window(timing: Timing, base: Clip, splice: Clip, *, wraps: bool = True) -> SpliceWindow:
+def splice_window(
+    timing: Timing,
+    base: Clip,
+    splice: Clip,
+    *,
+    wraps: bool = True,
+    moments: Floats | None = None,
+) -> SpliceWindow:
     """Frames, weights and moments of a splice.
 
     On a cyclic base it acts in every round alike: what lies beyond the end of one comes at the
@@ -164,13 +177,16 @@ def splice_window(timing: Timing, base: Clip, splice: Clip, *, wraps: bool = Tru
         base: the base.
         splice: the splice clip.
         wraps: whether a splice may begin at the end of a cyclic base and end at its start.
+        moments: (moments,) of the base at which to look, if not on its frames: for all that is said
+            of them afterwards they are the frames. Those of the base in the splice are among them.
 
     Raises:
         ClipError: rate, length or easing make no sense, or markers cross.
     """
     start, end = splice_span(timing, base, splice)
     clock = splice_clock(timing, base.rate, splice.rate)
-    times, looks = (splice.frames[0], splice.frames[-1]), base.frames
+    times = splice.frames[0], splice.frames[-1]
+    looks = given = base.frames if moments is None else moments
     endless = base.cyclic and timing.after == "loop" and end - start >= base.cycle - 1e-6
     if endless:
         clock = clock.fitted(base.cycle, times[1] - times[0])
@@ -194,7 +210,9 @@ def splice_window(timing: Timing, base: Clip, splice: Clip, *, wraps: bool = Tru
         shown, rounds, seams = _looped(looks, clock, times, eases, endless=endless)
     elif timing.after == "hold":
         shown = clock.at(_slowed(looks, float(clock.when(times[1])), timing.ease_out))
-    return SpliceWindow(frames, looks, weights, entering, shown, rounds, seams[0], seams[1])
+    own = np.flatnonzero(np.isin(given[frames], base.frames))
+    ends = (int(own[0]), int(own[-1])) if len(own) else (0, len(looks) - 1)
+    return SpliceWindow(frames, looks, weights, entering, shown, rounds, seams[0], seams[1], ends)
 
 
 def _eased(
@@ -274,6 +292,50 @@ def _check(timing: Timing) -> None:
         raise ClipError("Easing cannot be below zero.", "Enter 0 for a hard cut.")
     if timing.after not in AFTER:
         raise ClipError(f"'{timing.after}' is no ending.", "Choose hold, loop or stop.")
+
+
+def moments_within(
+    base: Clip, spans: Iterable[tuple[float, float]], finer: int, step: float
+) -> Floats:
+    """Moments at which to look at what is spliced: between frames too, and where it begins and
+    ends. Of a cyclic base they are all over it.
+
+    Args:
+        base: what is spliced onto.
+        spans: first and last moment of each splice.
+        finer: moments per frame.
+        step: frames from the moment before a splice to its first, and from its last to the one
+            behind it.
+
+    Returns:
+        (moments,) of the base ascending, all of its frames in these spans among them.
+    """
+    frames = base.frames
+    count = finer * (len(frames) - 1) + 1
+    grid = np.interp(np.arange(count) / finer, np.arange(len(frames)), frames)
+    chosen = np.full(count, base.cyclic)
+    borders: list[float] = []
+    for start, end in spans:
+        # One further moment on either side, at which nothing is spliced.
+        chosen |= (grid >= start - 1.0) & (grid <= end + 1.0)
+        borders += [start - step, start, end, end + step]
+    found = np.array(borders)[np.isfinite(borders)]
+    if base.cyclic:
+        found = grid[0] + np.mod(found - grid[0], base.cycle)
+    found = np.unique(found[(found > grid[0]) & (found < grid[-1])])
+    extra = found[_from_nearest(found, frames) > 0.5 * step]
+    # What of the finer moments all but falls on one of these says nothing of its own.
+    crowded = ~np.isin(grid, frames) & (_from_nearest(grid, extra) < 2.0 * step)
+    return np.union1d(grid[chosen & ~crowded], extra)
+
+
+def _from_nearest(looks: Floats, frames: Floats) -> Floats:
+    """How far each moment is from the nearest of some frames."""
+    if not len(frames):
+        return np.full(len(looks), np.inf)
+    after = np.clip(np.searchsorted(frames, looks), 1, max(len(frames) - 1, 1))
+    sides = (frames[np.minimum(after - side, len(frames) - 1)] for side in (0, 1))
+    return np.minimum(*(np.abs(looks - each) for each in sides))
 
 
 def window_middle(weights: Floats) -> int:

@@ -83,16 +83,18 @@ class LegTravel:
         ours = self._retarget.frames[0]
         own = body_path(clip, ours, base, clip.frames)
         path = self._way(span)
-        first, last = span.frames.start, span.frames.stop - 1
+        first = span.frames.start
+        begin, end = span.ends
         # Begin where the base is, and the way it faces.
-        turn = heading(own.orientations[first], path.orientations[0])
-        places = own.places[first] + self._ratio * rotate(turn, path.places - path.places[0])
+        turn = heading(own.orientations[first + begin], path.orientations[begin])
+        way = path.places - path.places[begin]
+        places = own.places[first + begin] + self._ratio * rotate(turn, way)
         heights = path.places[:, 2] - self._other_ground
         places[:, 2] = self._ground + self._ratio * heights
         orientations = multiply(turn, path.orientations)
         # Go on from where it ends.
-        away = heading(orientations[-1], own.orientations[last])
-        shift = (places[-1] - rotate(away, own.places[last])) * _LEVEL
+        away = heading(orientations[end], own.orientations[first + end])
+        shift = (places[end] - rotate(away, own.places[first + end])) * _LEVEL
         later = BodyPath(
             multiply(away, own.orientations[first:]), rotate(away, own.places[first:]) + shift
         )

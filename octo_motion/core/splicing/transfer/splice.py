@@ -131,18 +131,27 @@ def numbered(number: int) -> Iterator[None]:
         raise SpliceError(number, error) from error
 
 
-def build_splices(base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice]) -> Clip:
+def build_splices(
+    base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], finer: Clip | None = None
+) -> Clip:
     """All splices of a stack, each onto the result of those before. Nothing given is changed.
+
+    Args:
+        base: what they go onto.
+        landmarks: of its skeleton.
+        splices: in order.
+        finer: the base at the moments at which the result is wanted, between frames too; see
+            :func:`~octo_motion.core.splicing.clip.moments_within`. Its own frames without.
 
     Raises:
         SpliceError: a bone or landmark is missing, or a timing makes no sense.
     """
     # All on the same base: the ground is where it stands, whatever is done to its legs on the way.
     ready = _made_ready(base, landmarks, splices)
-    result = base
+    result = base if finer is None else finer
     for number, each in enumerate(ready):
         with numbered(number):
-            result = each.onto(result, each.window(each.splice.timing))
+            result = each.onto(result, each.window(each.splice.timing, result.frames))
     return result
 
 
@@ -187,11 +196,12 @@ class Splicer:
             lock = TravelLock(self._retargets, splice.part.sides)
             self._lock = lock if lock.needed else None
 
-    def window(self, timing: Timing) -> SpliceWindow:
-        """What a timing means for the base; ClipError if it makes no sense."""
+    def window(self, timing: Timing, moments: Floats | None = None) -> SpliceWindow:
+        """What a timing means for the base or moments of it; ClipError if it makes no sense."""
         # A way through the world has a beginning and an end.
         wraps = self._travel is None
-        return splice_window(timing, self._base, self.splice.clip, wraps=wraps)
+        clip = self.splice.clip
+        return splice_window(timing, self._base, clip, wraps=wraps, moments=moments)
 
     def needed(self, span: SpliceWindow, rows: Iterable[int]) -> list[int]:
         """Frames on which the result at these hangs, themselves included, ascending."""
