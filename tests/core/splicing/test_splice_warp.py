@@ -13,8 +13,11 @@ from octo_motion.core.rotations import Floats
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.clip.clip_clock import ClipClock, MarkerPair, RateCurve
 from octo_motion.core.splicing.clip.splice_timing import Timing, splice_clock, splice_window
+from octo_motion.core.splicing.transfer.mirror import mirrored_clip
 from octo_motion.core.splicing.transfer.parts import PARTS, Part
+from octo_motion.core.splicing.transfer.retarget import MappedClip
 from octo_motion.core.splicing.transfer.splice import Splice, SplicePreview
+from octo_motion.core.splicing.transfer.timing_suggestions import suggest_timings
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion, spliced
 
 few = settings(max_examples=40)
@@ -133,6 +136,23 @@ def test_what_is_seen_while_a_warped_splice_is_dragged_is_what_is_built(
         for row in (0, 30, 55, 79):
             seen = preview.at(base.frames[row], moved)
             assert np.abs(seen.posed()[1] - built.posed()[1][row]).max() < 1e-9
+
+
+def test_timing_is_suggested_for_the_clip_as_it_is_warped_and_mirrored():
+    random = np.random.default_rng(3)
+    base = replace(motion(random, humanoid(random), 300, strength=0.4), rate=24.0)
+    cut = base.taken(np.arange(120, 180))
+    # Every frame of it is shown twice: the base at half speed has its match where it did.
+    slow = replace(base, frames=2.0 * base.frames - 1.0, rate=24.0)
+    looks = np.arange(1.0, 600.0)
+    timing = Timing(1.0, cut.frames[0], rates=RateCurve(looks, np.full(len(looks), 0.5)))
+    onto = MappedClip(slow, LANDMARKS)
+    best, *_ = suggest_timings(onto, MappedClip(cut, LANDMARKS), timing)
+    assert best.base_start == pytest.approx(241.0, abs=2.0)
+    mirrored, marks = mirrored_clip(cut, LANDMARKS)
+    splice = Splice(PARTS["legs"], mirrored, timing, marks, mirror=True)
+    again, *_ = suggest_timings(onto, splice.mapped, timing)
+    assert again.base_start == best.base_start
 
 
 # --- Loops ----------------------------------------------------------------------------------------
