@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.animation.actions import MARK, curves_of
+from octo_motion.blender.animation.clips import read_clip
 from tests.referee.recording import Floats, moments, record
 from tests.ui.splicing.test_splicing import (
     OPERATORS,
@@ -106,3 +107,12 @@ def test_the_result_of_a_base_that_is_no_cycle_is_none():
     OPERATORS.splice_build()
     assert not hero.animation_data.action.use_cyclic
     assert bpy.context.scene is not None
+
+
+def test_legs_that_turn_the_body_are_told_to_break_the_cycle():
+    hero, _, item = cyclic_body("range")
+    item.part, item.with_travel, item.after, item.base_start = "LEGS", True, "HOLD", 10.0
+    OPERATORS.splice_build()
+    ends = read_clip(hero).rotations[[0, -1]]
+    closes = bool(np.abs(np.abs(np.sum(ends[0] * ends[1], axis=-1)) - 1.0).max() < 1e-4)
+    assert hero.animation_data.action.use_cyclic == closes
