@@ -138,7 +138,7 @@ def write_clip(
 
     Each bone keeps its rotation mode, and turns the short way from frame to frame. The action
     that the armature had is not changed. The object gets keys where the clip moves it. A cyclic
-    clip that ends in the pose in which it begins repeats.
+    clip repeats.
 
     Args:
         armature: an armature with the clip's bones.
@@ -167,7 +167,7 @@ def write_clip(
         channels,
         previous=previous,
         settings_note=note,
-        repeats=clip.cyclic and closes(clip.rotations),
+        repeats=clip.cyclic,
     )
 
 

@@ -41,6 +41,8 @@ _MOVED: Final = 1e-5
 
 def copy_curve(source: bpy.types.FCurve, target: bpy.types.FCurve, *, keys: bool = True) -> None:
     """Make a curve what another one is: modifiers, looks, and its keys if they are wanted."""
+    if source == target:
+        return
     for name in _LOOK:
         if getattr(target, name) != getattr(source, name):
             setattr(target, name, getattr(source, name))

@@ -42,7 +42,7 @@ from .actions import (
     shown_curves,
     writable_armature,
 )
-from .clips import bone_channels, closes, location_axes, slot_of
+from .clips import bone_channels, location_axes, slot_of
 from .fcurves import evaluate_fcurve
 from .kept_curves import (
     can_be_cut,
@@ -80,7 +80,7 @@ class SplicedMotion:
     base: Clip
     """As its action plays it."""
     result: Clip
-    """The same moments of the same skeleton."""
+    """The same moments of the same skeleton; cyclic if it is to repeat as the base does."""
     first: float
     """The base's first frame, …"""
     last: float
@@ -110,6 +110,7 @@ def write_spliced(
     name: str,
     note: str,
     previous: bpy.types.Action | None = None,
+    settings: str = "",
 ) -> bpy.types.Action:
     """Give an armature a copy of a base's action in which some bones move otherwise for a time.
 
@@ -121,6 +122,7 @@ def write_spliced(
         name: name of a new action.
         note: what it was made from, kept with the action.
         previous: an action written here before, to be written anew if nobody has edited it.
+        settings: path of settings whose keys go along from the action that the armature has.
 
     Returns:
         The action, assigned to the armature.
@@ -130,6 +132,7 @@ def write_spliced(
     """
     writable_armature(armature)
     base = _curves(armature, action, slot or slot_of(armature, action))
+    base |= _setting_curves(armature, settings)
     unkeyed = unkeyed_pose(armature)
     changed = _changed(armature, motion, base, unkeyed)
     keep_unkeyed_pose(armature)
@@ -146,10 +149,9 @@ def write_spliced(
         for channel in bone_channels(armature, motion.anew, motion.bones):
             writer.replace(channel, motion.anew.frames)
     writer.finish()
-    repeats = motion.base.cyclic and closes(motion.result.rotations)
     if motion.base.cyclic:
-        writer.let_repeat(repeats=repeats)
-    result.use_cyclic = repeats
+        writer.let_repeat(repeats=motion.result.cyclic)
+    result.use_cyclic = motion.result.cyclic
     result.use_frame_range = True
     result.frame_start, result.frame_end = motion.first, motion.last
     assign_generated(armature, result, note)
@@ -170,6 +172,15 @@ def _curves(
         if there[path] and np.isfinite(key_points(curve)).all():
             found[path][curve.array_index] = curve
     return dict(found)
+
+
+def _setting_curves(armature: bpy.types.Object, path: str) -> _Curves:
+    """Curves of settings in the action that an armature has; none without a path."""
+    data = armature.animation_data
+    if not path or data is None or data.action is None or data.action_slot is None:
+        return {}
+    found = _curves(armature, data.action, data.action_slot)
+    return {each: curves for each, curves in found.items() if each.startswith(path)}
 
 
 def _resolves(armature: bpy.types.Object, path: str) -> bool:

@@ -476,6 +476,8 @@ def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
         previous = None
     kept, settings.result = settings.result, None
     try:
+        cyclic = _repeats(stack.base.clip, motion.result)
+        motion = replace(motion, result=replace(motion.result, cyclic=cyclic))
         action = _write(armature, stack, motion, previous)
     except BaseException:
         settings.result = kept
@@ -485,8 +487,7 @@ def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
         # What was used is what the table shows from now on.
         write_landmarks(settings.landmarks, stack.base.landmarks.bones)
     warnings = list(_warnings(stack, settings.splices))
-    was_closed = stack.base.clip.cyclic and closes(stack.base.clip.rotations)
-    if was_closed and not closes(motion.result.rotations):
+    if stack.base.clip.cyclic and not cyclic:
         warnings.append(
             f"'{stack.base.clip.name}' is a cycle, but '{action.name}' ends in another pose than "
             "it begins in: it does not repeat."
@@ -519,7 +520,21 @@ def _write(
         return write_clip(
             armature, motion.result, name=name, note=note, previous=previous, besides=besides
         )
-    return write_spliced(armature, base, slot, motion, name=name, note=note, previous=previous)
+    return write_spliced(
+        armature,
+        base,
+        slot,
+        motion,
+        name=name,
+        note=note,
+        previous=previous,
+        settings=settings.path_from_id("splices"),
+    )
+
+
+def _repeats(base: Clip, result: Clip) -> bool:
+    """Whether a result is a cycle: that of a cycle is, if it closes as far as that does."""
+    return base.cyclic and (closes(result.rotations) or not closes(base.rotations))
 
 
 def _listed(names: Iterable[str]) -> str:

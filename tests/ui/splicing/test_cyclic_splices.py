@@ -9,6 +9,7 @@ import pytest
 
 from octo_motion.blender.animation.actions import MARK, curves_of
 from octo_motion.blender.animation.clips import read_clip
+from tests.referee.clips import imported
 from tests.referee.recording import Floats, moments, record
 from tests.ui.splicing.test_splicing import (
     OPERATORS,
@@ -17,6 +18,9 @@ from tests.ui.splicing.test_splicing import (
     select,
     stack_of,
 )
+
+# Blender's importer leaves the file open.
+pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
 
 LAST = 51
 """The motion of these bodies repeats every 25 frames."""
@@ -107,6 +111,27 @@ def test_the_result_of_a_base_that_is_no_cycle_is_none():
     OPERATORS.splice_build()
     assert not hero.animation_data.action.use_cyclic
     assert bpy.context.scene is not None
+
+
+@pytest.mark.parametrize("after", ["STOP", "HOLD", "LOOP"])
+def test_an_arm_of_another_on_a_walk_cycle_ends_where_it_begins(shared_data: Any, after: str):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    walk, throw = (
+        imported(shared_data(f"secondlife/avatar_{name}.bvh")) for name in ("walk", "throw_R")
+    )
+    action = walk.animation_data.action
+    action.use_frame_range = action.use_cyclic = True
+    action.frame_start, action.frame_end = 1, 14
+    select(throw, walk)
+    OPERATORS.splice_add(part="RIGHT_ARM")
+    item = stack_of(walk).splices[0]
+    item.base_start, item.splice_start, item.after = 9.0, 6.0, after
+    OPERATORS.splice_build()
+    assert walk.animation_data.action.use_cyclic
+    played = record(walk, np.array([1.0, 14.0]), with_skin=False)
+    chest, *arm = (played.names.index(each) for each in ("chest", "rShldr", "rForeArm", "rHand"))
+    seen = np.einsum("mji,mbjk->mbik", played.turns[:, chest], played.turns[:, arm])
+    assert np.abs(seen[0] - seen[1]).max() < 2e-2
 
 
 def test_legs_that_turn_the_body_are_told_to_break_the_cycle():

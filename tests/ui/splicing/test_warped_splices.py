@@ -172,3 +172,21 @@ def test_keys_of_a_rate_stay_with_their_splice_when_the_list_changes():
     stack.active_splice = 0
     OPERATORS.splice_remove()
     assert keyed() == []
+
+
+def test_keys_that_are_set_on_what_was_built_count_and_stay():
+    hero, source, item = two_bodies()
+    OPERATORS.splice_build()
+    item.keyframe_insert("rate", frame=1)
+    for frame in (1, 40):
+        item.rate = 0.5
+        item.keyframe_insert("rate", frame=frame)
+    frames = np.array([1.0, 11.0, 31.0])
+    for _ in range(3):
+        OPERATORS.splice_build()
+        assert shows(hero, source, frames, 1.0 + 0.5 * (frames - 1.0)) < 0.1
+    # The keys are those that were set, two of them.
+    (curve,) = [
+        each for each in curves_of(hero.animation_data.action) if each.data_path.endswith(".rate")
+    ]
+    assert [key.co[0] for key in curve.keyframe_points] == [1.0, 40.0]
