@@ -405,6 +405,7 @@ NOT_IN_THE_PANELS = (
     *("The timing has values that are no numbers.", "The rate of a splice must be above zero."),
     *("The length of a splice must be above zero.", "Easing cannot be below zero."),
     *("… is no ending.", "The part … has no legs to travel with.", "There is no part …."),
+    "An additive splice has no travel.",
     "It is not known which bones of … are arms and legs.",
     # Whose it is, or which line, before a problem that is explained.
     *("…: …", "……."),

@@ -624,6 +624,11 @@ def _fingerprint(
     return digest.hexdigest()
 
 
+def is_setting(path: str) -> bool:
+    """Whether a data path is that of a setting of this add-on: its keys are no part of a motion."""
+    return path.startswith("octo_motion.")
+
+
 def _listed(action: bpy.types.Action) -> list[tuple[str, int, str, bpy.types.FCurve]]:
     """Path, component, state as text and curve of all curves, by path and component: an artist may
     move channels up and down in the list.
@@ -642,7 +647,7 @@ def _listed(action: bpy.types.Action) -> list[tuple[str, int, str, bpy.types.FCu
         texts = [f"{_extrapolation(kind)!r}, {off}, {locked})" for kind, off, locked in states]
         paths = [curve.data_path for curve in curves]
         found.extend(zip(paths, index.tolist(), texts, curves, strict=True))
-    return sorted(found, key=itemgetter(0, 1))
+    return sorted((each for each in found if not is_setting(each[0])), key=itemgetter(0, 1))
 
 
 _AS_GENERATED: Final = frozenset({("mode_before", "REPEAT"), ("mode_after", "REPEAT")})

@@ -36,6 +36,7 @@ from .actions import (
     assign_generated,
     generated_action,
     group_named,
+    is_setting,
     key_points,
     own_channelbag,
     read_channels,
@@ -378,7 +379,7 @@ class _Writer:
             if not repeats:
                 for modifier in [each for each in curve.modifiers if each.type == "CYCLES"]:
                     curve.modifiers.remove(modifier)
-            elif not len(curve.modifiers) and len(curve.keyframe_points):
+            elif not (len(curve.modifiers) or curve.is_empty or is_setting(curve.data_path)):
                 key_ends(curve, self._motion.first, self._motion.last)
                 add_cycles(curve)
 

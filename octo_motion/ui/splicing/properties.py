@@ -113,6 +113,28 @@ SEEN_FROM: Final = (
 )
 
 
+BLENDINGS: Final = (
+    ("REPLACE", "Replace", "The part moves as the clip has it", 0),
+    (
+        "ADD",
+        "Add",
+        "What the clip does is put on top of what the base does: a breath, a limp",
+        1,
+    ),
+)
+
+REFERENCES: Final = (
+    ("FIRST", "First Frame", "What the clip does since its first frame", 0),
+    (
+        "REST",
+        "Rest",
+        "What the clip does beyond its rest pose, or the reference pose that was found",
+        1,
+    ),
+    ("FRAME", "Frame", "What the clip does against a frame of its own", 2),
+)
+
+
 def part_kind(item: Any) -> PartKind | None:
     """What a splice's part is, ``None`` for a chain."""
     name = item.part.lower()
@@ -275,6 +297,27 @@ class SpliceItem(bpy.types.PropertyGroup):
         description="With travel, feet that stand in the clip stand here as well, on the ground of "
         "the base: legs of other proportions would slide",
         default=True,
+    )
+    weight: props.FloatProperty(
+        name="Weight",
+        description="How much of the splice is seen: 0 is the base, 1 the splice. It may have keys",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+    )
+    blending: props.EnumProperty(
+        name="Blending",
+        description="Whether the clip takes the place of what the base does, or comes on top of it",
+        items=BLENDINGS,
+    )
+    reference: props.EnumProperty(
+        name="Reference",
+        description="With Add: the pose in which the clip does nothing",
+        items=REFERENCES,
+    )
+    reference_frame: _frame(
+        "Reference Frame", "Frame of the clip in which it does nothing", default=1.0
     )
     mute: props.BoolProperty(name="Mute", description="Leave this splice out")
 

@@ -88,19 +88,28 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
             layout.label(text="Deleted, kept for this splice", icon="INFO")
         layout.prop(item, "visual")
         layout.prop(item, "mirror")
+        layout.prop(item, "weight")
+        layout.row().prop(item, "blending", expand=True)
+        additive = item.blending == "ADD"
+        if additive:
+            layout.prop(item, "reference")
+            if item.reference == "FRAME":
+                layout.prop(item, "reference_frame")
         if kind is None:
             return
         layout.row().prop(item, "mode", expand=True)
         if kind.clavicle:
             layout.prop(item, "with_clavicle")
         if kind.travels:
-            layout.prop(item, "with_travel")
+            travel = layout.column()
+            travel.active = not additive
+            travel.prop(item, "with_travel")
             lock = layout.column()
-            lock.active = item.with_travel
+            lock.active = item.with_travel and not additive
             lock.prop(item, "foot_lock")
         if len(kind.seen_from) > 1:
             seen = layout.row()
-            seen.active = not item.with_travel
+            seen.active = additive or not item.with_travel
             seen.prop(item, "seen_from", expand=True)
 
 

@@ -44,6 +44,7 @@ from ...core.splicing.transfer import (
     LimbGoal,
     MappedClip,
     Part,
+    Reference,
     Splice,
     SpliceError,
     SplicePreview,
@@ -59,7 +60,7 @@ from ...core.splicing.transfer import (
 from ..declared_settings import plain
 from .bodies import known_landmarks
 from .properties import splicing_settings, write_landmarks
-from .timing_settings import read_timing
+from .timing_settings import read_timing, read_weight
 
 _FINEST: Final = 4
 """Moments per frame of what is played, …"""
@@ -380,12 +381,14 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
         timing=timing,
         landmarks=source.landmarks,
         goal=cast("LimbGoal", item.mode.lower()),
-        # The panel offers it for legs alone.
-        travel=item.with_travel and part.kind is not None and part.kind.travels,
+        travel=_travels(item, part),
         foot_lock=item.foot_lock,
         clavicle=item.with_clavicle,
         seen_from=item.seen_from.lower(),
         mirror=item.mirror,
+        weight=read_weight(splicing_settings(item.id_data), item, base.clip),
+        additive=item.blending == "ADD",
+        reference=_reference(item),
     )
     if part.kind is not None:
         for each in (base, source):
@@ -393,6 +396,18 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
     # What only both together can tell.
     splice.retargets(base)
     return splice
+
+
+def _travels(item: Any, part: Part) -> bool:
+    """The panel offers it for legs alone, and where the clip takes the place of the base."""
+    legs = part.kind is not None and part.kind.travels
+    return item.with_travel and legs and item.blending != "ADD"
+
+
+def _reference(item: Any) -> Reference:
+    if item.reference == "FRAME":
+        return float(item.reference_frame)
+    return "rest" if item.reference == "REST" else "first"
 
 
 def _part(item: Any, base: Source, source: Source) -> Part:
@@ -549,7 +564,9 @@ def _warnings(stack: Stack, items: Any) -> Iterator[str]:
         if splice is None:
             continue
         timing, clip = splice.timing, splice.clip
-        if not splice_window(timing, base, clip).weights.any():
+        if splice.weight is not None and not splice.weight[1].any():
+            yield f"'{item.name}' changes nothing: its weight is 0."
+        elif not splice_window(timing, base, clip).weights.any():
             whose, start, frames = ", and the base", timing.base_start, base.frames
             if timing.after == "stop" and timing.splice_start >= clip.frames[-1]:
                 whose = " of its clip, which"

@@ -15,7 +15,7 @@ from ...core.rotations import Floats
 from ...core.splicing.clip import After, Clip, MarkerPair, RateCurve, Timing
 
 _PER_FRAME: Final = 4
-"""Samples of a rate that has keys."""
+"""Samples of a setting that has keys."""
 
 
 def read_timing(settings: Any, item: Any, base: Clip) -> Timing:
@@ -85,15 +85,35 @@ def _by_name(markers: Iterable[Any]) -> dict[str, list[int]]:
     return found
 
 
+def read_weight(settings: Any, item: Any, base: Clip) -> tuple[Floats, Floats] | None:
+    """Frames of the base and the weight of a splice there; none if it is 1 throughout.
+
+    Raises:
+        ClipError: it has keys that are no numbers.
+    """
+    keyed = _keyed(settings, item, "weight", base.frames)
+    if keyed is not None:
+        return keyed
+    if item.weight == 1.0:
+        return None
+    return base.frames[:1], np.array([item.weight])
+
+
 def _rates(settings: Any, item: Any, frames: Floats) -> RateCurve | None:
     """The rate over the base's frames, none if it has no keys."""
+    keyed = _keyed(settings, item, "rate", frames)
+    return None if keyed is None else RateCurve(*keyed)
+
+
+def _keyed(settings: Any, item: Any, name: str, frames: Floats) -> tuple[Floats, Floats] | None:
+    """Moments over the base's frames and a setting's values there, none if it has no keys."""
     count = _PER_FRAME * max(round(frames[-1] - frames[0]), 1) + 1
     looks = np.linspace(frames[0], frames[-1], count)
     slot = settings.base.slots.get(settings.base_slot) if settings.base_slot else None
-    values = setting_values(item.id_data, item.path_from_id("rate"), looks, settings.base, slot)
+    values = setting_values(item.id_data, item.path_from_id(name), looks, settings.base, slot)
     if values is None:
         return None
     if not np.isfinite(values).all():
-        raise ClipError("The keys of its rate are no finite numbers.", "Repair or delete them.")
-    limits = item.bl_rna.properties["rate"]
-    return RateCurve(looks, np.clip(values, limits.hard_min, limits.hard_max))
+        raise ClipError(f"The keys of its {name} are no finite numbers.", "Repair or delete them.")
+    limits = item.bl_rna.properties[name]
+    return looks, np.clip(values, limits.hard_min, limits.hard_max)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, Literal
 
@@ -28,6 +28,9 @@ Integers = NDArray[np.intp]
 
 After = Literal["hold", "loop", "stop"]
 AFTER: Final = ("hold", "loop", "stop")
+
+_ON_THE_WAY: Final = 64
+"""Frames at most on which one frame of an easing hangs."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,8 @@ class SpliceWindow:
     ends: tuple[int, int]
     """The first and the last of these frames that are the base's own, and no moments between: there
     a way through the world begins and ends."""
+    blended: bool = False
+    """Whether a weight of its own lets it act in part: it then comes and goes as one."""
 
     def easing(self, row: int) -> list[int]:
         """The base's frames from this one to the middle of the easing in which it lies."""
@@ -95,14 +100,16 @@ class SpliceWindow:
             if len(place):
                 center = window_middle(self.weights[same])
                 first, last = sorted((int(place[0]), center))
-                return (same[first : last + 1] + self.frames.start).tolist()
+                # Of a long way there, as many as show which way round it goes.
+                rows = np.linspace(first, last, min(last - first + 1, _ON_THE_WAY)).astype(np.intp)
+                return (same[rows] + self.frames.start).tolist()
         return []
 
     @cached_property
     def easings(self) -> list[Integers]:
         """The window's rows in which it comes, and those in which it goes, as it sees them."""
         easing = (self.weights > 0.0) & (self.weights < 1.0)
-        leaving = self.weights < self.entering
+        leaving = (self.weights < self.entering) & (not self.blended)
         chosen = (np.flatnonzero(easing & side) for side in (~leaving, leaving))
         return [rows[np.argsort(self.looks[rows])] for rows in chosen if len(rows)]
 
@@ -121,6 +128,16 @@ class SpliceWindow:
             self.seams[chosen],
             self.seam_speeds[chosen],
             (int(first), min(int(last), len(chosen) - 1)),
+            self.blended,
+        )
+
+    def weighted(self, shares: Floats) -> SpliceWindow:
+        """The same with a weight of its own (window,), 0…1."""
+        return replace(
+            self,
+            weights=self.weights * shares,
+            entering=self.entering * shares,
+            blended=bool((shares < 1.0).any()),
         )
 
 

@@ -13,7 +13,7 @@ from .parts import (
     part_named,
 )
 from .retarget import MappedClip
-from .splice import LimbGoal, Splice, SpliceError, SplicePreview, build_splices, numbered
+from .splice import LimbGoal, Reference, Splice, SpliceError, SplicePreview, build_splices, numbered
 from .timing_suggestions import Suggestion, suggest_timings
 from .whole_body import WholeBody, rests_standing, retarget_clip
 
@@ -24,6 +24,7 @@ __all__ = [
     "MappedClip",
     "Part",
     "PartKind",
+    "Reference",
     "Splice",
     "SpliceError",
     "SplicePreview",

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...errors import ClipError, OctoMotionError
 from ...rotations import (
+    IDENTITY,
     Floats,
     conjugate,
     continuous,
@@ -29,6 +30,7 @@ from ...rotations import (
 )
 from ..clip import (
     Clip,
+    Posture,
     SpliceWindow,
     Timing,
     posture_of,
@@ -54,6 +56,9 @@ from .travel_lock import SIGHT, TravelLock
 
 LimbGoal = Literal["direction", "exact"]
 
+Reference = Literal["first", "rest"] | float
+"""Of a clip: its first frame, its rest pose (or the reference pose that was found), or a frame."""
+
 
 @dataclass(frozen=True, eq=False)
 class Splice:
@@ -75,6 +80,14 @@ class Splice:
     """Whether feet stand where the clip's do, with travel."""
     seen_from: SeenFrom = ""
     """From where legs are seen: the pelvis if empty, the chest in the source."""
+    weight: tuple[Floats, Floats] | None = None
+    """Frames of the base (samples,) and how much the splice acts there (samples,), 0…1; in full if
+    none is given."""
+    additive: bool = False
+    """Whether what the clip does is put on top of what the base does, instead of taking its place:
+    turns of each bone since the reference, after the base's own."""
+    reference: Reference = "first"
+    """With ``additive``: the pose in which the clip does nothing."""
     mirror: bool = False
     """Whether the clip is seen in a mirror: its right arm is then the part's left one. Of a chain
     the mirror image is taken, unless its bone on the splice clip is named."""
@@ -179,6 +192,8 @@ class Splicer:
             raise ClipError(
                 f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
             )
+        if splice.travel and splice.additive:
+            raise ClipError("An additive splice has no travel.", "Turn With Travel off.")
         mapped = MappedClip(base, landmarks)
         self.splice = splice
         self._base = base
@@ -200,8 +215,12 @@ class Splicer:
         """What a timing means for the base or moments of it; ClipError if it makes no sense."""
         # A way through the world has a beginning and an end.
         wraps = self._travel is None
-        clip = self.splice.clip
-        return splice_window(timing, self._base, clip, wraps=wraps, moments=moments)
+        clip, weight = self.splice.clip, self.splice.weight
+        span = splice_window(timing, self._base, clip, wraps=wraps, moments=moments)
+        if weight is None:
+            return span
+        frames = self._base.frames if moments is None else moments
+        return span.weighted(np.interp(frames[span.frames], *weight))
 
     def needed(self, span: SpliceWindow, rows: Iterable[int]) -> list[int]:
         """Frames on which the result at these hangs, themselves included, ascending."""
@@ -249,37 +268,79 @@ class Splicer:
         exact = self.splice.goal == "exact"
         for each in self._retargets:
             write_retargeted(each, before, moment, turned, moved, exact=exact)
+        if self.splice.additive:
+            self._add(base, span, before, turned, moved)
         if (span.weights < 1.0).any():
             _ease(base, span, self._bones, turned, moved)
         if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
             self._travel.move(base, span, whole, rotations, locations)
-        scales = _scaled(base, self._clip, span, self._retargets)
+        scales = self._scaled(base, span)
         result = replace(base, rotations=rotations, locations=locations, scales=scales)
         lock = self._lock
         return result if lock is None else lock.onto(result, span)
 
+    def _add(
+        self, base: Clip, span: SpliceWindow, before: Posture, turned: Floats, moved: Floats
+    ) -> None:
+        """Put what was written, as seen from the reference, on top of what the base has there.
 
-def _scaled(
-    base: Clip, splice: Clip, span: SpliceWindow, retargets: Sequence[Retarget]
-) -> Floats | None:
-    """The base's scales with those of the part, which only mean something on the same bones."""
-    if base.scales is None and splice.scales is None:
-        return None
-    shape = base.locations.shape
-    scales = np.ones(shape) if base.scales is None else base.scales.copy()
-    # A view: what is written here is written into the whole.
-    acting = scales[span.frames]
-    weights = span.weights[:, None, None]
-    for each in retargets:
-        pairs = each.match.pairs if each.match.same_body else {}
-        bones = [bone for bone in each.bones if bone in pairs and each.match.same_axes(bone)]
-        others = [pairs[bone] for bone in bones]
-        rest = [bone for bone in each.bones if bone not in bones]
-        there = sample_scales(splice, span.splice_frames, span.seams, span.seam_speeds, others)
-        acting[:, bones] += weights * (there - acting[:, bones])
-        acting[:, rest] += weights * (1.0 - acting[:, rest])
-    return scales
+        The reference goes onto the same postures of the base; seen from it, each bone's own turn is
+        what the clip does, and comes after the base's. Blender's NLA combines quaternions alike.
+        """
+        still, placed = base.rotations[span.frames].copy(), base.locations[span.frames].copy()
+        pose, exact = self._reference(len(still)), self.splice.goal == "exact"
+        for each in self._retargets:
+            write_retargeted(each, before, pose, still, placed, exact=exact)
+        bones = self._bones
+        own = base.rotations[span.frames][:, bones]
+        done = multiply(conjugate(still[:, bones]), turned[:, bones])
+        turned[:, bones] = multiply(own, done)
+        moved[:, bones] += base.locations[span.frames][:, bones] - placed[:, bones]
+
+    def _scaled(self, base: Clip, span: SpliceWindow) -> Floats | None:
+        """The base's scales with those of the part, which only mean something on the same bones."""
+        clip, moments = self._clip, (span.splice_frames, span.seams, span.seam_speeds)
+        if base.scales is None and clip.scales is None:
+            return None
+        shape = base.locations.shape
+        scales = np.ones(shape) if base.scales is None else base.scales.copy()
+        # A view: what is written here is written into the whole.
+        acting = scales[span.frames]
+        weights = span.weights[:, None, None]
+        for each in self._retargets:
+            pairs = each.match.pairs if each.match.same_body else {}
+            bones = [bone for bone in each.bones if bone in pairs and each.match.same_axes(bone)]
+            others = [pairs[bone] for bone in bones]
+            there = sample_scales(clip, *moments, others)
+            if self.splice.additive:
+                acting[:, bones] += weights * (there - self._reference_scales(len(there), others))
+                continue
+            rest = [bone for bone in each.bones if bone not in bones]
+            acting[:, bones] += weights * (there - acting[:, bones])
+            acting[:, rest] += weights * (1.0 - acting[:, rest])
+        return scales
+
+    def _reference_scales(self, count: int, bones: Sequence[int]) -> Floats:
+        frame, none = self._reference_frame(), np.zeros(count)
+        if frame is None:
+            return np.ones((count, len(bones), 3))
+        return sample_scales(self._clip, np.full(count, frame), none, none, bones)
+
+    def _reference(self, count: int) -> Posture:
+        """The clip's reference, so many times."""
+        frame, skeleton = self._reference_frame(), self._clip.skeleton
+        if frame is not None:
+            return sample_clip(self._clip, np.full(count, frame))
+        rotations = np.tile(IDENTITY, (count, len(skeleton), 1))
+        return posture_of(skeleton, rotations, np.zeros((count, len(skeleton), 3)))
+
+    def _reference_frame(self) -> float | None:
+        """The frame at which an additive splice does nothing; none if that is at rest."""
+        reference = self.splice.reference
+        if reference == "rest":
+            return None
+        return float(self._clip.frames[0]) if reference == "first" else float(reference)
 
 
 def _ease(
