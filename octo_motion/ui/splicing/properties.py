@@ -353,6 +353,11 @@ class OCTO_MOTION_PG_retarget(bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=_is_mesh,
     )
+    standing: _action(
+        "Stands As in",
+        "An action of this armature that tells at which height it stands; empty is found: the base "
+        "of its splices, or its own action, or an idle one. Otherwise it stands as it rests",
+    )
     visual: _as_shown("As Shown", "clip")
 
 

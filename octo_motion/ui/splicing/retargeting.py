@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...blender.animation import (
+    actions_for,
     is_generated,
     may_replace,
     note_of,
@@ -182,18 +183,21 @@ def _base(armature: bpy.types.Object, moving: Source | None) -> Source:
 
 
 def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:
-    """A motion of the armature's own, none if there is none: the base of its splices, its action,
-    or one of its NLA tracks. What was retargeted tells nothing of its own.
+    """A motion of the armature's own, none if there is none: the one that it has for this, the
+    base of its splices, its action, or one with a slot of its name. What was retargeted tells
+    nothing of it.
     """
     settings = splicing_settings(armature)
     own = own_action(armature)
     choices: list[tuple[bpy.types.Action, str]] = []
+    if settings.retarget.standing is not None:
+        choices.append((settings.retarget.standing, ""))
     if settings.base is not None:
         choices.append((settings.base, settings.base_slot))
     choices += [own] if own is not None else []
-    tracks = armature.animation_data.nla_tracks if armature.animation_data is not None else ()
-    strips = [strip.action for track in tracks for strip in track.strips]
-    choices += [(each, "") for each in sorted(filter(None, strips), key=_busy)]
+    identifier = f"OB{armature.name}"
+    others = [each for each in actions_for(armature) if identifier in each.slots]
+    choices += [(each, identifier) for each in sorted(others, key=_busy)]
     for action, slot in choices:
         if is_generated(action):
             continue
@@ -233,6 +237,7 @@ def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retar
     armature = local_object(job.armature)
     writable_armature(armature)
     settings = splicing_settings(armature)
+    _remember(settings, job)
     note = {"retargeted": {"source": job.source.armature, "action": job.source.clip.name}}
     text = json.dumps(note, sort_keys=True)
     action = write_clip(
@@ -246,6 +251,15 @@ def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retar
         # What was used is what the table shows from now on.
         write_landmarks(settings.landmarks, job.base.landmarks.bones)
     return Retargeted(action.name, len(clip), tuple(_warnings(job)))
+
+
+def _remember(settings: Any, job: RetargetJob) -> None:
+    """Keep the armature's own action: it is not the armature's any more when the next one comes."""
+    own = own_action(local_object(job.armature))
+    if settings.retarget.standing is not None or own is None or is_generated(own[0]):
+        return
+    if own[0].name == job.standing.clip.name:
+        settings.retarget.standing = own[0]
 
 
 def _previous(armature: bpy.types.Object, note: str) -> bpy.types.Action | None:

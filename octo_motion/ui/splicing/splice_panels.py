@@ -156,6 +156,7 @@ class OCTO_MOTION_PT_retarget(_Panel, bpy.types.Panel):
         ground = lock.column()
         ground.active = retarget.foot_lock
         ground.prop(retarget, "ground")
+        layout.prop(retarget, "standing")
         layout.prop(retarget, "visual")
         column = layout.column(align=True)
         column.operator_context = "INVOKE_DEFAULT"

@@ -48,6 +48,12 @@ _LOWER: Final = 0.35
 _SPREAD: Final = 0.02
 """Leg lengths by which heights on one ground differ: breath, soft soles, and what files lose."""
 
+_LOW: Final = 0.12
+"""Leg lengths above its lowest that a point which stands says little of the ground."""
+
+_LEAST: Final = 0.04
+"""Of all frames: for how many at least somebody stands, or nothing is known of it."""
+
 _FLOOR: Final = 0.05
 """Of all frames: for how many a point may be lower than where it stands."""
 
@@ -240,15 +246,20 @@ def find_stance(paths: FootPaths) -> Stance:
     says nothing: files that keep a motion a little less exactly tell the same heights.
     """
     heights = paths.points[..., 2]
-    weights = 1.0 / (1.0 + (_speeds(paths) / _SLOW) ** 4)
+    floors = np.quantile(heights, _FLOOR, axis=(0, 1))
+    # On a treadmill nothing stands, but what turns round in the air is slow.
+    low = 1.0 / (1.0 + ((heights - floors) / (_LOW * paths.leg)) ** 4)
+    weights = low / (1.0 + (_speeds(paths) / _SLOW) ** 4)
     flat = weights.prod(axis=-1)
     found = []
     for point in (ANKLE, BALL):
-        chosen = next((each for each in (flat, weights[..., point]) if each.max() > 0.5), None)
+        choices = (flat, weights[..., point])
+        chosen = next((each for each in choices if each.max(axis=1).mean() > _LEAST), None)
         if chosen is None:
-            found.append(float(np.quantile(heights[..., point].min(axis=1), _FLOOR)))
+            found.append(float(floors[point]))
         else:
-            found.append(_usual(heights[..., point].ravel(), chosen.ravel(), _SPREAD * paths.leg))
+            usual = _usual(heights[..., point].ravel(), chosen.ravel(), _SPREAD * paths.leg)
+            found.append(usual)
     return Stance(*found)
 
 
