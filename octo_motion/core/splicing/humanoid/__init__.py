@@ -9,6 +9,7 @@ from .correspondence import (
     matched_bones,
     matched_chains,
     rest_alike,
+    same_build,
 )
 from .counterparts import mirror_images, opposite
 from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks, mirrored
@@ -42,5 +43,6 @@ __all__ = [
     "opposite",
     "recognised",
     "rest_alike",
+    "same_build",
     "stature",
 ]

@@ -258,6 +258,16 @@ def rest_alike(
     )
 
 
+def same_build(base: Skeleton, splice: Skeleton, landmarks: tuple[Landmarks, Landmarks]) -> bool:
+    """Whether all landmarks are joined alike by bones of the same lengths, up to one factor.
+
+    A few bones alone are alike by chance: every pelvis is a triangle with two equal sides.
+    """
+    pairs = _landmark_pairs(base, splice, landmarks)
+    known = [each.bones.keys() for each in landmarks]
+    return known[0] == known[1] and _same_body(base, splice, pairs)[0]
+
+
 def _landmark_pairs(
     base: Skeleton, splice: Skeleton, landmarks: tuple[Landmarks | None, Landmarks | None]
 ) -> dict[int, int]:

@@ -6,6 +6,9 @@ bones' axes: X to the body's left, Y to its back, Z up along the trunk, as for a
 Blender's front. Landmarks are taken in the reference pose, which comes from the clip; a skeleton
 that has none is taken at rest.
 
+A frame may stand **upright**: it faces as its bone does, and what leans in the one clip then leans
+alike on the other body, however their pelvises are tilted [SPEC 2.4 asks for that of the trunk].
+
 Where two skeletons carry the same joints at the same places of the bone, these joints are laid over
 each other instead: the frames then agree to the last digit whatever the two people do.
 """
@@ -19,8 +22,20 @@ from typing import Final
 import numpy as np
 
 from ...errors import ClipError
-from ...rotations import Floats, conjugate, from_matrix, multiply, normalized, rotate
+from ...rotations import (
+    IDENTITY,
+    Floats,
+    conjugate,
+    dot,
+    from_matrix,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+    slerp,
+)
 from ...skeleton import Skeleton
+from ...smoothing import smooth_step
 from ..clip import Posture
 from ..humanoid import Landmarks
 from .parts import landmark_bone
@@ -38,6 +53,11 @@ _SAME: Final = 0.01
 _FLAT: Final = 0.02
 """Of its length: joints that spread less than this sideways do not tell how a bone is turned."""
 
+_UPRIGHT: Final = (float(np.cos(np.radians(75.0))), float(np.cos(np.radians(45.0))))
+"""Cosines of tilts: of who lies or turns over, nothing stands upright; up to the second, all."""
+
+_Z: Final = np.array([0.0, 0.0, 1.0])
+
 
 @dataclass(frozen=True, eq=False)
 class AnatomicalFrame:
@@ -51,12 +71,17 @@ class AnatomicalFrame:
     """(3,) from the bone's head, along the bone's axes."""
     joints: dict[str, Floats]
     """Places of the joints that hang on the bone, along the bone's axes, by landmark."""
+    up: Floats | None = None
+    """(3,) armature space, if the frame stands upright."""
 
     def orientation(self, posture: Posture) -> Floats:
         """(frames, 4), armature space."""
         if self.bone < 0:
             return self.turn
-        return multiply(posture.orientation(self.bone), self.turn)
+        turned = multiply(posture.orientation(self.bone), self.turn)
+        if self.up is None:
+            return turned
+        return slerp(turned, _facing(turned, self.up), uprightness(turned, self.up))
 
     def place(self, posture: Posture) -> Floats:
         """Origin (frames, 3), armature space."""
@@ -69,6 +94,20 @@ class AnatomicalFrame:
         if self.bone < 0:
             return self.turn
         return multiply(skeleton.rest_rotations[self.bone], self.turn)
+
+
+def uprightness(orientations: Floats, up: Floats) -> Floats:
+    """How much bodies (frames, 4) stand, (frames,): 1 upright, 0 for who lies or turns over."""
+    least, most = _UPRIGHT
+    return smooth_step((dot(rotate(orientations, _Z), up) - least) / (most - least))
+
+
+def heading(goal: Floats, start: Floats) -> Floats:
+    """The turn about Z (…, 4) that brings one orientation closest to another."""
+    between = multiply(goal, conjugate(start)) * [1.0, 0.0, 0.0, 1.0]
+    # Upside down there is none.
+    between[..., 0] += 1e-12
+    return normalized(between)
 
 
 def chest_frame(
@@ -115,6 +154,18 @@ def pelvis_frame(
     return _frame(skeleton, hips, left - right, top - middle, origin=middle, joints=joints)
 
 
+def joint_frame(skeleton: Skeleton, bone: int, body: AnatomicalFrame) -> AnatomicalFrame:
+    """The frame of a part's own joint: fixed to what its first bone hangs on, and at rest as the
+    body's frame is.
+    """
+    parent = skeleton.parents[bone]
+    if parent < 0:
+        return body
+    back = conjugate(skeleton.rest_rotations[parent])
+    offset = rotate(back, skeleton.heads[bone] - skeleton.heads[parent])
+    return AnatomicalFrame(parent, multiply(back, body.at_rest(skeleton)), offset, {})
+
+
 def chain_frame(skeleton: Skeleton, bones: Sequence[int]) -> AnatomicalFrame:
     """The frame of a chain that is no limb of a humanoid: fixed to what the chain hangs on, with
     X along the chain at rest and Z up.
@@ -157,7 +208,13 @@ def laid_over(splice: AnatomicalFrame, base: AnatomicalFrame) -> AnatomicalFrame
         return splice
     back = conjugate(from_matrix(turn))
     origin = their_middle + rotate(back, base.origin - our_middle) / scale
-    return AnatomicalFrame(splice.bone, multiply(back, base.turn), origin, splice.joints)
+    return AnatomicalFrame(splice.bone, multiply(back, base.turn), origin, splice.joints, splice.up)
+
+
+def _facing(orientations: Floats, up: Floats) -> Floats:
+    """Upright orientations (frames, 4) that face as these do."""
+    standing = shortest_arc(_Z, up)
+    return multiply(standing, heading(multiply(conjugate(standing), orientations), IDENTITY))
 
 
 def _referred(

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import ClipError
 from ...rotations import (
+    IDENTITY,
     Floats,
     conjugate,
     from_axis_angle,
@@ -28,16 +29,18 @@ from ..clip import (
     Clip,
     Posture,
     SpliceWindow,
+    posture_of,
     sample_clip,
     sample_world,
     seam_shifts,
     seam_turns,
 )
 from ..humanoid import chain_length
-from .body_frames import AnatomicalFrame
+from .body_frames import AnatomicalFrame, heading, uprightness
 from .foot_contacts import find_stance, own_paths
 from .parts import LEG
 from .retarget import MappedClip, Retarget
+from .upright import stand_over, trunk_of
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _LEVEL: Final = np.array([1.0, 1.0, 0.0])
@@ -67,6 +70,7 @@ class LegTravel:
         ours, theirs = retarget.base, retarget.splice
         check_hips(ours.skeleton, retarget.frames[0].bone)
         self._ratio = leg_length(ours) * ours.clip.scale / (leg_length(theirs) * theirs.clip.scale)
+        self._trunk = trunk_of(ours.skeleton, ours.humanoid())
 
     def move(
         self, clip: Clip, span: SpliceWindow, base: Posture, rotations: Floats, locations: Floats
@@ -105,6 +109,40 @@ class LegTravel:
         later.orientations[:count] = slerp(goal_turns, orientations, span.weights)
         later.places[:count] = goal_places + span.weights[:, None] * (places - goal_places)
         write_hips(clip, ours, base, later, (rotations, locations))
+        if self._trunk is not None:
+            self._keep_upright(clip, (own, later), base, (rotations, locations))
+
+    def _keep_upright(
+        self,
+        clip: Clip,
+        paths: tuple[BodyPath, BodyPath],
+        base: Posture,
+        arrays: tuple[Floats, Floats],
+    ) -> None:
+        """Turn the trunk so that it leans as the base's does.
+
+        The legs bring their pelvis along: the body on it is to stand as it stood, unless one of the
+        two lies or turns over (Heck, Kovar and Gleicher, 2006, do likewise).
+        """
+        assert self._trunk is not None
+        (own, path), (rotations, locations) = paths, arrays
+        trunk, chosen = self._trunk, slice(len(clip) - len(path.places), None)
+        before, after = own.orientations[chosen], path.orientations
+        standing = uprightness(before, _UP) * uprightness(after, _UP)
+        carried = multiply(after, conjugate(before))
+        facing = heading(carried, IDENTITY)
+        turns, _, _ = sample_world(clip, clip.frames[chosen])
+        # The waist as the base's, seen in the world but for the heading, …
+        turn = slerp(IDENTITY, multiply(facing, conjugate(carried)), standing)
+        turn = multiply(multiply(conjugate(turns), turn), turns)
+        result = posture_of(clip.skeleton, rotations[chosen], locations[chosen])
+        waist = multiply(turn, result.orientation(trunk.waist))
+        rotations[chosen, trunk.waist] = multiply(conjugate(result.carried(trunk.waist)), waist)
+        # … and the neck over the hips, on which the waist may sit askew.
+        result = posture_of(clip.skeleton, rotations[chosen], locations[chosen])
+        facing = multiply(multiply(conjugate(turns), facing), turns)
+        way = rotate(facing, trunk.lean(base)[chosen])
+        stand_over(trunk, result, rotations[chosen], way, standing)
 
     def _way(self, span: SpliceWindow) -> BodyPath:
         """The splice's pelvis through the world, round after round where it loops."""
@@ -182,12 +220,6 @@ def body_path(clip: Clip, frame: AnatomicalFrame, posture: Posture, frames: Floa
         multiply(turns, frame.orientation(posture)),
         shifts + scale * rotate(turns, frame.place(posture)),
     )
-
-
-def heading(goal: Floats, start: Floats) -> Floats:
-    """The turn about the vertical (4,) that brings one orientation closest to another."""
-    between = multiply(goal, conjugate(start))
-    return from_axis_angle(_UP, 2.0 * np.arctan2(between[3], between[0]))
 
 
 def leg_length(mapped: MappedClip) -> float:

@@ -15,7 +15,9 @@ from ...errors import ClipError
 from ...skeleton import Skeleton
 from ..humanoid import Landmarks
 
-SeenFrom = Literal["", "chest", "pelvis"]
+SeenFrom = Literal["", "chest", "pelvis", "joint", "world"]
+"""From where a part is seen: the chest; the pelvis; what it hangs on; upright axes that face as the
+pelvis does."""
 
 
 @dataclass(frozen=True)
@@ -55,19 +57,23 @@ class PartKind:
 ARM: Final = PartKind(
     "arm",
     root="upper_arm",
-    seen_from=("chest",),
+    seen_from=("chest", "pelvis", "joint", "world"),
     limb=("upper_arm", "forearm", "hand"),
     clavicle="clavicle",
 )
 LEG: Final = PartKind(
     "leg",
     root="thigh",
-    seen_from=("pelvis", "chest"),
+    seen_from=("pelvis", "chest", "joint", "world"),
     limb=("thigh", "shin", "foot"),
     travels=True,
 )
-TRUNK: Final = PartKind("trunk", root="chest", below="hips", seen_from=("pelvis",), spine=True)
-HEAD: Final = PartKind("head", root="head", below="chest", seen_from=("chest",))
+TRUNK: Final = PartKind(
+    "trunk", root="chest", below="hips", seen_from=("world", "pelvis", "joint"), spine=True
+)
+HEAD: Final = PartKind(
+    "head", root="head", below="chest", seen_from=("chest", "pelvis", "joint", "world")
+)
 
 
 @dataclass(frozen=True)

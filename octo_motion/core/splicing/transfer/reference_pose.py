@@ -67,6 +67,9 @@ one that is farther stands."""
 _FEWEST: Final = 4
 """Moments from which one sees how fast a foot moves."""
 
+_UPRIGHT: Final = float(np.cos(np.radians(35.0)))
+"""Cosine of how far off an axis of the world people may stand on average, and that axis is up."""
+
 _RIGID: Final = 2e-3
 """Of the body's size: what a joint may move against a bone and count as fixed to it."""
 
@@ -119,6 +122,21 @@ def find_reference_pose(
         return None
 
 
+def standing_up(clip: Clip, landmarks: Landmarks) -> Floats:
+    """Which way is up (3,), armature space: that axis of the world along which people stand.
+
+    Usually Z; but a file may lie on its back, and who turns the whole of it anyhow changes nothing.
+    """
+    axes: Floats = np.array(clip.world[0, :3, :3]) / clip.scale
+    try:
+        found = _Finder(clip, landmarks).upward()
+    except (_NoFrameError, KeyError):
+        return axes[2]
+    ways = np.concatenate([axes, -axes])
+    nearest = ways[np.argmax(ways @ found)]
+    return nearest if nearest @ found > _UPRIGHT else found
+
+
 class _NoFrameError(Exception):
     """Joints from which left and up are to be told lie in one line."""
 
@@ -154,6 +172,10 @@ class _Finder:
         self._means(made, hips, chest)
         orientations = np.array([made[bone] for bone in range(len(self._skeleton))])
         return ReferencePose(orientations, self._fixed())
+
+    def upward(self) -> Floats:
+        """(3,) from feet to head of who stands."""
+        return robust_direction(self._upward, self._standing)
 
     def _how_standing(self) -> Floats:
         """(moments,) weights: how much each says of where up is."""
@@ -326,8 +348,12 @@ class _Finder:
             bone = self._bones[carrier]
             found[carrier] = {}
             for name in names:
-                if name in self._bones:
-                    places = self._seen(bone, self._joints(name) - self._heads[:, bone])
+                # The first bone on the way there: what hangs on it may be still by chance.
+                path = self._skeleton.ancestors(end) if (end := self._bones.get(name)) else []
+                path = path[: path.index(bone)] if bone in path else []
+                if end is not None and (path or self._skeleton.parents[end] == bone):
+                    first = path[-1] if path else end
+                    places = self._seen(bone, self._heads[:, first] - self._heads[:, bone])
                     place = np.median(places, axis=0)
                     if _lengths(places - place).max() < _RIGID * size:
                         found[carrier][name] = places.mean(axis=0)

@@ -28,8 +28,16 @@ from ..humanoid import (
     matched_bones,
     matched_chains,
     rest_alike,
+    same_build,
 )
-from .body_frames import AnatomicalFrame, chain_frame, chest_frame, laid_over, pelvis_frame
+from .body_frames import (
+    AnatomicalFrame,
+    chain_frame,
+    chest_frame,
+    joint_frame,
+    laid_over,
+    pelvis_frame,
+)
 from .limb_rotation import LimbTriangle, bend_to_reach, hinge_axis, joint_turn
 from .parts import (
     Part,
@@ -41,7 +49,8 @@ from .parts import (
     landmark_bone,
     sided,
 )
-from .reference_pose import ReferencePose, find_reference_pose, has_fingers
+from .reference_pose import ReferencePose, find_reference_pose, has_fingers, standing_up
+from .upright import Trunk, stand_over, trunk_of
 
 _HINGE_SAMPLES = 200
 """Frames of a clip from which a limb's hinge is read."""
@@ -68,6 +77,11 @@ class MappedClip:
             return self
         rests = Reresting(self.skeleton, with_rest_pose(self.skeleton, found.orientations))
         return ReferredClip(rests.into(self.clip), self.landmarks, found, rests)
+
+    @cached_property
+    def up(self) -> Floats:
+        """(3,) armature space: along it the body of the clip stands."""
+        return standing_up(self.clip, self.humanoid())
 
     @property
     def skeleton(self) -> Skeleton:
@@ -165,6 +179,8 @@ class Retarget:
     """Joint, elbow and hand, on base and splice."""
     spread: tuple[tuple[int, ...], tuple[int, ...]] | None
     """Chains with unlike numbers of bones, on base and splice."""
+    trunks: tuple[Trunk, Trunk] | None = None
+    """Of base and splice, if the part is a trunk."""
 
     @cached_property
     def joined(self) -> _JoinedBones | None:
@@ -269,9 +285,14 @@ def write_retargeted(
     if retarget.spread is not None:
         _write_spread(retarget, between, splice, result, rotations)
         locations[:, list(retarget.bones)] = 0.0
-        return
-    _write_inner(retarget, between, (result, splice), rotations)
-    _write_locations(retarget, between, splice, result, locations)
+    else:
+        _write_inner(retarget, between, (result, splice), rotations)
+        _write_locations(retarget, between, splice, result, locations)
+    if retarget.trunks is not None:
+        trunk, other = retarget.trunks
+        result = posture_of(base.skeleton, rotations, locations)
+        way = rotate(between, other.lean(splice))
+        stand_over(trunk, result, rotations, way, np.ones(len(way)))
     if retarget.limb is None:
         return
     (joint, elbow, hand), (other_joint, other_elbow, other_hand) = retarget.limb
@@ -401,6 +422,7 @@ def _side_retarget(
     """The retarget of a humanoid's part on one side."""
     base, splice = clips
     marks = base.humanoid(), splice.humanoid()
+    asked = kind.frame(seen_from)
     if kind.clavicle and clavicle:
         clavicle = all(_hangs_on_clavicle(kind, side, each) for each in clips)
 
@@ -410,13 +432,17 @@ def _side_retarget(
         with mapped.named_in_errors():
             bones = kind_bones(kind, side, skeleton, landmarks, clavicle=clavicle)
             chest = chest_frame(skeleton, landmarks, mapped.reference)
-            if kind.frame(seen_from) != "pelvis":
+            if asked == "chest":
                 return bones, chest, chest
-            return bones, chest, pelvis_frame(skeleton, landmarks, mapped.reference)
+            if asked == "joint":
+                return bones, chest, joint_frame(skeleton, bones[0], chest)
+            pelvis = pelvis_frame(skeleton, landmarks, mapped.reference)
+            return bones, chest, replace(pelvis, up=mapped.up if asked == "world" else None)
 
     (bones, chest, frame), (others, other_chest, other_frame) = map(seen, clips)
-    chests = chest, laid_over(other_chest, chest)
-    frames = frame, laid_over(other_frame, frame)
+    if same_build(base.skeleton, splice.skeleton, marks):
+        other_chest, other_frame = laid_over(other_chest, chest), laid_over(other_frame, frame)
+    chests, frames = (chest, other_chest), (frame, other_frame)
     if kind.spine:
         return _spine_retarget(clips, (bones, others), frames, chests)
     pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, marks)
@@ -465,7 +491,9 @@ def _spine_retarget(
     )
     top = multiply(chests[1].turn, conjugate(chests[0].turn))
     match = replace(match, constants={**match.constants, ours[-1]: top})
-    return Retarget(base, splice, tuple(ours), frames, match, None, spread)
+    trunks = trunk_of(base.skeleton, marks[0]), trunk_of(splice.skeleton, marks[1])
+    both = None if trunks[0] is None or trunks[1] is None else (trunks[0], trunks[1])
+    return Retarget(base, splice, tuple(ours), frames, match, None, spread, both)
 
 
 def _at_rest(
