@@ -30,7 +30,7 @@ from octo_motion.core.splicing.transfer.body_frames import (
     pelvis_frame,
 )
 from octo_motion.core.splicing.transfer.limb_rotation import SOFT
-from octo_motion.core.splicing.transfer.parts import LEG, PARTS, Part, part_bones
+from octo_motion.core.splicing.transfer.parts import LEG, PARTS, Part, SeenFrom, part_bones
 from octo_motion.core.splicing.transfer.retarget import MappedClip
 from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices
 from tests.bench.splice_quality import feet_at_rest, limb_length
@@ -121,7 +121,27 @@ def test_every_part_of_a_clip_on_itself_gives_the_clip_back(shared_data: SharedD
 def test_where_the_splice_clip_stands_and_faces_changes_nothing(shared_data: SharedData, name: str):
     base, landmarks = load(shared_data("secondlife/avatar_walk.bvh"))
     clip, marks = load(shared_data(name))
-    turn = np.array([0.9, 0.1, -0.3, 0.2]) / np.linalg.norm([0.9, 0.1, -0.3, 0.2])
+    upright = normalized(np.array([0.9, 0.0, 0.0, 0.3]))
+    anyhow = normalized(np.array([0.9, 0.1, -0.3, 0.2]))
+    for part in PARTS.values():
+        # A trunk leans against the vertical as its clip does: laid on its back it is another one.
+        seen_from: SeenFrom = "pelvis" if part is PARTS["trunk"] else ""
+        for turn, asked in ((upright, ""), (anyhow, seen_from)):
+            away = elsewhere(clip, marks, turn)
+            for goal in GOALS:
+                results = [
+                    spliced(
+                        base,
+                        landmarks,
+                        Splice(part, each, Timing(1, 1), marks, goal, seen_from=asked),
+                    )
+                    for each in (clip, away)
+                ]
+                assert angle_between(results[0].rotations, results[1].rotations).max() < 1e-6
+
+
+def elsewhere(clip: Clip, marks: Landmarks, turn: Floats) -> Clip:
+    """A clip turned and moved in the world, by its root and by its object."""
     root = clip.skeleton.index[marks["hips"]]
     assert clip.skeleton.parents[root] < 0
     # The root's keys, as an artist would move them: in its rest frame.
@@ -132,14 +152,7 @@ def test_where_the_splice_clip_stands_and_faces_changes_nothing(shared_data: Sha
     locations[:, root] = rotate(local, locations[:, root]) + np.array([300.0, -40.0, 7.0])
     world = clip.world.copy()
     world[:, :3, 3] += (1.0, 2.0, 3.0)
-    away = replace(clip, rotations=rotations, locations=locations, world=world)
-    for part in PARTS.values():
-        for goal in GOALS:
-            results = [
-                spliced(base, landmarks, Splice(part, each, Timing(1, 1), marks, goal))
-                for each in (clip, away)
-            ]
-            assert angle_between(results[0].rotations, results[1].rotations).max() < 1e-6
+    return replace(clip, rotations=rotations, locations=locations, world=world)
 
 
 @pytest.mark.parametrize("name", ["walk", "throw_R", "punch_L"])

@@ -103,14 +103,29 @@ MODES: Final = (
 
 
 SEEN_FROM: Final = (
-    ("PELVIS", "Pelvis", "Feet stay under the hips, however the trunk leans", 0),
     (
-        "CHEST",
-        "Chest",
-        "As the method that this follows has it: legs go along with a trunk that leans or turns",
-        1,
+        "AUTO",
+        "Usual",
+        "Arms and head from the chest, legs from the pelvis, the trunk from upright axes",
+        2,
+    ),
+    ("CHEST", "Chest", "The part goes along with a chest that leans or turns", 1),
+    ("PELVIS", "Pelvis", "The part goes along with a pelvis that tilts", 0),
+    (
+        "JOINT",
+        "Own Joint",
+        "The part is turned against the bone that it hangs on as it is in the clip",
+        3,
+    ),
+    (
+        "WORLD",
+        "Upright",
+        "From axes that stay upright and face as the pelvis does: what leans or points up in the "
+        "clip does so on the base",
+        4,
     ),
 )
+"""Files keep the numbers."""
 
 
 BLENDINGS: Final = (
@@ -283,9 +298,10 @@ class SpliceItem(bpy.types.PropertyGroup):
     )
     seen_from: props.EnumProperty(
         name="Seen From",
-        description="From where the clip's legs are seen, so that they lie alike on the base. Legs "
+        description="From where the part is seen in the clip, so that it lies alike on the base. Legs "
         "with travel are always seen from the pelvis",
         items=SEEN_FROM,
+        default="AUTO",
     )
     with_travel: props.BoolProperty(
         name="With Travel",

@@ -109,8 +109,8 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
             lock.prop(item, "foot_lock")
         if len(kind.seen_from) > 1:
             seen = layout.row()
-            seen.active = additive or not item.with_travel
-            seen.prop(item, "seen_from", expand=True)
+            seen.active = additive or not (kind.travels and item.with_travel)
+            seen.prop(item, "seen_from")
 
 
 class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):

@@ -81,12 +81,22 @@ def test_moving_and_turning_the_splice_clip_changes_nothing(seed: int, part: Par
     random = np.random.default_rng(seed)
     base = motion(random, humanoid(random))
     clip = motion(random, humanoid(random, same_proportions=False))
-    away = moved(clip, from_rotation_vector(random.normal(size=3)), random.normal(size=3))
-    results = [
-        spliced(base, LANDMARKS, Splice(part, each, FROM_START, LANDMARKS, goal))
-        for each in (clip, away)
-    ]
-    assert angle_between(results[0].rotations, results[1].rotations).max() < 1e-6
+    anyhow = from_rotation_vector(random.normal(size=3))
+    about_the_vertical = turned_about((0.0, 0.0, 1.0), random.normal())
+    # A trunk leans against the vertical as its clip does: laid on its back it is another one.
+    seen_from: tuple[SeenFrom, ...] = ("",) if part is not TRUNK else ("pelvis", "joint")
+    for turn, seen in ((about_the_vertical, ("",)), (anyhow, seen_from)):
+        away = moved(clip, turn, random.normal(size=3))
+        for asked in seen:
+            results = [
+                spliced(
+                    base,
+                    LANDMARKS,
+                    Splice(part, each, FROM_START, LANDMARKS, goal, seen_from=asked),
+                )
+                for each in (clip, away)
+            ]
+            assert angle_between(results[0].rotations, results[1].rotations).max() < 1e-6
 
 
 @few
@@ -208,15 +218,13 @@ def test_an_arm_that_does_not_hang_on_its_collar_bone_comes_without_it():
         np.testing.assert_array_equal(with_it.rotations, without.rotations)
 
 
-def test_trunk_and_head_take_the_whole_orientation():
+def test_trunk_and_head_seen_from_the_pelvis_take_the_whole_orientation():
     random = np.random.default_rng(5)
     skeleton = humanoid(random)
     base, clip = motion(random, skeleton), motion(random, skeleton)
-    result = build_splices(
-        base,
-        LANDMARKS,
-        [Splice(part, clip, FROM_START, LANDMARKS) for part in (TRUNK, HEAD, LEFT_ARM)],
-    )
+    trunk = Splice(TRUNK, clip, FROM_START, LANDMARKS, seen_from="pelvis")
+    others = [Splice(part, clip, FROM_START, LANDMARKS) for part in (HEAD, LEFT_ARM)]
+    result = build_splices(base, LANDMARKS, [trunk, *others])
     assert np.allclose(relative(result, "crown", "hips"), relative(clip, "crown", "hips"))
     assert np.allclose(relative(result, "hand.L", "hips"), relative(clip, "hand.L", "hips"))
 

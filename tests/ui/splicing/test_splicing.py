@@ -222,6 +222,23 @@ def test_legs_can_be_seen_from_the_chest() -> None:
     assert apart[1] < 10 * ROUNDING
 
 
+def test_every_part_can_be_seen_from_elsewhere_and_is_seen_as_usual_unless_asked() -> None:
+    hero, _ = hero_and_source()
+    usual = {"RIGHT_ARM": "CHEST", "LEGS": "PELVIS", "HEAD": "CHEST", "TRUNK": "WORLD"}
+    for part, seen_from in usual.items():
+        OPERATORS.splice_add(part=part)
+        (item,) = stack_of(hero).splices
+        turns = {}
+        for asked in ("AUTO", "CHEST", "PELVIS", "JOINT", "WORLD"):
+            item.seen_from = asked
+            OPERATORS.splice_build()
+            turns[asked] = np.stack(list(motion(hero, stack_of(hero).result).values()))
+        assert angle_between(turns["AUTO"], turns[seen_from]).max() < 10 * ROUNDING
+        others = [each for each in ("PELVIS", "JOINT", "WORLD") if each != seen_from]
+        assert any(angle_between(turns["AUTO"], turns[each]).max() > 0.02 for each in others), part
+        OPERATORS.splice_remove()
+
+
 def test_base_and_clips_stay_as_they_are() -> None:
     hero, _ = hero_and_source()
     before = {action.name: keys(action) for action in bpy.data.actions}

@@ -6,9 +6,6 @@ bones' axes: X to the body's left, Y to its back, Z up along the trunk, as for a
 Blender's front. Landmarks are taken in the reference pose, which comes from the clip; a skeleton
 that has none is taken at rest.
 
-A frame may stand **upright**: it faces as its bone does, and what leans in the one clip then leans
-alike on the other body, however their pelvises are tilted [SPEC 2.4 asks for that of the trunk].
-
 Where two skeletons carry the same joints at the same places of the bone, these joints are laid over
 each other instead: the frames then agree to the last digit whatever the two people do.
 """
@@ -22,20 +19,8 @@ from typing import Final
 import numpy as np
 
 from ...errors import ClipError
-from ...rotations import (
-    IDENTITY,
-    Floats,
-    conjugate,
-    dot,
-    from_matrix,
-    multiply,
-    normalized,
-    rotate,
-    shortest_arc,
-    slerp,
-)
+from ...rotations import Floats, conjugate, from_matrix, multiply, normalized, rotate
 from ...skeleton import Skeleton
-from ...smoothing import smooth_step
 from ..clip import Posture
 from ..humanoid import Landmarks
 from .parts import landmark_bone
@@ -53,11 +38,6 @@ _SAME: Final = 0.01
 _FLAT: Final = 0.02
 """Of its length: joints that spread less than this sideways do not tell how a bone is turned."""
 
-_UPRIGHT: Final = (float(np.cos(np.radians(75.0))), float(np.cos(np.radians(45.0))))
-"""Cosines of tilts: of who lies or turns over, nothing stands upright; up to the second, all."""
-
-_Z: Final = np.array([0.0, 0.0, 1.0])
-
 
 @dataclass(frozen=True, eq=False)
 class AnatomicalFrame:
@@ -71,17 +51,12 @@ class AnatomicalFrame:
     """(3,) from the bone's head, along the bone's axes."""
     joints: dict[str, Floats]
     """Places of the joints that hang on the bone, along the bone's axes, by landmark."""
-    up: Floats | None = None
-    """(3,) armature space, if the frame stands upright."""
 
     def orientation(self, posture: Posture) -> Floats:
         """(frames, 4), armature space."""
         if self.bone < 0:
             return self.turn
-        turned = multiply(posture.orientation(self.bone), self.turn)
-        if self.up is None:
-            return turned
-        return slerp(turned, _facing(turned, self.up), uprightness(turned, self.up))
+        return multiply(posture.orientation(self.bone), self.turn)
 
     def place(self, posture: Posture) -> Floats:
         """Origin (frames, 3), armature space."""
@@ -94,20 +69,6 @@ class AnatomicalFrame:
         if self.bone < 0:
             return self.turn
         return multiply(skeleton.rest_rotations[self.bone], self.turn)
-
-
-def uprightness(orientations: Floats, up: Floats) -> Floats:
-    """How much bodies (frames, 4) stand, (frames,): 1 upright, 0 for who lies or turns over."""
-    least, most = _UPRIGHT
-    return smooth_step((dot(rotate(orientations, _Z), up) - least) / (most - least))
-
-
-def heading(goal: Floats, start: Floats) -> Floats:
-    """The turn about Z (…, 4) that brings one orientation closest to another."""
-    between = multiply(goal, conjugate(start)) * [1.0, 0.0, 0.0, 1.0]
-    # Upside down there is none.
-    between[..., 0] += 1e-12
-    return normalized(between)
 
 
 def chest_frame(
@@ -208,13 +169,7 @@ def laid_over(splice: AnatomicalFrame, base: AnatomicalFrame) -> AnatomicalFrame
         return splice
     back = conjugate(from_matrix(turn))
     origin = their_middle + rotate(back, base.origin - our_middle) / scale
-    return AnatomicalFrame(splice.bone, multiply(back, base.turn), origin, splice.joints, splice.up)
-
-
-def _facing(orientations: Floats, up: Floats) -> Floats:
-    """Upright orientations (frames, 4) that face as these do."""
-    standing = shortest_arc(_Z, up)
-    return multiply(standing, heading(multiply(conjugate(standing), orientations), IDENTITY))
+    return AnatomicalFrame(splice.bone, multiply(back, base.turn), origin, splice.joints)
 
 
 def _referred(

@@ -36,11 +36,11 @@ from ..clip import (
     seam_turns,
 )
 from ..humanoid import chain_length
-from .body_frames import AnatomicalFrame, heading, uprightness
+from .body_frames import AnatomicalFrame
 from .foot_contacts import find_stance, own_paths
 from .parts import LEG
-from .retarget import MappedClip, Retarget
-from .upright import stand_over, trunk_of
+from .retarget import MappedClip, Retarget, bodies_of
+from .upright import heading, stand_over
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _LEVEL: Final = np.array([1.0, 1.0, 0.0])
@@ -70,7 +70,7 @@ class LegTravel:
         ours, theirs = retarget.base, retarget.splice
         check_hips(ours.skeleton, retarget.frames[0].bone)
         self._ratio = leg_length(ours) * ours.clip.scale / (leg_length(theirs) * theirs.clip.scale)
-        self._trunk = trunk_of(ours.skeleton, ours.humanoid())
+        self._bodies = bodies_of(ours, theirs)
 
     def move(
         self, clip: Clip, span: SpliceWindow, base: Posture, rotations: Floats, locations: Floats
@@ -109,12 +109,13 @@ class LegTravel:
         later.orientations[:count] = slerp(goal_turns, orientations, span.weights)
         later.places[:count] = goal_places + span.weights[:, None] * (places - goal_places)
         write_hips(clip, ours, base, later, (rotations, locations))
-        if self._trunk is not None:
-            self._keep_upright(clip, (own, later), base, (rotations, locations))
+        if self._bodies is not None:
+            self._keep_upright(clip, span, (own, later), base, (rotations, locations))
 
     def _keep_upright(
         self,
         clip: Clip,
+        span: SpliceWindow,
         paths: tuple[BodyPath, BodyPath],
         base: Posture,
         arrays: tuple[Floats, Floats],
@@ -124,25 +125,27 @@ class LegTravel:
         The legs bring their pelvis along: the body on it is to stand as it stood, unless one of the
         two lies or turns over (Heck, Kovar and Gleicher, 2006, do likewise).
         """
-        assert self._trunk is not None
+        assert self._bodies is not None
         (own, path), (rotations, locations) = paths, arrays
-        trunk, chosen = self._trunk, slice(len(clip) - len(path.places), None)
-        before, after = own.orientations[chosen], path.orientations
-        standing = uprightness(before, _UP) * uprightness(after, _UP)
-        carried = multiply(after, conjugate(before))
-        facing = heading(carried, IDENTITY)
+        body, other = self._bodies
+        chosen = slice(len(clip) - len(path.places), None)
+        standing = body.standing(base, _up(clip))[chosen]
+        there = sample_clip(self._retarget.splice.clip, span.splice_frames)
+        standing[: len(span.weights)] *= other.standing(there, _up(self._retarget.splice.clip))
+        carried = multiply(path.orientations, conjugate(own.orientations[chosen]))
+        turned = heading(carried, IDENTITY)
         turns, _, _ = sample_world(clip, clip.frames[chosen])
         # The waist as the base's, seen in the world but for the heading, …
-        turn = slerp(IDENTITY, multiply(facing, conjugate(carried)), standing)
+        turn = slerp(IDENTITY, multiply(turned, conjugate(carried)), standing)
         turn = multiply(multiply(conjugate(turns), turn), turns)
         result = posture_of(clip.skeleton, rotations[chosen], locations[chosen])
-        waist = multiply(turn, result.orientation(trunk.waist))
-        rotations[chosen, trunk.waist] = multiply(conjugate(result.carried(trunk.waist)), waist)
+        waist = multiply(turn, result.orientation(body.waist))
+        rotations[chosen, body.waist] = multiply(conjugate(result.carried(body.waist)), waist)
         # … and the neck over the hips, on which the waist may sit askew.
         result = posture_of(clip.skeleton, rotations[chosen], locations[chosen])
-        facing = multiply(multiply(conjugate(turns), facing), turns)
-        way = rotate(facing, trunk.lean(base)[chosen])
-        stand_over(trunk, result, rotations[chosen], way, standing)
+        turned = multiply(multiply(conjugate(turns), turned), turns)
+        way = rotate(turned, body.lean(base)[chosen])
+        stand_over(body, result, rotations[chosen], way, standing)
 
     def _way(self, span: SpliceWindow) -> BodyPath:
         """The splice's pelvis through the world, round after round where it loops."""
@@ -220,6 +223,11 @@ def body_path(clip: Clip, frame: AnatomicalFrame, posture: Posture, frames: Floa
         multiply(turns, frame.orientation(posture)),
         shifts + scale * rotate(turns, frame.place(posture)),
     )
+
+
+def _up(clip: Clip) -> Floats:
+    """The vertical (3,), armature space."""
+    return clip.world[0, 2, :3] / clip.scale
 
 
 def leg_length(mapped: MappedClip) -> float:

@@ -68,7 +68,7 @@ _FEWEST: Final = 4
 """Moments from which one sees how fast a foot moves."""
 
 _UPRIGHT: Final = float(np.cos(np.radians(35.0)))
-"""Cosine of how far off an axis of the world people may stand on average, and that axis is up."""
+"""Cosine of how far off the vertical people may stand on average, and that is still up."""
 
 _RIGID: Final = 2e-3
 """Of the body's size: what a joint may move against a bone and count as fixed to it."""
@@ -123,18 +123,16 @@ def find_reference_pose(
 
 
 def standing_up(clip: Clip, landmarks: Landmarks) -> Floats:
-    """Which way is up (3,), armature space: that axis of the world along which people stand.
+    """Which way is up (3,), armature space: that of the world where people stand along it.
 
-    Usually Z; but a file may lie on its back, and who turns the whole of it anyhow changes nothing.
+    A file may lie on its back: then it is how they stand on average.
     """
-    axes: Floats = np.array(clip.world[0, :3, :3]) / clip.scale
+    up: Floats = clip.world[0, 2, :3] / clip.scale
     try:
         found = _Finder(clip, landmarks).upward()
     except (_NoFrameError, KeyError):
-        return axes[2]
-    ways = np.concatenate([axes, -axes])
-    nearest = ways[np.argmax(ways @ found)]
-    return nearest if nearest @ found > _UPRIGHT else found
+        return up
+    return up if up @ found > _UPRIGHT else found
 
 
 class _NoFrameError(Exception):

@@ -50,7 +50,7 @@ from .parts import (
     sided,
 )
 from .reference_pose import ReferencePose, find_reference_pose, has_fingers, standing_up
-from .upright import Trunk, stand_over, trunk_of
+from .upright import Body, body_of, facing, stand_over
 
 _HINGE_SAMPLES = 200
 """Frames of a clip from which a limb's hinge is read."""
@@ -179,8 +179,12 @@ class Retarget:
     """Joint, elbow and hand, on base and splice."""
     spread: tuple[tuple[int, ...], tuple[int, ...]] | None
     """Chains with unlike numbers of bones, on base and splice."""
-    trunks: tuple[Trunk, Trunk] | None = None
-    """Of base and splice, if the part is a trunk."""
+    bodies: tuple[Body, Body] | None = None
+    """Base and splice, where it matters how they stand."""
+    upright: bool = False
+    """Whether the part is seen from upright axes that face as the frames do."""
+    spine: bool = False
+    """Whether the part is a trunk."""
 
     @cached_property
     def joined(self) -> _JoinedBones | None:
@@ -280,7 +284,7 @@ def write_retargeted(
     ours, theirs = retarget.frames
     our_frame = ours.orientation(base)
     # From the splice clip's world into the base's: the bodies' frames laid over each other.
-    between = multiply(our_frame, conjugate(theirs.orientation(splice)))
+    between = _between(retarget, (base, splice), (our_frame, theirs.orientation(splice)))
     result = posture_of(base.skeleton, rotations, locations)
     if retarget.spread is not None:
         _write_spread(retarget, between, splice, result, rotations)
@@ -288,11 +292,11 @@ def write_retargeted(
     else:
         _write_inner(retarget, between, (result, splice), rotations)
         _write_locations(retarget, between, splice, result, locations)
-    if retarget.trunks is not None:
-        trunk, other = retarget.trunks
+    if retarget.spine and retarget.bodies is not None:
+        body, other = retarget.bodies
         result = posture_of(base.skeleton, rotations, locations)
         way = rotate(between, other.lean(splice))
-        stand_over(trunk, result, rotations, way, np.ones(len(way)))
+        stand_over(body, result, rotations, way, np.ones(len(way)))
     if retarget.limb is None:
         return
     (joint, elbow, hand), (other_joint, other_elbow, other_hand) = retarget.limb
@@ -331,6 +335,24 @@ def _turn_limb(
             carried = multiply(turn, carried)
         wanted = multiply(lower_turn, result.orientation(elbow))
         rotations[:, elbow] = multiply(conjugate(carried), wanted)
+
+
+def _between(
+    retarget: Retarget, postures: tuple[Posture, Posture], frames: tuple[Floats, Floats]
+) -> Floats:
+    """(frames, 4) from the splice clip's armature space into the base's: their frames laid over
+    each other.
+    """
+    ours, theirs = frames
+    between = multiply(ours, conjugate(theirs))
+    if retarget.bodies is None or not retarget.upright:
+        return between
+    ups = retarget.base.up, retarget.splice.up
+    standing = np.ones(len(between))
+    for body, posture, up in zip(retarget.bodies, postures, ups, strict=True):
+        standing = standing * body.standing(posture, up)
+    upright = multiply(facing(ours, ups[0]), conjugate(facing(theirs, ups[1])))
+    return slerp(between, upright, standing)
 
 
 def _write_inner(
@@ -437,14 +459,15 @@ def _side_retarget(
             if asked == "joint":
                 return bones, chest, joint_frame(skeleton, bones[0], chest)
             pelvis = pelvis_frame(skeleton, landmarks, mapped.reference)
-            return bones, chest, replace(pelvis, up=mapped.up if asked == "world" else None)
+            return bones, chest, pelvis
 
     (bones, chest, frame), (others, other_chest, other_frame) = map(seen, clips)
     if same_build(base.skeleton, splice.skeleton, marks):
         other_chest, other_frame = laid_over(other_chest, chest), laid_over(other_frame, frame)
     chests, frames = (chest, other_chest), (frame, other_frame)
     if kind.spine:
-        return _spine_retarget(clips, (bones, others), frames, chests)
+        found = _spine_retarget(clips, (bones, others), frames, chests)
+        return replace(found, bodies=bodies_of(*clips), upright=asked == "world")
     pairs = matched_bones(base.skeleton, bones, splice.skeleton, others, marks)
     match = find_correspondence(
         base.skeleton,
@@ -457,7 +480,14 @@ def _side_retarget(
     limb = None
     if kind.limb is not None:
         limb = _limb_joints(kind, side, base), _limb_joints(kind, side, splice)
-    return Retarget(base, splice, tuple(bones), frames, match, limb, None)
+    found = Retarget(base, splice, tuple(bones), frames, match, limb, None)
+    return replace(found, bodies=bodies_of(*clips), upright=True) if asked == "world" else found
+
+
+def bodies_of(base: MappedClip, splice: MappedClip) -> tuple[Body, Body] | None:
+    """How both stand; none where either's trunk does not go along with its hips."""
+    ours, theirs = (body_of(each.skeleton, each.humanoid()) for each in (base, splice))
+    return None if ours is None or theirs is None else (ours, theirs)
 
 
 def _spine_retarget(
@@ -491,9 +521,7 @@ def _spine_retarget(
     )
     top = multiply(chests[1].turn, conjugate(chests[0].turn))
     match = replace(match, constants={**match.constants, ours[-1]: top})
-    trunks = trunk_of(base.skeleton, marks[0]), trunk_of(splice.skeleton, marks[1])
-    both = None if trunks[0] is None or trunks[1] is None else (trunks[0], trunks[1])
-    return Retarget(base, splice, tuple(ours), frames, match, None, spread, both)
+    return Retarget(base, splice, tuple(ours), frames, match, None, spread, spine=True)
 
 
 def _at_rest(

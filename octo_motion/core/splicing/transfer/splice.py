@@ -79,7 +79,7 @@ class Splice:
     foot_lock: bool = False
     """Whether feet stand where the clip's do, with travel."""
     seen_from: SeenFrom = ""
-    """From where legs are seen: the pelvis if empty, the chest in the source."""
+    """From where the part is seen; as usual for it if empty. Legs with travel from the pelvis."""
     weight: tuple[Floats, Floats] | None = None
     """Frames of the base (samples,) and how much the splice acts there (samples,), 0…1; in full if
     none is given."""
