@@ -120,8 +120,7 @@ SEEN_FROM: Final = (
     (
         "WORLD",
         "Upright",
-        "From axes that stay upright and face as the pelvis does: what leans or points up in the "
-        "clip does so on the base",
+        "As the pelvis faces, but upright: what leans or points up in the clip does so on the base",
         4,
     ),
 )
@@ -298,8 +297,8 @@ class SpliceItem(bpy.types.PropertyGroup):
     )
     seen_from: props.EnumProperty(
         name="Seen From",
-        description="From where the part is seen in the clip, so that it lies alike on the base. Legs "
-        "with travel are always seen from the pelvis",
+        description="From where the part is seen in the clip, so that it lies alike on the base. "
+        "Legs with travel are always seen from the pelvis",
         items=SEEN_FROM,
         default="AUTO",
     )
