@@ -102,7 +102,7 @@ def test_a_pelvis_that_happens_to_have_the_shape_of_another_is_not_taken_for_it(
         for each, known in ((result, landmarks), (clip, marks)):
             index, heads = each.skeleton.index, each.posed()[1]
             hips, knees = (
-                0.5 * sum(heads[:, index[known[f"{joint}.{side}"]]] for side in "LR")
+                np.mean([heads[:, index[known[f"{joint}.{side}"]]] for side in "LR"], axis=0)
                 for joint in ("thigh", "shin")
             )
             moved.append(np.median((knees - hips)[: len(clip)], axis=0))

@@ -26,6 +26,7 @@ from octo_motion.core.splicing.transfer.parts import (
     PARTS,
     Part,
     PartKind,
+    SeenFrom,
     chain_part,
     kind_bones,
     part_bones,
@@ -84,8 +85,9 @@ def test_moving_and_turning_the_splice_clip_changes_nothing(seed: int, part: Par
     anyhow = from_rotation_vector(random.normal(size=3))
     about_the_vertical = turned_about((0.0, 0.0, 1.0), random.normal())
     # A trunk leans against the vertical as its clip does: laid on its back it is another one.
-    seen_from: tuple[SeenFrom, ...] = ("",) if part is not TRUNK else ("pelvis", "joint")
-    for turn, seen in ((about_the_vertical, ("",)), (anyhow, seen_from)):
+    usual: tuple[SeenFrom, ...] = ("",)
+    seen_from: tuple[SeenFrom, ...] = ("pelvis", "joint") if part is TRUNK else usual
+    for turn, seen in ((about_the_vertical, usual), (anyhow, seen_from)):
         away = moved(clip, turn, random.normal(size=3))
         for asked in seen:
             results = [
