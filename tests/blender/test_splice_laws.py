@@ -125,9 +125,9 @@ def test_where_the_splice_clip_stands_and_faces_changes_nothing(shared_data: Sha
     anyhow = normalized(np.array([0.9, 0.1, -0.3, 0.2]))
     for part in PARTS.values():
         # A trunk leans against the vertical as its clip does: laid on its back it is another one.
-        usual: SeenFrom = ""
-        seen_from: SeenFrom = "pelvis" if part is PARTS["trunk"] else usual
-        for turn, asked in ((upright, usual), (anyhow, seen_from)):
+        tilted: SeenFrom = "pelvis" if part is PARTS["trunk"] else ""
+        cases: list[tuple[Floats, SeenFrom]] = [(upright, ""), (anyhow, tilted)]
+        for turn, asked in cases:
             away = elsewhere(clip, marks, turn)
             for goal in GOALS:
                 results = [
