@@ -25,6 +25,7 @@ from ...rotations import (
     slerp,
 )
 from ...skeleton import Skeleton
+from ...smoothing import smooth_step
 from ..clip import (
     Clip,
     Posture,
@@ -130,9 +131,12 @@ class LegTravel:
         body, other = self._bodies
         chosen = slice(len(clip) - len(path.places), None)
         standing = body.standing(base, _up(clip))[chosen]
-        there = sample_clip(self._retarget.splice.clip, span.splice_frames)
-        standing[: len(span.weights)] *= other.standing(there, _up(self._retarget.splice.clip))
+        other_clip = self._retarget.splice.clip
+        there = sample_clip(other_clip, span.splice_frames, span.seams, span.seam_speeds)
+        standing[: len(span.weights)] *= other.standing(there, _up(other_clip))
         carried = multiply(path.orientations, conjugate(own.orientations[chosen]))
+        # Over on its head a pelvis has no heading.
+        standing = standing * smooth_step(0.5 + rotate(carried, _UP)[:, 2])
         turned = heading(carried, IDENTITY)
         turns, _, _ = sample_world(clip, clip.frames[chosen])
         # The waist as the base's, seen in the world but for the heading, …
