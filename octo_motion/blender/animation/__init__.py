@@ -44,7 +44,7 @@ from .poses import (
     standing_of,
 )
 from .scene_playback import play_bones, time_kept
-from .spliced_action import STEP, SplicedMotion, write_spliced
+from .spliced_action import STEP, SplicedMotion, write_layer, write_spliced
 
 __all__ = [
     "SCALE",
@@ -89,5 +89,6 @@ __all__ = [
     "writable_object",
     "write_action",
     "write_clip",
+    "write_layer",
     "write_spliced",
 ]

@@ -214,12 +214,20 @@ def assign_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_n
     as it is now.
     """
     _assign(obj, action)
+    mark_generated(obj, action, settings_note)
+
+
+def mark_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_note: str) -> None:
+    """Mark an action as it is now; of one that is a layer of the NLA, its tracks are remembered."""
+    tracks = {key: action[MARK][key] for key in ("track", "beneath") if key in action.get(MARK, {})}
     handles = {
         (path, index): _handles(curve)
         for path, index, _, curve in _listed(action)
         if _has_own_handles(curve)
     }
     _mark(action, obj, settings_note, None, handles)
+    for key, name in tracks.items():
+        action[MARK][key] = name
 
 
 def _assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
@@ -342,7 +350,9 @@ def _used_elsewhere(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
         if data is not None:
             if user != obj and action in (data.action, data.action_tweak_storage):
                 return True
-            strips = (strip for track in data.nla_tracks for strip in track.strips)
+            own = action[MARK].get("track") if user == obj else None
+            tracks = (track for track in data.nla_tracks if track.name != own)
+            strips = (strip for track in tracks for strip in track.strips)
             if any(strip.action == action for strip in flattened(strips)):
                 return True
         if isinstance(user, bpy.types.Object) and action in _constraint_actions(user):

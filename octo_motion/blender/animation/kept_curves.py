@@ -173,6 +173,15 @@ def key_ends(curve: bpy.types.FCurve, first: float, last: float) -> None:
         write_kept_keys(curve, ended)
 
 
+def keep_between(curve: bpy.types.FCurve, first: float, last: float) -> None:
+    """Take a curve's keys away outside of two frames, at which it gets keys."""
+    keys = read_keys(curve)
+    for frame in (first, last):
+        keys = _cut(keys, curve, float(np.float32(frame)))
+    inside = (keys.frames > first - SAME_FRAME) & (keys.frames < last + SAME_FRAME)
+    write_kept_keys(curve, keys.chosen(inside))
+
+
 def _copy_modifier(source: Any, target: Any) -> None:
     """All that can be set of a modifier; what decides how much else there is comes first."""
     names = [each.identifier for each in source.bl_rna.properties if not each.is_readonly]

@@ -38,6 +38,7 @@ from .actions import (
     group_named,
     is_setting,
     key_points,
+    mark_generated,
     own_channelbag,
     read_channels,
     shown_curves,
@@ -48,6 +49,7 @@ from .fcurves import evaluate_fcurve
 from .kept_curves import (
     can_be_cut,
     copy_curve,
+    keep_between,
     key_ends,
     straight_keys,
     write_baked,
@@ -55,6 +57,7 @@ from .kept_curves import (
     write_stretches,
 )
 from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, unkeyed_pose
+from .splice_layer import check_layers, lay_over, take_off
 
 _SAME_TURN: Final = 4e-6
 """Radians by which a bone may be off and be where the base has it: rounding, …"""
@@ -138,18 +141,13 @@ def write_spliced(
     changed = _changed(armature, motion, base, unkeyed)
     keep_unkeyed_pose(armature)
     result = generated_action(armature, name, previous)
-    channelbag = own_channelbag(result, result.slots[0])
-    writer = _Writer(channelbag, motion)
+    take_off(armature, result)
+    writer = _Writer(own_channelbag(result, result.slots[0]), motion)
     otherwise = {each.path for each in changed}
     for path, components in base.items():
         for component, curve in components.items():
             writer.copy(path, component, curve, keys=path not in otherwise)
-    for each in changed:
-        writer.change(each, base.get(each.path, {}))
-    if motion.anew is not None:
-        for channel in bone_channels(armature, motion.anew, motion.bones):
-            writer.replace(channel, motion.anew.frames)
-    writer.finish()
+    _write_changed(armature, writer, changed, base)
     if motion.base.cyclic:
         writer.let_repeat(repeats=motion.result.cyclic)
     result.use_cyclic = motion.result.cyclic
@@ -158,6 +156,55 @@ def write_spliced(
     assign_generated(armature, result, note)
     _rest_unkeyed(armature, result, unkeyed)
     return result
+
+
+def write_layer(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    motion: SplicedMotion,
+    *,
+    name: str,
+    note: str,
+    previous: bpy.types.Action | None = None,
+) -> bpy.types.Action:
+    """The same as a layer of the NLA over the base: an action that has nothing but what is changed,
+    over the time in which it is, on a track of its own.
+
+    Raises:
+        WriteError: the armature is read-only, in NLA tweak mode, or its NLA is switched off.
+    """
+    writable_armature(armature)
+    check_layers(armature)
+    slot = slot or slot_of(armature, action)
+    base, unkeyed = _curves(armature, action, slot), unkeyed_pose(armature)
+    changed = _changed(armature, motion, base, unkeyed)
+    keep_unkeyed_pose(armature)
+    result = generated_action(armature, name, previous)
+    writer = _Writer(own_channelbag(result, result.slots[0]), motion)
+    _write_changed(armature, writer, changed, base)
+    ends = [each.frames[[0, -1]] for found in changed for each in found.stretches]
+    first, last = motion.first, motion.last
+    if ends and motion.anew is None:
+        first, last = float(np.min(ends)), float(np.max(ends))
+    writer.keep_between(first, last)
+    result.use_cyclic, result.use_frame_range = False, True
+    result.frame_start, result.frame_end = first, last
+    mark_generated(armature, result, note)
+    lay_over(armature, result, action, slot)
+    return result
+
+
+def _write_changed(
+    armature: bpy.types.Object, writer: _Writer, changed: Sequence[_Property], base: _Curves
+) -> None:
+    for each in changed:
+        writer.change(each, base.get(each.path, {}))
+    motion = writer.motion
+    if motion.anew is not None:
+        for channel in bone_channels(armature, motion.anew, motion.bones):
+            writer.replace(channel, motion.anew.frames)
+    writer.finish()
 
 
 def _curves(
@@ -340,7 +387,7 @@ class _Writer:
     """Fills a channelbag: curves that are there already are filled anew, all others go."""
 
     def __init__(self, channelbag: bpy.types.ActionChannelbag, motion: SplicedMotion) -> None:
-        self._channelbag, self._motion = channelbag, motion
+        self._channelbag, self.motion = channelbag, motion
         self._old = {(each.data_path, each.array_index): each for each in channelbag.fcurves}
         self._made: dict[tuple[str, int], bpy.types.FCurve] = {}
 
@@ -359,7 +406,7 @@ class _Writer:
             if own is None or can_be_cut(own, changed.stretches):
                 write_stretches(curve, own, pairs, component)
                 continue
-            base = self._motion
+            base = self.motion
             frames = np.arange(np.ceil(4.0 * base.first), np.floor(4.0 * base.last) + 1.0) / 4.0
             pieces = [(each.frames, each.values[:, component]) for each in changed.stretches]
             write_baked(curve, own, pieces, frames, changed.bound)
@@ -373,6 +420,11 @@ class _Writer:
             points = np.column_stack([frames, channel.values[:, component]])
             write_kept_keys(curve, straight_keys(points))
 
+    def keep_between(self, first: float, last: float) -> None:
+        """Let curves have no keys but between two frames, and at both."""
+        for curve in self._made.values():
+            keep_between(curve, first, last)
+
     def let_repeat(self, *, repeats: bool) -> None:
         """Let all curves repeat the base's cycle, as far as no modifiers do, or none of them."""
         for curve in self._made.values():
@@ -380,7 +432,7 @@ class _Writer:
                 for modifier in [each for each in curve.modifiers if each.type == "CYCLES"]:
                     curve.modifiers.remove(modifier)
             elif not (len(curve.modifiers) or curve.is_empty or is_setting(curve.data_path)):
-                key_ends(curve, self._motion.first, self._motion.last)
+                key_ends(curve, self.motion.first, self.motion.last)
                 add_cycles(curve)
 
     def finish(self) -> None:

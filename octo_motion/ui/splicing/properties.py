@@ -137,6 +137,16 @@ BLENDINGS: Final = (
     ),
 )
 
+RESULTS: Final = (
+    ("ACTION", "New Action", "One action with all of the motion, in place of the base", 0),
+    (
+        "LAYER",
+        "NLA Layer",
+        "An action with nothing but what is spliced, on an NLA track over the base",
+        1,
+    ),
+)
+
 REFERENCES: Final = (
     ("FIRST", "First Frame", "What the clip does since its first frame", 0),
     (
@@ -392,6 +402,11 @@ class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
         "Result",
         "The action that was built last. It is made anew in place until you edit it; then it is "
         "yours, and the next one is a new action",
+    )
+    result_as: props.EnumProperty(
+        name="Result As",
+        description="What is built: both play alike",
+        items=RESULTS,
     )
     retarget: props.PointerProperty(
         name="Retarget",

@@ -59,6 +59,7 @@ class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
         column.operator_context = "INVOKE_DEFAULT"
         column.operator(OCTO_MOTION_OT_splice_drag_timing.bl_idname, icon="ARROW_LEFTRIGHT")
         column.operator(OCTO_MOTION_OT_splice_suggest_timing.bl_idname, icon="LIGHT")
+        layout.row().prop(settings, "result_as", expand=True)
         row = layout.row()
         row.scale_y = 1.5
         row.operator(OCTO_MOTION_OT_splice_build.bl_idname, icon="PLAY", text="Build")

@@ -26,6 +26,7 @@ from ...blender.animation import (
     resized_bones,
     writable_armature,
     write_clip,
+    write_layer,
     write_spliced,
 )
 from ...blender.rig import armature_data
@@ -297,6 +298,11 @@ class ClipReader:
                 f"'{armature.name}' has no base action, or it is gone.",
                 "Choose the base in the panel Splicing.",
             )
+        if settings.visual and settings.result_as == "LAYER":
+            raise ClipError(
+                "As shown, a base has its NLA in it: a layer over that would not be it any more.",
+                "Choose New Action as the Result, or turn off Base As Shown.",
+            )
         if settings.visual:
             _check_mixing(armature)
         return self.source(armature, settings.base, settings.base_slot, visual=settings.visual)
@@ -536,6 +542,8 @@ def _write(
         return write_clip(
             armature, motion.result, name=name, note=note, previous=previous, besides=besides
         )
+    if settings.result_as == "LAYER":
+        return write_layer(armature, base, slot, motion, name=name, note=note, previous=previous)
     return write_spliced(
         armature,
         base,
