@@ -242,6 +242,9 @@ def _set_apart(held: np.ndarray, width: int) -> np.ndarray:
     """Contacts (frames, 2) with some frames at least between two stances, where the foot is on its
     way: also where one point lets go just as the other one takes hold.
     """
+    # A point that moves for a moment while the other one stands has not let go.
+    gaps = [short_gaps(each, 2 * width) for each in held.T]
+    held = held | (np.stack(gaps, axis=-1) & held[:, ::-1])
     standing = held.any(axis=-1)
     hands_over = standing[1:] & standing[:-1] & ~(held[1:] & held[:-1]).any(axis=-1)
     edges = np.concatenate([hands_over, [False]]) | np.concatenate([[False], hands_over])
