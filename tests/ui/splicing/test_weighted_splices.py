@@ -178,7 +178,8 @@ def test_a_breath_comes_on_top_of_a_motion(weight: float) -> None:
     for one, other, angle in zip(before, after, wanted, strict=True):
         added = one.inverted() @ other
         assert 2.0 * np.arctan2(abs(added.x), abs(added.w)) == pytest.approx(angle, abs=2e-3)
-        assert abs(added.y) + abs(added.z) < 1e-3
+        # Bodies in other postures are compared in reference poses: the axis may be 3° off.
+        assert np.hypot(added.y, added.z) <= np.sin(np.radians(3.0)) * abs(added.x) + 1e-4
     for one, other in zip(others, turns(hero, "upper_arm.R", frames), strict=True):
         assert abs(one.dot(other)) > 1.0 - 1e-6
 
