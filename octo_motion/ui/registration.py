@@ -91,6 +91,7 @@ def _steps() -> list[Step]:
         *locomotion.STEPS,
         *(_entry(getattr(bpy.types, menu), draw) for menu, draw in MENUS),
         *posing.STEPS,
+        *splicing.STEPS,
         Step(nothing, at_work.stop_all),
     ]
 

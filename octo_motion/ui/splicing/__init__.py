@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from ..steps import own_classes
+from ..steps import Step, nothing, own_classes
 from . import (
     import_clips,
     landmark_table,
     mapping_operators,
     properties,
+    reference_figure,
     retarget_operators,
     splice_operators,
     splice_panels,
@@ -36,6 +37,7 @@ CLASSES: Final = (
     *own_classes(
         landmark_table,
         mapping_operators,
+        reference_figure,
         import_clips,
         splice_operators,
         timing_drag,
@@ -45,10 +47,14 @@ CLASSES: Final = (
 )
 """Operators and panels."""
 
+STEPS: Final = (Step(nothing, reference_figure.take_down_all),)
+"""What is done when the add-on is switched on, and undone when it is switched off."""
+
 __all__ = [
     "CLASSES",
     "PARTS",
     "SETTINGS",
+    "STEPS",
     "ClipReader",
     "OCTO_MOTION_PG_landmarks",
     "OCTO_MOTION_PG_retarget",

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -20,11 +20,16 @@ from ...core.splicing.humanoid import (
     LANDMARKS,
     OPTIONAL,
     Landmarks,
+    ReferenceMoment,
     map_skeleton,
     recognised,
     stature,
 )
+from ...core.splicing.transfer import reference_doubts
 from .properties import read_landmarks, splicing_settings
+
+REFERENCE_KEY: Final = "reference_pose"
+"""Of a saved mapping: "rest", or a frame."""
 
 _LOOKS: Final = 50
 """Frames of an action that are looked at to see how its bones lie."""
@@ -40,6 +45,14 @@ def in_motion(armature: bpy.types.Object) -> Skeleton | None:
         return average_pose(read_clip(armature, frames=np.unique(np.linspace(first, last, _LOOKS))))
     except OctoMotionError:
         return None
+
+
+def clip_doubts(armature: bpy.types.Object, landmarks: Landmarks) -> list[str]:
+    """What the armature's action does not tell of how its body stands: sentences."""
+    try:
+        return reference_doubts(read_clip(armature), landmarks)
+    except OctoMotionError:
+        return []
 
 
 @dataclass(frozen=True)
@@ -69,9 +82,10 @@ def known_landmarks(
         skeleton: its bones as they rest.
         moving: the same as they lie in a motion, if there is one.
     """
-    bones = dict(read_landmarks(splicing_settings(armature).landmarks).bones)
+    table = read_landmarks(splicing_settings(armature).landmarks)
+    bones = dict(table.bones)
     if is_complete(bones):
-        return KnownBody(Landmarks(bones))
+        return KnownBody(table)
     saved = saved_landmarks(armature)
     known = saved.bones | bones
     if not is_complete(known):
@@ -79,8 +93,9 @@ def known_landmarks(
         if found.problem and not known:
             return KnownBody(None, found.problem, damaged=saved.damaged)
         known = dict(found.landmarks.bones) | known
+    reference = table.reference if bones or table.reference != "" else saved.reference
     return KnownBody(
-        Landmarks(known), found=not bones, mapping=saved.mapping, damaged=saved.damaged
+        Landmarks(known, reference), found=not bones, mapping=saved.mapping, damaged=saved.damaged
     )
 
 
@@ -99,6 +114,8 @@ class SavedLandmarks:
     """Its bones by landmark."""
     damaged: tuple[str, ...] = ()
     """What is wrong with others: sentences."""
+    reference: ReferenceMoment = ""
+    """Where the reference pose is found."""
 
 
 def saved_landmarks(armature: bpy.types.Object) -> SavedLandmarks:
@@ -108,7 +125,16 @@ def saved_landmarks(armature: bpy.types.Object) -> SavedLandmarks:
     found = recognised(mappings, parents_of(armature)) if mappings else None
     if found is None:
         return SavedLandmarks(damaged=problems)
-    return SavedLandmarks(found[0].name, dict(found[1].bones), problems)
+    name, reference = found[0].name, saved_reference(found[0].further)
+    return SavedLandmarks(name, dict(found[1].bones), problems, reference)
+
+
+def saved_reference(further: Mapping[str, Any]) -> ReferenceMoment:
+    """Where a saved mapping says the reference pose is found; as usual if it says nothing."""
+    told = further.get(REFERENCE_KEY, "")
+    if isinstance(told, (int, float)) and not isinstance(told, bool) and np.isfinite(told):
+        return float(told)
+    return "rest" if told == "rest" else ""
 
 
 def parents_of(armature: bpy.types.Object) -> dict[str, str]:

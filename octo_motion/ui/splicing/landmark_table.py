@@ -18,9 +18,10 @@ from ...core.errors import RigError
 from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
 from ..operator_base import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in
-from .bodies import SavedLandmarks, in_motion, is_complete, saved_landmarks
+from .bodies import SavedLandmarks, clip_doubts, in_motion, is_complete, saved_landmarks
 from .mapping_operators import draw_mapping
-from .properties import PROPERTIES, read_landmarks, title, write_landmarks
+from .properties import PROPERTIES, read_landmarks, title, write_landmarks, write_reference
+from .reference_figure import OCTO_MOTION_OT_reference_show, is_shown
 from .splice_operators import StackOperator
 
 _CHOICES: Final = tuple(
@@ -64,13 +65,16 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
         if self.keep:
             bones |= read_landmarks(settings.landmarks).bones
         write_landmarks(settings.landmarks, bones)
+        if saved.reference != "":
+            write_reference(settings.landmarks, saved.reference)
         whose = f" Mapping: {saved.mapping} (saved)." if saved.mapping else ""
         self.report({"INFO"}, f"{len(bones)} of {len(LANDMARKS)} landmarks are set.{whose}")
         asked = [each for each in found.asked if each not in bones]
         if asked:
             names = ", ".join(title(each) for each in asked)
             self.report({"WARNING"}, f"Choose the bones of: {names}. {found.missing[asked[0]]}")
-        for note in (*(() if saved.mapping else found.notes), *saved.damaged):
+        doubts = clip_doubts(armature, read_landmarks(settings.landmarks))
+        for note in (*(() if saved.mapping else found.notes), *doubts, *saved.damaged):
             self.report({"WARNING"}, note)
 
 
@@ -183,7 +187,11 @@ class OCTO_MOTION_OT_landmark_preset_add(  # pyright: ignore[reportIncompatibleM
         *ARMATURE,
         "landmarks = armature.octo_motion.splicing.landmarks",
     ]
-    preset_values = [f"landmarks.{name}" for name in PROPERTIES.values()]
+    preset_values = [
+        *(f"landmarks.{name}" for name in PROPERTIES.values()),
+        # A frame that is asked for is the current one, until it is set.
+        *("landmarks.reference_pose", "landmarks.reference_frame"),
+    ]
 
 
 def draw_landmarks(
@@ -203,6 +211,16 @@ def draw_landmarks(
     row.operator(preset, text="", icon="ADD")
     cast("Any", row.operator(preset, text="", icon="REMOVE")).remove_active = True
     table, armature = settings.landmarks, settings.id_data
+    row = layout.row(align=True)
+    row.prop(table, "reference_pose")
+    if table.reference_pose == "FRAME":
+        row.prop(table, "reference_frame", text="")
+    row.operator(
+        OCTO_MOTION_OT_reference_show.bl_idname,
+        text="",
+        icon="HIDE_OFF",
+        depress=is_shown(armature),
+    )
     # Picking is for pose mode: elsewhere the buttons would only take room.
     can_pick = context.mode == "POSE"
     _draw_rows(layout, table, armature, MIDDLE, can_pick=can_pick)

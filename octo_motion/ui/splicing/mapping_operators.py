@@ -18,8 +18,13 @@ from ...blender.rig import active_armature
 from ...core.errors import RigError
 from ...core.splicing.humanoid import new_mapping
 from ..operator_base import ArmatureOperator, window_manager
-from .bodies import parents_of, saved_landmarks
-from .properties import read_landmarks, splicing_settings, write_landmarks
+from .bodies import REFERENCE_KEY, parents_of, saved_landmarks, saved_reference
+from .properties import (
+    read_landmarks,
+    splicing_settings,
+    write_landmarks,
+    write_reference,
+)
 from .splice_operators import StackOperator
 
 
@@ -58,7 +63,11 @@ class OCTO_MOTION_OT_mapping_save(ArmatureOperator, bpy.types.Operator):
         armature = active_armature(context)
         name = self.name.strip()
         landmarks = read_landmarks(splicing_settings(armature).landmarks)
-        mapping = new_mapping(name, parents_of(armature), landmarks, _further(name))
+        further = _further(name)
+        further.pop(REFERENCE_KEY, None)
+        if landmarks.reference != "":
+            further[REFERENCE_KEY] = landmarks.reference
+        mapping = new_mapping(name, parents_of(armature), landmarks, further)
         save_mapping(mapping, overwrite=self.overwrite)
         self.report({"INFO"}, f"Saved the mapping '{name}'.")
 
@@ -93,6 +102,7 @@ class OCTO_MOTION_OT_mapping_load(StackOperator, bpy.types.Operator):
                 "Choose another mapping, or fill the table by hand.",
             )
         write_landmarks(settings.landmarks, landmarks.bones)
+        write_reference(settings.landmarks, saved_reference(mapping.further))
         self.report({"INFO"}, f"Mapping: {mapping.name} (saved).")
 
 

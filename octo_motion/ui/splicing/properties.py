@@ -13,7 +13,7 @@ from typing import Any, Final
 import bpy
 
 from ...blender.rig import armature_data
-from ...core.splicing.humanoid import LANDMARKS, Landmarks
+from ...core.splicing.humanoid import LANDMARKS, Landmarks, ReferenceMoment
 from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
 from .. import declared_settings as props
 from ..declared_settings import make_overridable
@@ -42,14 +42,45 @@ _SIDED: Final = {
 }
 
 
-class OCTO_MOTION_PG_landmarks(bpy.types.PropertyGroup):
-    """One bone name for each landmark; empty where the rig has none."""
+REFERENCE_POSES: Final = (
+    ("FOUND", "As Found", "From where the joints are while the clip plays", 0),
+    ("FRAME", "Frame", "From one frame, in which the body stands upright", 1),
+    ("REST", "Rest", "From the rest pose, where that is a pose of the body", 2),
+)
 
-    __annotations__ = _MIDDLE | {
-        f"{part}_{side[0]}": _bone(f"{side.capitalize()} {name}", description.format(side))
-        for side in ("left", "right")
-        for part, (name, description) in _SIDED.items()
-    }
+
+def _take_frame(group: Any, context: bpy.types.Context) -> None:
+    """Whoever asks for a frame means the one that is seen."""
+    if group.reference_pose == "FRAME" and context.scene is not None:
+        group.reference_frame = context.scene.frame_current
+
+
+_REFERENCE: Final = {
+    "reference_pose": props.EnumProperty(
+        name="Reference Pose",
+        description="Where it is found how each bone lies when the body stands upright. In this "
+        "pose bodies are compared: neither rest pose nor bone axes of a file change a splice",
+        items=REFERENCE_POSES,
+        update=_take_frame,
+    ),
+    "reference_frame": props.IntProperty(
+        name="Frame", description="Frame of the action in which the body stands upright", default=1
+    ),
+}
+
+
+class OCTO_MOTION_PG_landmarks(bpy.types.PropertyGroup):
+    """One bone name for each landmark, empty where the rig has none; and how the body stands."""
+
+    __annotations__ = (
+        _MIDDLE
+        | _REFERENCE
+        | {
+            f"{part}_{side[0]}": _bone(f"{side.capitalize()} {name}", description.format(side))
+            for side in ("left", "right")
+            for part, (name, description) in _SIDED.items()
+        }
+    )
 
 
 PROPERTIES: Final = {each: each.replace(".", "_").lower() for each in LANDMARKS}
@@ -65,7 +96,23 @@ def title(landmark: str) -> str:
 def read_landmarks(group: Any) -> Landmarks:
     """The table as core's landmarks, whether the bones exist or not."""
     bones = {each: getattr(group, name) for each, name in PROPERTIES.items()}
-    return Landmarks({each: bone for each, bone in bones.items() if bone})
+    return Landmarks({each: bone for each, bone in bones.items() if bone}, _reference(group))
+
+
+def _reference(group: Any) -> ReferenceMoment:
+    """Where the table says the reference pose is to be found."""
+    if group.reference_pose == "FRAME":
+        return float(group.reference_frame)
+    return "rest" if group.reference_pose == "REST" else ""
+
+
+def write_reference(group: Any, reference: ReferenceMoment) -> None:
+    """Set where the reference pose is found."""
+    if isinstance(reference, str):
+        group.reference_pose = "REST" if reference else "FOUND"
+    else:
+        group.reference_pose = "FRAME"
+        group.reference_frame = round(reference)
 
 
 def write_landmarks(group: Any, bones: Mapping[str, str]) -> None:

@@ -61,7 +61,7 @@ from ...core.splicing.transfer import (
 )
 from ..declared_settings import plain
 from .bodies import known_landmarks
-from .properties import splicing_settings, write_landmarks
+from .properties import splicing_settings, write_landmarks, write_reference
 from .timing_settings import read_timing, read_weight
 
 _FINEST: Final = 4
@@ -508,6 +508,7 @@ def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
     if stack.base.found and stack.base.landmarks is not None:
         # What was used is what the table shows from now on.
         write_landmarks(settings.landmarks, stack.base.landmarks.bones)
+        write_reference(settings.landmarks, stack.base.landmarks.reference)
     warnings = list(_warnings(stack, settings.splices))
     if stack.base.clip.cyclic and not cyclic:
         warnings.append(

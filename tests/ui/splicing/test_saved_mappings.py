@@ -169,15 +169,41 @@ def test_a_name_of_no_use_is_refused(name: str, reason: str) -> None:
         bpy.ops.octo_motion.mapping_save(name=name)
 
 
+@pytest.mark.parametrize("where", ["REST", "FRAME", "FOUND"])
+def test_where_the_reference_pose_is_found_is_kept_with_the_mapping(where: str) -> None:
+    armature = saved_doll()
+    fill(armature, SWAPPED)
+    table: Any = splicing_settings(armature).landmarks
+    bpy.context.scene.frame_set(7)
+    table.reference_pose = where
+    click("mapping_save", name="Doll", overwrite=True)
+    for name in ("mapping_load", "map_skeleton"):
+        other: Any = splicing_settings(make_humanoid(number_name)).landmarks
+        click(name, **({"name": "Doll"} if name == "mapping_load" else {}))
+        assert other.reference_pose == where
+        assert where != "FRAME" or other.reference_frame == 7
+
+
+def test_a_reference_pose_that_a_file_cannot_mean_is_as_found() -> None:
+    saved_doll()
+    (path,) = own_folder("mappings").glob("*.json")
+    for odd in ("anything", True, None, [1]):
+        content = json.loads(path.read_text(encoding="utf-8")) | {"reference_pose": odd}
+        path.write_text(json.dumps(content), encoding="utf-8")
+        other: Any = splicing_settings(make_humanoid(number_name)).landmarks
+        click("map_skeleton")
+        assert other.reference_pose == "FOUND"
+
+
 def test_saved_again_a_file_keeps_what_others_have_put_into_it() -> None:
     armature = saved_doll()
     (path,) = own_folder("mappings").glob("*.json")
-    content = json.loads(path.read_text(encoding="utf-8")) | {"reference_pose": "frame 3"}
+    content = json.loads(path.read_text(encoding="utf-8")) | {"colour": "blue"}
     path.write_text(json.dumps(content), encoding="utf-8")
     fill(armature, SWAPPED | {"neck": ""})
     click("mapping_save", name="Doll", overwrite=True)
     again = json.loads(path.read_text(encoding="utf-8"))
-    assert again["reference_pose"] == "frame 3"
+    assert again["colour"] == "blue"
     assert "neck" not in again["landmarks"]
 
 

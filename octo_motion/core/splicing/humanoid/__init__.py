@@ -12,7 +12,15 @@ from .correspondence import (
     same_build,
 )
 from .counterparts import mirror_images, opposite
-from .landmarks import LANDMARKS, MIDDLE, OPTIONAL, SIDED, Landmarks, mirrored
+from .landmarks import (
+    LANDMARKS,
+    MIDDLE,
+    OPTIONAL,
+    SIDED,
+    Landmarks,
+    ReferenceMoment,
+    mirrored,
+)
 from .mapping import map_skeleton
 from .saved_mapping import (
     SavedMapping,
@@ -29,6 +37,7 @@ __all__ = [
     "SIDED",
     "Correspondence",
     "Landmarks",
+    "ReferenceMoment",
     "SavedMapping",
     "chain_length",
     "damaged_mapping",

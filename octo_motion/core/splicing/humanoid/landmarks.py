@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Literal
 
 MIDDLE: Final = ("hips", "spine", "chest", "neck", "head")
 """On the body's mid plane, from the pelvis up. ``spine`` is the lowest bone above the pelvis that
@@ -34,12 +34,18 @@ OPTIONAL: Final = frozenset({"clavicle.L", "clavicle.R", "toe.L", "toe.R", "neck
 """What some rigs do not have; all else is required."""
 
 
+ReferenceMoment = Literal["", "rest"] | float
+"""Where a body's reference pose is found: in all of its clip, at rest, or at a frame of it."""
+
+
 @dataclass(frozen=True)
 class Landmarks:
     """Which bone is which. A bone stands for the joint at its head."""
 
     bones: Mapping[str, str]
     """Bone name by landmark; optional ones may be missing."""
+    reference: ReferenceMoment = ""
+    """Where the pose is found in which this body is compared with others."""
 
     def __getitem__(self, landmark: str) -> str:
         """Name of a landmark's bone; KeyError if the rig has none."""

@@ -13,6 +13,7 @@ from .parts import (
     part_bones,
     part_named,
 )
+from .reference_pose import ReferencePose, find_reference_pose, reference_doubts
 from .retarget import MappedClip
 from .splice import LimbGoal, Reference, Splice, SpliceError, SplicePreview, build_splices, numbered
 from .timing_suggestions import Suggestion, suggest_timings
@@ -26,6 +27,7 @@ __all__ = [
     "Part",
     "PartKind",
     "Reference",
+    "ReferencePose",
     "SeenFrom",
     "Splice",
     "SpliceError",
@@ -35,10 +37,12 @@ __all__ = [
     "bones_beneath",
     "build_splices",
     "chain_part",
+    "find_reference_pose",
     "numbered",
     "opposite_part",
     "part_bones",
     "part_named",
+    "reference_doubts",
     "rests_standing",
     "retarget_clip",
     "suggest_timings",

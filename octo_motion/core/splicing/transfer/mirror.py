@@ -53,7 +53,7 @@ def mirrored_clip(clip: Clip, landmarks: Landmarks | None) -> tuple[Clip, Landma
         opposite(landmark): _image_name(clip.skeleton, images, bone)
         for landmark, bone in landmarks.bones.items()
     }
-    return result, Landmarks(bones)
+    return result, Landmarks(bones, landmarks.reference)
 
 
 def mirror_name(skeleton: Skeleton, landmarks: Landmarks | None, bone: str) -> str:

@@ -15,13 +15,14 @@ where that is a pose of this body: how a hand without fingers is turned about it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from ...rotations import (
+    IDENTITY,
     Floats,
     angle_between,
     conjugate,
@@ -70,6 +71,9 @@ _FEWEST: Final = 4
 _UPRIGHT: Final = float(np.cos(np.radians(35.0)))
 """Cosine of how far off the vertical people may stand on average, and that is still up."""
 
+_DOUBTFUL: Final = 0.2
+"""Weight of a moment below which nobody may be said to stand."""
+
 _RIGID: Final = 2e-3
 """Of the body's size: what a joint may move against a bone and count as fixed to it."""
 
@@ -117,9 +121,21 @@ def find_reference_pose(
     } <= {name for name, bone in landmarks.bones.items() if bone in clip.skeleton.index}:
         return None
     try:
-        return _Finder(clip, landmarks).pose(fingers=fingers)
+        return _Finder(_told_by(clip, landmarks), landmarks).pose(fingers=fingers)
     except _NoFrameError:
         return None
+
+
+def _told_by(clip: Clip, landmarks: Landmarks) -> Clip:
+    """What of a clip the reference pose is found from: all, its rest pose, or one frame."""
+    moment = landmarks.reference
+    if moment == "":
+        return clip
+    if moment == "rest":
+        one = clip.taken([0])
+        at_rest = np.broadcast_to(IDENTITY, one.rotations.shape)
+        return replace(one, rotations=at_rest, locations=np.zeros(one.locations.shape))
+    return clip.taken([int(np.abs(clip.frames - moment).argmin())])
 
 
 def standing_up(clip: Clip, landmarks: Landmarks) -> Floats:
@@ -133,6 +149,14 @@ def standing_up(clip: Clip, landmarks: Landmarks) -> Floats:
     except (_NoFrameError, KeyError):
         return up
     return up if up @ found > _UPRIGHT else found
+
+
+def reference_doubts(clip: Clip, landmarks: Landmarks) -> list[str]:
+    """What a clip does not tell of how its body lies: sentences that name landmarks."""
+    try:
+        return _Finder(_told_by(clip, landmarks), landmarks).doubts()
+    except (_NoFrameError, KeyError):
+        return []
 
 
 class _NoFrameError(Exception):
@@ -174,6 +198,49 @@ class _Finder:
     def upward(self) -> Floats:
         """(3,) from feet to head of who stands."""
         return robust_direction(self._upward, self._standing)
+
+    def doubts(self) -> list[str]:
+        """What the moments do not tell, or tell in two ways."""
+        found = []
+        if self._standing.max() < _DOUBTFUL:
+            found.append(
+                "Nobody stands here: which way is up may be wrong. Choose a frame in which the "
+                "body stands (Reference Pose, Frame)."
+            )
+        across = [
+            self._joints(f"{joint}.L") - self._joints(f"{joint}.R")
+            for joint in ("thigh", "upper_arm")
+        ]
+        if np.median(dot(*across)) < 0.0:
+            found.append("Arms and legs are on opposite sides: look at Upper Arm and Thigh.")
+        elif self._points_backwards(across[0]):
+            found.append("The toes point backwards: left and right may be exchanged (Thigh, Toes).")
+        for (root, middle, end), *_ in _LIMBS:
+            for side, word in (("L", "left"), ("R", "right")):
+                names = [f"{each}.{side}" for each in (root, middle, end)]
+                if all(each in self._bones for each in names) and self._always_straight(names):
+                    what = middle.replace("_", " ")
+                    found.append(
+                        f"The {word} {what} is always straight: how the limb is turned about "
+                        "itself is as if it had swung there."
+                    )
+        return found
+
+    def _points_backwards(self, left: Floats) -> bool:
+        """Whether toes lie behind their feet."""
+        forward = cross(left, self._upward)
+        ways = [
+            dot(normalized(self._joints(f"toe.{side}") - self._joints(f"foot.{side}")), forward)
+            for side in "LR"
+            if {f"toe.{side}", f"foot.{side}"} <= self._bones.keys()
+        ]
+        return bool(ways) and float(np.median(ways)) < 0.0
+
+    def _always_straight(self, names: Sequence[str]) -> bool:
+        root, middle, end = (self._joints(each) for each in names)
+        upper, lower = normalized(middle - root), normalized(end - middle)
+        bend = np.arctan2(_lengths(cross(upper, lower)), dot(upper, lower))
+        return bool(np.quantile(bend, 0.9) < _BENT[0])
 
     def _how_standing(self) -> Floats:
         """(moments,) weights: how much each says of where up is."""

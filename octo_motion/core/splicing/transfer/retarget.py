@@ -138,7 +138,8 @@ def compared(base: MappedClip, splice: MappedClip) -> tuple[MappedClip, MappedCl
     if base.landmarks is None or splice.landmarks is None:
         return base, splice
     marks = base.landmarks, splice.landmarks
-    if rest_alike(base.skeleton, splice.skeleton, marks):
+    asked = any(each.reference != "" for each in marks)
+    if not asked and rest_alike(base.skeleton, splice.skeleton, marks):
         return base, splice
     fingers = any(
         has_fingers(each.clip, known) for each, known in zip((base, splice), marks, strict=True)
