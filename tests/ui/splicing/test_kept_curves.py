@@ -370,3 +370,41 @@ def test_a_recorded_walk_onto_itself_plays_the_same_between_frames(
     OPERATORS.splice_build()
     assert walk.animation_data.action != base
     assert apart(before, played(walk, moments)) < 1e-5
+
+
+def hand_in_chest(armature: Any, names: tuple[str, str], frames: Iterable[float]) -> np.ndarray:
+    """(frames, 3) where a hand is, seen from the chest, as Blender plays it."""
+    found = []
+    for frame in frames:
+        whole = int(np.floor(frame))
+        bpy.context.scene.frame_set(whole, subframe=float(frame - whole))
+        chest, hand = (armature.pose.bones[name] for name in names)
+        found.append(chest.matrix.inverted() @ hand.head)
+    return np.array(found)
+
+
+def test_of_a_recording_of_more_frames_per_second_the_hand_is_right_between_frames(
+    shared_data: SharedData,
+) -> None:
+    """120 per second in a scene of 24: most of its keys are between frames."""
+    bpy.context.scene.render.fps = 24
+    found: list[Any] = []
+    for name in ("12_01_walk.bvh", "12_03_walk.bvh"):
+        path = shared_data(f"cmu/{name}")
+        bpy.ops.import_anim.bvh(filepath=str(path), update_scene_fps=False, use_fps_scale=True)
+        found.append(bpy.context.object)
+    source, hero = found
+    select(source, hero)
+    moments = np.arange(2.0, 60.0, 0.25)
+    bones = "Spine1", "RightHand"
+    wanted = hand_in_chest(source, bones, moments)
+    before = hand_in_chest(hero, bones, moments)
+    OPERATORS.splice_add(part="RIGHT_ARM", source=source.name)
+    (item,) = stack_of(hero).splices
+    item.mode, item.base_start, item.splice_start = "EXACT", 1.0, 1.0
+    item.ease_in = item.ease_out = 0.0
+    OPERATORS.splice_build()
+    height = np.ptp(played(hero, [1.0])[0, ..., 2])
+    off = np.linalg.norm(hand_in_chest(hero, bones, moments) - wanted, axis=-1)
+    assert np.linalg.norm(before - wanted, axis=-1).max() > 0.02 * height
+    assert off.max() < 1e-3 * height
