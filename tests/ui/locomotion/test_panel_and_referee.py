@@ -44,6 +44,32 @@ def test_the_panel_and_the_referee_agree(name: str, add_on: Any) -> None:  # noq
         assert told["DEPTH"].value > 0.2
 
 
+@pytest.mark.parametrize(("name", "ground"), [("swim", "plane"), ("idle", "slope")])
+def test_arms_in_a_ground_that_nothing_holds_are_told(
+    name: str,
+    ground: str,
+    add_on: Any,  # noqa: ARG001
+) -> None:
+    scene = build(name, ground)
+    told = {each.kind: each for each in scene.armature.octo_motion.locomotion.figures}
+    played = record(scene.armature, moments(scene.start, scene.end))
+    length, surface = referee.arm_length(played, scene.arms), Surface.of(scene.ground)
+    sink = referee.sink(played, surface, length).deepest
+    assert sink.value > 0.1
+    assert told["DEPTH"].value == pytest.approx(sink.value, rel=0.1, abs=0.002)
+
+
+def test_beyond_the_edge_of_a_ground_there_is_no_depth(add_on: Any) -> None:  # noqa: ARG001
+    scene = build("swim", "plane")
+    settings = scene.armature.octo_motion.locomotion
+    # What is left of it lies far aside.
+    for vertex in scene.ground.data.vertices:
+        vertex.co.x += 100.0
+    scene.ground.data.update()
+    bpy.ops.octo_motion.generate_locomotion()
+    assert {each.kind: each.value for each in settings.figures}["DEPTH"] == 0.0
+
+
 def test_a_cliff_that_breaks_the_walk_is_told_as_the_referee_sees_it(
     add_on: Any,  # noqa: ARG001
     monkeypatch: pytest.MonkeyPatch,

@@ -141,6 +141,7 @@ def sample_ground(
     spacing: float,
     headroom: float,
     content: bytes | None = None,
+    bare: float | None = None,
 ) -> HeightField:
     """The ground that faces make along a path.
 
@@ -157,6 +158,7 @@ def sample_ground(
         headroom: metres.
         content: a key of the faces' content, where it is known, so that they need not be looked at
             again for another path.
+        bare: how high it is where there are no faces; without, as high as they are beside it.
 
     Raises:
         GroundError: there are no faces, or none under some point of the path.
@@ -181,13 +183,15 @@ def sample_ground(
         coarse = _near_path(grid, path, reach)
         heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
     inside = np.flatnonzero(needed)
-    bare = ~np.isfinite(heights[_nearest(grid, path[inside])])
-    if np.any(bare):
-        share = float(np.flatnonzero(bare)[0]) / max(len(inside) - 1, 1)
+    missing = ~np.isfinite(heights[_nearest(grid, path[inside])])
+    if np.any(missing):
+        share = float(np.flatnonzero(missing)[0]) / max(len(inside) - 1, 1)
         raise GroundError(
             f"The route leaves the ground after {100.0 * share:.0f} % of its length.",
             "Move the route, or make the ground larger.",
         )
+    if bare is not None:
+        return HeightField(grid.origin, spacing, np.where(np.isfinite(heights), heights, bare))
     return single or HeightField(grid.origin, spacing, _filled(heights))
 
 

@@ -184,6 +184,8 @@ class Measured:
     of one that goes along. None where it does."""
     played: Played | None = None
     """What Blender plays, none where that is what was computed."""
+    floor: Ground | None = None
+    """What lies below where nothing is stood on, or in place; none where there is nothing."""
 
     @property
     def moments(self) -> Floats:
@@ -211,17 +213,17 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
         arm = _moving(measured, number)
         if len(measured.frames) > 1:
             keep("TURN", change(arm.orientations[::2], measured.frames), name)
+        length = measured.arms[number].length * measured.scale
+        if measured.floor is not None:
+            below = _below(measured, number, arm, arm.joints, measured.floor)
+            deepest = _beside_walls(below, arm.joints[:, 1:] / length, measured.floor, length)
+            keep("DEPTH", deepest, name, per_frame=2)
         if measured.ground is None:
             continue
-        length = measured.arms[number].length * measured.scale
         going = _going(measured, arm.joints)
         lying, cycles = _lying(measured, number)
         keep("SLIP", slip(going[:, None], lying, cycles, np.array([length])), name, per_frame=2)
-        below = measured.ground.height(going[:, 1:]) - going[:, 1:, 2]
-        if measured.skins is not None:
-            skin, scale = measured.skins[number], measured.scale
-            below = _skin_below(below, skin, arm.orientations, scale, TOLD["DEPTH"] * length)
-        below /= length
+        below = _below(measured, number, arm, going, measured.ground)
         deepest = _beside_walls(below, going[:, 1:] / length, measured.ground, length)
         keep("DEPTH", deepest, name, per_frame=2)
         shown = arm.joints[::2] / length
@@ -318,6 +320,20 @@ def _moving(measured: Measured, number: int) -> _ArmMoving:
     locations, orientations = _places(measured, going=False)
     joints = locations[:, None] + rotate(orientations[:, None], own)
     return _ArmMoving(joints, multiply(orientations[:, None], turned), strains[::2])
+
+
+def _below(
+    measured: Measured, number: int, arm: _ArmMoving, joints: Floats, ground: Ground
+) -> Floats:
+    """Arm lengths (moments, joints − 1) that an arm's skin is below a ground, of all joints
+    (moments, joints, 3) but the root.
+    """
+    length = measured.arms[number].length * measured.scale
+    below = ground.height(joints[:, 1:]) - joints[:, 1:, 2]
+    if measured.skins is not None:
+        skin, scale = measured.skins[number], measured.scale
+        below = _skin_below(below, skin, arm.orientations, scale, TOLD["DEPTH"] * length)
+    return below / length
 
 
 def _skin_below(

@@ -97,6 +97,18 @@ class GroundJob:
     warnings: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """What lies below a body that holds on to nothing there: one that swims, or is in place."""
+
+    skins: Sequence[ArmSkin]
+    """Of each arm."""
+    triangles: Floats
+    """(triangles, 3, 3) world."""
+    content: bytes
+    """A key of what they are."""
+
+
 @dataclass(frozen=True)
 class ChangeAt:
     """A place where the gait changes."""
@@ -162,6 +174,8 @@ class MotionJob:
     """What arms reach for."""
     tolerances: Tolerances | None
     """How far few keys may be off, distances in arm lengths; none for a key on every frame."""
+    floor: Floor | None = None
+    """What lies below where no gait holds on to it, none where nothing does; for figures alone."""
     live: bool = False
     """Whether it is to be quick: the same motion with a key on every frame, and without figures of
     how good it is."""

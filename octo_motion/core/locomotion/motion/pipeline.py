@@ -22,6 +22,7 @@ from ..path import plan_travel
 from ..reaching import Carried, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .few_keys import Motion, measure_keyed, reduced
+from .floor import floor_under
 from .job import MotionJob, Tolerances
 from .planning import MotionPlan, frames_of_arms, plan_motion
 from .segments import SegmentedMotion
@@ -294,6 +295,7 @@ def _measured(
     if job.live:
         return None, overlaps
     poses = Poses(arms.rotations, arms.strains, *going)
+    below = plan.standing[0].job if plan.standing else job.floor
     measured = Measured(
         frames=plan.schedule.frames,
         arms=frames_of_arms(creature.skeleton, creature.arms, creature.body),
@@ -307,9 +309,10 @@ def _measured(
         separation=separation,
         every=every,
         halfway=halfway_automatic(poses, cyclic=job.repeats),
-        skins=plan.standing[0].job.skins if plan.standing else None,
+        skins=below.skins if below is not None else None,
         rate=job.timing.rate,
         stays=(keyed[0][0], keyed[1][0]) if job.in_place else None,
+        floor=floor_under(job, keyed, plan.first.poser.arm_length * creature.scale),
     )
     return measured, overlaps
 

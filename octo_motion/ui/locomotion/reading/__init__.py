@@ -3,6 +3,7 @@
 
 from .motion import (
     read_changes,
+    read_floor,
     read_gaits,
     read_ground,
     read_reaches,
@@ -33,6 +34,7 @@ __all__ = [
     "previous_action",
     "read_changes",
     "read_creature",
+    "read_floor",
     "read_gaits",
     "read_ground",
     "read_reaches",

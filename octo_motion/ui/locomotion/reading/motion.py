@@ -22,7 +22,7 @@ from ....blender.scene import (
     read_places,
     read_triangles,
 )
-from ....core.errors import SettingsError
+from ....core.errors import GroundError, SettingsError
 from ....core.keyframes import check_bounds
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.ground import StanceSettings
@@ -30,6 +30,7 @@ from ....core.locomotion.motion import (
     ChangeAt,
     ChangesByHeight,
     Creature,
+    Floor,
     GaitJob,
     GroundJob,
     Timing,
@@ -215,6 +216,28 @@ def read_ground(
         rest_within=ground.rest_within,
         warnings=warnings,
     )
+
+
+def read_floor(
+    settings: OCTO_MOTION_PG_locomotion,
+    armature: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    creature: Creature,
+    *,
+    walks: bool,
+) -> Floor | None:
+    """The ground where nothing holds on to it: below one that swims, or about one that stays; none
+    where there is none.
+    """
+    ground, stays = settings.ground, settings.travel_on == "NONE"
+    if not ground.use or ground.object is None or (walks and not stays):
+        return None
+    try:
+        triangles, content = read_triangles(ground.object, depsgraph)
+    except GroundError:
+        # Nobody needs it: what is no ground is none to keep off.
+        return None
+    return Floor(arm_skins(armature, creature.at_rest, creature.bones), triangles, content)
 
 
 # --- Reaches of the list: what is reached for, and where that is meanwhile ------------------------
