@@ -171,8 +171,7 @@ def sample_ground(
     low, high = block * np.floor(low / block), block * np.ceil(high / block)
     shape = tuple(int(each) + 1 for each in np.rint((high - low) / spacing))
     grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
-    if content is None:
-        content = content_key(triangles)
+    content = content or content_key(triangles)
     key = content_key(content, grid.origin, spacing, shape)
     lowest, highest = _extents.get(key, lambda: _extent(triangles, grid))
     single = _single_known.get(key, lambda: _single(grid, lowest, highest))
