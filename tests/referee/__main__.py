@@ -69,7 +69,7 @@ def main() -> int:
     """Measure what the command line asks for, and print the tables."""
     wanted = _arguments()
     if wanted.scene:
-        print("\n" + json.dumps(measured(wanted.scene, pops=not wanted.no_pops)))
+        print("\n" + json.dumps(_found(wanted)))
         sys.stdout.flush()
         # Blender 4.5 may wait for ever at its own end.
         os._exit(0)
@@ -84,6 +84,13 @@ def main() -> int:
         LIMITS.write_text(json.dumps(_tightened(limits, rows), indent=1, sort_keys=True) + "\n")
     print(f"\n{beyond} figures are beyond their limits." if beyond else "\nAll within limits.")
     return int(beyond > 0)
+
+
+def _found(wanted: argparse.Namespace) -> Row:
+    """What is asked of a scene."""
+    if wanted.pops_alone:
+        return popping(wanted.scene)
+    return measured(wanted.scene, pops=not wanted.no_pops)
 
 
 def limit_of(value: float) -> float:
@@ -134,6 +141,23 @@ def measured(name: str, *, pops: bool = False) -> Row:
     return {key: asdict(figures[key]) for key in creatures.UNITS if key in figures}
 
 
+def popping(name: str) -> Row:
+    """Whether a creature's scene pops, by its name in the tables."""
+    import bpy
+
+    import octo_motion
+
+    from . import creatures
+
+    if not hasattr(bpy.types.Object, "octo_motion"):
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        octo_motion.register()
+    kind, setup, ground = name.split("/")
+    rig = RIGS[kind]
+    file = data_folder() / rig if rig is not None else None
+    return {"pop": asdict(creatures.continuity(setup, ground, file))}
+
+
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="make referee ARGS=…", description=__doc__)
     parser.add_argument("only", nargs="*", help="scenes that have these words, as 'walk/stairs'")
@@ -141,6 +165,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--json", metavar="FILE", help="keep all figures, with frame and bone")
     parser.add_argument("--write", action="store_true", help="keep what is better as the new limit")
     parser.add_argument("--no-pops", action="store_true", help="without other frame rates: quicker")
+    parser.add_argument("--pops-alone", action="store_true", help="other frame rates and no more")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--scene", help=argparse.SUPPRESS)
     return parser.parse_args()
@@ -164,6 +189,8 @@ def _scenes(wanted: argparse.Namespace) -> list[str]:
         print("Rigs and clips of others are not here; $OCTO_MOTION_DATA names their folder.")
     if wanted.short:
         names = list(SHORT)
+    if wanted.pops_alone:
+        names = [name for name in names if name.split("/")[0] in RIGS]
     if wanted.only:
         names = [name for name in names if any(word in name for word in wanted.only)]
     return names
@@ -171,7 +198,7 @@ def _scenes(wanted: argparse.Namespace) -> list[str]:
 
 def _process(name: str, wanted: argparse.Namespace) -> Row:
     command = [sys.executable, "-m", "tests.referee", "--scene", name]
-    command += ["--no-pops"] * wanted.no_pops
+    command += ["--no-pops"] * wanted.no_pops + ["--pops-alone"] * wanted.pops_alone
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
     print(".", end="", file=sys.stderr, flush=True)
     if done.returncode:

@@ -14,7 +14,7 @@ from .recording import Recording, moments, record
 from .scenes import Scene, build
 from .surface import Surface
 
-RATES = (24, 48, 96, 192)
+RATES = (24, 48, 96)
 """Frames a second at which the same motion is made, to see whether it pops."""
 
 UNITS = {

@@ -84,7 +84,12 @@ def record(armature: bpy.types.Object, frames: Floats, *, with_skin: bool = True
     names = [bone.name for bone in bones]
     rows = {name: row for row, name in enumerate(names)}
     parents = np.array([_parent(bone, rows) for bone in bones])
-    meshes = [each for each in bpy.data.objects if with_skin and _deforms(each, armature)]
+    skin = [each for each in bpy.data.objects if _deforms(each, armature)]
+    if not with_skin:
+        # Nobody looks at it: Blender need not deform it at each moment.
+        for mesh in skin:
+            mesh.hide_viewport = True
+    meshes = skin if with_skin else []
     heads, tails, turns = [], [], []
     points: list[list[Floats]] = [[] for _ in meshes]
     for frame in frames:

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from tests.referee.__main__ import LIMITS, SHORT, beyond_limits, measured
+from tests.referee.__main__ import LIMITS, SHORT, beyond_limits, measured, popping
 
 # Blender's importer leaves its files open.
 pytestmark = [
@@ -22,3 +22,11 @@ def test_what_plays_is_within_the_limits(scene: str) -> None:
     limits = json.loads(LIMITS.read_text())
     assert row.keys() <= limits[scene].keys()
     assert {key: row[key] for key in beyond_limits(scene, row, limits)} == {}
+
+
+@pytest.mark.parametrize("scene", ["octopus/walk/plane", "octopus/idle/plane"])
+def test_what_plays_pops_no_more_than_it_may(scene: str) -> None:
+    row = popping(scene)
+    limits = json.loads(LIMITS.read_text())
+    assert "pop" in limits[scene]
+    assert beyond_limits(scene, row, limits) == []
