@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.animation.actions import MARK
+from octo_motion.ui.splicing.retargeting import RetargetSession, file_clip
+from octo_motion.ui.splicing.stack import ClipReader
 from tests.referee.recording import Floats, Recording, moments, record
 from tests.ui.rig import scene_contents
 from tests.ui.splicing.walkers import BODIES, CYCLE, Body, holds, make_body, walk
@@ -307,3 +309,20 @@ def test_location_keys_of_a_part_are_the_clips() -> None:
     recording = record(base, moments(5, 15), with_skin=False)
     arm = joint(recording, "hand.R") - joint(recording, "forearm.R")
     assert np.ptp(np.linalg.norm(arm, axis=1)) < 1e-4
+
+
+def test_what_is_stopped_leaves_nothing_behind() -> None:
+    hero = make_body("Hero", BODIES["no toes"])
+    select(hero)
+    before = set(bpy.data.objects), set(bpy.data.actions), set(bpy.data.armatures)
+    reader = ClipReader()
+    clips = [
+        (name, file_clip("Hero", BVH / f"{name}.bvh", 1, reader)) for name in ("walk", "punch")
+    ]
+    session = RetargetSession(hero, clips)
+    steps = session.steps()
+    next(steps)
+    # Esc: nobody goes on.
+    steps.close()
+    assert (set(bpy.data.objects), set(bpy.data.actions), set(bpy.data.armatures)) == before
+    assert hero.animation_data is None or hero.animation_data.action is None
