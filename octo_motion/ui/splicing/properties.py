@@ -216,6 +216,10 @@ def _is_armature(_: Any, candidate: bpy.types.Object) -> bool:
     return candidate.type == "ARMATURE"
 
 
+def _is_mesh(_: Any, candidate: bpy.types.Object) -> bool:
+    return candidate.type == "MESH"
+
+
 def _slot(description: str) -> Any:
     return props.StringProperty(name="Slot", description=description)
 
@@ -370,6 +374,13 @@ class SpliceItem(bpy.types.PropertyGroup):
         "the base: legs of other proportions would slide",
         default=True,
     )
+    ground: props.PointerProperty(
+        name="Ground",
+        description="Mesh on which locked feet stand. If empty it is level, at the height at which "
+        "the base stands",
+        type=bpy.types.Object,
+        poll=_is_mesh,
+    )
     weight: props.FloatProperty(
         name="Weight",
         description="How much of the splice is seen: 0 is the base, 1 the splice. It may have keys",
@@ -392,10 +403,6 @@ class SpliceItem(bpy.types.PropertyGroup):
         "Reference Frame", "Frame of the clip in which it does nothing", default=1.0
     )
     mute: props.BoolProperty(name="Mute", description="Leave this splice out")
-
-
-def _is_mesh(_: Any, candidate: bpy.types.Object) -> bool:
-    return candidate.type == "MESH"
 
 
 class OCTO_MOTION_PG_retarget(bpy.types.PropertyGroup):

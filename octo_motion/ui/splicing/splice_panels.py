@@ -108,6 +108,9 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
             lock = layout.column()
             lock.active = item.with_travel and not additive
             lock.prop(item, "foot_lock")
+            ground = lock.column()
+            ground.active = item.foot_lock
+            ground.prop(item, "ground")
         if len(kind.seen_from) > 1:
             seen = layout.row()
             seen.active = additive or not (kind.travels and item.with_travel)

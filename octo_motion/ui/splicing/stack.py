@@ -31,6 +31,7 @@ from ...blender.animation import (
 )
 from ...blender.rig import armature_data
 from ...core.errors import ClipError, OctoMotionError, WriteError
+from ...core.locomotion.ground import Ground
 from ...core.splicing.clip import (
     Clip,
     average_pose,
@@ -61,6 +62,7 @@ from ...core.splicing.transfer import (
 )
 from ..declared_settings import plain
 from .bodies import known_landmarks
+from .mesh_ground import mesh_ground
 from .properties import splicing_settings, write_landmarks, write_reference
 from .timing_settings import read_timing, read_weight
 
@@ -378,6 +380,13 @@ def _check_mixing(armature: bpy.types.Object) -> None:
         )
 
 
+def _ground(item: Any, part: Part) -> Ground | None:
+    """What locked feet stand on, if it is a mesh."""
+    if item.ground is None or not (item.foot_lock and _travels(item, part)):
+        return None
+    return mesh_ground(item.ground)
+
+
 def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
     timing = read_timing(splicing_settings(item.id_data), item, base.clip)
     source = reader.item(item)
@@ -390,6 +399,7 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
         goal=cast("LimbGoal", item.mode.lower()),
         travel=_travels(item, part),
         foot_lock=item.foot_lock,
+        ground=_ground(item, part),
         clavicle=item.with_clavicle,
         seen_from=cast("SeenFrom", "" if item.seen_from == "AUTO" else item.seen_from.lower()),
         mirror=item.mirror,

@@ -160,16 +160,40 @@ def test_a_body_goes_from_where_its_armature_stands_and_faces() -> None:
     assert way[0] > 0.9 * np.linalg.norm(way)
 
 
-def test_feet_stand_on_a_mesh() -> None:
-    _, hero = walker_and("short legs, wide hips")
-    body = BODIES["short legs, wide hips"]
+def slope() -> Any:
+    """A mesh that rises the way the walkers go."""
     points = [(x, y, -0.15 * y) for x in (-3.0, 3.0) for y in (-6.0, 3.0)]
     mesh = bpy.data.meshes.new("Slope")
     mesh.from_pydata(points, [], [(0, 1, 3, 2)])
     ground = bpy.data.objects.new("Slope", mesh)
     bpy.context.scene.collection.objects.link(ground)
-    hero.octo_motion.splicing.retarget.ground = ground
+    return ground
+
+
+def test_feet_stand_on_a_mesh() -> None:
+    _, hero = walker_and("short legs, wide hips")
+    body = BODIES["short legs, wide hips"]
+    hero.octo_motion.splicing.retarget.ground = slope()
     OPERATORS.retarget()
+    recording = played(hero)
+    assert drifts(recording, body) < 0.005
+    for side in "LR":
+        ankle = joint(recording, f"foot.{side}")
+        for rows in holds(recording.frames, side, ball=False):
+            above = ankle[rows, 2] + 0.15 * ankle[rows, 1]
+            assert np.abs(above - body.ankle).max() < 0.03 * body.leg
+
+
+def test_feet_of_a_splice_stand_on_a_mesh() -> None:
+    source, hero = walker_and("short legs, wide hips")
+    body = BODIES["short legs, wide hips"]
+    walk(hero, body)
+    select(source, hero)
+    OPERATORS.splice_add(part="LEGS")
+    item = hero.octo_motion.splicing.splices[0]
+    item.with_travel, item.ease_in, item.ease_out, item.after = True, 0, 0, "HOLD"
+    item.ground = slope()
+    OPERATORS.splice_build()
     recording = played(hero)
     assert drifts(recording, body) < 0.005
     for side in "LR":

@@ -40,6 +40,7 @@ from ..clip import (
     window_middle,
 )
 from ..humanoid import Landmarks
+from .foot_lock import GroundHeight
 from .leg_travel import LegTravel, ground_height
 from .mirror import mirror_name, mirrored_clip
 from .parts import Part, SeenFrom
@@ -78,6 +79,8 @@ class Splice:
     is the shoulder."""
     foot_lock: bool = False
     """Whether feet stand where the clip's do, with travel."""
+    ground: GroundHeight | None = None
+    """What they stand on; none for the height at which the base stands."""
     seen_from: SeenFrom = ""
     """From where the part is seen; as usual for it if empty. Legs with travel from the pelvis."""
     weight: tuple[Floats, Floats] | None = None
@@ -208,7 +211,7 @@ class Splicer:
             self._travel = LegTravel(self._retargets[0], ground_height(mapped))
         self._lock = None
         if splice.travel and splice.foot_lock:
-            lock = TravelLock(self._retargets, splice.part.sides)
+            lock = TravelLock(self._retargets, splice.part.sides, splice.ground)
             self._lock = lock if lock.needed else None
 
     def window(self, timing: Timing, moments: Floats | None = None) -> SpliceWindow:

@@ -13,21 +13,25 @@ from ...rotations import Floats, conjugate, rotate
 from ..clip import Clip, SpliceWindow
 from .foot_contacts import (
     FootContacts,
+    Stance,
     ball_places,
     find_contacts,
     find_stance,
     foot_bones,
     own_paths,
 )
-from .foot_lock import Footing, lock_feet, steps_of
+from .foot_lock import Footing, GroundHeight, lock_feet, steps_of
 from .leg_travel import leg_length
-from .retarget import Retarget
+from .retarget import MappedClip, Retarget
 
 SIGHT: Final = 2.0
 """Seconds before and after a frame on which its feet hang, as far as one can see."""
 
 _GAP: Final = 1.5
 """Of the usual step between frames: more is a gap."""
+
+_ANKLE: Final = 0.4
+"""Leg lengths: an ankle higher above where its object stands does not stand there."""
 
 _ALIKE: Final = 1e-3
 """By how much legs may differ in length and travel as far."""
@@ -39,22 +43,28 @@ class TravelLock:
     Args:
         retargets: of the legs, or of one of them.
         sides: on which they are, "L" and "R".
+        ground: what feet stand on; none for the height at which the base stands.
 
     Raises:
         ClipError: a landmark is missing.
     """
 
-    def __init__(self, retargets: Sequence[Retarget], sides: Sequence[str]) -> None:
+    def __init__(
+        self, retargets: Sequence[Retarget], sides: Sequence[str], ground: GroundHeight | None
+    ) -> None:
         base, splice = retargets[0].base, retargets[0].splice
         ratio = size_ratio(retargets[0])
         alike = all(each.match.same_body for each in retargets) and abs(ratio - 1.0) < _ALIKE
-        self.needed = not alike
+        self.needed = not alike or ground is not None
         """Whether there is anything to do: feet of a body like the clip's stand as there."""
-        if alike:
+        if not self.needed:
             return
         self._base = base
         self._balls = answering_balls(retargets, sides)
+        self._ground = ground
         self._stands = find_stance(own_paths(base, self._balls))
+        if ground is not None:
+            self._stands = above_soles(self._stands, base)
         paths = own_paths(splice)
         contacts = find_contacts(paths)
         contacts.held[:, [name not in sides for name in "LR"]] = False
@@ -80,7 +90,8 @@ class TravelLock:
                 FootContacts(self._contacts.held[held]),
                 self._stands,
                 self._steps[held],
-                balls=self._balls,
+                self._ground,
+                self._balls,
             )
             there = acting[chosen]
             locked = lock_feet(self._base, result.taken(there), footing, span.weights[chosen])
@@ -109,3 +120,15 @@ def answering_balls(retargets: Sequence[Retarget], sides: Sequence[str]) -> Floa
             side = "LR".index(name)
             found[side] = size * rotate(conjugate(constant), others[side])
     return found
+
+
+def above_soles(stands: Stance, base: MappedClip) -> Stance:
+    """Heights above the soles, which are where the object is, if that is beneath the feet as usual;
+    otherwise as low as the lowest joint.
+    """
+    floor = float(base.clip.world[0, 2, 3])
+    lowest = min(stands.ankle, stands.ball)
+    leg = leg_length(base) * base.clip.scale
+    if not 0.0 <= lowest - floor < _ANKLE * leg:
+        floor = lowest
+    return Stance(stands.ankle - floor, stands.ball - floor)

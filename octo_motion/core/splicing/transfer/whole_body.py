@@ -26,7 +26,6 @@ from ...smoothing import blurred
 from ..clip import Clip, posture_of, sample_clip
 from ..humanoid import Landmarks, chain_length
 from .foot_contacts import (
-    Stance,
     find_contacts,
     find_stance,
     foot_paths,
@@ -38,7 +37,6 @@ from .leg_travel import (
     body_path,
     check_hips,
     heading,
-    leg_length,
     write_hips,
 )
 from .loop_rounds import Rounds, is_loop
@@ -53,7 +51,7 @@ from .retarget import (
     write_retargeted,
 )
 from .splice import LimbGoal
-from .travel_lock import answering_balls, size_ratio
+from .travel_lock import above_soles, answering_balls, size_ratio
 
 _PARTS: Final = ("legs", "trunk", "left_arm", "right_arm", "head")
 """In the order in which they are put on: each hangs on those before it."""
@@ -67,9 +65,6 @@ _UPRIGHT: Final = 0.85
 
 _FOLLOWED: Final = 0.2
 """Seconds over which the body follows the ground, a third of it to either side."""
-
-_ANKLE: Final = 0.4
-"""Leg lengths: an ankle higher above where its object stands does not stand there."""
 
 _LEVEL: Final = np.array([1.0, 1.0, 0.0])
 
@@ -183,7 +178,7 @@ class _Mover:
         self._balls = answering_balls(retargets[:2], "LR")
         self._stands = find_stance(own_paths(stands, self._balls))
         if settings.ground is not None:
-            self._stands = _above_soles(self._stands, base)
+            self._stands = above_soles(self._stands, base)
         self._width = max(1, round(_FOLLOWED * self._paths.rate))
         check_hips(base.skeleton, retargets[0].frames[0].bone)
 
@@ -245,18 +240,6 @@ class _Mover:
             contacts, self._stands, steps, self._settings.ground, self._balls, cyclic=loops
         )
         return lock_feet(self._base, result, footing)
-
-
-def _above_soles(stands: Stance, base: MappedClip) -> Stance:
-    """Heights above the soles, which are where the object is, if that is beneath the feet as usual;
-    otherwise as low as the lowest joint.
-    """
-    floor = float(base.clip.world[0, 2, 3])
-    lowest = min(stands.ankle, stands.ball)
-    leg = leg_length(base) * base.clip.scale
-    if not 0.0 <= lowest - floor < _ANKLE * leg:
-        floor = lowest
-    return Stance(stands.ankle - floor, stands.ball - floor)
 
 
 def _object_turn(clip: Clip) -> Floats:
