@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...rotations import (
     Floats,
+    angle_between,
     conjugate,
     from_matrix,
     from_rotation_vector,
@@ -27,6 +28,10 @@ from ...skeleton import Skeleton
 
 MOTION_SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
 """Endings of the files from which clips may come."""
+
+
+_CLOSED: Final = 1e-3
+"""Radians by which bones of two poses may be turned otherwise, and the poses be the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +72,11 @@ class Clip:
     def cycle(self) -> float:
         """Frames after which it begins again; infinite if it does not."""
         return float(self.frames[-1] - self.frames[0]) if self.cyclic else np.inf
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether it ends in the pose in which it begins, wherever that stands."""
+        return bool(angle_between(self.rotations[0], self.rotations[-1]).max() < _CLOSED)
 
     def posed(self) -> tuple[Floats, Floats]:
         """World orientations (frames, bones, 4) and head positions (frames, bones, 3)."""
@@ -182,7 +192,8 @@ def sample_clip(
     before, after, share = _between(clip, frames)
     between = share.any()
     seams = np.zeros(len(frames)) if seams is None else seams
-    speeds = np.zeros(len(frames)) if seam_speeds is None else seam_speeds
+    # Who has made a clip end in the pose in which it begins has made a loop.
+    speeds = np.zeros(len(frames)) if seam_speeds is None or clip.closed else seam_speeds
     looped = seams.any()
 
     def rotations(bones: Sequence[int]) -> Floats:

@@ -171,7 +171,7 @@ class LegTravel:
         ends.orientations[begins] = multiply(turn, ends.orientations[begins])
         begun = rotate(turn, ends.places[begins] - first)
         ends.places[begins] = begun + last * _LEVEL + first * _UP
-        seams = span.seams, span.seam_speeds
+        seams = span.seams, span.seam_speeds * (not clip.closed)
         added = seam_turns(ends.orientations, times, *seams)
         shift = seam_shifts(ends.places, times, *seams)
         # Behind the seam as the round that begins there sees it.
