@@ -34,14 +34,12 @@ from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.parts import LEG, PARTS, part_bones
 from octo_motion.core.splicing.transfer.splice import Splice
 from tests.bench.plain_copy import plain_copy
+from tests.bench.splice_joints import degrees_off
 from tests.bench.splice_quality import (
     feet_at_rest,
     foot_slip,
     limb_length,
-    out_of_reach,
-    path_error,
     seams,
-    turn_error,
 )
 from tests.core.splice_bodies import spliced
 
@@ -77,12 +75,10 @@ class Measured:
     part: str
     method: str
     same_skeleton: bool
-    path: list[float]
-    """Distances of hands or feet from where they were seen, in limb lengths, frame by frame."""
-    beyond: list[float]
-    """How much of that no limb of its length can reach, likewise."""
-    turn: list[float]
-    """Of trunk or head: degrees."""
+    off: list[float]
+    """Degrees by which the part points elsewhere than in its clip, frame by frame."""
+    lean: list[float]
+    """Degrees by which the body leans otherwise than it should, likewise."""
     roughness: list[float]
     """Log dimensionless jerk of the rougher source less the result's, for each seam."""
     slip: list[float]
@@ -228,14 +224,13 @@ def measure(base: Take, other: Take) -> list[Measured]:
         splice = Splice(part, other.clip, timing, other.landmarks, travel=part == LEGS)
         for method, make in ways.items():
             result = make(splice)
-            turns = np.degrees(turn_error(result, base.landmarks, splice))
+            off, lean = degrees_off(result, whole, base.landmarks, splice)
             jerks = seams(result, whole, base.landmarks, splice)
             found.append(
                 Measured(
                     *(base.name, other.name, name, method, bool(same)),
-                    path=path_error(result, base.landmarks, splice).ravel().tolist(),
-                    beyond=out_of_reach(result, base.landmarks, splice).ravel().tolist(),
-                    turn=turns.ravel().tolist(),
+                    off=off.ravel().tolist(),
+                    lean=lean.tolist(),
                     roughness=[seam.roughness for seam in jerks],
                     slip=_slip(result, whole, base.landmarks, splice).tolist(),
                 )
@@ -286,12 +281,14 @@ def _lengthened(clip: Clip, seconds: float) -> Clip:
 
 # --- Telling -------------------------------------------------------------------------------------
 
-_HEAD: Final = f"{'':>25} {'pairs':>5} │" + "│".join(f"{name:^42}" for name in METHODS) + "│"
-_COLUMNS: Final = f"{'miss: mean':>11}{'most':>7}{'seam':>7}{'slip mm':>9}{'99 %':>6}  "
+_HEAD: Final = f"{'':>25} {'pairs':>5} │" + "│".join(f"{name:^45}" for name in METHODS) + "│"
+_COLUMNS: Final = f"{'off °':>8}{'99 %':>7}{'lean':>6}{'seam':>7}{'slip mm':>9}{'99 %':>6}  "
 
 _LEGEND: Final = (
-    "miss: arms and legs: distance of hand or foot from where the clip has it, as seen from",
-    "  chest or pelvis, in per cent of the limb's length; trunk and head: degrees",
+    "off: degrees by which shoulder → hand (seen from the chest), thigh → foot (seen as the",
+    "  pelvis faces), hips → neck (likewise) or neck → head (seen from the chest) point elsewhere",
+    "  than in the clip, from joint positions alone: median, and what 99 of 100 frames stay below",
+    "lean: degrees by which hips → neck leans otherwise than it should: 99 of 100 frames",
     "seam: by how much a hand or foot is less smooth where the splice comes and goes than in",
     "  the rougher clip (natural logarithm of the dimensionless jerk; median of all seams, 0 or",
     "  less is as smooth)",
@@ -310,18 +307,12 @@ def _summary(
             if chosen:
                 rows.append({"title": f"{title}, {part}"} | _row(chosen))
     exact = [each for each in results if each.method == "exact"]
-    points = [pair for each in exact for pair in zip(each.path, each.beyond, strict=True)]
-    within = [miss for miss, beyond in points if beyond == 0.0]
-    assert within
     return {
         "blender": bpy.app.version_string,
         "clips": len(takes),
         "pairs": len({(each.base, each.splice) for each in results}),
         "splices": len(exact),
         "rows": rows,
-        "out_of_reach": 100.0 * (1.0 - len(within) / len(points)),
-        "within_most": 100.0 * float(np.percentile(within, 99)),
-        "within_mean": 100.0 * float(np.mean(within)),
         "left_out": list(left_out),
     }
 
@@ -331,13 +322,14 @@ def _row(results: Sequence[Measured]) -> dict[str, Any]:
     row: dict[str, Any] = {"pairs": len({(each.base, each.splice) for each in results})}
     for method in METHODS:
         chosen = [each for each in results if each.method == method]
-        misses = [100.0 * value for each in chosen for value in each.path]
-        misses += [value for each in chosen for value in each.turn]
+        off = [value for each in chosen for value in each.off]
+        lean = [value for each in chosen for value in each.lean]
         jerks = [value for each in chosen for value in each.roughness]
         slips = [value for each in chosen for value in each.slip]
         row[method] = {
-            "mean": float(np.mean(misses)),
-            "most": max(misses),
+            "median": _quantile(off, 50),
+            "most": _quantile(off, 99),
+            "lean": _quantile(lean, 99),
             "seam": _quantile(jerks, 50),
             "slip": _quantile(slips, 50),
             "slip_most": _quantile(slips, 99),
@@ -359,13 +351,6 @@ def text(found: Any) -> str:
         *(_line(row["title"], row) for row in found["rows"]),
         "",
         *_LEGEND,
-        "",
-        f"{found['out_of_reach']:.1f} % of the points for hands and feet are out of reach for the",
-        (
-            f"base's limbs. Of those within reach 99 of 100 are missed by less than "
-            f"{found['within_most']:.1f} %"
-        ),
-        f"in exact, the mean is {found['within_mean']:.2f} %.",
         *(f"Left out: {reason}" for reason in found["left_out"]),
     ]
     return "\n".join(lines)
@@ -383,12 +368,12 @@ def said(found: Any) -> list[str]:
         )
     for method in METHODS:
         told = [
-            f"{part.replace('_', ' ')} {rows[title][method]['mean']:.1f}{unit}"
-            for part, unit in zip(PARTS_TOLD, (" %", " %", " %", "°", "°"), strict=True)
+            f"{part.replace('_', ' ')} {rows[title][method]['median']:.1f}°"
+            for part in PARTS_TOLD
             if (title := f"other skeleton, {part}") in rows
         ]
         if told:
-            lines.append(f"Between skeletons *{method}* is off in the mean: {', '.join(told)}.")
+            lines.append(f"Between skeletons *{method}* points elsewhere by {', '.join(told)}.")
     return lines
 
 
@@ -408,7 +393,7 @@ def _line(title: str, row: Any) -> str:
     for method in METHODS:
         own = row[method]
         cells.append(
-            f"{own['mean']:>11.2f}{own['most']:>7.1f}{_cell(own['seam'], 7, 2)}"
+            f"{own['median']:>8.1f}{own['most']:>7.1f}{own['lean']:>6.1f}{_cell(own['seam'], 7, 2)}"
             f"{_cell(own['slip'], 9, 1)}{_cell(own['slip_most'], 6, 0)}  "
         )
     return f"{title:>25} {row['pairs']:>5} │" + "│".join(cells) + "│"
