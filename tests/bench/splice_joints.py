@@ -84,15 +84,15 @@ def degrees_off(
         axes = measures.level if root == "thigh" else measures.chest
         sides = [each for each in measures.SIDES if each[0].upper() in splice.part.sides]
         pairs = [
-            tuple(_seen(axes(each), each[f"{side}_{end}"] - each[f"{side}_{root}"])
-                  for each in (ours, theirs))
+            (
+                np.einsum("mji,mj->mi", axes(ours), ours[f"{side}_{end}"] - ours[f"{side}_{root}"]),
+                np.einsum(
+                    "mji,mj->mi", axes(theirs), theirs[f"{side}_{end}"] - theirs[f"{side}_{root}"]
+                ),
+            )
             for side in sides
-        ]  # fmt: skip
+        ]
     off = np.empty((len(own), len(pairs)))
     for number, (first, second) in enumerate(pairs):
         off[:, number] = measures.angle(first, second)
     return off, np.asarray(lean, dtype=np.float64)
-
-
-def _seen(axes: Floats, vectors: Floats) -> Floats:
-    return np.einsum("mji,mj->mi", axes, vectors)
