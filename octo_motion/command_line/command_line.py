@@ -35,8 +35,8 @@ list that the .blend file has is built. What is read stays as it is.
 
 What is not given has the value that the panel gives to a new splice. Settings have the names that
 scripts use: Object.octo_motion.splicing.splices[N].NAME. clip=FILE, action=NAME and source=NAME (an
-armature of the .blend file) say where the part is from; landmarks.NAME=BONE says which bone is
-which, where it cannot be told.
+armature of the .blend file) say where the part is from; ground=MESH says on what locked feet stand;
+landmarks.NAME=BONE says which bone is which, where it cannot be told.
 """
 
 _POSE: Final = """\

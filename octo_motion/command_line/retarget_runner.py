@@ -8,12 +8,12 @@ from typing import Any
 import bpy
 
 from ..blender.animation import writable_armature
-from ..core.errors import ClipError, SettingsError
+from ..core.errors import ClipError
 from ..ui.splicing import ClipReader, RetargetSession, file_clip, splicing_settings
 from .job_report import ShotSummary
 from .schema import set_values
 from .shot_schema import ShotRequest
-from .splice_runner import named
+from .splice_runner import mesh_named
 
 _FIRST_FRAME = 1
 
@@ -31,10 +31,7 @@ def retarget(armature: bpy.types.Object, shot: ShotRequest) -> ShotSummary:
     set_values(settings, landmarks)
     set_values(settings.retarget, own)
     if shot.ground:
-        ground = named(bpy.data.objects, shot.ground)
-        if ground is None or ground.type != "MESH":
-            raise SettingsError(f"There is no mesh '{shot.ground}'.", "Name a mesh of the file.")
-        settings.retarget.ground = ground
+        settings.retarget.ground = mesh_named(shot.ground)
     paths = [each.clip for each in shot.splices or () if each.clip is not None]
     reader = ClipReader()
     clips = [(path.stem, file_clip(armature.name, path, _FIRST_FRAME, reader)) for path in paths]

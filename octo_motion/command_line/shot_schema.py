@@ -72,6 +72,8 @@ class NewSplice:
     """Armature in the .blend file that the clip is for, the one that is spliced onto if empty."""
     action: str = ""
     """Name of the action, the only one of the motion file or the source's own if empty."""
+    ground: str = ""
+    """Name of the mesh on which locked feet stand; level ground if empty."""
     settings: Settings = field(default_factory=dict)
     """Values of the item by name, the part among them, and ``landmarks.NAME`` of the source."""
 
@@ -323,7 +325,8 @@ LIMITS: Final = Table(
 
 
 def _new_splice(values: dict[str, Any], reading: Reading) -> NewSplice:
-    own = {key: values.pop(key) for key in ("clip", "source", "action") if values.get(key)}
+    names = ("clip", "source", "action", "ground")
+    own = {key: values.pop(key) for key in names if values.get(key)}
     if values.get("part") == "CHAIN" and not values.get("bone"):
         reading.fault('A chain needs its first bone: write bone = "…".')
     if "clip" in own and "source" in own:
@@ -333,7 +336,12 @@ def _new_splice(values: dict[str, Any], reading: Reading) -> NewSplice:
 
 SPLICES: Final = Tables(
     Table(
-        {"clip": File("motion file", MOTION_SUFFIXES), "source": Text(), "action": Text()},
+        {
+            "clip": File("motion file", MOTION_SUFFIXES),
+            "source": Text(),
+            "action": Text(),
+            "ground": Text(),
+        },
         known="splices",
         example='{ part = "right_arm", clip = "throw.bvh" }',
         needed=("part",),

@@ -13,7 +13,7 @@ import bpy
 
 from ..blender.animation import lasting, writable_armature
 from ..blender.scene import NOTE, ImportedClip, import_clip
-from ..core.errors import ClipError, OctoMotionError
+from ..core.errors import ClipError, OctoMotionError, SettingsError
 from ..ui.splicing import (
     ClipReader,
     add_splice,
@@ -192,6 +192,14 @@ def named(blocks: Iterable[Any], name: str) -> Any:
     return next((each for each in found if each.library is None), found[0] if found else None)
 
 
+def mesh_named(name: str) -> bpy.types.Object:
+    """A mesh of the file, for feet to stand on."""
+    found = named(bpy.data.objects, name)
+    if found is None or found.type != "MESH":
+        raise SettingsError(f"There is no mesh '{name}'.", "Name a mesh of the file.")
+    return found
+
+
 def _action(name: str) -> bpy.types.Action:
     action = named(bpy.data.actions, name)
     if action is None:
@@ -215,6 +223,8 @@ def _add(
     frames = reader.source(source, action, slot, visual=visual).clip.frames
     item = add_splice(stack, source, action, begins, frames)
     set_values(item, values)
+    if asked.ground:
+        item.ground = mesh_named(asked.ground)
     if not item.name:
         name_splice(stack, item)
 

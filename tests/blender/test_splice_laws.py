@@ -2,7 +2,7 @@
 """What must hold of splicing, on recorded motion."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,8 @@ from octo_motion.core.splicing.transfer.body_frames import (
 )
 from octo_motion.core.splicing.transfer.limb_rotation import SOFT
 from octo_motion.core.splicing.transfer.parts import LEG, PARTS, Part, SeenFrom, part_bones
-from octo_motion.core.splicing.transfer.retarget import MappedClip
+from octo_motion.core.splicing.transfer.reference_pose import ReferencePose
+from octo_motion.core.splicing.transfer.retarget import MappedClip, ReferredClip
 from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices
 from tests.bench.splice_quality import feet_at_rest, limb_length
 from tests.core.splice_bodies import spliced
@@ -242,19 +243,35 @@ def in_chest(clip: Clip, landmarks: Landmarks, landmark: str) -> Floats:
     return rotate(conjugate(frame.orientation(posture)), moved)
 
 
-def in_pelvis(clip: Clip, landmarks: Landmarks, landmark: str) -> Floats:
-    """The same as seen from the pelvis."""
-    clip, frame = with_pelvis(clip, landmarks)
-    posture = posture_of(clip.skeleton, clip.rotations, clip.locations)
-    moved = posture.head(clip.skeleton.index[landmarks[landmark]]) - frame.place(posture)
-    return rotate(conjugate(frame.orientation(posture)), moved)
+@dataclass(frozen=True, eq=False)
+class ReferredBody:
+    """A clip resting in a reference pose, that of its own motion or of what it was made from."""
 
+    clip: Clip
+    landmarks: Landmarks
+    reference: ReferencePose
 
-def with_pelvis(clip: Clip, landmarks: Landmarks) -> tuple[Clip, AnatomicalFrame]:
-    """The clip in its reference pose, and its pelvis."""
-    mapped = MappedClip(clip, landmarks).in_reference_pose()
-    assert mapped.reference is not None
-    return mapped.clip, pelvis_frame(mapped.skeleton, landmarks, mapped.reference)
+    @classmethod
+    def of(cls, clip: Clip, landmarks: Landmarks, told_by: Clip) -> "ReferredBody":
+        mapped = MappedClip(told_by, landmarks).in_reference_pose()
+        assert isinstance(mapped, ReferredClip)
+        return cls(mapped.rests.into(clip), landmarks, mapped.reference)
+
+    @property
+    def pelvis(self) -> AnatomicalFrame:
+        return pelvis_frame(self.clip.skeleton, self.landmarks, self.reference)
+
+    @property
+    def chest(self) -> AnatomicalFrame:
+        return chest_frame(self.clip.skeleton, self.landmarks, self.reference)
+
+    def seen(self, frame: AnatomicalFrame, landmark: str) -> Floats:
+        """Path of a landmark in a frame, (frames, 3), armature units."""
+        posture = posture_of(self.clip.skeleton, self.clip.rotations, self.clip.locations)
+        bone = self.clip.skeleton.index[self.landmarks[landmark]]
+        return rotate(
+            conjugate(frame.orientation(posture)), posture.head(bone) - frame.place(posture)
+        )
 
 
 def arm_length(clip: Clip, landmarks: Landmarks) -> float:
@@ -478,39 +495,42 @@ def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: Share
         splices = [Splice(part, other, timing, others) for part in parts]
         result = build_splices(base, landmarks, splices)
         frames = min(len(result), len(other))
-        for upper, lower in (
-            ("clavicle", "upper_arm"),
-            ("upper_arm", "forearm"),
-            ("forearm", "hand"),
-            ("thigh", "shin"),
+        # The result moves otherwise than the base: it is the same body all the same.
+        bodies = (
+            ReferredBody.of(result, landmarks, base),
+            ReferredBody.of(other, others, other),
+        )
+        for on_chest, upper, lower in (
+            (True, "clavicle", "upper_arm"),
+            (True, "upper_arm", "forearm"),
+            (True, "forearm", "hand"),
+            (False, "thigh", "shin"),
         ):
             for side in "LR":
                 ours, theirs = (
-                    in_pelvis(each, mark, f"{lower}.{side}")
-                    - in_pelvis(each, mark, f"{upper}.{side}")
-                    for each, mark in ((result, landmarks), (other, others))
+                    normalized(
+                        each.seen(frame, f"{lower}.{side}") - each.seen(frame, f"{upper}.{side}")
+                    )[:frames]
+                    for each in bodies
+                    for frame in [each.chest if on_chest else each.pelvis]
                 )
-                ours, theirs = normalized(ours[:frames]), normalized(theirs[:frames])
                 # Bodies are built differently; a limb that points elsewhere is off by far more.
                 assert np.degrees(np.arccos(np.sum(ours * theirs, axis=-1).min())) < 40.0
         for side in "LR":
-            ours, theirs = (
-                foot_in_pelvis(each, mark, side)[:frames]
-                for each, mark in ((result, landmarks), (other, others))
-            )
+            ours, theirs = (foot_in_pelvis(each, side)[:frames] for each in bodies)
             # One has toes, the other just an end.
             assert np.degrees(np.arccos(np.sum(ours * theirs, axis=-1).min())) < 40.0
 
 
-def foot_in_pelvis(clip: Clip, landmarks: Landmarks, side: str) -> Floats:
+def foot_in_pelvis(body: ReferredBody, side: str) -> Floats:
     """Where a foot points, (frames, 3), in the pelvis's frame."""
-    if landmarks.get(f"toe.{side}"):
-        toe, foot = (in_pelvis(clip, landmarks, f"{name}.{side}") for name in ("toe", "foot"))
+    if body.landmarks.get(f"toe.{side}"):
+        toe, foot = (body.seen(body.pelvis, f"{name}.{side}") for name in ("toe", "foot"))
         return normalized(toe - foot)
-    clip, pelvis = with_pelvis(clip, landmarks)
-    frame = pelvis.orientation(posture_of(clip.skeleton, clip.rotations, clip.locations))
+    clip = body.clip
+    frame = body.pelvis.orientation(posture_of(clip.skeleton, clip.rotations, clip.locations))
     foot = clip.skeleton.pose(clip.rotations, clip.locations)[0][
-        :, clip.skeleton.index[landmarks[f"foot.{side}"]]
+        :, clip.skeleton.index[body.landmarks[f"foot.{side}"]]
     ]
     return rotate(multiply(conjugate(frame), foot), [0.0, 1.0, 0.0])
 

@@ -79,7 +79,7 @@ def test_splice_has_all_settings_that_the_list_has(tmp_path: Path) -> None:
 def test_nothing_that_the_list_has_is_left_out() -> None:
     from octo_motion.ui.splicing.properties import SpliceItem
 
-    pointers = {"source", "action"}
+    pointers = {"source", "action", "ground"}
     assert set(SpliceItem.__annotations__) - pointers <= set(known().tables["splices"])
 
 
