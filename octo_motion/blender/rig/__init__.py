@@ -10,6 +10,7 @@ from .armature import (
     bone_and_property,
     carrying_axes,
     deformed_meshes,
+    even_scale,
     hidden_bones,
     is_driven_object,
     linked_names,
@@ -31,7 +32,6 @@ from .armature import (
 from .puppet import Puppet
 from .puppet_reading import (
     bone_materials,
-    even_scale,
     is_part_of,
     mark_bones,
     read_rig,

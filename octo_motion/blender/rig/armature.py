@@ -154,6 +154,32 @@ def deformed_meshes(armature: bpy.types.Object) -> list[bpy.types.Object]:
     ]
 
 
+def even_scale(armature: bpy.types.Object) -> float:
+    """The scale of an object, which must be the same in all directions.
+
+    Raises:
+        RigError: it is not, or zero, or negative, or sheared.
+    """
+    matrix = np.array(armature.matrix_world, dtype=np.float64)[:3, :3]
+    sizes = np.linalg.norm(matrix, axis=0)
+    name = f"'{armature.name}'"
+    if not np.isfinite(matrix).all() or sizes.min() <= 1e-9 * max(1.0, sizes.max()):
+        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
+    if sizes.max() - sizes.min() > _EVEN * sizes.max():
+        shown = ", ".join(f"{size:.4g}" for size in sizes)
+        raise RigError(
+            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
+        )
+    axes = matrix / sizes
+    if np.abs(axes.T @ axes - np.eye(3)).max() > _EVEN:
+        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
+    if np.linalg.det(axes) < 0.0:
+        raise RigError(
+            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
+        )
+    return float(sizes.mean())
+
+
 def world_matrix(armature: bpy.types.Object) -> Floats:
     """The object's world matrix, (4, 4)."""
     return np.array(armature.matrix_world, dtype=np.float64)
@@ -184,6 +210,10 @@ def driven_channels(
         if name:
             yield name, channel, curve
 
+
+_EVEN: Final = 1e-3
+"""Share by which scales of the three axes may differ, and cosine by which axes may be off a right
+angle."""
 
 _BONE_PATH: Final = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]\.?(.*)', re.DOTALL)
 

@@ -15,8 +15,8 @@ from mathutils import Quaternion, Vector
 from ...core.errors import RigError
 from ...core.posing.puppet import Figure, Pose
 from ...core.rotations import Floats, conjugate, from_matrix, multiply, rotate
-from .armature import carrying_axes
-from .puppet_reading import PuppetRig, even_scale, posed_bones, read_rig
+from .armature import carrying_axes, even_scale
+from .puppet_reading import PuppetRig, posed_bones, read_rig
 
 _NOTHING = 1e-9
 """Factor below which a bone is scaled to nothing."""

@@ -31,7 +31,14 @@ from ...core.posing.puppet import (
 )
 from ...core.rotations import Floats, from_matrix
 from ...core.skeleton import Skeleton
-from .armature import armature_data, driven_channels, pose_of, read_skeleton, vertex_positions
+from .armature import (
+    armature_data,
+    driven_channels,
+    even_scale,
+    pose_of,
+    read_skeleton,
+    vertex_positions,
+)
 
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
@@ -52,9 +59,6 @@ _MOST_VERTICES: Final = 6000
 """Of each mesh that are looked at: more make no better radius."""
 _LEAST_WEIGHT: Final = 0.35
 """A vertex counts for the bone that has at least this share of it, and the most."""
-_EVEN: Final = 1e-3
-"""Share by which scales of the three axes may differ, and cosine by which axes may be off a right
-angle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,32 +136,6 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
 
 def _scaled(posed: PosedBones, unit: float) -> PosedBones:
     return replace(posed, heads=posed.heads * unit, lengths=posed.lengths * unit)
-
-
-def even_scale(armature: bpy.types.Object) -> float:
-    """The scale of an object, which must be the same in all directions.
-
-    Raises:
-        RigError: it is not, or zero, or negative, or sheared.
-    """
-    matrix = np.array(armature.matrix_world, dtype=np.float64)[:3, :3]
-    sizes = np.linalg.norm(matrix, axis=0)
-    name = f"'{armature.name}'"
-    if not np.isfinite(matrix).all() or sizes.min() <= 1e-9 * max(1.0, sizes.max()):
-        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
-    if sizes.max() - sizes.min() > _EVEN * sizes.max():
-        shown = ", ".join(f"{size:.4g}" for size in sizes)
-        raise RigError(
-            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
-        )
-    axes = matrix / sizes
-    if np.abs(axes.T @ axes - np.eye(3)).max() > _EVEN:
-        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
-    if np.linalg.det(axes) < 0.0:
-        raise RigError(
-            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
-        )
-    return float(sizes.mean())
 
 
 def posed_bones(armature: bpy.types.Object, scale: float) -> PosedBones:

@@ -14,15 +14,14 @@ from typing import Final, TypeVar
 import numpy as np
 
 from ...keyframes import Channel
-from ...rotations import IDENTITY, Floats, from_matrix, slerp
+from ...rotations import IDENTITY, Floats, from_matrix, rotate, slerp
 from ..clearance import ArmsOverGround, Opened, keep_off_ground, raise_between_frames, separate_arms
-from ..ground import Ground
+from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, figures
 from ..path import plan_travel
 from ..reaching import Carried, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .few_keys import Motion, measure_keyed, reduced
-from .floor import floor_under
 from .job import MotionJob, Tolerances
 from .planning import MotionPlan, frames_of_arms, plan_motion
 from .segments import SegmentedMotion
@@ -73,6 +72,16 @@ _EXACT_DISTANCE: Final = 0.002
 """… and arm lengths of an arm's tip."""
 _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
+_FLOOR_AROUND: Final = 2.5
+"""Arm lengths to all sides of the body in which the floor is looked at …"""
+_FLOOR_FINE: Final = 0.02
+"""… and those from one sample of it to the next."""
+_FLOOR_HEADROOM: Final = 0.0
+"""Arm lengths above the body up to which a surface is a floor and not a roof."""
+_FLOOR_PLACES: Final = 1000
+"""Places of the body, or twice as many, that say which of several surfaces is below it."""
+_FLOOR_NOWHERE: Final = 1000.0
+"""Arm lengths below the body: as deep as this is what has no faces."""
 
 _Outcome = TypeVar("_Outcome")
 Steps = Generator[float, None, _Outcome]
@@ -312,7 +321,7 @@ def _measured(
         skins=below.skins if below is not None else None,
         rate=job.timing.rate,
         stays=(keyed[0][0], keyed[1][0]) if job.in_place else None,
-        floor=floor_under(job, keyed, plan.first.poser.arm_length * creature.scale),
+        floor=_floor_under(job, keyed, plan.first.poser.arm_length * creature.scale),
     )
     return measured, overlaps
 
@@ -391,3 +400,30 @@ def _dragged(job: MotionJob, arm: int) -> bool:
     """Whether a contact of an arm is where the artist has put it."""
     overrides = job.ground.overrides if job.ground is not None else ()
     return any(each.arm == arm and each.position is not None for each in overrides)
+
+
+def _floor_under(job: MotionJob, places: tuple[Floats, Floats], length: float) -> Ground | None:
+    """The floor that no gait holds on to, none where there is none: below a body that swims, or
+    about one that stays. A gait in the water knows no ground, and one in place a level one that
+    goes by; what a mesh that lies there all the same has of their arms in it is measured.
+
+    Args:
+        job: the motion.
+        places: locations (moments, 3) and orientations (moments, 4) of the armature, world.
+        length: of an arm, metres.
+    """
+    if job.floor is None:
+        return None
+    creature = job.creature
+    some = slice(None, None, max(1, len(places[0]) // _FLOOR_PLACES))
+    path = places[0][some] + rotate(places[1][some], creature.scale * creature.body.center)
+    return sample_ground(
+        job.floor.triangles,
+        path,
+        np.zeros(len(path), dtype=bool),
+        reach=_FLOOR_AROUND * length,
+        spacing=_FLOOR_FINE * length,
+        headroom=_FLOOR_HEADROOM * length,
+        content=job.floor.content,
+        bare=float(path[:, 2].min()) - _FLOOR_NOWHERE * length,
+    )
