@@ -26,7 +26,9 @@ def run(*command: str | Path) -> None:
 def fetch_wheel(name: str) -> Path:
     """Download one wheel by name, or take the one that is there if its hash is a pinned one."""
     wheel = WHEELS / name
-    if wheel.exists() and f"sha256:{sha256(wheel.read_bytes()).hexdigest()}" in PINS.read_text():
+    if wheel.exists() and f"sha256:{sha256(wheel.read_bytes()).hexdigest()}" in PINS.read_text(
+        encoding="utf-8"
+    ):
         return wheel
     _distribution, _version, python_tag, abi, platforms = name.removesuffix(".whl").split("-")
     WHEELS.mkdir(parents=True, exist_ok=True)
