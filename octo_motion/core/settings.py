@@ -31,8 +31,7 @@ class Setting:
     default: Any
     """What the field is if it is not given."""
     offered: Any = None
-    """What an artist begins with, if that is not the default: the source's own motion is that of
-    the defaults."""
+    """What an artist begins with, if that is not the default, which leaves a step out."""
     stored_as: str = ""
     """Name of the property that scripts and files know, if it is not the field's."""
     low: float | None = None

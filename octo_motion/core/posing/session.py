@@ -23,7 +23,7 @@ from ..rotations import (
     multiply,
     to_rotation_vector,
 )
-from .puppet import Elements, Figure, Pose, joints_of, turned_bodies
+from .puppet import Elements, Figure, Flags, Pose, joints_of, turned_bodies
 from .solver import Coupling, HandSpring, Obstacle, World, WorldSettings, WorldSnapshot
 
 COARSEST: Final = 4e-3
@@ -180,12 +180,18 @@ class Session:
         self._start = self.world.pose()
         self._reference = self._start
         self._touched: set[int] = set()
+        # Joints that were pulled since the reference; None where that may be all of them.
+        self._pulled: Flags | None = np.zeros(len(figure), dtype=bool)
+        # Of a figure that nobody has held yet, those that something touches.
+        self._yielding = self._pulled
         self._clock = clock
         self._length = StepLength(settings.step, COARSEST, BUSY, 0.4, 0.2)
         self._left = 0.0
         self._ratio = 1.0
         self._calm = 0.0
         self._before: list[WorldSnapshot] = []
+        self._after: list[WorldSnapshot] = []
+        """What steps back have undone."""
 
     @property
     def figure(self) -> Figure:
@@ -221,6 +227,7 @@ class Session:
     ) -> HandSpring:
         """Take hold of a body with one more hand, see ``World.grab``."""
         self.remember()
+        self._note_touched()
         spring = self.world.grab(body, point, orientation, coupling or self.coupling)
         self.wake()
         return spring
@@ -284,11 +291,30 @@ class Session:
         for number in range(1, count + 1):
             for sweep in sweeps:
                 sweep.pull(number / count)
+            self._let_yield()
             world.step()
         self.time += passed
         calm = float(np.abs(world.velocities()).max(initial=0.0)) < STILL
         self._calm = self._calm + passed if calm else 0.0
         self.changed = True
+
+    def _let_yield(self) -> None:
+        """Let joints give way that are pulled, and no others: in a quick drag their own inertia
+        would bend limbs that nobody touches.
+
+        Those that were pulled last go on giving way after the hand has let go. Where nobody holds
+        a figure that has weight, all do.
+        """
+        world, joints = self.world, self._yielding
+        if world.grabs:
+            joints = world.pulled()
+        elif any(world.settings.gravity):
+            joints = None
+        elif joints is not None:
+            joints = joints | world.pulled()
+        world.let_yield(joints)
+        self._yielding = joints
+        self._pulled = None if joints is None or self._pulled is None else self._pulled | joints
 
     # --- What can be changed on the way ----------------------------------------------------------
 
@@ -325,9 +351,26 @@ class Session:
     # --- What has come of it ---------------------------------------------------------------------
 
     def touched(self) -> list[int]:
-        """Bodies whose joint was turned in this session, and roots that were moved."""
+        """Bodies whose joint was pulled and turned in this session, and roots that were moved."""
         self._note_touched()
         return sorted(self._touched)
+
+    def put_back(self) -> None:
+        """Turn back what was turned by too little to count: a figure that is keyed where it was
+        touched looks so.
+
+        Of a figure in a hand that is what nobody pulls; where its weight bends it, nothing.
+        """
+        if self._pulled is None:
+            return
+        joints = ~self._pulled
+        if not self.world.grabs:
+            joints[:] = True
+            joints[self.touched()] = False
+        # Roots are where they are.
+        joints[np.array(self.figure.parents) < 0] = False
+        self.world.turn_back(joints, self._reference)
+        self.changed = True
 
     def adopt(self, pose: Pose) -> None:
         """Take a pose that was given from elsewhere, at rest; hands let go.
@@ -337,6 +380,7 @@ class Session:
         self.release()
         self._touched.clear()
         self._before.clear()
+        self._after.clear()
         old = self.world
         anchors = joints_of(self.figure.parents, pose)
         apart = np.linalg.norm(anchors - self.figure.anchors, axis=1)
@@ -348,11 +392,14 @@ class Session:
                 self.world.pin(body, firm=firm)
         self.show(pose)
         self._reference = self.world.pose()
+        self._pulled = np.zeros(len(self.figure), dtype=bool)
 
     def show(self, pose: Pose) -> None:
         """Stand in a pose at rest, pins where bodies are then; hands go on holding."""
         self.world.set_pose(pose)
         self.world.pin_here()
+        # It may be bent anywhere.
+        self._pulled = None
         self.wake()
 
     def restore(self) -> None:
@@ -362,10 +409,18 @@ class Session:
 
     def step_back(self) -> bool:
         """Back to before the last grab or restoring; whether there was one."""
+        return self._step(self._before, self._after)
+
+    def step_forward(self) -> bool:
+        """On to where the last step back came from; whether there was one since the last grab."""
+        return self._step(self._after, self._before)
+
+    def _step(self, taken: list[WorldSnapshot], kept: list[WorldSnapshot]) -> bool:
         self.release()
-        if not self._before:
+        if not taken:
             return False
-        self.world.restore(self._before.pop())
+        kept.append(self.world.state())
+        self.world.restore(taken.pop())
         self.world.pin_here()
         self.wake()
         return True
@@ -373,7 +428,12 @@ class Session:
     def remember(self) -> None:
         """Let a step back lead to how all is now."""
         self._before.append(self.world.state())
+        self._after.clear()
         del self._before[:-MOST_STEPS_BACK]
 
     def _note_touched(self) -> None:
-        self._touched |= set(turned_bodies(self.figure, self._reference, self.pose))
+        turned = turned_bodies(self.figure, self._reference, self.pose)
+        if self._pulled is not None:
+            # Others give way to nothing: what they are bent by now, they spring back.
+            turned = [body for body in turned if self._pulled[body]]
+        self._touched |= set(turned)

@@ -50,10 +50,17 @@ class Velocities:
     sweeps: int
     change: float
     """Largest change of an impulse in the last sweep, against the largest impulse."""
+    impulses: list[Floats]
+    """Of the blocks of rows, for the next step to start from."""
 
 
 def solve(
-    problem: Problem, parents: Sequence[int], *, sweeps: int = 20_000, tolerance: float = 1e-12
+    problem: Problem,
+    parents: Sequence[int],
+    *,
+    sweeps: int = 20_000,
+    tolerance: float = 1e-12,
+    start: Sequence[Floats] = (),
 ) -> Velocities:
     """Velocities at the end of a step by Gauss–Seidel sweeps over all rows.
 
@@ -62,6 +69,7 @@ def solve(
         parents: of the figure.
         sweeps: at most so many.
         tolerance: change of the impulses in a sweep, against the largest, at which it ends.
+        start: impulses of the step before, warm as the source has it; none, or of other rows: cold.
     """
     count = len(parents)
     inverse = np.zeros((count, 6, 6))
@@ -86,6 +94,11 @@ def solve(
             for jacobian, spread in zip(block.jacobians, block.spread, strict=True)
         ]
         block.own = np.sum(own, axis=0)
+    if [len(each) for each in start] == [len(block.impulse) for block in blocks]:
+        for block, impulse in zip(blocks, start, strict=True):
+            block.impulse = impulse
+            for body, spread in zip(block.bodies, block.spread, strict=True):
+                velocities[body] += spread @ impulse
     change = np.inf
     done = 0
     while done < sweeps and change > tolerance:
@@ -106,7 +119,7 @@ def solve(
     result = np.empty((count, 6))
     result[:, :3] = velocities[:, 3:]
     result[:, 3:] = velocities[:, :3] + np.cross(problem.centres, velocities[:, 3:])
-    return Velocities(result, done, change)
+    return Velocities(result, done, change, [block.impulse for block in blocks])
 
 
 def _point(problem: Problem, body: int, place: Floats) -> Floats:

@@ -11,16 +11,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
-from octo_motion.core.posing.puppet.figure import Pose
+from octo_motion.core.posing.puppet.figure import Elements, Pose
 from octo_motion.core.posing.puppet.materials import MATERIALS, elements_for, joint_loads
-from octo_motion.core.posing.puppet.plastic_element import ElementResponse, PlasticLaw
+from octo_motion.core.posing.puppet.plastic_element import ElementResponse, PlasticLaw, law_of
 from octo_motion.core.posing.solver.world import World, WorldSettings
-from octo_motion.core.rotations import Floats, angle_between, from_rotation_vector, multiply, rotate
+from octo_motion.core.rotations import (
+    Floats,
+    angle_between,
+    conjugate,
+    from_rotation_vector,
+    multiply,
+    rotate,
+    to_matrix,
+    to_rotation_vector,
+)
 from tests.core.oracles.drag_fit import measure
 from tests.core.puppets import chain, doll, free, octopus, posed, puppet, soft
 from tests.core.world_probes import bend_springs, joint_springs, joint_turns
 
-# [Plastic, Fig. 5]: 0.1 kg pushed with 1 N for 5 s, then let go.
+# [Plastic, Fig. 5]: 0.1 kg pushed for a while, then let go. The force and how long are ours.
 MASS, K_F, D_F, D_D, FORCE, LOADED = 0.1, 1.0, 10.0, 100.0, 1.0, 5.0
 # Closed form of the same, worked out on its own: time, displacement, velocity, spring.
 CLOSED = np.array(
@@ -370,3 +379,84 @@ def test_spring_is_kept_in_the_material_however_the_figure_turns():
         np.abs((joint_turns(world)[1:] * joint_turns(other)[1:]).sum(-1)), 1.0, atol=1e-12
     )
     assert free(1).yield_torque[0] == np.inf
+
+
+# --- Coefficients about each axis -----------------------------------------------------------------
+
+
+def uneven(limit: float, count: int = 1) -> Elements:
+    """Stiffest against twist, and giving way about Z the most."""
+    three = ([3.0, 40.0, 8.0], [0.2, 1.0, 0.5], [0.7, 9.0, 0.2])
+    stiffness, damping, flow = (np.tile(each, (count, 1)) for each in three)
+    return Elements(stiffness, damping, flow, np.full(count, limit))
+
+
+def turned_law(elements: Elements, seed: int) -> tuple[PlasticLaw, Floats]:
+    """The law of bones that stand anyhow, and their axes (joints, 3, 3)."""
+    vectors = np.random.default_rng(seed).normal(size=(len(elements.yield_torque), 3))
+    frames = to_matrix(from_rotation_vector(vectors))
+    return law_of(elements, 0.01).seen_in(frames), frames
+
+
+@given(seed=st.integers(0, 1000), limit=st.sampled_from([0.0, 1.0, 5.0, np.inf]))
+@settings(deadline=None)
+def test_alike_about_all_axes_is_one_law_however_it_is_written(seed: int, limit: float):
+    rng = np.random.default_rng(seed)
+    one = soft(5, 3.0, 0.2, 0.7, limit)
+    # One joint that is not alike: the others are worked out by the law of axes as well.
+    mixed = uneven(limit, 5)
+    for field in ("stiffness", "damping", "flow"):
+        getattr(mixed, field)[1:] = getattr(one, field)[1:, None]
+    law, _ = turned_law(mixed, seed)
+    springs, speeds = rng.normal(size=(2, 5, 3))
+    same, axes = respond(PlasticLaw(one, 0.01), springs, speeds), respond(law, springs, speeds)
+    np.testing.assert_allclose(axes.load[1:], same.load[1:], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(axes.slope[1:], same.slope[1:], rtol=1e-7, atol=1e-9)
+
+
+@given(seed=st.integers(0, 1000), limit=st.sampled_from([0.0, 0.5, 3.0]))
+@settings(deadline=None)
+def test_uneven_element_obeys_its_law_spends_energy_and_has_its_slope(seed: int, limit: float):
+    rng = np.random.default_rng(seed)
+    elements = uneven(limit)
+    law, (frame,) = turned_law(elements, seed)
+    spring, speed = rng.normal(size=(2, 1, 3))
+    answer = respond(law, spring, speed)
+    load, flow = answer.load[0] @ frame, flow_of(answer)[0] @ frame
+    q, w = spring[0] @ frame, speed[0] @ frame
+    k, d, over = (np.ravel(each) for each in (elements.stiffness, elements.damping, elements.flow))
+    # λ = −K_f q_f[t+1] − D_f w_f and, while it flows, λ = −τ w_d/|w_d| − D_d w_d.
+    np.testing.assert_allclose(load, -k * (q + 0.01 * (w - flow)) - d * (w - flow), atol=1e-9)
+    size = np.linalg.norm(flow)
+    if size > 0.0:
+        np.testing.assert_allclose(load, -limit * flow / size - over * flow, atol=1e-7)
+    else:
+        assert np.linalg.norm(load) <= limit
+    assert load @ flow <= 0.0
+    for axis in range(3):
+        nudge = np.zeros((1, 3))
+        nudge[0, axis] = 1e-6
+        change = respond(law, spring, speed + nudge).load - respond(law, spring, speed - nudge).load
+        np.testing.assert_allclose(-change[0] / 2e-6, answer.slope[0][:, axis], atol=1e-5)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_joint_has_the_source_residue_about_each_axis_by_itself(axis: int):
+    """F T/D_d, with a D_d of its own about each axis of the bone, which stands askew."""
+    flow = np.array([[50.0, 200.0, 100.0]])
+    elements = Elements(np.full((1, 3), 10.0), np.full((1, 3), 1.0), flow, np.zeros(1))
+    figure = puppet([-1], [[0.0, 0.0, 0.0]], [0.1], [0.02], elements)
+    centred = replace(figure, centres=np.zeros((1, 3)), inertias=MASS * np.eye(3)[None])
+    start = posed(centred, np.array([[0.4, -0.3, 0.8]]))
+    world = World(centred, start, WorldSettings(step=0.02))
+    world.pin(0)
+    bone = to_matrix(start.orientations[0])[:, axis]
+    world.forces[0, 3:] = FORCE * bone
+    for number in range(1500):
+        if number == round(LOADED / 0.02):
+            world.forces[:] = 0.0
+        world.step()
+    left = to_rotation_vector(
+        multiply(world.pose().orientations[0], conjugate(start.orientations[0]))
+    )
+    assert left == pytest.approx(FORCE * LOADED / flow[0, axis] * bone, rel=5e-3, abs=1e-4)

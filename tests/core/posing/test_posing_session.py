@@ -7,10 +7,20 @@ import numpy as np
 import pytest
 
 from octo_motion.core.posing.puppet.figure import Figure, Pose
+from octo_motion.core.posing.puppet.materials import elements_for
 from octo_motion.core.posing.session import COARSEST, HandSample, Session, TickReport
+from octo_motion.core.posing.solver.obstacle_shapes import Box
 from octo_motion.core.posing.solver.world import WorldSettings
-from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle
-from tests.core.puppets import chain, posed, soft
+from octo_motion.core.rotations import (
+    IDENTITY,
+    Floats,
+    angle_between,
+    conjugate,
+    from_axis_angle,
+    multiply,
+    rotate,
+)
+from tests.core.puppets import chain, doll, octopus, posed, puppet, soft
 
 TICK = 1.0 / 60.0
 
@@ -263,3 +273,130 @@ def test_each_hand_leads_its_own_limb() -> None:
     assert session.world.grabs == (second,)
     assert not session.resting
     assert session.touched() == [1, 2, 3]
+
+
+# --- What is bent stays ---------------------------------------------------------------------------
+
+
+def arm(bones: int) -> Figure:
+    """An arm of a metre that tapers, in so many bones."""
+    widths = 1.0 - 0.6 * np.arange(bones) / bones
+    widths /= widths.sum()
+    anchors = [[0.0, 0.0, 0.0]] + [[0.0, width, 0.0] for width in widths[:-1]]
+    thin = (0.12 * (1.0 - 0.6 * np.arange(bones) / bones)).tolist()
+    return puppet(range(-1, bones - 1), anchors, widths.tolist(), thin)
+
+
+def came_back(figure: Figure, material: str, body: int, way: Floats) -> float:
+    """Of a drag of a limb's end by ``way``, m, that was held still for half a second, the share
+    that is gone once it was let go."""
+    figure = replace(figure, elements=elements_for(figure, material))
+    session = Session(figure, posed(figure), WorldSettings(step=4e-3), clock=None)
+    session.pin(0, state=True)
+    start = session.pose
+    point = start.positions[body] + rotate(
+        start.orientations[body], [0.0, figure.lengths[body], 0.0]
+    )
+    hand = session.grab(body, point)
+    for share in np.minimum(np.arange(1, 76) / 45.0, 1.0):
+        session.tick(TICK, {hand: HandSample(point + share * way, IDENTITY)})
+    held = session.held_point()
+    assert held is not None
+    session.release()
+    ticks(session, 30)
+    back = np.linalg.norm(session.world.held_point(hand) - held)
+    return float(back / np.linalg.norm(held - point))
+
+
+@pytest.mark.parametrize(("material", "most"), [("clay", 0.01), ("wire", 0.1), ("doll", 0.01)])
+@pytest.mark.parametrize("limb", ["doll's hand", "arm of an octopus", "arm of 30 bones"])
+def test_what_is_bent_and_held_still_stays(material: str, most: float, limb: str) -> None:
+    """On any chain: springs of a limb's joints do not add up. 1/5 of the limb's reach and more."""
+    figure, body, way = {
+        "doll's hand": (doll(), 8, np.array([0.0, 0.0, 0.2])),
+        "arm of an octopus": (octopus(), 12, np.array([0.12, -0.12, 0.05])),
+        "arm of 30 bones": (arm(30), 29, np.array([0.05, -0.1, 0.2])),
+    }[limb]
+    # Measured: clay 0.1 to 0.4 %, wire 2 to 6 %, doll 0.2 to 0.7 %.
+    assert came_back(figure, material, body, way) < most
+
+
+def test_limb_springs_back_as_far_into_however_many_bones_it_is_divided() -> None:
+    way = np.array([0.0, 0.0, 0.25])
+    few, many = (came_back(arm(count), "wire", count - 1, way) for count in (6, 48))
+    # Of the same limb a few links are stiffer than many: within a third.
+    assert many == pytest.approx(few, rel=0.33)
+
+
+@pytest.mark.parametrize("material", ["clay", "wire", "doll"])
+def test_quick_drag_of_one_wrist_leaves_the_other_limbs_as_they_are(material: str) -> None:
+    """Their own inertia does not shake them out of their pose, and none gets a key."""
+    figure = replace(doll(), elements=elements_for(doll(), material))
+    session = Session(figure, posed(figure), WorldSettings(step=2e-3), clock=None)
+    session.pin(0, state=True)
+    start = session.pose
+    point = start.positions[8]
+    hand = session.grab(8, point)
+    way = np.array([-0.25, -0.3, 0.3])
+    for share in (0.2, 0.4, 0.6, 0.8, 1.0):
+        session.tick(TICK, {hand: HandSample(point + share * way, IDENTITY)})
+    session.release()
+    # With auto keying, keys are made now.
+    at_release = session.touched()
+    ticks(session, 60)
+    arm_and_trunk = {1, 2, 5, 6, 7, 8}
+    assert {6, 7} <= set(at_release) <= set(session.touched()) <= arm_and_trunk
+    session.put_back()
+    others = sorted(set(range(len(figure))) - set(session.touched()))
+    turned = angle_between(_turns(figure, start), _turns(figure, session.pose))[others]
+    # Not only too little to be keyed, but none: the figure is as its keys will have it.
+    assert turned.max() < 1e-9
+    ticks(session, 30)
+    turned = angle_between(_turns(figure, start), _turns(figure, session.pose))[others]
+    assert np.degrees(turned.max()) < 0.01
+
+
+def _turns(figure: Figure, pose: Pose) -> Floats:
+    parents = np.maximum(figure.parents, 0)
+    own = multiply(conjugate(pose.orientations[parents]), pose.orientations)
+    own[0] = pose.orientations[0]
+    return own
+
+
+def test_limb_that_nobody_holds_gives_way_to_what_it_is_pressed_into() -> None:
+    figure = replace(doll(), elements=elements_for(doll(), "clay"))
+    start = posed(figure)
+    hand_at, root_at = start.positions[8], start.positions[0]
+    table = Box(position=hand_at - [0.0, 0.0, 0.1], half=np.array([0.15, 0.15, 0.05]))
+    session = Session(figure, start, WorldSettings(step=4e-3), [table], clock=None)
+    hand = session.grab(0, root_at, IDENTITY)
+    for share in np.linspace(0.0, 1.0, 60):
+        session.tick(TICK, {hand: HandSample(root_at - [0.0, 0.0, 0.2 * share], IDENTITY)})
+    assert {5, 6, 7, 8} & set(session.touched())
+    assert not {9, 10, 11, 12} & set(session.touched())
+
+
+@pytest.mark.parametrize("material", ["clay", "doll"])
+def test_hand_feels_the_box_that_it_presses_a_limb_into(material: str) -> None:
+    """Harder the deeper it means to go, and by the box alone: without it there is far less."""
+    felt = {}
+    for boxes in (True, False):
+        figure = replace(doll(), elements=elements_for(doll(), material))
+        start = posed(figure)
+        point = start.positions[8]
+        box = Box(position=point - [0.0, 0.0, 0.13], half=np.array([0.2, 0.2, 0.1]))
+        session = Session(
+            figure, start, WorldSettings(step=4e-3), [box] if boxes else [], clock=None
+        )
+        session.pin(0, state=True)
+        hand = session.grab(8, point)
+        forces = []
+        for deep in (0.03, 0.06, 0.09):
+            for _ in range(30):
+                down = HandSample(point - [0.0, 0.0, deep], IDENTITY)
+                session.tick(TICK, {hand: down})
+            forces.append(-session.force()[2])
+        felt[boxes] = np.array(forces)
+    assert (np.diff(felt[True]) > 0.0).all()
+    # Held still, the joints bear what they yield to; the box pushes back as far as the hand wants.
+    assert felt[True][-1] > 3.0 * felt[False][-1]

@@ -10,6 +10,7 @@ from .corrections import (
     afloat,
     joints_that_count,
     keep_off_ground,
+    lead_past,
     raise_between_frames,
     separate_arms,
 )
@@ -25,6 +26,7 @@ __all__ = [
     "afloat",
     "joints_that_count",
     "keep_off_ground",
+    "lead_past",
     "measure_overlap",
     "raise_between_frames",
     "separate_arms",

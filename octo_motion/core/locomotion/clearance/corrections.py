@@ -35,6 +35,7 @@ from ..rig import (
 )
 from .capsule_overlap import Capsules, Crowd, Opened, Separation, measure_overlap
 from .overlap_solver import parted
+from .way_past import Passing, led_past
 
 MOST_CAPSULES: Final = 16
 """Of an arm; those of more bones are taken together. With eight of the default octopus' twelve
@@ -105,36 +106,113 @@ def separate_arms(
         opened: where arms stand round a body that swims as it lies, none for others.
         cyclic: whether the last frame is the first again.
     """
-    some, chosen = _joints_chosen(volume.arms)
-    posed = _Posed.of_all(volume.arms, rotations)
-    joints = np.empty((len(rotations), len(volume.arms), len(chosen[0]), 3))
-    for each in posed:
-        joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
-    locations, orientations = travel
-    crowd = Crowd(
-        joints=joints,
-        radii=np.stack([own[which] for own, which in zip(volume.radii, chosen, strict=True)]),
-        at_rest=np.stack(
-            [arm.joints(arm.at_rest)[which] for arm, which in zip(volume.arms, chosen, strict=True)]
-        ),
-        in_contact=np.stack(
-            [_in_contact(own, which) for own, which in zip(in_contact, chosen, strict=True)], axis=1
-        ),
-        kept=busy,
-        upward=volume.upward,
-        opened=opened,
-        up=rotate(conjugate(orientations), _UP),
+    crowd = _Crowded.of(
+        volume, rotations, strains, in_contact=in_contact, busy=busy, travel=travel, opened=opened
     )
-    floor = Surface(ground, locations, orientations, scale) if ground is not None else None
     moved = parted(
-        crowd, volume.still, floor=floor, width=width_of(frames_per_cycle), cyclic=cyclic
+        crowd.crowd,
+        volume.still,
+        floor=_floor(travel, ground, scale),
+        width=width_of(frames_per_cycle),
+        cyclic=cyclic,
     )
-    if moved is None:
-        return None
-    result = rotations.copy()
-    for each in posed:
-        each.turn(result, crowd.joints, moved, some[each.numbers[0]])
-    return result
+    return crowd.turned(rotations, moved)
+
+
+def lead_past(
+    volume: BodyVolume,
+    rotations: Floats,
+    strains: Floats,
+    *,
+    share: Floats,
+    held: Sequence[np.ndarray],
+    travel: tuple[Floats, Floats],
+    ground: Ground | None,
+    scale: float,
+    frames_per_cycle: float,
+) -> Floats | None:
+    """Rotations (frames, bones, 4) of arms that reach past the others; none if they do anyway.
+
+    Args:
+        volume: the arms and the body.
+        rotations: (frames, bones, 4) of all arms, one after the other.
+        strains: (frames, bones) by how much bones are longer than at rest, as a share.
+        share: (frames, arms) how far arms may be led another way, 0…1.
+        held: for each arm (frames, joints) how far joints are to stay where they are, 0…1.
+        travel: locations (frames, 3) and orientations (frames, 4) of the armature, world.
+        ground: what is below them, if anything.
+        scale: metres of the armature's unit.
+        frames_per_cycle: of the gait: the shorter, the quicker arms make way.
+    """
+    lying = [each > 0.0 for each in held]
+    nobody = np.zeros(share.shape, dtype=bool)
+    crowd = _Crowded.of(volume, rotations, strains, in_contact=lying, busy=nobody, travel=travel)
+    holds = np.stack([each.max(axis=1) for each in held], axis=1)
+    passing = Passing(share, holds, crowd.crowd.in_contact.argmax(axis=2))
+    moved = led_past(
+        crowd.crowd,
+        volume.still,
+        passing,
+        _floor(travel, ground, scale),
+        width=width_of(frames_per_cycle),
+    )
+    return crowd.turned(rotations, moved)
+
+
+def _floor(travel: tuple[Floats, Floats], ground: Ground | None, scale: float) -> Surface | None:
+    return Surface(ground, *travel, scale) if ground is not None else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Crowded:
+    """All arms of a motion, by the joints that stand for all."""
+
+    crowd: Crowd
+    posed: list[_Posed]
+    some: list[np.ndarray]
+
+    @classmethod
+    def of(
+        cls,
+        volume: BodyVolume,
+        rotations: Floats,
+        strains: Floats,
+        *,
+        in_contact: Sequence[np.ndarray],
+        busy: np.ndarray,
+        travel: tuple[Floats, Floats],
+        opened: Opened | None = None,
+    ) -> _Crowded:
+        """What arms with these rotations and strains, as in :func:`separate_arms`, are."""
+        some, chosen = _joints_chosen(volume.arms)
+        posed = _Posed.of_all(volume.arms, rotations)
+        joints = np.empty((len(rotations), len(volume.arms), len(chosen[0]), 3))
+        for each in posed:
+            joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
+        crowd = Crowd(
+            joints=joints,
+            radii=np.stack([own[which] for own, which in zip(volume.radii, chosen, strict=True)]),
+            at_rest=np.stack(
+                [arm.joints(arm.at_rest)[at] for arm, at in zip(volume.arms, chosen, strict=True)]
+            ),
+            in_contact=np.stack(
+                [_in_contact(own, at) for own, at in zip(in_contact, chosen, strict=True)], axis=1
+            ),
+            kept=busy,
+            upward=volume.upward,
+            opened=opened,
+            up=rotate(conjugate(travel[1]), _UP),
+        )
+        return cls(crowd, posed, some)
+
+    def turned(self, rotations: Floats, moved: Floats | None) -> Floats | None:
+        """Rotations (frames, bones, 4) with joints (frames, arms, joints, 3) that were moved."""
+        if moved is None:
+            return None
+        result = rotations.copy()
+        for each in self.posed:
+            each.turn(result, self.crowd.joints, moved, self.some[each.numbers[0]])
+        return result
 
 
 def _joints_chosen(arms: Sequence[ArmFrames]) -> tuple[list[np.ndarray], list[np.ndarray]]:

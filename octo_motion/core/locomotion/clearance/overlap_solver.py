@@ -84,14 +84,13 @@ def joints_of(roots: Floats, directions: Floats, lengths: Floats) -> Floats:
     return np.cumsum(steps, axis=1)
 
 
-_ROUNDS: Final = 8
-"""With four arms of Prowl overlap by 0.12 radii instead of 0.07; sixteen help by 0.03 at most."""
-_BOLDLY: Final = 1.3
-"""How much further arms are asked to go than they have to: they never get all the way. At 0.65 arms
-of Curl overlap by 0.22 radii instead of 0.065, at 2.6 Walk has a jerk of 0.124 instead of 0.088."""
-_DONE: Final = 0.08
-"""Share of the thinner radius: arms that overlap no deeper have made way. That is as deep as they
-stay: at 0.16 arms of Curl overlap by 0.13 radii, at 0.04 by 0.035."""
+_ROUNDS: Final = 12
+"""With eight, arms of Hurry uphill overlap by 0.083 radii instead of 0.055."""
+_BOLDLY: Final = 1.6
+"""How much further arms are asked to go than they have to: they never get all the way. At 1.3 arms
+of Hurry uphill overlap by 0.070 radii."""
+_DONE: Final = 0.05
+"""Share of the thinner radius: arms that overlap no deeper have made way."""
 _AROUND: Final = 4
 """Reaches of the means, before and after arms touch, within which others may have to make way. Two
 or eight change no figure by a tenth."""
@@ -101,6 +100,10 @@ _BRIEF: Final = 0.34
 _BORDER: Final = 1.6
 """Segments from where an arm lies over which it is less and less free to move. At 3.2 arms of Walk
 overlap by 0.28 radii instead of 0.06."""
+_RELUCTANT: Final = 3.0
+"""How much less than in proportion what is hardly free gives way: it gives way against little
+stiffness, and at 1 arms of the default walk would turn at once as they come to lie, by 15° in a
+48th of a second instead of 11°. At 10 arms of Hurry uphill overlap the more."""
 _STEADY: Final = 0.7
 """Share by which an arm in stance makes less way. At 0.35 arms of Hurry overlap by 0.060 radii
 instead of 0.045."""
@@ -225,8 +228,9 @@ class _Parting:
 
     def _in_time(self, free: Floats, kept: np.ndarray) -> Floats:
         """Freedom (frames, arms, …) that comes and goes smoothly, and is nowhere more."""
-        bound = self._covered(np.where(kept, 1.0, 1.0 - free), brief=True)
-        return np.where((free > 0.0) & ~kept, 1.0 - np.minimum(bound, 1.0), 0.0)
+        bound = np.minimum(self._covered(np.where(kept, 1.0, 1.0 - free), brief=True), 1.0)
+        left = (1.0 - bound) / (1.0 + (_RELUCTANT - 1.0) * bound)
+        return np.where((free > 0.0) & ~kept, left, 0.0)
 
     def _clearance(self) -> tuple[Floats, Floats]:
         """How high above the floor joints (frames, arms, joints) have to stay, and are above that.
@@ -307,10 +311,12 @@ class _Parting:
         columns, size = asked[some], size[:, some]
         if not len(columns):
             return result
-        mean = blurred(flat[:, columns], self._width, cyclic=self._cyclic)
+        # The way is told over as many frames as it is gone in: where one would be at an end before
+        # the other, arms would set out with a jump.
+        mean = blurred(flat[:, columns], 2 * self._width, cyclic=self._cyclic)
         length = _length(mean)
         # Where it is asked to go now one way and now the other, it stays between them.
-        mean_size = blurred(size, self._width, cyclic=self._cyclic)
+        mean_size = blurred(size, 2 * self._width, cyclic=self._cyclic)
         agreed = smooth_step(2.0 * length / np.maximum(mean_size, _TINY))
         whole = self._covered(size) * agreed
         whole[whole < 1e-5 * self._scale] = 0.0
@@ -327,7 +333,9 @@ class _Parting:
         size = _length(wanted[:, 1:])
         joints = np.arange(1, lengths.shape[1] + 1)
         pinned = self._held[chosen][:, None] * (joints == self._anchor[chosen][:, None])
-        weights = size / (size + 0.1 * self._scale) * (1.0 - pinned) + _PINNED * pinned
+        weights = size / (size + 0.1 * self._scale) * (1.0 - pinned)
+        # What is half held gives way half as far, and not as far as half that stiffness lets it.
+        weights += pinned / (1.0 - pinned + 1.0 / _PINNED)
         directions = turned_towards(
             self._directions[chosen],
             lengths,

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The free arm: gait table → pseudo-targets → weighted CCD."""
 
-from .ccd import close_group, diameters
-from .gait_poser import Arm, Build, GaitPoser, GaitSettings, bone_twists
+from .ccd import close_group, diameters, shares_before
+from .gait_poser import Arm, Build, GaitPoser, GaitSettings, bone_twists, target_places
 from .table import (
     ANGLES,
     CYCLE,
@@ -36,4 +36,6 @@ __all__ = [
     "gait_presets",
     "gait_to_json",
     "renamed_gait",
+    "shares_before",
+    "target_places",
 ]

@@ -17,6 +17,7 @@ goes from one side to the other passes round the straight line and not through i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -37,8 +38,8 @@ def diameters(joints: int, first: float = 1.0, taper: float = 0.01) -> Floats:
     return first * (1.0 - taper * np.arange(joints, dtype=np.float64))
 
 
-def split_groups(lengths: Floats) -> tuple[int, int, int]:
-    """Sizes of the three groups, as equal in length as whole segments allow.
+def split_groups(lengths: Floats, least: tuple[int, int, int] = (1, 1, 1)) -> tuple[int, int, int]:
+    """Sizes of the three groups, as equal in length as whole segments allow, none less than asked.
 
     The source cuts n segments, n a multiple of three, into thirds. Artists' arms have any number of
     segments of any length, at least three, not all zero, so the cuts are made where the three sums
@@ -58,10 +59,29 @@ def split_groups(lengths: Floats) -> tuple[int, int, int]:
     counts = np.stack(np.broadcast_arrays(first, second - first, count - second))
     # The second term only decides between cuts of equal cost.
     cost = cost + 1e-9 * np.sum((counts / count) ** 2, axis=0)
-    cost = np.where(second > first, cost, np.inf)
+    enough = np.all(counts >= np.array(least)[:, None, None], axis=0)
+    cost = np.where(enough, cost, np.inf)
     row, column = np.unravel_index(np.argmin(cost), cost.shape)
     cut_first, cut_second = int(first[row, 0]), int(second[0, column])
     return cut_first, cut_second - cut_first, count - cut_second
+
+
+# Share of its segments by length that a group keeps at least, whatever the weights, and two of two:
+# a group of a single one has nothing to bend.
+_KEPT_SEGMENTS: Final = 0.5
+
+
+def weighted_groups(lengths: Floats, weights: Floats) -> tuple[int, int, int]:
+    """Sizes of the three groups, as equal as whole segments allow in how far they can bend: length
+    times weight (segments,), of the joint at each segment's root.
+
+    So the bends between the gait's links come to be where the joints bend readily.
+    """
+    alike = split_groups(lengths)
+    first, second, third = (
+        min(size, max(2, int(np.ceil(_KEPT_SEGMENTS * size)))) for size in alike
+    )
+    return split_groups(lengths * (weights / weights.max()), (first, second, third))
 
 
 def group_lengths(lengths: Floats, sizes: tuple[int, int, int]) -> Floats:
@@ -184,6 +204,11 @@ class JointChain:
     from nothing and goes to nothing where it changes sides. Where the links before and after have
     a say in it, a bend of many degrees changes sides from one frame to the next."""
 
+    @cached_property
+    def before(self) -> Floats:
+        """(segments,) as of :func:`shares_before`."""
+        return shares_before(self.weights)
+
     @property
     def groups(self) -> tuple[slice, ...]:
         """The segments of each group."""
@@ -237,7 +262,7 @@ def solve_ccd(
     for number in range(1, iterations + 1):
         before = directions
         for _ in range(_SPREADS):
-            directions = softened(directions, softness)
+            directions = softened(directions, softness, chain.before)
         for segments in chain.pairs:
             directions[segments] = before[segments]
         if floor is not None:
@@ -402,19 +427,33 @@ def overreach(chords: Floats, whole: Floats, stretch_slack: float) -> Floats:
     return whole * slack * stretch_slack / (slack + stretch_slack)
 
 
-def softened(directions: Floats, amount: float) -> Floats:
+def shares_before(weights: Floats) -> Floats:
+    """Share (segments,) that the segment before each has in the mean of its neighbours.
+
+    A joint between two resists a bend by one over its weight, (segments,) of those at the
+    segments' roots: half where weights are alike. So spread again and again, bends come to be in
+    proportion to the weights.
+    """
+    stiff = 1.0 / weights
+    return stiff / (stiff + np.append(stiff[1:], stiff[-1:]))
+
+
+def softened(directions: Floats, amount: float, before: Floats) -> Floats:
     """Directions drawn towards the mean of their neighbours, across the borders of groups too.
 
-    Before the first segment stands the way in which the arm leaves the body, x.
+    Before the first segment stands the way in which the arm leaves the body, x. Each one's share in
+    the mean is from :func:`shares_before`.
     """
     if amount < _TINY:
         return directions
     # In quarters of the amount: it is made of unit length in the end.
     mean = (4.0 / amount - 2.0) * directions
-    mean[1:] += directions[:-1]
-    mean[:-1] += directions[1:]
-    mean[0, 0] += 1.0
-    mean[-1] += directions[-1]
+    before = 2.0 * before[:, None, None]
+    after = 2.0 - before
+    mean[1:] += before[1:] * directions[:-1]
+    mean[:-1] += after[:-1] * directions[1:]
+    mean[0, 0] += before[0, 0, 0]
+    mean[-1] += after[-1] * directions[-1]
     return _made_unit(mean)
 
 

@@ -54,7 +54,7 @@ from .ccd import (
     overreach,
     pseudo_targets,
     solve_ccd,
-    split_groups,
+    weighted_groups,
 )
 from .swim_spread import swim_azimuths, trailing_asides, trailing_beside
 from .table import GaitCurve, GaitTable, gait_angles, variation
@@ -71,22 +71,22 @@ class Build:
 
 
 def builds_of(
-    segments: Sequence[Floats], weights: Sequence[float], *, on_ground: bool
+    segments: Sequence[Floats], weights: Sequence[tuple[float, ...]], *, on_ground: bool
 ) -> tuple[Build, ...]:
     """Arms by how they are built, of segments (bones,) as long, in any unit.
 
-    Weights are of the joints, at even steps from an arm's root to its tip [Octopus, eq. 3.7].
+    Each arm's weights are of its joints, at even steps from its root to its tip [Octopus, eq. 3.7].
     """
     shares = [lengths / float(lengths.sum()) for lengths in segments]
-    same: dict[tuple[float, ...], list[int]] = {}
+    same: dict[tuple[tuple[float, ...], ...], list[int]] = {}
     for arm, own in enumerate(shares):
         # Bones' lengths are single precision.
-        same.setdefault(tuple(np.round(own, 6).tolist()), []).append(arm)
+        same.setdefault((tuple(np.round(own, 6).tolist()), weights[arm]), []).append(arm)
     builds = []
-    for arms in same.values():
+    for (_, given), arms in same.items():
         own = shares[arms[0]]
-        sizes = split_groups(own)
-        sampled = np.interp(np.cumsum(own) - own, np.linspace(0.0, 1.0, len(weights)), weights)
+        sampled = np.interp(np.cumsum(own) - own, np.linspace(0.0, 1.0, len(given)), given)
+        sizes = weighted_groups(own, sampled)
         chain = JointChain(own, sizes, sampled, pairs_as_asked=not on_ground)
         builds.append(Build(tuple(arms), chain, group_lengths(own, sizes)))
     return tuple(builds)
@@ -129,6 +129,8 @@ class Arm:
     """Radians that it is ahead of what the gait says."""
     flip: bool = False
     """Whether "towards the front" and the sense of bank are mirrored."""
+    weights: tuple[float, ...] = ()
+    """Of its own joints, in place of ``GaitSettings.weights``; none for those."""
 
     @property
     def handedness(self) -> float:
@@ -241,10 +243,7 @@ class GaitSettings:
 
     def __post_init__(self) -> None:
         check_settings(self)
-        if not self.weights or min(self.weights) <= 0.0 or max(self.weights) > 1.0:
-            raise SettingsError(
-                "A joint's weight is not between 0 and 1.", "Give weights above 0, 1 at most."
-            )
+        _check_weights(self.weights)
         if self.variation[0] > self.variation[1]:
             raise SettingsError(
                 "The variation's minimum is greater than its maximum.", "Exchange the two."
@@ -267,6 +266,7 @@ class GaitPoser:
 
     Raises:
         RigError: there are no arms, arms share bones, or a bone does not exist.
+        SettingsError: a weight of an arm's own is not between 0 and 1.
     """
 
     arms: Final[tuple[Arm, ...]]
@@ -327,7 +327,10 @@ class GaitPoser:
         sway = np.array([_across(gait.curve(pair)) for pair in self._pairs])
         sway[:, PITCH] *= self._hands
         self._sway = settings.lateral_bend * sway
-        self.builds = builds_of(segments, settings.weights, on_ground=gait.on_ground)
+        weights = [arm.weights or settings.weights for arm in self.arms]
+        for each in weights:
+            _check_weights(each)
+        self.builds = builds_of(segments, weights, on_ground=gait.on_ground)
         self._floor = -np.inf
         self._few: ContentCache[tuple[Floats, Floats]] = ContentCache()
         if settings.raise_to_floor and gait.on_ground:
@@ -501,9 +504,13 @@ class GaitPoser:
         key = content_key(build.arms, angles, steering)
         return self._few.get(key, lambda: self._shapes(build, angles, steering))
 
-    def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
-        frames, arms = angles.shape[:2]
-        batch = frames * arms
+    def chains(
+        self, build: Build, angles: Floats, steering: Floats
+    ) -> tuple[Floats, Floats, Floats | None]:
+        """Links (frames, arms, links, 4) and pseudo-targets Q₀ … Q₃ (frames, arms, links + 1, 3) of
+        a build's arms, from :meth:`asked`, in their frames and lengths; heights (arms,) of the
+        floor that targets are raised to, none where there is none.
+        """
         width = build.widths * (1.0 + contraction(angles, self.settings.contraction)) ** (
             # A group of a single bone cannot shorten.
             np.array(build.chain.sizes) > 1
@@ -511,20 +518,29 @@ class GaitPoser:
         steered = angles.copy()
         steered[..., 0, PITCH] += steering
         links = link_rotations(steered)
-        targets = _batch_last(pseudo_targets(links, width), batch)
-        floor = None
+        targets = pseudo_targets(links, width)
         # Two targets raised to one height come nearer to each other, which a single bone cannot.
-        if np.isfinite(self._floor) and min(build.chain.sizes) > 1:
-            columns = list(build.arms)
-            own = (self._floor - self.roots[columns, 2]) / self.lengths[columns]
-            floor = np.tile(own, frames)
-            targets[1:, 2] = smooth_floor(targets[1:, 2], floor, FLOOR_ROUNDING)
+        if not np.isfinite(self._floor) or min(build.chain.sizes) == 1:
+            return links, targets, None
+        columns = list(build.arms)
+        floor = (self._floor - self.roots[columns, 2]) / self.lengths[columns]
+        targets[..., 1:, 2] = smooth_floor(targets[..., 1:, 2], floor[:, None], FLOOR_ROUNDING)
+        return links, targets, floor
+
+    def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        frames, arms = angles.shape[:2]
+        batch = frames * arms
+        links, targets, floor = self.chains(build, angles, steering)
+        links, targets = _batch_last(links, batch), _batch_last(targets, batch)
+        floor = None if floor is None else np.tile(floor, frames)
+        steered = angles[..., [HEAD, PITCH]]
+        steered[..., 0, 1] += steering
         sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
-        shape = asked_shape(build.chain, _batch_last(steered[..., [HEAD, PITCH]], batch), sway.T)
+        shape = asked_shape(build.chain, _batch_last(steered, batch), sway.T)
         directions = solve_ccd(
             build.chain,
             shape,
-            _batch_last(links, batch),
+            links,
             targets,
             softness=self.settings.softness,
             stretch_slack=self.settings.stretch_slack,
@@ -545,10 +561,32 @@ class GaitPoser:
         )
 
 
+def target_places(poser: GaitPoser, phase: Floats, turn: Floats) -> Floats:
+    """Pseudo-targets Q₀ … Q₃ (frames, arms, 4, 3) in the body's frame, armature units, at phases
+    and turns as of :meth:`GaitPoser.pose`. What holds the ground has its foothold instead.
+    """
+    angles, steering = poser.asked(poser.arm_phases(phase), turn)
+    result = np.empty((len(phase), len(poser.arms), GROUPS + 1, 3))
+    for build in poser.builds:
+        columns = list(build.arms)
+        _, chain, _ = poser.chains(build, angles[:, columns], steering[:, columns])
+        chain *= poser.lengths[columns, None, None]
+        outward = poser.outward[columns, None]
+        result[:, columns] = poser.roots[columns, None] + rotate(outward, chain)
+    return result
+
+
 def _batch_last(values: Floats, batch: int) -> Floats:
     """From (frames, arms, rows, components) to what the solver takes: (rows, components, batch)."""
     rows = values.reshape(batch, *values.shape[2:])
     return np.ascontiguousarray(np.moveaxis(rows, 0, -1))
+
+
+def _check_weights(weights: Sequence[float]) -> None:
+    if not weights or min(weights) <= 0.0 or max(weights) > 1.0:
+        raise SettingsError(
+            "A joint's weight is not between 0 and 1.", "Give weights above 0, 1 at most."
+        )
 
 
 def _check_disjoint(arms: Sequence[Arm]) -> None:

@@ -440,13 +440,15 @@ def _carry(frames: Floats, ways: Floats, seen: Floats) -> None:
     frames[..., 0, :, :] = ways
 
 
-def evened(directions: Floats, share: Floats) -> Floats:
+def evened(directions: Floats, share: Floats, before: Floats) -> Floats:
     """Directions (segments, 3, batch) between those before and after, by a share (segments, batch).
 
-    Sharp bends spread over neighbouring joints; the first and the last segment stay.
+    Sharp bends spread over neighbouring joints; the first and the last segment stay. The one before
+    has a share of its own (segments, 1) in the mean of the two.
     """
     result = directions.copy()
-    mean = 0.5 * (directions[2:] + directions[:-2])
+    mean = before[1:-1, None] * (directions[:-2] - directions[2:])
+    mean += directions[2:]
     mean -= directions[1:-1]
     mean *= share[1:-1, None]
     result[1:-1] += mean

@@ -27,6 +27,7 @@ from ...content_cache import part_of
 from ...rotations import Floats, components_first
 from ...rotations.components_first import dot
 from ...smoothing import least_jerk, smooth_step
+from ..gait import shares_before
 from ..rig import MARGIN, JointRoom, loose_from_root, room_needed
 from .arm_curves import bent, curve, drawn, evened, lerp_bends, raise_over_ground, spread_chain
 from .footholds import PEELING, UNROLLING, Footholds
@@ -363,9 +364,10 @@ def _drawn_to_foothold(
     needed = room_needed(batch.radii, batch.reach[-1], batch.lift)
     soft = _SOFT * np.max(batch.radii, axis=0) + _TINY
     room = JointRoom(needed, _loose(batch, stance), soft)
+    before = shares_before(batch.limbs.weights[:, 0])[:, None]
     for number, steps in enumerate(_STEPS):
         # The last time it only has to meet its goal.
-        softer = evened(own, _EVENED * free) if number < len(_STEPS) - 1 else own
+        softer = evened(own, _EVENED * free, before) if number < len(_STEPS) - 1 else own
         own = raise_over_ground(
             softer,
             lengths,
@@ -534,8 +536,12 @@ def _arch(batch: Batch, stance: Stance, chord: Floats, arriving: Floats, strain:
         (leaving, arriving), chord, batch.upward, ratio / (1.0 + strain)
     )
     size = stance.contact_from * (1.0 + strain)
-    middles = np.clip(0.5 * (reach[1:] + reach[:-1]) / stance.contact_from, 0.0, 1.0)[:, None]
     parts = np.clip(stance.contact_from - reach[:-1], 0.0, lengths)
+    # How far along, is counted in how readily the joints bend.
+    bendable = batch.limbs.weights * lengths
+    middles = np.cumsum(bendable, axis=0) - 0.5 * bendable
+    middles /= np.sum(batch.limbs.weights * parts, axis=0)
+    middles = np.clip(middles, 0.0, 1.0)[:, None]
     tight = ratio / (1.0 + strain)
     over = 0.5 * (tight - _BUNCHED)
     least = _BUNCHED + over + np.sqrt(over * over + _BUNCHING**2)

@@ -29,6 +29,11 @@ _BLOCK: Final = 16
 """Samples: a ground's border lies at multiples of as many from the world's origin."""
 _MOST_SAMPLES: Final = 4_000_000
 """Samples of a ground; a longer route is sampled more coarsely."""
+_KINK: Final = 1.2
+"""By how much the rise per metre falls from one sample to the next where there is an edge. A step
+of 0.036 arm lengths has one; bumps of 0.3 bend by a tenth of that."""
+_DEEPEST: Final = 6.0
+"""Radii below an edge down to which it is rounded: of a higher wall the foot is left as it is."""
 
 
 _ONE: Final = 1e-4
@@ -110,6 +115,30 @@ class HeightField:
         across = [self.height(at + each) - self.height(at - each) for each in step]
         return np.stack(across, axis=-1) * (0.5 / self.spacing)
 
+    def rounded(self, radius: float) -> HeightField:
+        """The same with its edges rounded off outwards, for bones, which are straight.
+
+        Below an edge, d metres from its wall, the ground is at most d² / 2r lower: what follows it
+        cuts no edge, and comes up a step before it stands at it. Ground without edges is unchanged.
+        """
+        heights, around = self.heights, ((1, 0), (-1, 0), (1, 1), (-1, 1))
+        beside = [_shifted(heights, *each, np.inf) for each in around]
+        least = np.minimum(beside[0] + beside[1], beside[2] + beside[3])
+        edges = np.where(2.0 * heights - least > _KINK * self.spacing, heights, -np.inf)
+        if not np.isfinite(edges).any():
+            return self
+        # The wall may stand anywhere between two samples.
+        result = np.max([edges, *(_shifted(edges, *each, -np.inf) for each in around)], axis=0)
+        far = int(np.sqrt(2.0 * _DEEPEST) * radius / self.spacing) + 1
+        # A parabola in both directions is one in each after the other.
+        for axis in (0, 1):
+            whole = np.full(result.shape, -np.inf)
+            for step in range(-far, far + 1):
+                fall = (step * self.spacing) ** 2 / (2.0 * radius)
+                np.maximum(whole, _shifted(result, step, axis, -np.inf) - fall, out=whole)
+            result = whole
+        return HeightField(self.origin, self.spacing, np.maximum(heights, result))
+
     def _place(self, points: Floats, axis: int) -> tuple[Floats, np.ndarray]:
         """How far points are beyond the sample before them along an axis, and its number."""
         place = np.array(points[..., axis], dtype=np.float64)
@@ -121,6 +150,17 @@ class HeightField:
         number = place.astype(np.intp)
         place -= number
         return place, number
+
+
+def _shifted(values: Floats, step: int, axis: int, beyond: float) -> Floats:
+    """Values (nx, ny) so many samples further along an axis, with others beyond the border."""
+    result = np.full(values.shape, beyond)
+    there, here = (slice(max(each, 0), min(each, 0) or None) for each in (step, -step))
+    if axis == 0:
+        result[there] = values[here]
+    else:
+        result[:, there] = values[:, here]
+    return result
 
 
 def _along(heights: Floats, first: np.ndarray, share: Floats) -> Floats:
@@ -509,6 +549,8 @@ class Limbs:
     aims: Floats
     """(arms, 2) radians about the arm's vertical: where the gait has the foothold, and which way
     the arm lies from there, from straight outward."""
+    weights: Floats
+    """(segments, 1) of the joint at each one's root: how readily it bends."""
     may_stretch: bool = False
     free: np.ndarray | None = None
     """(arms,) whether the gait keeps an arm off the ground, none if it keeps no arm off."""

@@ -333,6 +333,7 @@ def limbs_of(
         lengths=scale * build.chain.lengths[:, None] * poser.lengths[columns],
         radii=scale * np.stack([radii[arm] for arm in columns], axis=1),
         aims=np.zeros((len(columns), 2)),
+        weights=build.chain.weights[:, None],
         may_stretch=may_stretch,
         free=np.array([gait.curve(poser.arms[arm].pair).free for arm in columns]),
     )

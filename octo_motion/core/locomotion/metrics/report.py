@@ -104,8 +104,9 @@ _SAID: Final = {
     "TURN": "'{arm}' turns by {degrees:.0f}° at frame {frame}",
 }
 """How what is too bad is told; misses and overlaps have sentences of their own."""
-_WAYS: Final = np.arange(1, 9) / 8.0
-"""Shares of how deep skin is below the ground, at which it is looked for a way out to the side."""
+_WAYS: Final = np.concatenate([np.geomspace(1.0 / 64.0, 1.0 / 8.0, 7), np.arange(2, 9) / 8.0])
+"""Shares of how deep skin is below the ground, at which it is looked for a way out to the side:
+beside a cliff that is far less than how high it is."""
 _AT_ONCE: Final = 256
 """Joints for which that is done at once, the deepest first."""
 _TINY: Final = 1e-12

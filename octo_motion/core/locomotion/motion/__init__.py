@@ -15,7 +15,14 @@ from .job import (
     Tolerances,
 )
 from .pipeline import MISS, MotionResult, compute
-from .planning import MotionPlan, plan_motion, schedule, shown_contacts
+from .planning import (
+    GaitTargets,
+    MotionPlan,
+    gait_targets,
+    plan_motion,
+    schedule,
+    shown_contacts,
+)
 
 __all__ = [
     "MISS",
@@ -25,6 +32,7 @@ __all__ = [
     "Creature",
     "Floor",
     "GaitJob",
+    "GaitTargets",
     "GroundJob",
     "MotionJob",
     "MotionPlan",
@@ -33,6 +41,7 @@ __all__ = [
     "Timing",
     "Tolerances",
     "compute",
+    "gait_targets",
     "plan_motion",
     "schedule",
     "shown_contacts",

@@ -15,11 +15,18 @@ import numpy as np
 
 from ...keyframes import Channel
 from ...rotations import IDENTITY, Floats, from_matrix, rotate, slerp
-from ..clearance import ArmsOverGround, Opened, keep_off_ground, raise_between_frames, separate_arms
+from ..clearance import (
+    ArmsOverGround,
+    Opened,
+    keep_off_ground,
+    lead_past,
+    raise_between_frames,
+    separate_arms,
+)
 from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, figures
 from ..path import plan_travel
-from ..reaching import Carried, Travelling
+from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .few_keys import Motion, measure_keyed, reduced
 from .job import MotionJob, Tolerances
@@ -129,8 +136,8 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     made = yield from _scaled(posing, 0.0, moving)
     arms = _cleared(plan, made, going)
     swimming, warnings = segments.swimming(travel.distance), list(plan.warnings)
-    notes, carried, busy = _reach(plan, arms, keyed)
-    warnings += _separate(plan, arms, busy, going, swimming=swimming, every=every)
+    reached = _reach(plan, arms, keyed, going)
+    warnings += _separate(plan, arms, reached, going, swimming=swimming, every=every)
     motion = _motion(plan, arms, keyed, swimming)
     on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
@@ -148,11 +155,11 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
         channels=[*channels, *plan.breath],
         automatic=not reducing,
         arms=arms,
-        carried=carried,
+        carried=reached.carried if reached is not None else (),
         measured=measured,
         figures=figures(measured) if measured is not None else (),
         warnings=(*warnings, *warnings_for_misses(plan, on_frames), *overlaps),
-        notes=notes,
+        notes=reached.notes if reached is not None else (),
     )
     yield 1.0
     return result
@@ -195,9 +202,14 @@ def _ground(plan: MotionPlan) -> Ground | None:
     return plan.standing[0].ground if plan.standing else None
 
 
+def _underfoot(plan: MotionPlan) -> Ground | None:
+    """The same as they feel it."""
+    return plan.standing[0].underfoot if plan.standing else None
+
+
 def _cleared(plan: MotionPlan, made: SegmentedMotion, going: Travelled) -> ArmMotion:
     """Arms that do not dip into the ground between frames, nor swim into it."""
-    arms, ground, creature = made.arms, _ground(plan), plan.job.creature
+    arms, ground, creature = made.arms, _underfoot(plan), plan.job.creature
     if ground is None:
         return arms
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
@@ -228,38 +240,61 @@ def _cleared(plan: MotionPlan, made: SegmentedMotion, going: Travelled) -> ArmMo
     return arms
 
 
-def _reach(
-    plan: MotionPlan, arms: ArmMotion, keyed: Travelled
-) -> tuple[tuple[str, ...], tuple[Carried, ...], np.ndarray]:
-    """Let arms reach: what they do, where they take objects, and which do (moments, arms).
+def _reach(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, going: Travelled) -> Reached | None:
+    """Let arms reach, past each other and the ground; none where nothing is reached for.
 
     Arms which reach hold no ground and follow no gait.
     """
-    reaching, busy = plan.job.reaching, np.zeros(arms.late.shape, dtype=bool)
+    reaching, creature = plan.job.reaching, plan.job.creature
     if reaching is None:
-        return (), (), busy
+        return None
     before = arms.rotations.copy()
-    travelling = Travelling(*keyed, plan.job.creature.scale)
-    notes, carried = reaching.apply(plan.schedule.frames, arms.rotations, travelling, arms.strains)
+    travelling = Travelling(*keyed, creature.scale)
+    reached = reaching.apply(plan.schedule.frames, arms.rotations, travelling, arms.strains)
+    _led_past(plan, arms, reached, going)
     moved = np.any(arms.rotations != before, axis=-1)
     for number, bones in enumerate(plan.segments.bones_of):
         own = moved[:, bones]
         arms.in_contact[number][:, 1:] &= ~np.logical_or.accumulate(own, axis=1)
-        busy[:, number] = own.any(axis=1)
-        arms.late[busy[:, number], number] = arms.misses[busy[:, number], number] = 0.0
-    return notes, carried, busy
+        busy = own.any(axis=1)
+        arms.late[busy, number] = arms.misses[busy, number] = 0.0
+    return reached
+
+
+def _led_past(plan: MotionPlan, arms: ArmMotion, reached: Reached, going: Travelled) -> None:
+    """Lead arms that reach past the others, and over the ground."""
+    job, ground, scale = plan.job, _ground(plan), plan.job.creature.scale
+    if job.volume is not None and job.keep_apart:
+        past = lead_past(
+            job.volume,
+            arms.rotations,
+            arms.strains,
+            share=reached.led,
+            held=reached.held,
+            travel=going,
+            ground=ground,
+            scale=scale,
+            frames_per_cycle=plan.stride * plan.pace.mean,
+        )
+        arms.rotations = past if past is not None else arms.rotations
+    if ground is not None and job.reaching is not None:
+        course = ArmsOverGround(job.reaching.frames, ground, scale, cyclic=job.in_place)
+        poses = Poses(arms.rotations, arms.strains, *going)
+        radii = [scale * each for each in job.reaching.radii]
+        loose = reached.away * (1.0 - np.stack([each.max(axis=1) for each in reached.held], axis=1))
+        arms.rotations = keep_off_ground(course, poses, radii, loose)
 
 
 def _separate(
     plan: MotionPlan,
     arms: ArmMotion,
-    busy: np.ndarray,
+    reached: Reached | None,
     going: Travelled,
     *,
     swimming: Floats | None,
     every: int,
 ) -> list[str]:
-    """Let arms make way for each other, but for those that are busy; what there is to warn of."""
+    """Let arms make way for each other, but for those that reach; what there is to warn of."""
     job, volume = plan.job, plan.job.volume
     if volume is None or not job.keep_apart:
         return []
@@ -270,9 +305,9 @@ def _separate(
         arms.rotations,
         arms.strains,
         in_contact=arms.in_contact,
-        busy=busy,
+        busy=reached.away > 0.0 if reached is not None else np.zeros(arms.late.shape, dtype=bool),
         travel=going,
-        ground=_ground(plan),
+        ground=_underfoot(plan),
         scale=job.creature.scale,
         frames_per_cycle=every * plan.pace.mean,
         opened=_opened(plan, len(arms.rotations), swimming),

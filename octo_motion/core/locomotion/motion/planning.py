@@ -16,7 +16,7 @@ from ...errors import SettingsError
 from ...keyframes import Channel
 from ...rotations import Floats
 from ...skeleton import Skeleton
-from ..gait import CYCLE, Arm, GaitPoser
+from ..gait import CYCLE, Arm, GaitPoser, target_places
 from ..ground import ContactOverride, GroundedWalk
 from ..path import (
     Course,
@@ -294,6 +294,41 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         breath=breath,
         warnings=tuple(warnings),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class GaitTargets:
+    """Where the gait that a motion begins with has its pseudo-targets, whatever the ground is."""
+
+    frames: Floats
+    """(frames,)"""
+    places: Floats
+    """(frames, arms, 4, 3) Q₀ … Q₃, armature space, of a body that stands as it does at rest."""
+    groups: tuple[tuple[tuple[str, ...], ...], ...]
+    """Of each arm the bones of its three groups, root to tip."""
+
+    def at(self, frame: float, arm: int) -> Floats:
+        """Those of an arm at a frame (4, 3): before and after the motion as at its ends."""
+        places = self.places[:, arm].reshape(len(self.frames), -1)
+        return np.array([np.interp(frame, self.frames, each) for each in places.T]).reshape(-1, 3)
+
+
+def gait_targets(job: MotionJob) -> GaitTargets:
+    """The pseudo-targets of a motion, which is not computed for that.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    when = schedule(job)
+    poser, body = _poser(job, job.gaits[0], when.lean), job.creature.body
+    travel = plan_travel(when.route, when.travel, when.times)
+    places = body.center + target_places(poser, travel.phase, travel.turn) @ body.rotation.T
+    sizes = {arm: build.chain.sizes for build in poser.builds for arm in build.arms}
+    groups = tuple(
+        tuple(arm.bones[end - size : end] for end, size in zip(np.cumsum(own), own, strict=True))
+        for arm, own in ((arm, sizes[number]) for number, arm in enumerate(poser.arms))
+    )
+    return GaitTargets(when.frames, places, groups)
 
 
 def _arm_length(job: MotionJob) -> float:

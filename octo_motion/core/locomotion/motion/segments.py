@@ -71,6 +71,9 @@ _FINE: Final = 0.03
 """Arm lengths between the samples of a ground …"""
 _COARSE: Final = 0.1
 """… and of one that only follows the route."""
+_EDGE: Final = 1.0 / 6.0
+"""Arm lengths: radius with which arms feel an edge. At 1/8 skin of Walk is 0.5 % of an arm in
+stairs instead of 0.3 %, without it 2.9 %."""
 _AROUND: Final = 1.8
 """Arm lengths to all sides of the route that the ground is sampled."""
 _HEADROOM: Final = 2.0
@@ -85,7 +88,7 @@ _OVER_ITSELF: Final = (
     "the ground, or switch Hold the Ground off."
 )
 
-_grounds: Final[ContentCache[Ground]] = ContentCache(2)
+_grounds: Final[ContentCache[tuple[Ground, Ground]]] = ContentCache(2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +101,8 @@ class Standing:
     line: BodyLine
     bearings: Bearings
     ground: Ground
+    underfoot: Ground
+    """The same as its arms feel it: with its edges rounded."""
     timing: ContactTiming | None
     """When arms hold on; none for the gait's own."""
     phases: tuple[float, float]
@@ -131,7 +136,7 @@ class Standing:
             self.poser,
             creature.body,
             line,
-            self.ground,
+            self.underfoot,
             settings=self.job.stance,
             scale=creature.scale,
             radii=self.radii,
@@ -172,12 +177,12 @@ def stand(
     """
     scale, warnings, bearings = creature.scale, job.warnings, bearings_of(route, travel)
     if cyclic:
-        ground, warnings = LevelGround(0.0), ()
+        ground, underfoot, warnings = LevelGround(0.0), LevelGround(0.0), ()
     elif job.mesh is None and plane is not None:
-        ground = LevelGround(plane)
+        ground = underfoot = LevelGround(plane)
     else:
         reach = poser.arm_length * scale
-        ground, more = _ground(job.mesh, route, travel, bearings, reach=reach)
+        (ground, underfoot), more = _ground(job.mesh, route, travel, bearings, reach=reach)
         warnings = (*more, *warnings)
     under = _under(poser, [each.radii for each in job.skins])
     line = body_line(
@@ -198,6 +203,7 @@ def stand(
         line=line,
         bearings=bearings,
         ground=ground,
+        underfoot=underfoot,
         timing=_timing(poser, job, line, route, scale=scale, cyclic=cyclic),
         phases=(0.0, 2.0 * np.pi * strides(route, travel)),
         cyclic=cyclic,
@@ -273,8 +279,8 @@ def _ground(
     bearings: Bearings,
     *,
     reach: float,
-) -> tuple[Ground, tuple[str, ...]]:
-    """The ground of a walk, and what there is to warn of."""
+) -> tuple[tuple[Ground, Ground], tuple[str, ...]]:
+    """The ground of a walk, as it is and as arms feel it, and what there is to warn of."""
     beyond = 0.0 if route.cyclic else travel.stride + reach
     count = int(np.ceil((route.length + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
     distance = np.linspace(-beyond, route.length + beyond, count)
@@ -285,15 +291,16 @@ def _ground(
             warnings = (_OVER_ITSELF,)
         around, spacing = _AROUND * reach, _COARSE * reach
         ground = ground_along_path(path, reach=around, spacing=spacing, softness=0.3 * reach)
-        return ground, warnings
+        return (ground, ground), warnings
     inside = (distance >= 0.0) & (distance <= route.length)
     triangles, content = mesh
     sizes = {"reach": _AROUND * reach, "spacing": _FINE * reach, "headroom": _HEADROOM * reach}
-    ground = _grounds.get(
-        content_key(content, path, inside, sizes),
-        lambda: sample_ground(triangles, path, inside, **sizes, content=content),
-    )
-    return ground, ()
+
+    def sampled() -> tuple[Ground, Ground]:
+        ground = sample_ground(triangles, path, inside, **sizes, content=content)
+        return ground, ground.rounded(_EDGE * reach)
+
+    return _grounds.get(content_key(content, path, inside, sizes), sampled), ()
 
 
 # --- Segments: one for each gait along the way, and how arms go over from one to the next ---------

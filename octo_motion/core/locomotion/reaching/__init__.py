@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arms that reach, wind round something, carry it and let go."""
 
-from .grasp import Carried, Mode, Places, Reach, Reaching, Target, Travelling, plan_grasp
+from .grasp import Carried, Mode, Places, Reach, Reached, Reaching, Target, Travelling, plan_grasp
 from .timeline import Timeline, curled
 from .winding import Profile, profile_of
 
@@ -11,6 +11,7 @@ __all__ = [
     "Places",
     "Profile",
     "Reach",
+    "Reached",
     "Reaching",
     "Target",
     "Timeline",

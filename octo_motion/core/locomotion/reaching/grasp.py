@@ -32,7 +32,17 @@ from ...rotations import (
 from ...smoothing import least_jerk, smooth_step
 from ..gait import Arm, close_group
 from ..rig import ArmFrames, frame_of, transport_frames
-from .timeline import Timeline, curled, first_place, folded, front_width, passed
+from .timeline import (
+    Pace,
+    Progress,
+    Timeline,
+    curled,
+    embracing,
+    first_place,
+    folded,
+    front_width,
+    passed,
+)
 from .winding import Coil, Profile, Skins, Winding, WindingStart, wind
 
 Mode = Literal["TOUCH", "COIL"]
@@ -50,6 +60,11 @@ _LEAST_HELD: Final = 0.1
 _TWISTED: Final = 0.8
 """The twist that brings suckers to the object lies in this last share of the free part."""
 _LIFT: Final = 0.25
+_HEAP: Final = (0.7, 0.2)
+"""Shares of the free part's length that its way has, from which on it begins to make a knee, and at
+which it does nothing else."""
+_KNEE: Final = np.array([3.0, 1.5, 1.5])
+"""Which way a knee goes: out from the body and back again, up and down again, and down midway."""
 _CLEAR: Final = 0.85
 """Of the skin's radius: joints on their way keep so far from the object."""
 _CLEAR_BETWEEN: Final = 0.65
@@ -69,6 +84,10 @@ _CLOSING: Final = 20
 _X: Final = np.array([1.0, 0.0, 0.0])
 _Y: Final = np.array([0.0, 1.0, 0.0])
 _UP: Final = np.array([0.0, 0.0, 1.0])
+_TURNED_OVER: Final = np.radians(160.0)
+"""By how much what is brought to the mouth turns over."""
+_BESIDE: Final = 2
+"""How many arms close over what is at the mouth, beside the one that has brought it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +144,8 @@ class Grasp:
     """(3,) away from the ground, armature space."""
     wraps: bool
     """Whether it winds on after the touch."""
+    pace: Pace | None = None
+    """How its time is given to what it does; evenly without."""
 
     @property
     def turns(self) -> float:
@@ -219,35 +240,68 @@ class Grasp:
         """Rotations (frames, bones, 4) of the arm at any times (frames,), of what it does
         otherwise, alike.
         """
-        arm, lengths, timeline = self.arm, self.arm.lengths, self.timeline
-        weight = timeline.weight(times, arm.reach[:-1] / arm.length)
-        moves = np.any(weight > 0.0, axis=-1)
+        arm, progress = self.arm, self.progress(times)
+        moves = np.any(progress.weight(arm.along) > 0.0, axis=-1)
         result = otherwise.copy()
-        if not np.any(moves):
-            return result
-        width = front_width(lengths)
-        # What only touches is there with all that it lays on the object.
+        if np.any(moves):
+            usual = arm.shape(arm.from_bones(otherwise[moves]))
+            result[moves] = arm.to_bones(self._reaching(progress[moves], places[moves], usual))
+        return result
+
+    def progress(self, times: Floats) -> Progress:
+        """How far it is at times (frames,)."""
+        return self.timeline.progress(times, self.pace)
+
+    @property
+    def _touches(self) -> float:
+        """Where the front is along the arm when it touches; what only touches is there then with
+        all that it lays on the object.
+        """
         laid = 0 if self.wraps else len(self.coil.facing)
-        touches = arm.reach[self.coil.first + laid] + width
-        ends = arm.length + width if self.wraps else touches
-        front_at = first_place(lengths)
-        front = timeline.front(times[moves], front_at, touches, ends)
-        holding = arm.shape(self.holding(places[moves]))
+        return float(self.arm.reach[self.coil.first + laid]) + front_width(self.arm.lengths)
+
+    def front(self, progress: Progress) -> Floats:
+        """Where the front is along the arm, (moments,)."""
+        lengths, touches = self.arm.lengths, self._touches
+        return progress.front(
+            begins=first_place(lengths),
+            touches=touches,
+            ends=self.arm.length + front_width(lengths) if self.wraps else touches,
+            freed=float(self.arm.reach[self.coil.first]),
+        )
+
+    def _reaching(self, progress: Progress, places: Places, usual: Floats) -> Floats:
+        """Frames (moments, segments, 4) of the arm at some progress, from the shape (moments,
+        segments, 4) that it has otherwise.
+        """
+        arm, lengths = self.arm, self.arm.lengths
+        front = self.front(progress)
+        holding = arm.shape(self.holding(places))
         reached = passed(lengths, front)
         last = self.coil.first + len(self.coil.facing)
         # Beyond the last turn the arm is left to curl off.
         reached[:, last:] = 0.0
-        fold = folded(lengths, front)
+        limp = progress.limp[:, None]
+        fold = folded(lengths, front, bend=limp, curl=limp)
         fold[:, 0] = holding[:, 0]
         reaching = lerp_rotation_vectors(fold, holding, reached)
         # What holds is out of the way already.
-        loose = 1.0 - least_jerk((front - touches + width) / width)
-        cleared = self._cleared(arm.shaped(reaching), places[moves], loose)
-        reaching = arm.shape(cleared)
-        usual = arm.shape(arm.from_bones(otherwise[moves]))
-        shape = arm.shaped(lerp_rotation_vectors(usual, reaching, weight[moves]))
-        result[moves] = arm.to_bones(shape)
-        return result
+        loose = 1.0 - least_jerk((front - self._touches) / front_width(lengths) + 1.0)
+        cleared = self._cleared(arm.shaped(reaching), places, loose)
+        weight = progress.weight(arm.along)
+        return arm.shaped(lerp_rotation_vectors(usual, arm.shape(cleared), weight))
+
+    def paced(self, touched: Places, released: Places) -> Grasp:
+        """The same, hurried nowhere: places are those (one) of the touch and of the release."""
+        arm = self.arm
+
+        def frames(progress: Progress) -> Floats:
+            count = len(progress.out)
+            usual = np.tile(arm.shape(arm.at_rest), (count, 1, 1))
+            place = released if np.any(progress.back > 0.0) else touched
+            return self._reaching(progress, place[np.zeros(count, dtype=np.intp)], usual)
+
+        return replace(self, pace=Pace.of(frames))
 
 
 def plan_grasp(
@@ -301,7 +355,8 @@ def plan_grasp(
             plans.append((abs(twist) - 1e-3 * sense, replace(loose, twist=twist)))
     if not plans:
         raise _too_far(arm, target, times[held], holding, name)
-    return min(plans, key=itemgetter(0))[1]
+    best = min(plans, key=itemgetter(0))[1]
+    return best.paced(holding[:1], holding[-1:])
 
 
 def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coil | None:
@@ -398,6 +453,11 @@ def _approach(
         + (3.0 * u * u - 2.0 * u) * arrives
         + 3.0 * bowed * far * (1.0 - 2.0 * u) * bow
     )
+    # Much too long, it would lie in a heap, and which way that leads is not to be told.
+    out, rises, falls = _KNEE
+    knee = (1.0 - 2.0 * u) * (out * outward + rises * up) - 6.0 * falls * u * (1.0 - u) * up
+    heap = smooth_step((_HEAP[0] - far / ends[-1]) / (_HEAP[0] - _HEAP[1]))
+    shape = normalized(shape) + heap * (normalized(knee) - normalized(shape))
     return np.moveaxis(normalized(shape), 1, -1)
 
 
@@ -455,6 +515,33 @@ class Reach:
     """(frames, 4)"""
     carry: bool = False
     """Whether the object goes along while it is held."""
+    brought: float | None = None
+    """Frame at which the object that is carried has been brought to the mouth, where it stays; none
+    if it is not."""
+
+    @property
+    def covered(self) -> Timeline | None:
+        """When the arms beside it close over what is brought to the mouth; never if it lets go
+        before.
+        """
+        own, brought = self.timeline, self.brought
+        if brought is None or own.release <= brought:
+            return None
+        return Timeline(own.closed, brought, brought, own.release, own.end)
+
+    def beside_the_body(self, times: Floats) -> Floats:
+        """How far (frames,) the arm works beside the body and not below it, 0…1."""
+        if self.brought is None:
+            return np.ones(len(times))
+        if self.mode == "COVER":
+            return np.zeros(len(times))
+        closed = self.timeline.closed
+        return 1.0 - least_jerk((times - closed) / max(0.5 * (self.brought - closed), 1e-6))
+
+    def takes_along(self, times: Floats) -> np.ndarray:
+        """At which of the times (frames,) it carries: what is at the mouth stays there."""
+        lets_go = times > self.timeline.release
+        return (times >= self.timeline.closed) & ~(lets_go & (self.brought is None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -469,6 +556,23 @@ class Carried:
     """(frames, 3) world."""
     rotations: Floats
     """(frames, 4) world."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """What has become of the reaches of a motion."""
+
+    notes: tuple[str, ...]
+    """What the arms do, in words."""
+    carried: tuple[Carried, ...]
+    """The objects that they take along."""
+    away: Floats
+    """(frames, arms) how far each has left what it does otherwise, 0…1."""
+    led: Floats
+    """(frames, arms) how far each may be led another way, past the others and the body, 0…1: not
+    where it works below the body."""
+    held: tuple[Floats, ...]
+    """For each arm (frames, joints) how far they lie on what is held, 0…1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -490,8 +594,8 @@ class Reaching:
         rotations: Floats,
         travelling: Travelling,
         strains: Floats | None = None,
-    ) -> tuple[tuple[str, ...], tuple[Carried, ...]]:
-        """Let arms reach, in place; what they do in words, and the objects that they carry.
+    ) -> Reached:
+        """Let arms reach, in place.
 
         At times (frames,) of the motion, rotations (frames, bones, 4) and strains (frames, bones),
         by how much bones are longer than at rest, are of all arms, one after the other. An arm that
@@ -501,46 +605,49 @@ class Reaching:
             OctoMotionError: an object is out of reach at a frame, which is named; two reaches of
                 one arm overlap.
         """
-        ends = np.cumsum([0, *(len(arm.bones) for arm in self.arms)])
-        busy: list[tuple[int, Reach]] = []
-        notes: list[str] = []
-        ways = _ways(self.reaches, times, travelling)
+        work = _Work.of(self, times, travelling, rotations, strains)
         for reach in sorted(self.reaches, key=lambda each: each.timeline.start):
-            way = ways.get(reach.target, reach)
-            seen = travelling.seen(way.positions, way.rotations)
-            number = self._arm(reach, times, seen)
-            shift, turn = self.standings[number]
-            places = Places(
-                rotate(conjugate(turn), seen.positions - shift),
-                multiply(conjugate(turn), seen.rotations),
-            )
-            _check_free(busy, number, reach, self.arms[number].name)
-            busy.append((number, reach))
-            columns = slice(int(ends[number]), int(ends[number + 1]))
-            own, arm = rotations[:, columns], self.frames[number]
-            if strains is not None:
-                weight = reach.timeline.weight(times, arm.reach[:-1] / arm.length)
-                strains[:, columns] *= 1.0 - weight
-            if reach.profile is None:
-                rotations[:, columns] = curled(arm, reach.timeline, times, own)
-                continue
-            profile = reach.profile.scaled(1.0 / travelling.scale)
-            grasp = self._grasp(reach, number, Target(profile, places, f"'{reach.target}'"), times)
-            rotations[:, columns] = grasp.apply(times, places, own)
-            if reach.mode != "TOUCH":
-                notes.append(
-                    f"'{self.arms[number].name}' winds {grasp.turns:.1f} times round "
-                    f"'{reach.target}'."
-                )
+            number = self.arm_of(reach, times, work.seen(reach))
+            _check_free(work.busy, number, reach, self.arms[number].name)
+            work.busy.append((number, reach))
+            work.move(reach, number)
+        for number, reach in tuple(work.busy):
+            if reach.brought is not None:
+                work.cover(reach, number)
         carried: list[Carried] = []
-        for way in ways.values():
-            held = (times >= way.timeline.closed) & (times <= way.timeline.release)
+        for way in work.ways.values():
+            taken = way.takes_along(times)
             carried.append(
-                Carried(way.target, times[held], way.positions[held], way.rotations[held])
+                Carried(way.target, times[taken], way.positions[taken], way.rotations[taken])
             )
-        return tuple(notes), tuple(carried)
+        return Reached(tuple(work.notes), tuple(carried), work.away, work.led, work.held)
 
-    def _grasp(self, reach: Reach, number: int, target: Target, times: Floats) -> Grasp:
+    def drawn_in(
+        self, profile: Profile, position: Floats, rotation: Floats, share: Floats, number: int
+    ) -> tuple[Floats, Floats]:
+        """Where an object is and how it is turned, (moments, 3) and (moments, 4), armature space,
+        that an arm brings from a position (3,) and rotation (4,) to the mouth, by some share
+        (moments,) of the way.
+
+        The mouth is below the middle of the arms. The object goes in under the body first and then
+        up, and turns over as the arm curls in that holds it, so that nothing is wrung.
+        """
+        arm, (shift, turn) = self.frames[number], self.standings[number]
+        up = rotate(turn, self.up)
+        outward = rotate(turn, rotate(arm.at_rest[0], _X))
+        aside = normalized(np.cross(up, outward))
+        turned = multiply(from_axis_angle(aside, _TURNED_OVER * share), rotation)
+        skin = float(np.mean([each[0] for each in self.radii]))
+        roots = np.mean([each.root for each in self.frames], axis=0)
+        mouth = rotate(turn, roots - skin * self.up) + shift
+        middle = position + rotate(rotation, profile.center)
+        size = rotate(turned[-1], profile.outline - profile.center) @ up
+        way = mouth - float(size.max()) * up - middle
+        rise = (way @ up) * up
+        path = middle + share[:, None] * (way - rise) + (share * share)[:, None] * rise
+        return path - rotate(turned, profile.center), turned
+
+    def grasp(self, reach: Reach, number: int, target: Target, times: Floats) -> Grasp:
         """How an arm takes hold of what it reaches for."""
         mode: Mode = "TOUCH" if reach.mode == "TOUCH" else "COIL"
         return plan_grasp(
@@ -555,7 +662,7 @@ class Reaching:
             name=f"'{self.arms[number].name}'",
         )
 
-    def _arm(self, reach: Reach, times: Floats, places: Places) -> int:
+    def arm_of(self, reach: Reach, times: Floats, places: Places) -> int:
         """The arm that is named; else the one whose root the object is nearest to at the touch."""
         for number, arm in enumerate(self.arms):
             if arm.name == reach.arm:
@@ -575,35 +682,154 @@ class Reaching:
         return int(np.argmin(away))
 
 
-def _ways(reaches: Sequence[Reach], times: Floats, travelling: Travelling) -> dict[str, Reach]:
-    """Reaches that carry their objects, with where they take them, by the objects' names."""
-    ways: dict[str, Reach] = {}
-    for reach in reaches:
-        held = np.flatnonzero((times >= reach.timeline.closed) & (times <= reach.timeline.release))
-        if not reach.carry or len(held) == 0:
-            continue
-        if reach.target in ways:
-            raise SettingsError(
-                f"Both '{ways[reach.target].name}' and '{reach.name}' carry '{reach.target}'.",
-                "Let one of them carry it; the other arm may hold it as well.",
-            )
-        seen = travelling.seen(reach.positions, reach.rotations)
-        positions, rotations = reach.positions.copy(), reach.rotations.copy()
-        turn = travelling.orientations[held]
-        positions[held] = travelling.locations[held] + travelling.scale * rotate(
-            turn, seen.positions[held[0]]
+@dataclass(eq=False)
+class _Work:
+    """Reaches on their way to become a motion."""
+
+    reaching: Reaching
+    times: Floats
+    travelling: Travelling
+    rotations: Floats
+    """(frames, bones, 4) of all arms, changed in place."""
+    strains: Floats | None
+    """(frames, bones), likewise."""
+    ways: dict[str, Reach]
+    """Those that carry their objects, with where they take them, by the objects' names."""
+    busy: list[tuple[int, Reach]]
+    notes: list[str]
+    away: Floats
+    led: Floats
+    held: tuple[Floats, ...]
+
+    @classmethod
+    def of(
+        cls,
+        reaching: Reaching,
+        times: Floats,
+        travelling: Travelling,
+        rotations: Floats,
+        strains: Floats | None,
+    ) -> _Work:
+        """Nobody reaches yet."""
+        away, led = np.zeros((2, len(times), len(reaching.arms)))
+        held = tuple(np.zeros((len(times), len(arm.bones) + 1)) for arm in reaching.arms)
+        work = cls(reaching, times, travelling, rotations, strains, {}, [], [], away, led, held)
+        work.carry()
+        return work
+
+    def seen(self, reach: Reach) -> Places:
+        """Where a reach's object is, seen from the armature."""
+        way = self.ways.get(reach.target, reach)
+        return self.travelling.seen(way.positions, way.rotations)
+
+    def move(self, reach: Reach, number: int) -> None:
+        """Let an arm reach."""
+        reaching, times = self.reaching, self.times
+        seen, arm = self.seen(reach), reaching.frames[number]
+        shift, turn = reaching.standings[number]
+        places = Places(
+            rotate(conjugate(turn), seen.positions - shift),
+            multiply(conjugate(turn), seen.rotations),
         )
-        rotations[held] = multiply(turn, seen.rotations[held[0]])
-        positions[held[-1] :], rotations[held[-1] :] = positions[held[-1]], rotations[held[-1]]
-        ways[reach.target] = replace(reach, positions=positions, rotations=rotations)
-    return ways
+        columns = self._columns(number)
+        own, progress = self.rotations[:, columns], reach.timeline.progress(times)
+        if reach.profile is None:
+            moved = curled(arm, reach.timeline, times, own)
+        else:
+            profile = reach.profile.scaled(1.0 / self.travelling.scale)
+            target = Target(profile, places, f"'{reach.target}'")
+            grasp = reaching.grasp(reach, number, target, times)
+            moved, progress = grasp.apply(times, places, own), grasp.progress(times)
+            self.held[number][:, grasp.coil.first :] += progress.holds[:, None]
+            if reach.mode != "TOUCH":
+                self.notes.append(
+                    f"'{reaching.arms[number].name}' winds {grasp.turns:.1f} times round "
+                    f"'{reach.target}'."
+                )
+        self.rotations[:, columns] = moved
+        self._leaves(reach, number, progress)
+
+    def _columns(self, number: int) -> slice:
+        """Which of all bones are those of an arm."""
+        first = sum(len(each.bones) for each in self.reaching.arms[:number])
+        return slice(first, first + len(self.reaching.arms[number].bones))
+
+    def _leaves(self, reach: Reach, number: int, progress: Progress) -> None:
+        """Keep in mind that an arm does not do what it does otherwise."""
+        self.away[:, number] += progress.away
+        self.led[:, number] += progress.away * reach.beside_the_body(self.times)
+        if self.strains is not None:
+            weight = progress.weight(self.reaching.frames[number].along)
+            self.strains[:, self._columns(number)] *= 1.0 - weight
+
+    def cover(self, reach: Reach, number: int) -> None:
+        """Let the arms beside one that brings something to the mouth lie down on that, and the web
+        between them with them; those that reach for something else, or cannot, do not.
+        """
+        reaching, covered = self.reaching, reach.covered
+        if covered is None:
+            return
+        roots = np.array([arm.root for arm in reaching.frames])
+        lays = replace(reach, timeline=covered, mode="COVER")
+        outward = rotate(reaching.frames[number].at_rest[0], _X)
+        beside = np.argsort(np.linalg.norm(roots - roots[number], axis=1))[1 : 1 + _BESIDE]
+        for other in beside.tolist():
+            if _taken(self.busy, other, lays):
+                continue
+            self.busy.append((other, lays))
+            arm, columns = reaching.frames[other], self._columns(other)
+            # Suckers are below: about them it is the other way round.
+            over = np.cross(rotate(arm.at_rest[0], _X), outward) @ reaching.up
+            own, way = self.rotations[:, columns], -1.0 if over > 0.0 else 1.0
+            self.rotations[:, columns] = embracing(arm, covered, self.times, own, way)
+            self._leaves(lays, other, covered.progress(self.times))
+
+    def carry(self) -> None:
+        """Find out where objects are taken."""
+        times, travelling = self.times, self.travelling
+        for reach in self.reaching.reaches:
+            held = np.flatnonzero(reach.takes_along(times))
+            if not reach.carry or len(held) == 0:
+                continue
+            if reach.target in self.ways:
+                raise SettingsError(
+                    f"Both '{self.ways[reach.target].name}' and '{reach.name}' carry "
+                    f"'{reach.target}'.",
+                    "Let one of them carry it; the other arm may hold it as well.",
+                )
+            seen = travelling.seen(reach.positions, reach.rotations)
+            start, own = seen.positions[held[0]], seen.rotations[held[0]]
+            places, turned = np.tile(start, (len(held), 1)), np.tile(own, (len(held), 1))
+            if reach.brought is not None and reach.profile is not None:
+                took = max(reach.brought - reach.timeline.closed, 1e-6)
+                share = least_jerk((times[held] - reach.timeline.closed) / took)
+                profile = reach.profile.scaled(1.0 / travelling.scale)
+                number = self.reaching.arm_of(reach, times, seen)
+                places, turned = self.reaching.drawn_in(profile, start, own, share, number)
+            positions, rotations = reach.positions.copy(), reach.rotations.copy()
+            turn = travelling.orientations[held]
+            positions[held] = travelling.locations[held] + travelling.scale * rotate(turn, places)
+            rotations[held] = multiply(turn, turned)
+            positions[held[-1] :], rotations[held[-1] :] = positions[held[-1]], rotations[held[-1]]
+            self.ways[reach.target] = replace(reach, positions=positions, rotations=rotations)
+
+
+def _taken(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach) -> Reach | None:
+    """The reach that an arm is busy with when another is to begin, none if it is free."""
+    for other, before in busy:
+        apart = (
+            reach.timeline.start >= before.timeline.end
+            or before.timeline.start >= reach.timeline.end
+        )
+        if other == number and not apart:
+            return before
+    return None
 
 
 def _check_free(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach, arm: str) -> None:
-    for other, before in busy:
-        if other == number and reach.timeline.start < before.timeline.end:
-            raise SettingsError(
-                f"'{arm}' reaches in '{before.name}' until frame {before.timeline.end:g} and in "
-                f"'{reach.name}' from frame {reach.timeline.start:g}.",
-                "Let one end before the other starts, or choose another arm.",
-            )
+    if (before := _taken(busy, number, reach)) is not None:
+        raise SettingsError(
+            f"'{arm}' reaches in '{before.name}' until frame {before.timeline.end:g} and in "
+            f"'{reach.name}' from frame {reach.timeline.start:g}.",
+            "Let one end before the other starts, or choose another arm.",
+        )

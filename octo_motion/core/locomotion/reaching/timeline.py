@@ -5,11 +5,11 @@ Gutfreund, Flash, Yarom, Fiorito, Segev and Hochner, "Organization of octopus ar
 model system for studying the control of flexible arms" (Journal of Neuroscience 16, 1996), found
 that an octopus reaches by pushing a bend along its arm: what lies before the bend is straight and
 points at the target, what lies behind follows it curled; the bend's speed has one peak between
-start and end, and the movement stays near a plane. Here the bend's place along the arm runs as a
-hand's does in a reach of least jerk (Flash and Hogan 1985), ``10 t³ − 15 t⁴ + 6 t⁵``, whose speed
-is such a bell. What lies behind the bend is a logarithmic spiral: its radius is in proportion to
-what is left of the arm, so it does not run into itself. Suckers face outwards there, and lead at
-the bend, as they do in nature.
+start and end, and the movement stays near a plane. Here time is given to each stretch of the way as
+it turns the arm, along a course of least jerk (Flash and Hogan 1985), ``10 t³ − 15 t⁴ + 6 t⁵``,
+whose speed is such a bell. What lies behind the bend is a logarithmic spiral: its radius is in
+proportion to what is left of the arm, so it does not run into itself. Suckers face outwards there,
+and lead at the bend, as they do in nature.
 
 After the touch the same front runs on to the tip, and the arm winds about the object as it passes.
 An arm that only curls up has the same spiral, which forms at its tip.
@@ -17,19 +17,26 @@ An arm that only curls up has the same spiral, which forms at its tip.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from ...errors import SettingsError
-from ...rotations import Floats, lerp_rotation_vectors
-from ...smoothing import least_jerk
+from ...rotations import (
+    Floats,
+    angle_between,
+    from_axis_angle,
+    lerp_rotation_vectors,
+    multiply,
+)
+from ...smoothing import blurred, least_jerk
 from ..rig import ArmFrames, bend_rotations
 
-FOLD: Final = np.radians(100.0)
+FOLD: Final = np.radians(70.0)
 """Angle of the travelling bend."""
-_SPIRAL: Final = 1.2
+_SPIRAL: Final = 0.8
 """Radians of the spiral for each time that what is left of the arm gets e times shorter."""
 _BLUNT: Final = 0.2
 """Arm lengths that the spiral thinks are left at the tip, so that it is not wound up endlessly."""
@@ -40,24 +47,37 @@ _BOLD: Final = 0.6
 """Where along the arm, in its lengths, the bend has its full angle."""
 _MOST_BENT: Final = np.radians(75.0)
 """Of one joint."""
-_FRONT: Final = 0.26
+_FRONT: Final = 0.36
 """Width of the front in arm lengths."""
 _FRONT_SEGMENTS: Final = 2.0
 """Least width of the front in segments."""
 _FIRST_BEND: Final = 0.1
 """Where the bend forms, in arm lengths from the root."""
-_GATHERED: Final = 0.5
+_GATHERED: Final = 0.7
 """Share of the reach by which the arm has left what it did otherwise."""
-_SET_OUT: Final = 0.12
-"""Share of the reach after which the bend sets out."""
-_STAGGER: Final = 0.8
+_STAGGER: Final = 0.5
 """How much later the root joins in than the tip, in times that each of them takes."""
-_UNWOUND: Final = 0.5
+_UNWOUND: Final = 0.7
 """Share of the return by which the arm has let go."""
-_BACK_FROM, _BACK_TO = 0.25, 0.9
-"""Shares of the return between which the bend runs back to the root."""
-_LEAVES: Final = 0.45
+_LEAVES: Final = 0.3
 """Share of the return after which the arm begins to go back to what it does otherwise."""
+_LIMP: Final = 0.4
+"""Share of bend and spiral that an arm has left when it has let go: it does not fling its tip."""
+
+
+_SOON: Final = 0.15
+"""Share of the way out within which an arm has set out, and of the way back within which it is
+back."""
+_TAKES: Final = 0.4
+"""The same within which what it holds comes to stay where it is, and stays there no more."""
+_SAMPLES: Final = 65
+"""Moments of a part of a reach at which is looked how it turns."""
+_LOUDEST: Final = 6.0
+"""Power of the mean over an arm's bones of how far they turn: nearly the largest, and smooth."""
+_EVEN: Final = 0.25
+"""Share of the mean turn that time is given for where nothing turns."""
+_AT_ONCE: Final = 1e-6
+"""Frames that what takes none takes."""
 
 
 @dataclass(frozen=True)
@@ -87,34 +107,99 @@ class Timeline:
                 "Let each come after the one before.",
             )
 
-    def weight(self, times: Floats, along: Floats) -> Floats:
-        """How far (frames, joints) the arm has left what it does otherwise, 0…1, of joints along it
-        (joints,), 0…1.
+    def progress(self, times: Floats, pace: Pace | None = None) -> Progress:
+        """How far reaching out, winding and going back are at times (frames,)."""
+        spans = (
+            (self.start, self.contact),
+            (self.contact, self.closed),
+            (self.release, self.end),
+        )
+        shares = [least_jerk((times - begin) / max(end - begin, _AT_ONCE)) for begin, end in spans]
+        if pace is not None:
+            even = np.linspace(0.0, 1.0, _SAMPLES)
+            shares = [
+                np.interp(share, own, even) for share, own in zip(shares, pace.ways, strict=True)
+            ]
+        return Progress(*shares)
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """How far the three parts of a reach are, (moments,) each, 0…1."""
+
+    out: Floats
+    wound: Floats
+    back: Floats
+
+    def __getitem__(self, chosen: np.ndarray) -> Progress:
+        """At some of the moments."""
+        return Progress(self.out[chosen], self.wound[chosen], self.back[chosen])
+
+    def weight(self, along: Floats) -> Floats:
+        """How far (moments, joints) the arm has left what it does otherwise, 0…1, of joints along
+        it (joints,), 0…1.
 
         The tip curls up before the root aims, and stretches out after the root has gone back: so
         the arm does not sweep over what it reaches for.
         """
-        whole, back = self.contact - self.start, self.end - self.release
-        out = (times[:, None] - self.start) / (_GATHERED * whole)
-        gone = (times[:, None] - self.release - _LEAVES * back) / ((1.0 - _LEAVES) * back)
+        out = self.out[:, None] / _GATHERED
+        gone = (self.back[:, None] - _LEAVES) / (1.0 - _LEAVES)
         out = least_jerk((1.0 + _STAGGER) * out - _STAGGER * (1.0 - along))
         gone = least_jerk((1.0 + _STAGGER) * gone - _STAGGER * along)
         return out * (1.0 - gone)
 
-    def front(self, times: Floats, begins: float, touches: float, ends: float) -> Floats:
-        """Where (frames,) the front is along the arm, from its three places."""
-        whole, back = self.contact - self.start, self.end - self.release
-        out = least_jerk((times - self.start - _SET_OUT * whole) / ((1.0 - _SET_OUT) * whole))
-        if self.closed > self.contact:
-            wound = least_jerk((times - self.contact) / (self.closed - self.contact))
-        else:
-            wound = (times >= self.contact).astype(np.float64)
-        unwound = least_jerk((times - self.release) / (_UNWOUND * back))
-        back_again = least_jerk(
-            ((times - self.release) / back - _BACK_FROM) / (_BACK_TO - _BACK_FROM)
+    @property
+    def away(self) -> Floats:
+        """How far (moments,) the arm has left what it does otherwise, 0…1, at its very ends."""
+        return least_jerk(self.out / _SOON) * least_jerk((1.0 - self.back) / _SOON)
+
+    @property
+    def holds(self) -> Floats:
+        """How far (moments,) the arm holds what it reaches for, 0…1: all of it only meanwhile."""
+        return least_jerk((self.out - 1.0) / _TAKES + 1.0) * least_jerk(1.0 - self.back / _TAKES)
+
+    @property
+    def limp(self) -> Floats:
+        """Share (moments,) of bend and spiral that the arm has, 1 until it lets go."""
+        return 1.0 - (1.0 - _LIMP) * least_jerk(self.back)
+
+    def front(self, *, begins: float, touches: float, ends: float, freed: float) -> Floats:
+        """Where (moments,) the front is along the arm, from its four places: the last is where it
+        is when all of the arm is off the object again.
+        """
+        place = begins + (touches - begins) * self.out + (ends - touches) * self.wound
+        return place + (freed - ends) * self.back / _UNWOUND
+
+
+@dataclass(frozen=True, eq=False)
+class Pace:
+    """Which share of the turning of a reach is over by each moment of its even progress, for its
+    three parts: time is given to each stretch as it turns the arm.
+    """
+
+    ways: tuple[Floats, Floats, Floats]
+
+    @classmethod
+    def of(cls, shape: Callable[[Progress], Floats]) -> Pace:
+        """The pace at which no part of the way is hurried, from the frames (moments, bones, 4) that
+        an arm has at some progress.
+        """
+        even = np.linspace(0.0, 1.0, _SAMPLES)
+        none, whole = np.zeros(_SAMPLES), np.ones(_SAMPLES)
+        parts = (
+            Progress(even, none, none),
+            Progress(whole, even, none),
+            Progress(whole, whole, even),
         )
-        place = begins + (touches - begins) * out * (1.0 - back_again)
-        return place + (ends - touches) * wound * (1.0 - unwound)
+        ways: list[Floats] = []
+        for part in parts:
+            frames = shape(part)
+            turned = angle_between(frames[:-1], frames[1:])
+            most = np.sum(turned**_LOUDEST, axis=-1) ** (1.0 / _LOUDEST)
+            most = blurred(most[:, None], _SAMPLES // 32)[:, 0]
+            way = np.cumsum(np.append(0.0, most + _EVEN * (most.mean() + _AT_ONCE)))
+            ways.append(way / way[-1])
+        return cls((ways[0], ways[1], ways[2]))
 
 
 def front_width(lengths: Floats) -> float:
@@ -138,7 +223,9 @@ def passed(lengths: Floats, front: Floats) -> Floats:
     return result
 
 
-def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1.0) -> Floats:
+def folded(
+    lengths: Floats, front: Floats, *, bend: Floats | float = 1.0, curl: Floats | float = 1.0
+) -> Floats:
     """Turns (…, segments, 4) of what the front (…), a place along the arm, has not passed: so much
     of the bend, and of the spiral beyond it.
     """
@@ -162,8 +249,16 @@ def folded(lengths: Floats, front: Floats, *, bend: float = 1.0, curl: float = 1
 
 _FREE: Final = 0.3
 """Share of the arm, from its root, that hardly curls."""
-_TIGHT: Final = 3.1
+_TIGHT: Final = 4.65
 """How much tighter than that of a reach the spiral is."""
+_EMBRACE: Final = np.radians(95.0)
+"""Of all bones together to the side, of an arm that closes over what another has brought …"""
+_DOWN: Final = np.radians(30.0)
+"""… to its suckers …"""
+_LEANS: Final = np.radians(20.0)
+"""… and of its first."""
+_SUCKERS: Final = np.array([0.0, 1.0, 0.0])
+_ACROSS: Final = np.array([0.0, 0.0, 1.0])
 _WAVE: Final = 0.5
 """How much of the time the curl needs to run along the arm."""
 
@@ -174,17 +269,48 @@ def curled(arm: ArmFrames, timeline: Timeline, times: Floats, otherwise: Floats)
     A spiral forms at the tip and runs towards the root; letting go, the root is first to stretch.
     Of the timeline ``start``, ``contact``, ``release`` and ``end`` count.
     """
-    along = arm.reach[:-1] / arm.length
-    up = (times[:, None] - timeline.start) / (timeline.contact - timeline.start)
-    down = (times[:, None] - timeline.release) / (timeline.end - timeline.release)
-    up = least_jerk((up - _WAVE * (1.0 - along)) / (1.0 - _WAVE))
-    down = least_jerk((down - _WAVE * along) / (1.0 - _WAVE))
-    share = up * (1.0 - down) * least_jerk(along / _FREE)
+    share = _curling(arm, timeline, times) * least_jerk(arm.along / _FREE)
     usual = arm.shape(arm.from_bones(otherwise))
     # A front before the arm's root: all of it is behind.
     spiral = folded(arm.lengths, np.full(len(times), -arm.length), bend=0.0, curl=_TIGHT)
     spiral[:, 0] = usual[:, 0]
-    shape = arm.shaped(lerp_rotation_vectors(usual, spiral, share))
+    return _blended(arm, usual, spiral, share, otherwise)
+
+
+def embracing(
+    arm: ArmFrames, timeline: Timeline, times: Floats, otherwise: Floats, way: float
+) -> Floats:
+    """Rotations (frames, bones, 4) of an arm that bends to its side, the way (1 or −1) about the
+    side of its suckers, as one that closes over what another arm has brought.
+
+    Times are as in :func:`curled`.
+    """
+    share = _curling(arm, timeline, times)
+    usual = arm.shape(arm.from_bones(otherwise))
+    share_of_it = arm.lengths / arm.length
+    aside = from_axis_angle(_SUCKERS, way * _EMBRACE * share_of_it)
+    aside = multiply(aside, from_axis_angle(_ACROSS, _DOWN * share_of_it))
+    turned = np.tile(aside, (len(times), 1, 1))
+    turned[:, 0] = multiply(usual[:, 0], from_axis_angle(_SUCKERS, way * _LEANS))
+    return _blended(arm, usual, turned, share, otherwise)
+
+
+def _curling(arm: ArmFrames, timeline: Timeline, times: Floats) -> Floats:
+    """How far (frames, bones) an arm is curled, the tip first, and the root first to stretch."""
+    along = arm.along
+    up = (times[:, None] - timeline.start) / (timeline.contact - timeline.start)
+    down = (times[:, None] - timeline.release) / (timeline.end - timeline.release)
+    up = least_jerk((up - _WAVE * (1.0 - along)) / (1.0 - _WAVE))
+    return up * (1.0 - least_jerk((down - _WAVE * along) / (1.0 - _WAVE)))
+
+
+def _blended(
+    arm: ArmFrames, usual: Floats, other: Floats, share: Floats, otherwise: Floats
+) -> Floats:
+    """Rotations (frames, bones, 4) of an arm between two shapes; ``otherwise`` where it is in the
+    first.
+    """
+    shape = arm.shaped(lerp_rotation_vectors(usual, other, share))
     result = otherwise.copy()
     moves = np.any(share > 0.0, axis=-1)
     result[moves] = arm.to_bones(shape)[moves]

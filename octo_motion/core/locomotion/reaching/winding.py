@@ -62,6 +62,13 @@ class Profile:
         """Inverse of :meth:`to_profile`."""
         return points @ self.axes.T + self.center
 
+    @property
+    def outline(self) -> Floats:
+        """(points, 3) all round its slices, in the object's frame."""
+        across = self.support[..., None] * _CIRCLE.T
+        along = np.broadcast_to(self.heights[:, None, None], (*self.support.shape, 1))
+        return self.to_object(np.concatenate([across, along], axis=-1)).reshape(-1, 3)
+
     def clearance(self, points: Floats) -> Floats:
         """Distance (…,) across the axis from the surface, negative within; object's frame.
 

@@ -2,8 +2,8 @@
 """From solved joints to bone rotations: swing by the smallest rotation, twist by bank alone.
 
 A bone that follows its segment by the smallest rotation from where its parent carries it gains no
-twist of its own. So twist is a channel by itself: bank, and nothing else: the
-source's first open problem was arms that wring themselves, and suckers that face the sky.
+twist of its own. So twist is a channel by itself: bank, and nothing else. The source turns joints
+without regard to twist, and to which way suckers face; it names both as what is to be improved.
 
 The smallest rotation is indefinite, and jumps, where a bone points opposite to its rest. Arms of
 many rigs hang straight down at rest, and rear up straight when they move. So what the body carries
@@ -258,6 +258,11 @@ class ArmFrames:
     def length(self) -> float:
         """Of the whole arm."""
         return float(self.reach[-1])
+
+    @property
+    def along(self) -> Floats:
+        """(bones,) how far along the arm each bone begins, 0…1."""
+        return self.reach[:-1] / self.length
 
     @cached_property
     def at_rest(self) -> Floats:

@@ -41,7 +41,7 @@ from .arm_chains import (
     nearest_axis,
 )
 
-REMEDY: Final = "Select the bones of one arm, from its root to its tip, and click Add."
+REMEDY: Final = "Select the bones of one arm, root to tip, and click + beside the list."
 
 _TIP_MARKERS: Final = ("_end", ".end", "_nub", "nub", "_leaf", "_endsite")
 _CONTROL_PREFIXES: Final = ("ORG-", "MCH-", "CTRL-", "CTRL_", "VIS-", "IK-", "IK_", "FK-", "FK_")

@@ -10,12 +10,15 @@ from .figure import (
     Integers,
     Pose,
     capsules_in_world,
+    closed,
     distances_to_axes,
+    pose_of,
     rest_pose,
 )
 from .joint_limits import bends, slopes
 from .materials import (
     Bend,
+    JointCoefficients,
     Material,
     MeasuredBend,
     elements_for,
@@ -24,7 +27,7 @@ from .materials import (
     measure_bend,
     measure_shown,
 )
-from .plastic_element import ElementResponse, PlasticLaw
+from .plastic_element import ElementResponse, PlasticLaw, law_of
 
 __all__ = [
     "BODY",
@@ -38,6 +41,7 @@ __all__ = [
     "Figure",
     "Flags",
     "Integers",
+    "JointCoefficients",
     "JointLimits",
     "Material",
     "MeasuredBend",
@@ -49,15 +53,18 @@ __all__ = [
     "bends",
     "build_figure",
     "capsules_in_world",
+    "closed",
     "diagonal",
     "distances_to_axes",
     "elements_for",
     "find_roles",
     "joint_loads",
     "joints_of",
+    "law_of",
     "material_of",
     "measure_bend",
     "measure_shown",
+    "pose_of",
     "rest_pose",
     "slopes",
     "turned_bodies",

@@ -81,6 +81,13 @@ class RigFacts:
     """Bones whose rotation is locked about all axes."""
     smallest: float = SMALLEST
     """Share of the figure's size: shorter bones follow."""
+    goals: frozenset[str] = frozenset()
+    """Bones that inverse kinematics reach for or point at: controls, that hang on no limb."""
+    carried: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Of bones that something else moves, those that carry them as a parent would."""
+    controls: Mapping[str, int] = field(default_factory=dict)
+    """Where bones are posed through controls, and are limbs whatever else moves them: on how many
+    controls each depends. Empty elsewhere."""
 
 
 def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") -> Roles:
@@ -111,7 +118,7 @@ def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") 
             f"'{name}' has no bone that could be posed by hand.",
             "Mark bones as limbs in the panel Pose.",
         )
-    tree = _tree(skeleton, _joined(skeleton, facts, chosen, size), size)
+    tree = _tree(skeleton, facts, _joined(skeleton, facts, chosen, size), size)
     return replace(tree, driven=tuple(sorted(driven)))
 
 
@@ -148,14 +155,15 @@ def _chosen(
         name = skeleton.names[bone]
         driven = name in facts.moved
         # What is driven is locked in many rigs, so that nobody takes hold of it by mistake.
-        if mark is not None or (name in facts.locked and not driven):
+        locked = name in facts.locked and not (driven or facts.controls)
+        if mark is not None or locked or name in facts.goals:
             continue
         if reach[bone] < max(facts.smallest, 1e-6) * size:
             continue
         # What deforms in Rigify's rigs begins with DEF; the rest of the name counts.
         if by_name and is_helper_name(name.removeprefix("DEF-")):
             continue
-        if driven:
+        if driven and not facts.controls:
             twin = _twin(skeleton, facts, bone, size)
             if twin is None:
                 lost.add(bone)
@@ -190,10 +198,12 @@ def _twin(skeleton: Skeleton, facts: RigFacts, bone: int, size: float) -> int | 
     apart = np.linalg.norm(skeleton.heads - skeleton.heads[bone], axis=1)
     along = skeleton.rest_matrices[:, :3, 1] @ skeleton.rest_matrices[bone, :3, 1]
     off = np.abs(skeleton.lengths - skeleton.lengths[bone])
+    carriers = facts.carried.get(skeleton.names[bone], frozenset(skeleton.names))
     fitting = [
         other
         for other in np.flatnonzero((apart < _TWIN * size) & (along > 0.9)).tolist()
         if other != bone
+        and skeleton.names[other] in carriers
         and skeleton.names[other] not in facts.moved | facts.locked
         and not is_helper_name(skeleton.names[other])
     ]
@@ -217,6 +227,9 @@ def _end_nearby(skeleton: Skeleton, chosen: set[int], root: int, size: float) ->
 def _joined(skeleton: Skeleton, facts: RigFacts, chosen: set[int], size: float) -> set[int]:
     """The bodies, and the bones that they need to hang together."""
     result = set(chosen)
+    if facts.controls:
+        # What carries their controls is no part of the body.
+        return result
     while True:
         roots = _roots(skeleton, result)
         main = max(roots, key=lambda root: _limb_size(skeleton, result, root))
@@ -259,21 +272,26 @@ def _common_ancestor(skeleton: Skeleton, facts: RigFacts, bones: Sequence[int]) 
     return None
 
 
-def _tree(skeleton: Skeleton, chosen: set[int], size: float) -> Roles:
+def _tree(skeleton: Skeleton, facts: RigFacts, chosen: set[int], size: float) -> Roles:
     def carrier(bone: int) -> int:
         return next((each for each in skeleton.ancestors(bone) if each in chosen), -1)
 
     above = {bone: carrier(bone) for bone in chosen}
     roots = [bone for bone in sorted(chosen) if above[bone] < 0]
-    main = max(roots, key=lambda root: _limb_size(skeleton, chosen, root))
+    if facts.controls:
+        # No bone carries the others: the trunk hangs on the fewest controls.
+        main = min(roots, key=lambda root: facts.controls.get(skeleton.names[root], 0))
+    else:
+        main = max(roots, key=lambda root: _limb_size(skeleton, chosen, root))
     hangs = dict(above)
     for root in roots:
         if root == main:
             continue
         mate = _end_nearby(skeleton, chosen, root, size)
-        if mate is None:
-            mate = _nearest(skeleton, chosen, root)
-        if mate is not None and not _leads_to(hangs, mate, root):
+        if mate is None or _leads_to(hangs, mate, root):
+            free = {bone for bone in chosen if not _leads_to(hangs, bone, root)}
+            mate = _nearest(skeleton, free, root)
+        if mate is not None:
             hangs[root] = mate
     ordered = _parents_first(hangs)
     place = {bone: number for number, bone in enumerate(ordered)}

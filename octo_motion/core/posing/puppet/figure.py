@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...rotations import Floats, multiply, rotate
+from ...rotations import Floats, conjugate, multiply, rotate
 
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
@@ -56,17 +56,18 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """Coefficients of the three-element model [Plastic, eq. 16–26], alike about all axes.
+    """Coefficients of the three-element model [Plastic, eq. 16–26], for each joint alike about all
+    axes (bodies,), or about the bone's own X, Y (twist) and Z (bodies, 3).
 
-    One for each joint; a root's counts only where the root is pinned.
+    A root's count only where the root is pinned.
     """
 
     stiffness: Floats
-    """(bodies,) K_f, N·m/rad."""
+    """K_f, N·m/rad."""
     damping: Floats
-    """(bodies,) D_f, beside the spring, N·m·s/rad."""
+    """D_f, beside the spring, N·m·s/rad."""
     flow: Floats
-    """(bodies,) D_d, in series, N·m·s/rad: how fast the joint gives way."""
+    """D_d, in series, N·m·s/rad: how fast the joint gives way."""
     yield_torque: Floats
     """(bodies,) N·m: below it the series damper holds; 0 lets it creep always, as in the source."""
 
@@ -77,12 +78,10 @@ class Elements:
 
     def where(self, works: Flags) -> Elements:
         """These in the joints (bodies,) of a mask, and others limp."""
-        return Elements(
-            np.where(works, self.stiffness, 0.0),
-            np.where(works, self.damping, 0.0),
-            np.where(works, self.flow, 0.0),
-            self.yield_torque,
+        stiffness, damping, flow = (
+            (each.T * works).T for each in (self.stiffness, self.damping, self.flow)
         )
+        return Elements(stiffness, damping, flow, self.yield_torque)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +113,15 @@ def pose_of(figure: Figure, turns: Floats, roots: Floats) -> Pose:
             arm = rotate(orientations[parent], figure.anchors[body])
             positions[body] = positions[parent] + arm
     return Pose(positions, orientations)
+
+
+def closed(figure: Figure, pose: Pose) -> Pose:
+    """A pose with the same orientations and roots, and every joint closed."""
+    parents = np.array(figure.parents)
+    turns, hangs = pose.orientations.copy(), parents >= 0
+    carried = conjugate(pose.orientations[parents[hangs]])
+    turns[hangs] = multiply(carried, turns[hangs])
+    return pose_of(figure, turns, pose.positions)
 
 
 def distances_to_axes(ends: Floats, point: Floats) -> Floats:

@@ -57,16 +57,33 @@ class Material:
     """Seconds, D_f/K_f: how long springing back takes. Without a spring, D_f against the load."""
     gives: float
     """rad/s at twice the yield torque: τ/D_d. Without yield, 0 for a rigid series damper."""
+    of_limb: bool = False
+    """Whether a whole limb springs back so far, its joints together (``limb_shares``), and not each
+    joint by itself."""
+
+
+@dataclass(frozen=True)
+class JointCoefficients:
+    """What a joint is made of in numbers, about its bone's X, Y (twist) and Z."""
+
+    stiffness: tuple[float, float, float]
+    """K_f, N·m/rad."""
+    damping: tuple[float, float, float]
+    """D_f, N·m·s/rad."""
+    flow: tuple[float, float, float]
+    """D_d, N·m·s/rad, above zero."""
+    yield_torque: float
+    """τ, N·m, below which the joint holds; 0 creeps always, inf never gives way."""
 
 
 MATERIALS: Final[Mapping[str, Material]] = MappingProxyType(
     {
-        # Gives way slowly and stays: half a degree comes back.
-        "clay": Material(bears=1.25, springs=np.radians(0.5), settles=0.03, gives=1.0),
+        # Gives way slowly and stays: of a whole limb, a tenth of a degree comes back.
+        "clay": Material(1.25, springs=np.radians(0.1), settles=0.005, gives=1.0, of_limb=True),
         # Bends at once and springs back some.
-        "wire": Material(bears=1.25, springs=np.radians(8.0), settles=0.05, gives=10.0),
+        "wire": Material(1.25, springs=np.radians(2.0), settles=0.01, gives=10.0, of_limb=True),
         # Dry friction in a socket: firm, and hardly any spring.
-        "doll": Material(bears=2.0, springs=np.radians(0.25), settles=0.03, gives=20.0),
+        "doll": Material(2.0, springs=np.radians(0.25), settles=0.01, gives=20.0, of_limb=True),
         # Bends by its own weight and always comes back.
         "rubber": Material(bears=np.inf, springs=np.radians(20.0), settles=0.15, gives=0.0),
         # Bears nothing; a little resistance, so that it does not swing for ever.
@@ -79,10 +96,10 @@ def elements_for(
     figure: Figure,
     material: str | Material,
     strength: float = 1.0,
-    own: Mapping[int, Material] | None = None,
+    own: Mapping[int, Material | JointCoefficients] | None = None,
 ) -> Elements:
     """The elements of a figure of a material, in ``MATERIALS`` or measured; single bodies may have
-    their own.
+    their own, or coefficients, which no strength changes.
 
     The strength is a factor on all torques: with 1 every joint of a material that yields just bears
     what hangs on it.
@@ -102,17 +119,26 @@ def elements_for(
         )
     load = strength * joint_loads(figure)
     made_of = [(own or {}).get(body, material) for body in range(len(figure))]
-    values = [_values(each, at) for each, at in zip(made_of, load.tolist(), strict=True)]
-    return Elements(*np.array(values).reshape(-1, 4).T)
+    typed = any(isinstance(each, JointCoefficients) for each in made_of)
+    values = np.empty((4, len(figure), 3))
+    known = zip(made_of, load.tolist(), limb_shares(figure).tolist(), strict=True)
+    for body, (each, at, share) in enumerate(known):
+        if isinstance(each, JointCoefficients):
+            values[:, body] = each.stiffness, each.damping, each.flow, (each.yield_torque,) * 3
+        else:
+            values[:, body] = np.array(_values(each, at, share))[:, None]
+    if not typed:
+        return Elements(*values[:, :, 0])
+    return Elements(values[0], values[1], values[2], values[3, :, 0])
 
 
-def _values(material: Material, load: float) -> tuple[float, float, float, float]:
-    """K_f, D_f, D_d and τ of a joint with a load, N·m."""
+def _values(material: Material, load: float, share: float) -> tuple[float, float, float, float]:
+    """K_f, D_f, D_d and τ of a joint with a load, N·m, that is a share of its limb."""
     limit = material.bears * load
     bearing = limit if np.isfinite(limit) else load
     stiffness, damping = 0.0, load * material.settles
     if np.isfinite(material.springs):
-        stiffness = bearing / material.springs
+        stiffness = bearing / (material.springs * (share if material.of_limb else 1.0))
         damping = stiffness * material.settles
     # A joint that never yields has a series damper that never moves; any size will do.
     flow = bearing / material.gives if material.gives > 0.0 else 1e6 * load
@@ -129,6 +155,23 @@ def material_of(measured: MeasuredBend, load: float) -> Material:
         settles=measured.damping / measured.stiffness,
         gives=bearing / measured.flow if yields else 0.0,
     )
+
+
+def limb_shares(figure: Figure) -> Floats:
+    """(bodies,) what each bone is of the longest way over it from a root to a tip.
+
+    From any root to any tip they add up to 1 at most: what is divided among joints by them is the
+    same for a limb however many bones it has.
+    """
+    above, below = figure.lengths.copy(), figure.lengths.copy()
+    for body, parent in enumerate(figure.parents):
+        if parent >= 0:
+            above[body] += above[parent]
+    for body in range(len(figure) - 1, -1, -1):
+        parent = figure.parents[body]
+        if parent >= 0:
+            below[parent] = max(below[parent], figure.lengths[parent] + below[body])
+    return figure.lengths / (above + below - figure.lengths)
 
 
 def joint_loads(figure: Figure) -> Floats:

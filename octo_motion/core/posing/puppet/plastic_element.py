@@ -17,6 +17,15 @@ with s = λ_e/|λ_e|, and q_f[t+1] = q_f[t] + h (w − w_d). At τ = 0 that is e
 C = (D_d + G)/(D_d G) and D = K_f/G, and eq. 21 for q_f. λ falls as w grows and λ·w_d ≤ 0 whatever
 the step: the element stores or loses energy and never makes any. It is alike about all axes, so
 these may be any, and all functions work on arrays (joints, 3).
+
+Where coefficients differ about a bone's axes (``AxisLaw``), K_f, D_f and D_d are diagonal there;
+the yield torque still bounds the load as a vector: what the series damper spends is
+τ |w_d| + ½ w_d·D_d w_d, whose slope is the load while it moves. With v = −w_d and s = |v|
+
+    v = s λ_e/((D_d + G) s + τ),      |λ_e/((D_d + G) s + τ)| = 1,      λ = λ_e − G v,
+
+of which only s has to be found. With equal coefficients it is the law above, and at τ = 0 each axis
+is the source's element by itself.
 """
 
 from __future__ import annotations
@@ -46,6 +55,10 @@ class ElementResponse:
     """(joints,) |λ_e|; of no account where nothing flows."""
     flows: Flags | None
     """(joints,) where the series damper moves; None where all hold: the load is linear in w."""
+    flow: Floats | None = None
+    """(joints, 3) w_d; None where it follows from the load, see ``flow_of``."""
+    bent: Floats | None = None
+    """(joints, 3, 3) the slope where something flows; None likewise."""
 
     @property
     def slope(self) -> Floats:
@@ -53,6 +66,8 @@ class ElementResponse:
         law = self.law
         if self.flows is None:
             return law.diagonal
+        if self.bent is not None:
+            return self.bent
         # Along s only what the flow leaves, across it also the turning of s.
         which = self.flows.nonzero()[0]
         size = self.size.take(which) + _TINY
@@ -68,6 +83,8 @@ class ElementResponse:
 
     def flow_of(self, which: Integers) -> Floats:
         """(which, 3) w_d, rad/s, of those elements, of which each flows."""
+        if self.flow is not None:
+            return self.flow.take(which, 0)
         law = self.law
         size = self.size.take(which)
         excess = (size - law.yield_torque.take(which)) / (size + _TINY)
@@ -102,6 +119,14 @@ class PlasticLaw:
         self.held = step * self.diagonal
         """The same for the impulse over a step."""
 
+    def seen_in(self, frames: Floats) -> PlasticLaw:  # noqa: ARG002
+        """The law of a step in world axes, of bones with axes (joints, 3, 3)."""
+        return self
+
+    def speed_at(self, at_rest: Floats, trial: Floats) -> Floats:
+        """(joints, 3) w at which an element with that load at rest has the λ_e ``trial``."""
+        return (at_rest - trial) * self.mobility[:, None]
+
     def at_rest(self, spring: Floats) -> Floats:
         """−K_f q_f (joints, 3), the load at rest without flow."""
         return -self.stiffness[:, None] * spring
@@ -127,4 +152,98 @@ class PlasticLaw:
         return ElementResponse(self, load, trial, size, flows)
 
 
+class AxisLaw(PlasticLaw):
+    """Elements whose coefficients (joints, 3) differ about the bones' axes: bend, twist, bend."""
+
+    def __init__(self, elements: Elements, step: float, frames: Floats | None = None) -> None:
+        """Of bones with axes (joints, 3, 3); those of the world, where it is not known yet."""
+        self.step = step
+        self._elements = elements
+        self._stiff = _three(elements.stiffness)
+        self._back = self._stiff * step + _three(elements.damping)
+        self._whole = self._back + _three(elements.flow)
+        self.yield_torque = elements.yield_torque
+        self._can_flow = (self._whole > 0.0).all(axis=1)
+        self._frames = np.tile(_UNIT, (len(self._stiff), 1, 1)) if frames is None else frames
+        self._back_turned = self._frames.transpose(0, 2, 1)
+        self.diagonal = (self._frames * self._back[:, None, :]) @ self._back_turned
+        self.held = step * self.diagonal
+
+    def seen_in(self, frames: Floats) -> AxisLaw:
+        return AxisLaw(self._elements, self.step, frames)
+
+    def _along(self, factors: Floats, vectors: Floats) -> Floats:
+        """Vectors (joints, 3), world, each times the factors (joints, 3) of its joint's axes."""
+        own = (self._back_turned @ vectors[:, :, None])[:, :, 0] * factors
+        return (self._frames @ own[:, :, None])[:, :, 0]
+
+    def speed_at(self, at_rest: Floats, trial: Floats) -> Floats:
+        mobility = np.divide(1.0, self._back, out=np.zeros_like(self._back), where=self._back > 0.0)
+        return self._along(mobility, at_rest - trial)
+
+    def at_rest(self, spring: Floats) -> Floats:
+        return self._along(-self._stiff, spring)
+
+    def respond(self, at_rest: Floats, speed: Floats) -> ElementResponse:
+        return self.answer(at_rest - (self.diagonal @ speed[:, :, None])[:, :, 0])
+
+    def answer(self, trial: Floats) -> ElementResponse:
+        size = np.sqrt((trial * trial) @ _ONES)
+        flows = (size >= self.yield_torque) & (size > 0.0) & self._can_flow
+        if not flows.any():
+            return ElementResponse(self, trial, trial, size, None)
+        which = flows.nonzero()[0]
+        frames = self._frames.take(which, 0)
+        back, limit = self._back.take(which, 0), self.yield_torque.take(which)[:, None]
+        own = (trial.take(which, 0)[:, None, :] @ frames)[:, 0]
+        whole = self._whole.take(which, 0)
+        speed = _overstressed(own, whole, limit)
+        way = own / (whole * speed + limit)
+        # (D_d + G) + τ/s (1 − v̂ v̂ᵀ), times s: the inverse of what the flow answers.
+        firm = speed[:, :, None] * whole[:, :, None] * _UNIT
+        firm += limit[:, :, None] * (_UNIT - way[:, :, None] * way[:, None, :])
+        inner = back[:, :, None] * (speed[:, :, None] * np.linalg.inv(firm)) * back[:, None, :]
+        slopes = self.diagonal.copy()
+        slopes[which] = frames @ (back[:, :, None] * _UNIT - inner) @ frames.transpose(0, 2, 1)
+        flow, load = np.zeros_like(trial), trial.copy()
+        flow[which] = -(frames @ (speed * way)[:, :, None])[:, :, 0]
+        load[which] -= (frames @ (back * speed * way)[:, :, None])[:, :, 0]
+        return ElementResponse(self, load, trial, size, flows, flow, slopes)
+
+
+def _overstressed(trial: Floats, whole: Floats, limit: Floats) -> Floats:
+    """(joints, 1) s with |λ_e/((D_d + G) s + τ)| = 1, for |λ_e| ≥ τ: Newton's method on one over
+    that length, which is concave, from below.
+    """
+    speed = np.full_like(limit, _LEAST_SPEED)
+    for _ in range(_MOST_ROUNDS):
+        given = whole * speed + limit
+        parts = (trial / given) ** 2
+        length = np.sqrt(parts.sum(axis=1, keepdims=True))
+        slope = (parts * whole / given).sum(axis=1, keepdims=True) / length**3
+        further = np.maximum((1.0 - 1.0 / length) / slope, 0.0)
+        speed += further
+        if (further <= 1e-14 * speed).all():
+            break
+    return speed
+
+
+def law_of(elements: Elements, step: float) -> PlasticLaw:
+    """The law of elements: the quick one, unless coefficients differ about some bone's axes."""
+    three = (elements.stiffness, elements.damping, elements.flow)
+    alike = all(each.ndim == 1 or np.array_equal(each[:, :1] + 0.0 * each, each) for each in three)
+    if not alike:
+        return AxisLaw(elements, step)
+    stiffness, damping, flow = (each if each.ndim == 1 else each[:, 0] for each in three)
+    return PlasticLaw(Elements(stiffness, damping, flow, elements.yield_torque), step)
+
+
+def _three(coefficients: Floats) -> Floats:
+    """(joints, 3) of coefficients (joints,) alike about all axes, or (joints, 3)."""
+    return coefficients if coefficients.ndim == 2 else np.tile(coefficients[:, None], 3)
+
+
+_MOST_ROUNDS = 60
+_LEAST_SPEED = 1e-12
+"""rad/s"""
 _NONE = np.zeros(0)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...rotations import Floats, normalized, small_batches
-from ..puppet import Figure, Flags, Integers, Pose
+from ..puppet import Figure, Flags, Integers, Pose, pose_of
 from .tree import Tree
 
 
@@ -110,6 +110,15 @@ class Bodies:
         self.rest = self.turns()
         for array in (self.linear, self.angular, self.spin):
             array[:] = 0.0
+
+    def turn_back(self, joints: Flags, pose: Pose) -> None:
+        """Turn joints of a mask (bodies,) as a pose has them, with relaxed springs; the others stay
+        as they are, and so do velocities.
+        """
+        positions, turns = self.positions, self.turns()
+        self.place(pose)
+        turns[joints] = self.rest[joints] = self.turns()[joints]
+        self.place(pose_of(self._figure, turns, positions))
 
     def kept_spin(self) -> Floats:
         """Angular momenta, shortened where the body's turn would have made energy of them."""

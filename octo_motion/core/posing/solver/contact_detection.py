@@ -3,6 +3,10 @@
 
 A capsule is seen as spheres along its axis. Both end spheres can touch; between them only the
 nearest one to the obstacle, found on samples no further apart than the radius and then refined.
+
+An end that has got into a box or through it within a step, for what turns fast moves on an arc that
+no step foresees, is seen from the face that it went in by until it is out of there again: by its
+nearest face a thin board would let it out on the other side.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ import numpy as np
 
 from ...rotations import Floats, rotate, to_matrix
 from ..puppet import Figure, Flags, Integers, capsules_in_world, rest_pose
-from .obstacle_shapes import Obstacle, Plane
+from .obstacle_shapes import Box, Obstacle, Plane
 
 _MOST_SAMPLES: Final = 9
 _TINY: Final = 1e-12
@@ -85,7 +89,13 @@ class Detector:
         # What was worked out of obstacles, kept as long as they are the same ones.
         self._planes: WeakKeyDictionary[Plane, _Touched] = WeakKeyDictionary()
         self._world_boxes: WeakKeyDictionary[Obstacle, Floats] = WeakKeyDictionary()
+        self.forget()
         self._reach = float(figure.radii.max(initial=0.0))
+
+    def forget(self) -> None:
+        """The figure was put elsewhere: it came there by no way."""
+        # Of each box (bodies, 2 ends, 3), in its frame: where ends were last that are not in it.
+        self._outside: WeakKeyDictionary[Box, Floats] = WeakKeyDictionary()
 
     def find(
         self, positions: Floats, matrices: Floats, obstacles: Sequence[Obstacle], margin: float
@@ -163,6 +173,7 @@ class Detector:
             np.linspace(0.0, 1.0, self._samples), (len(near), self._samples)
         ).copy()
         distances, outs = obstacle.closest(start + shares[..., None] * along, reach)
+        self._see_from_outside(obstacle, near, local, distances, outs)
         rows = np.arange(len(near))
         limits = self._radii[near] + margin
         # Bodies, labels, distances, directions and places, each in parts.
@@ -177,8 +188,7 @@ class Detector:
         for end, sample in ((0, 0), (1, self._samples - 1)):
             kept = self._keep[near, end] & (distances[:, sample] < limits)
             add(np.flatnonzero(kept), sample, end)
-        best = np.argmin(distances, axis=1)
-        least = distances[rows, best]
+        best, least = np.argmin(distances, axis=1), distances.min(axis=1)
         slack = 1e-6 * self._radii[near]
         inner = (best > 0) & (best < self._samples - 1) & self._long[near] & (least < limits)
         # No nearer than an end, and the end will do.
@@ -204,6 +214,30 @@ class Detector:
         normals = outward @ frame.T
         points = centres @ frame.T + obstacle.position - radii[:, None] * normals
         return _with_obstacle(bodies, points, normals, apart - radii, labels)
+
+    def _see_from_outside(
+        self, box: Obstacle, near: Integers, ends: Floats, distances: Floats, outs: Floats
+    ) -> None:
+        """Let distances (near, samples) and ways out (near, samples, 3) of ends (near, 2, 3) that
+        have gone into a box be those of the face that they went in by.
+        """
+        if not isinstance(box, Box):
+            return
+        known = self._outside.get(box)
+        now = np.full((len(self._radii), 2, 3), np.nan)
+        now[near] = ends
+        if known is not None:
+            before = known[near]
+            entered, axis = box.entered(before, ends)
+            if entered.any():
+                now[near] = np.where(entered[..., None], before, ends)
+                body, end = entered.nonzero()
+                face = axis[body, end]
+                side = np.sign(before[body, end, face])
+                sample = -end
+                outs[body, sample] = side[:, None] * np.eye(3)[face]
+                distances[body, sample] = side * ends[body, end, face] - box.half[face]
+        self._outside[box] = now
 
     def _around(self, obstacle: Obstacle, boxes: tuple[Floats, Floats]) -> Integers:
         """The bodies whose boxes touch that of an obstacle."""

@@ -170,7 +170,7 @@ class Newton:
         if response is None:
             return None, _planes(problem, law.held, self._held, pressed, rows)
         # The speeds at which they would bear now what they bore then.
-        speeds = (self._base - response.trial) * law.mobility[:, None]
+        speeds = law.speed_at(self._base, response.trial)
         return None, self._bent(problem, response, speeds, pressed, rows)
 
     def _follow(self, problem: Problem, point: Iterate) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import SettingsError
 from ...rotations import IDENTITY, Floats, cross, normalized
-from ..puppet import Integers
+from ..puppet import Flags, Integers
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _TINY: Final = 1e-12
@@ -110,6 +110,17 @@ class Box(Obstacle):
         is_out = distance > 0.0
         out = np.where(is_out[..., None], outside / (distance + _TINY)[..., None], nearest)
         return np.where(is_out, distance, beyond.max(axis=-1)), out * side
+
+    def entered(self, before: Floats, after: Floats) -> tuple[Flags, Integers]:
+        """Whether straight ways (…, 3) to (…, 3) from outside lead into the box, and across which
+        axis' face; none leads in from where it is not known (NaN).
+        """
+        way = after - before
+        way = np.where(np.abs(way) < _TINY, _TINY, way)
+        first, second = (-self.half - before) / way, (self.half - before) / way
+        into = np.minimum(first, second)
+        begins, ends = into.max(axis=-1), np.maximum(first, second).min(axis=-1)
+        return (begins >= 0.0) & (begins <= 1.0) & (begins <= ends), np.argmax(into, axis=-1)
 
     @property
     def bounds(self) -> Floats:

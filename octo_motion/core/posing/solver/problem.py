@@ -154,7 +154,7 @@ class ProblemBuilder:
             self._figure.masses,
             spread.reshape(-1, 16),
             momenta,
-            law,
+            law.seen_in(bodies.matrices),
             bodies.springs(),
             stops,
             rows,

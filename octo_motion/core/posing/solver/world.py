@@ -22,7 +22,7 @@ import numpy as np
 
 from ...errors import SettingsError
 from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rotate
-from ..puppet import Elements, Figure, Integers, PlasticLaw, Pose
+from ..puppet import Elements, Figure, Flags, Integers, Pose, law_of
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
 from .contact_detection import Contacts, Detector
@@ -106,6 +106,7 @@ class World:
         self._size = typical_size(figure)
         self._springs: list[HandSpring] = []
         self._pins: dict[int, Hold] = {}
+        self._yielding: Flags | None = None
         settings = settings or WorldSettings()
         settings.check(figure)
         self._tree = Tree(figure)
@@ -157,8 +158,15 @@ class World:
         """
         self._bodies.place(pose)
         self._bodies.stop()
+        self._detector.forget()
         self._warm.forget()
         self._loads = np.zeros_like(self._loads)
+
+    def turn_back(self, joints: Flags, pose: Pose) -> None:
+        """Turn joints of a mask (bodies,) as a pose has them, with relaxed springs; others, and all
+        that moves, stay as they are.
+        """
+        self._bodies.turn_back(joints, pose)
 
     def change(self, settings: WorldSettings) -> None:
         """Take other settings; motion, pins and hands stay as they are.
@@ -175,6 +183,23 @@ class World:
         """Take other coefficients; what is bent stays bent."""
         self.figure = replace(self.figure, elements=elements)
         self._use_elements()
+
+    def pulled(self) -> Flags:
+        """(bodies,) joints through which a hand, a pin, a force from outside or a touch of the last
+        step pulls: it is at what hangs on them. On others there is nothing but weight and inertia.
+        """
+        at = self.forces.any(axis=1)
+        at[[*self._pins, *(spring.body for spring in self._springs)]] = True
+        if self.contacts is not None and len(self.contacts):
+            at[self.contacts.bodies] = True
+            at[self.contacts.others[self.contacts.others >= 0]] = True
+        return self._tree.above[at].any(axis=0)
+
+    def let_yield(self, joints: Flags | None) -> None:
+        """From now on, of a mask (bodies,) of joints these give way alone; None lets all."""
+        if not np.array_equal(self._yielding, joints):
+            self._yielding = joints
+            self._use_elements()
 
     def pin(self, body: int, *, firm: bool | None = None) -> None:
         """Hold a body's joint where it is now, and its orientation too if ``firm``.
@@ -269,6 +294,7 @@ class World:
     def restore(self, state: WorldSnapshot) -> None:
         """Go back to a snapshot; the same steps after it give the same result."""
         self._bodies.restore(state.bodies)
+        self._detector.forget()
         self._warm.restore(state.start, self._law)
 
     # The step
@@ -344,7 +370,11 @@ class World:
         works = ~self._bodies.is_root
         for body, pin in self._pins.items():
             works[body] |= not pin.turns
-        self._law = PlasticLaw(self.figure.elements.where(works), self.settings.step)
+        elements = self.figure.elements.where(works)
+        if self._yielding is not None:
+            limits = np.where(self._yielding, elements.yield_torque, np.inf)
+            elements = replace(elements, yield_torque=limits)
+        self._law = law_of(elements, self.settings.step)
         self._warm.use_law(self._law)
 
 

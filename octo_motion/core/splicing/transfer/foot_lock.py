@@ -5,7 +5,8 @@ After Kovar, Schreiner and Gleicher, "Footskate Cleanup for Motion Capture Editi
 foot is flat, ankle and ball stay where they are; while its heel lifts the ball alone stays, and the
 foot turns about it. Between two stances the way that a foot had to be moved changes smoothly from
 one to the other, as fast at both ends as it did there. Where a leg is too short to reach, the
-pelvis comes down in time. All frames are worked out at once.
+pelvis comes down in time, and where it would have to fold too tightly, it rises. All frames are
+worked out at once.
 """
 
 from __future__ import annotations
@@ -172,7 +173,7 @@ def lock_feet(
     legs = [_leg(moved, footing, balls[side], paths.rate, side) for side in range(2)]
     carried = _carried(legs, paths.rate)
     legs = [_brought(leg, carried, share, paths.rate) for leg in legs]
-    carried = share * (carried - _short(legs, share * carried, paths.rate)[:, None] * _UP)
+    carried = share * (carried - _lowered(legs, share * carried, paths.rate)[:, None] * _UP)
     if rounds is not None:
         own = own_round(len(clip))
         legs, carried = [each.taken(own) for each in legs], carried[own]
@@ -404,21 +405,25 @@ def _carried(legs: list[_Leg], rate: float) -> Floats:
     return blurred(np.stack(between, axis=-1), _width(rate))
 
 
-def _short(legs: list[_Leg], carried: Floats, rate: float) -> Floats:
-    """(frames,) by how much the pelvis has to come down so that both legs reach."""
-    needed = np.zeros(len(carried))
+def _lowered(legs: list[_Leg], carried: Floats, rate: float) -> Floats:
+    """(frames,) by how much the pelvis has to come down so that both legs reach, or to rise
+    (negative) so that neither is folded tighter than it folds of itself.
+    """
+    down, up = np.zeros(len(carried)), np.zeros(len(carried))
     for leg in legs:
         joints = leg.joints
-        upper, lower = (np.linalg.norm(each, axis=-1) for each in (joints.upper, joints.lower))
+        length = np.linalg.norm(joints.upper, axis=-1) + np.linalg.norm(joints.lower, axis=-1)
         own = np.linalg.norm(joints.hand - joints.joint, axis=-1)
-        most = np.maximum((1.0 - _SOFT) * (upper + lower), own)
+        most = np.maximum((1.0 - _SOFT) * length, own)
+        least = np.minimum(joints.folded, own)
         way = leg.goal - joints.joint - carried
         across = np.sum((way * _LEVEL) ** 2, axis=-1)
-        depth = np.sqrt(np.maximum(most**2 - across, 0.0))
+        stretched, folded = (np.sqrt(np.maximum(r**2 - across, 0.0)) for r in (most, least))
         # A foot in the air need not get where it would be.
-        limit = np.where(leg.standing, _LOWEST, _LOWEST_IN_AIR) * (upper + lower)
-        needed = np.maximum(needed, np.minimum(-way[:, 2] - depth, limit))
-    return covered(needed, _width(rate))
+        limit = np.where(leg.standing, _LOWEST, _LOWEST_IN_AIR) * length
+        down = np.maximum(down, np.minimum(-way[:, 2] - stretched, limit))
+        up = np.maximum(up, np.where(way[:, 2] < 0.0, np.minimum(way[:, 2] + folded, limit), 0.0))
+    return covered(down, _width(rate)) - covered(up, _width(rate))
 
 
 def _width(rate: float) -> int:

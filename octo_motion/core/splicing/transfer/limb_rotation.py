@@ -83,6 +83,12 @@ class LimbTriangle:
         return self.hand - self.elbow
 
     @cached_property
+    def folded(self) -> Floats:
+        """(frames,) how far the hand is from the joint when the limb is folded tightly."""
+        upper, lower = np.linalg.norm(self.upper, axis=-1), np.linalg.norm(self.lower, axis=-1)
+        return np.sqrt(upper**2 + lower**2 + 2.0 * upper * lower * np.cos(_TIGHT))
+
+    @cached_property
     def normal(self) -> Floats:
         """(frames, 3) about which it is bent, none of a straight one."""
         return cross(self.upper, self.lower)
@@ -189,7 +195,7 @@ def _wanted_bend(limb: LimbTriangle, target: Floats, share: float) -> Floats:
 
     soft = share * (upper + lower)
     far = upper + lower - soft
-    near = np.sqrt(upper**2 + lower**2 + 2.0 * product * np.cos(_TIGHT))
+    near = limb.folded
     straight, tight = bend_at(far), np.full(len(far), _TIGHT)
     bend = bend_at(np.clip(distance, near, far))
     bend -= eased(distance - far, far, straight, straight)

@@ -99,6 +99,25 @@ def test_motion_is_continuous(rig: dict[str, Any]) -> None:
     assert turns[3] < 0.75 * turns[2]
 
 
+@pytest.mark.parametrize("weights", [(1.0, 0.05), (0.05, 1.0)], ids=["root", "tip"])
+def test_weights_leave_footholds_and_continuity_as_they_are(weights: tuple[float, float]) -> None:
+    walk = walking("bumps", stretch=True, weights=weights)
+    poses = walk.pose(walk.times)
+    assert poses.misses.max() < 1e-6
+    for joints, lying, arms in zip(poses.joints, poses.in_contact, walk.walk.builds, strict=True):
+        assert deepest_joint(joints, walk.ground) < 0.005
+        worst = quality.slip(joints, lying, poses.cycles[:, list(arms)], np.ones(len(arms)))
+        assert worst.value < 1e-6
+    cycle = walk.travel.stride / walk.route.length
+    turns = [
+        largest_turn(walk.pose(np.linspace(0.4, 0.4 + cycle, count * FRAMES + 1)).rotations)
+        for count in (1, 4, 8)
+    ]
+    assert turns[0] < np.radians(50.0)
+    assert turns[1] < 0.5 * turns[0]
+    assert turns[2] < 0.75 * turns[1]
+
+
 def test_a_tip_that_lies_down_does_not_twitch() -> None:
     walk = walking("plane", stretch=True, radii=(0.12, 0.012))
     cycle = walk.travel.stride / walk.route.length

@@ -34,6 +34,7 @@ def lying(ground: HeightField, start: float, heading: float, *, curl: float = 0.
         lengths=np.full((BONES, 1), LENGTH),
         radii=np.full((BONES + 1, 1), SKIN),
         aims=np.zeros((1, 2)),
+        weights=np.ones((BONES, 1)),
     )
     return laid(
         limbs,
@@ -84,3 +85,31 @@ def test_what_rests_on_steps_is_not_in_them_and_no_bone_turns_over(height: float
     assert np.any(rests)
     assert below[rests].max() < 0.005
     assert np.degrees(largest_turn(poses.rotations)) < 45.0
+
+
+@given(st.floats(0.05, 1.0), st.floats(0.05, 0.3), st.integers(0, 2**31))
+def test_an_edge_is_rounded_so_that_no_bone_is_cut_by_it(
+    height: float, radius: float, seed: int
+) -> None:
+    ground = steps(height)
+    rounded = ground.rounded(radius)
+    random = np.random.default_rng(seed)
+    points = random.uniform((-2.0, -6.0), (4.0, 2.0), (400, 2))
+    assert np.all(rounded.height(points) >= ground.height(points) - 1e-12)
+    # A bone whose ends are on it sinks in by no more than such a curve bends along it.
+    ahead = LENGTH * np.array([0.0, 1.0])
+    chord = 0.5 * (rounded.height(points) + rounded.height(points + ahead))
+    cut = ground.height(points + 0.5 * ahead) - chord
+    assert cut.max() <= LENGTH**2 / (8.0 * radius) + 0.005
+    # It is the ground itself where no edge is near.
+    far = radius * np.sqrt(2.0 * height / radius) + 3.0 * ground.spacing
+    away = np.abs(points[:, 1] - np.round(points[:, 1])) > far
+    np.testing.assert_array_equal(rounded.height(points[away]), ground.height(points[away]))
+
+
+@given(st.floats(0.0, 1.7), st.floats(0.0, 6.3))
+def test_ground_without_edges_stays_as_it_is_however_steep(rise: float, way: float) -> None:
+    x, y = np.meshgrid(np.arange(40.0), np.arange(30.0), indexing="ij")
+    heights = 0.1 * rise * (np.cos(way) * x + np.sin(way) * y)
+    ground = HeightField((0.0, 0.0), 0.1, heights)
+    assert ground.rounded(0.2) is ground

@@ -10,7 +10,7 @@ from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser, GaitSettings
 from octo_motion.core.locomotion.reaching.grasp import Grasp, Mode, Places, Target, plan_grasp
-from octo_motion.core.locomotion.reaching.timeline import Timeline, curled, first_place, front_width
+from octo_motion.core.locomotion.reaching.timeline import Timeline, curled, front_width
 from octo_motion.core.locomotion.reaching.winding import profile_of
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, angle_between, from_axis_angle, rotate
@@ -111,10 +111,8 @@ def test_suckers_face_the_ground_where_the_rig_does_not_say() -> None:
 def bend(reaching: Case, times: Floats) -> Floats:
     """Place of the bend (frames, 3)."""
     along = reaching.joints(times, still(times))
-    arm, first = reaching.arm, reaching.grasp.coil.first
-    width = front_width(arm.lengths)
-    touches = arm.reach[first] + width
-    front = TIMELINE.front(times, first_place(arm.lengths), touches, arm.length + width)
+    arm, width = reaching.arm, front_width(reaching.arm.lengths)
+    front = reaching.grasp.front(reaching.grasp.progress(times))
     return np.stack(
         [
             _at(joints, arm.reach, place)
@@ -164,7 +162,9 @@ def test_halving_the_time_step_halves_the_largest_change(joints: int) -> None:
     coarse, fine = (
         angle_between(turns[:-1], turns[1:]).max()
         for turns in (
-            reaching.rotations(times, swaying(times)) for times in (frames(0.1), frames(0.05))
+            # What the gait does between two frames is another matter.
+            reaching.grasp.apply(times, swaying(times), reaching.base(0.0 * times + 7.0))
+            for times in (frames(0.1), frames(0.05))
         )
     )
     # A pop would keep its size.
@@ -284,7 +284,7 @@ def test_times_out_of_order_are_told(wrong: tuple[float, ...]) -> None:
 def test_a_motion_that_ends_before_the_release_holds_on() -> None:
     reaching = case()
     times = frames()[:70]
-    assert np.all(TIMELINE.weight(times, np.array([0.0, 1.0]))[-1] == 1.0)
+    assert np.all(reaching.grasp.progress(times).weight(np.array([0.0, 1.0]))[-1] == 1.0)
     points = reaching.joints(times, still(times))
     first = reaching.grasp.coil.first
     np.testing.assert_allclose(points[-1, first:], points[60, first:], atol=1e-6)

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms that reach, led past the other arms, the body and the ground.
+
+An arm that reaches crosses others, which stand or walk: it goes over them. Each frame is by itself.
+Where the arm is too near to something, its joints are asked to move away from it and up, by as much
+as it is too near; then the arm gives way as an elastic rod does, all its segments turning as little
+and as evenly as it takes (``turned_towards``). What it holds stays where it is. All that is asked
+is a smooth function of where arms are, so nothing jumps that has not jumped before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...content_cache import part_of
+from ...rotations import Floats
+from ...rotations.components_first import dot
+from ...smoothing import blurred, smooth_step
+from ..ground import drawn
+from .capsule_overlap import Capsules, Crowd, Touches, Touching
+from .overlap_solver import Floor, joints_of, turned_towards
+
+_ROUNDS: Final = 32
+_GAIN: Final = 2.0
+"""How much more is asked than there is: what is asked for is spread over the frames around."""
+_ROOM: Final = 0.1
+"""Share of the sum of the radii that is to be between them."""
+_BELIEVED: Final = 4.0
+"""How soon a depth, as a share of that, says that an arm has to go over the other."""
+_BLUNT: Final = 0.05
+"""So that nobody is sent a way that is nowhere certain."""
+_PINNED: Final = 30.0
+"""How much more the place where an arm holds on counts than that it makes way."""
+_STEPS: Final = 6
+"""Newton's steps that draw an arm back to where it holds."""
+_SOFT: Final = 0.1
+"""Share of a radius within which it begins gently to matter what is asked."""
+_TINY: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Passing:
+    """Which arms reach."""
+
+    share: Floats
+    """(frames, arms) how far they may be led another way, 0…1."""
+    holds: Floats
+    """(frames, arms) how far they hold something, 0…1."""
+    anchors: np.ndarray
+    """(frames, arms) from which joint on."""
+
+
+def led_past(
+    crowd: Crowd,
+    still: Sequence[Capsules],
+    passing: Passing,
+    floor: Floor | None,
+    *,
+    width: int,
+) -> Floats | None:
+    """Joints (frames, arms, joints, 3) where arms that reach keep clear; none if all do anyway.
+
+    Parts of the body that are ``still`` have one frame each.
+    """
+    items = np.nonzero(passing.share > 0.0)
+    if not len(items[0]):
+        return None
+    touching = Touching(crowd, still)
+    rod = _Rods.of(crowd, passing, items)
+    joints, moved = crowd.joints.copy(), False
+    for _ in range(_ROUNDS):
+        wanted, weights = _wanted(crowd, touching.at(joints), passing)
+        if floor is not None:
+            goals, matters = wanted[items], weights[items]
+            height = floor.clearance(items[0], joints[items])
+            _off_ground(crowd.radii[items[1]], height, goals, matters, crowd.up[items[0]])
+            wanted[items], weights[items] = goals, matters
+        if not np.any(wanted):
+            break
+        moved = True
+        wanted *= passing.share[..., None, None]
+        goals, matters = (_GAIN * blurred(each, width)[items] for each in (wanted, weights))
+        joints[items] = rod.bent(goals[:, 1:], np.minimum(matters[:, 1:], 1.0))
+    return joints if moved else None
+
+
+@dataclass(eq=False)
+class _Rods:
+    """Arms (items) that give way."""
+
+    roots: Floats
+    """(items, 3)"""
+    lengths: Floats
+    """(items, segments)"""
+    directions: Floats
+    """(items, segments, 3) unit."""
+    free: Floats
+    """(items, segments) 0…1."""
+    holds: Floats
+    """(items,) 0…1."""
+    anchor: np.ndarray
+    """(items,) number of the joint from which on they hold."""
+    places: Floats
+    """(items, 3) of that joint, where it is to be."""
+
+    @classmethod
+    def of(cls, crowd: Crowd, passing: Passing, items: tuple[np.ndarray, ...]) -> _Rods:
+        """The arms of a crowd at some frames."""
+        joints = crowd.joints[items]
+        steps = np.diff(joints, axis=1)
+        lengths = np.linalg.norm(steps, axis=2)
+        anchor, holds = passing.anchors[items], passing.holds[items]
+        beyond = np.arange(lengths.shape[1]) >= anchor[:, None]
+        return cls(
+            joints[:, 0],
+            lengths,
+            steps / np.maximum(lengths, _TINY)[..., None],
+            1.0 - beyond * holds[:, None],
+            holds,
+            anchor,
+            joints[np.arange(len(joints)), anchor],
+        )
+
+    def bent(self, goals: Floats, weights: Floats) -> Floats:
+        """Joints (items, segments + 1, 3) after they gave way to goals (items, segments, 3) of all
+        joints but the first.
+        """
+        count = self.lengths.shape[1]
+        pinned = self.holds[:, None] * (np.arange(1, count + 1) >= self.anchor[:, None])
+        self.directions = turned_towards(
+            self.directions,
+            self.lengths,
+            free=self.free,
+            goals=goals * (1.0 - pinned)[..., None],
+            weights=weights * (1.0 - pinned) + _PINNED * pinned,
+        )
+        self._draw_back()
+        return joints_of(self.roots, self.directions, self.lengths)
+
+    def _draw_back(self) -> None:
+        """Let those that hold something hold it where they did."""
+        some = np.flatnonzero(self.holds > 0.0)
+        if not len(some):
+            return
+        directions, lengths, anchor = self.directions[some], self.lengths[some], self.anchor[some]
+        rows = np.arange(len(some))
+        now = joints_of(self.roots[some], directions, lengths)[rows, anchor]
+        goal = now + self.holds[some, None] * (self.places[some] - now)
+        inside = np.arange(lengths.shape[1]) < anchor[:, None]
+        back = drawn(
+            np.ascontiguousarray(np.moveaxis(directions, 0, -1)),
+            np.ascontiguousarray(lengths.T),
+            free=np.ascontiguousarray(self.free[some].T),
+            chosen=np.ascontiguousarray(inside.T.astype(np.float64)),
+            roots=np.ascontiguousarray(self.roots[some].T),
+            goal=np.ascontiguousarray(goal.T),
+            steps=_STEPS,
+        )
+        back = np.moveaxis(back, -1, 0)
+        size = np.linalg.norm(back, axis=2, keepdims=True)
+        self.directions[some] = back / np.maximum(size, _TINY)
+
+
+def _wanted(crowd: Crowd, touches: Touches, passing: Passing) -> tuple[Floats, Floats]:
+    """By how much joints (frames, arms, joints, 3) of arms that reach would have to move, and how
+    much that matters (frames, arms, joints).
+    """
+    frames, arms, count = crowd.joints.shape[:3]
+    size = frames * arms * count
+    sums, weight = np.zeros((3, size)), np.zeros(size)
+    soft = _SOFT * float(crowd.radii.mean())
+    away = crowd.at_rest[:, 1] - crowd.at_rest[:, 0].mean(axis=0)
+    away -= (away @ crowd.upward)[:, None] * crowd.upward
+    away = (away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), _TINY)).T
+    for which in (0, 1):
+        arm = np.minimum(touches.arms[which], arms - 1)
+        own = (touches.arms[which] < arms) & (passing.share[touches.frame, arm] > 0.0)
+        near = touches.distance < (1.0 + _ROOM) * touches.wide
+        some = np.flatnonzero(own & near)
+        frame, arm = touches.frame[some], arm[some]
+        body = touches.arms[1 - which][some] >= arms
+        outward = np.where(body, away[:, arm], crowd.upward[:, None])
+        push = _over(part_of(touches, some), 1.0 - 2.0 * which, outward)
+        far = np.sqrt(dot(push, push))
+        first = (frame * arms + arm) * count + touches.segments[which][some]
+        share = touches.shares[which][some]
+        for joint, part in ((0, 1.0 - share), (1, share)):
+            heavy = far * part
+            weight += np.bincount(first + joint, heavy, size)
+            for axis in range(3):
+                sums[axis] += np.bincount(first + joint, heavy * push[axis], size)
+    goals = (sums / (weight + soft)).T.reshape(frames, arms, count, 3)
+    matters = weight / (weight + soft)
+    return goals, matters.reshape(frames, arms, count)
+
+
+def _over(touches: Touches, sign: Floats | float, outward: Floats) -> Floats:
+    """By how much (3, touches) an arm is to go past another, or past the body.
+
+    The arm is the first of the two with a sign of 1, the second with −1. Where they only just touch
+    it gives way straight; the deeper they are in each other, the more it goes to where it belongs:
+    ``outward`` (3, touches).
+    """
+    gap, wide = sign * touches.gap, touches.wide * (1.0 + _ROOM)
+    deep = np.maximum(1.0 - touches.distance / wide, 0.0)
+    way = gap / wide + smooth_step(_BELIEVED * deep) * outward
+    size = np.sqrt(dot(way, way) + _BLUNT * deep)
+    return wide * deep * way / np.maximum(size, _TINY)
+
+
+def _off_ground(radii: Floats, height: Floats, goals: Floats, weights: Floats, up: Floats) -> None:
+    """Ask joints (items, joints) at a height that are too low to rise (items, 3), in place."""
+    lacking = np.maximum(radii - height, 0.0)
+    goals += lacking[..., None] * up[:, None]
+    weights += lacking / (lacking + _SOFT * radii)
