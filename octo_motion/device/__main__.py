@@ -9,6 +9,8 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,7 +19,12 @@ if TYPE_CHECKING:
 
 # Arrays here are small: threads of a numerical library would only wait for each other. This must be
 # set before numpy is first imported.
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+for _variable in (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+):
     os.environ.setdefault(_variable, "1")
 
 
@@ -28,14 +35,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="list the devices that are plugged in, and what they lack")
-    watch = commands.add_parser("watch", help="print what the devices say")
+    # Not abbreviated: a key that is given on the command line must not name a file.
+    add = partial(commands.add_parser, allow_abbrev=False)
+    watch = add("watch", help="print what the devices say")
     watch.add_argument("--seconds", type=float, default=10.0, help="for how long")
     descriptor = commands.add_parser(
         "descriptor", help="print the report descriptor of the open force profile, for firmware"
     )
     descriptor.add_argument("--table", action="store_true", help="print its reports as tables")
-    bridge = commands.add_parser("bridge", help="what Blender starts: simulate, and serve devices")
-    hands = commands.add_parser("hands", help="what the bridge starts: the loop at the devices")
+    bridge = add("bridge", help="what Blender starts: simulate, and serve devices")
+    hands = add("hands", help="what the bridge starts: the loop at the devices")
     for each in (watch, bridge, hands):
         each.add_argument("--no-hid", action="store_true", help="leave HID devices alone")
         each.add_argument("--no-haply", action="store_true", help="do not look for Haply's service")
@@ -47,7 +56,11 @@ def _parser() -> argparse.ArgumentParser:
         each.add_argument(
             "--rate", type=float, default=1000.0, help="Hz of the loop; less on a slow machine"
         )
-        each.add_argument("--key", default="", help="32 hexadecimal digits, for --udp and --tcp")
+        each.add_argument(
+            "--key-file",
+            type=Path,
+            help="with the key for --udp and --tcp, made if it is not there",
+        )
     return parser
 
 
@@ -78,16 +91,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Sources:
-    from .sources import KEY_BYTES, Sources  # noqa: PLC0415 - what help does without
+    from .sources import Sources  # noqa: PLC0415 - what help does without
 
     ports = ((kind, getattr(options, kind)) for kind in ("udp", "tcp"))
     network = next((each for each in ports if each[1] is not None), None)
-    try:
-        key = bytes.fromhex(options.key)
-    except ValueError:
-        key = b""
-    if network is not None and len(key) != KEY_BYTES:
-        parser.error(f"--key must be {2 * KEY_BYTES} hexadecimal digits")
+    if network is not None and options.key_file is None:
+        parser.error("--udp and --tcp need --key-file")
     if network is not None and not 0 <= network[1] <= 0xFFFF:
         parser.error("a port is a number from 0 to 65535")
     return Sources(
@@ -96,7 +105,7 @@ def _sources(parser: argparse.ArgumentParser, options: argparse.Namespace) -> So
         haply_port=options.haply_port,
         simulated=options.simulate,
         network=network,
-        key=key,
+        key_file=options.key_file,
     )
 
 
@@ -144,9 +153,9 @@ def _descriptor(*, table: bool) -> int:
 def _watch(sources: Sources, seconds: float) -> int:
     from .calibration import NONE, Response, corrected  # noqa: PLC0415
     from .driver import DeviceLostError  # noqa: PLC0415
-    from .sources import Discovery  # noqa: PLC0415
+    from .hand_process import discovery_of  # noqa: PLC0415
 
-    discovery = Discovery(sources)
+    discovery = discovery_of(sources)
     drivers: list[Driver] = []
     end = time.monotonic() + seconds
     shown = 0.0
@@ -178,6 +187,7 @@ def _watch(sources: Sources, seconds: float) -> int:
     finally:
         for driver in drivers:
             driver.close()
+        discovery.close()
     return 0
 
 

@@ -65,6 +65,26 @@ class Sample(NamedTuple):
     """False where a device with a sensor for it says that no hand holds it."""
     push: Axes | None = None
     """Of a rate device: −1…1 by the maker's range; None while it is silent, as it is at rest."""
+    clock: float | None = None
+    """s of the device's own clock when the pose was measured; None where it tells none."""
+    delay: float = 0.0
+    """s since the newest force that had reached the device then was sent; 0: it does not tell."""
+
+
+class SentTimes:
+    """When each of the last commands to a device was sent, by its sequence."""
+
+    def __init__(self) -> None:
+        self._times = [(0, 0.0)] * 1024
+
+    def note(self, sequence: int, now: float) -> None:
+        """A command was sent (s)."""
+        self._times[sequence % len(self._times)] = (sequence, now)
+
+    def since(self, sequence: int, now: float) -> float:
+        """S since a command was sent; 0 for one that never was, or very long ago."""
+        kept, sent = self._times[sequence % len(self._times)]
+        return now - sent if sequence and kept == sequence else 0.0
 
 
 def is_possible(sample: Sample) -> bool:

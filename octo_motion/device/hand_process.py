@@ -12,6 +12,7 @@ import logging
 import os
 import platform
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Final
 
 from ..core.errors import DeviceError
@@ -31,6 +32,8 @@ _TIMES_EVERY: Final = 1.0
 _LET_GO_SECONDS: Final = 0.2
 """For taking all force away, once whoever started us is gone; a tick is enough, unless the system
 call of a driver does not return."""
+_IDLE_PERIOD: Final = 0.004
+"""s from tick to tick while no hand feels anything."""
 _LOOK_EVERY: Final = 0.1
 """s after which the discovery may look for devices again."""
 
@@ -42,6 +45,7 @@ class HandLoop:
         self._channel = channel
         self._discovery = discovery
         self._schedule = schedule
+        self._period = schedule.period
         self._pointers: dict[int, Pointer] = {}
         self._numbers: dict[str, int] = {}
         self._workspaces: dict[int, messages.Workspace] = {}
@@ -73,9 +77,19 @@ class HandLoop:
         self._held = any(each.grab for each in self.pointers)
         if self._held and not held:
             self._schedule.forget()  # the clock's times are those of holding something
+        self._keep_pace(now)
         if not self._held and now - self._looked > _LOOK_EVERY:
             self._looked = now
             self._look()
+
+    def _keep_pace(self, now: float) -> None:
+        """Tick as often as a hand needs it that feels something; seldom where none does."""
+        busy = any(each.busy(now) for each in self.pointers)
+        period = self._period if busy else max(self._period, _IDLE_PERIOD)
+        if period != self._schedule.period:
+            self._schedule.period = period
+            for pointer in self.pointers:
+                pointer.period = period
 
     def _receive(self, message: messages.Message, now: float) -> None:
         pointer = self._pointers.get(getattr(message, "pointer", -1))
@@ -175,7 +189,8 @@ class HandLoop:
             return
         if number in self._pointers:  # the same program, and another device
             self._send_device(self._pointers[number], present=False)
-        pointer = Pointer(number, driver, self._schedule.period, self._settings)
+        pointer = Pointer(number, driver, self._period, self._settings)
+        pointer.period = self._schedule.period
         if number in self._corrections:
             pointer.correct(self._corrections[number])
         if number in self._workspaces:
@@ -225,19 +240,26 @@ class HandLoop:
         self._discovery.close()
 
 
+def discovery_of(sources: Sources) -> Discovery:
+    """The search for devices; without programs, which it says, where their port cannot be used."""
+    try:
+        return Discovery(sources)
+    except (OSError, OverflowError) as error:
+        problem = DeviceError(f"The network port cannot be used: {error}.", "Choose another one.")
+    except DeviceError as error:
+        problem = error
+    discovery = Discovery(replace(sources, network=None))
+    discovery.problems.append(problem)
+    return discovery
+
+
 def run(sources: Sources, rate: float) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     parent = Parent(_LET_GO_SECONDS)
     channel = parent.line()
     if channel is None:
         return 2
-    try:
-        discovery = Discovery(sources)
-    except (OSError, ValueError) as error:
-        channel.send(
-            messages.Notice(f"The network port cannot be used: {error}.", "Choose another one.")
-        )
-        discovery = Discovery(Sources(sources.hid, sources.haply, simulated=sources.simulated))
+    discovery = discovery_of(sources)
     priority = make_real_time()
     channel.send(messages.Hello(os.getpid(), platform.python_version(), priority))
     schedule = Schedule(1.0 / rate)

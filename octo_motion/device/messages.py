@@ -45,6 +45,10 @@ HEADER: Final = struct.Struct("<4sHHI")
 MOST_BYTES: Final = 4_000_000
 """Of one message: a figure of 4096 bodies needs 2 MB, a mesh of 50,000 triangles 3.6 MB."""
 MOST_POINTS: Final = 150_000
+_LIGHTEST, _HEAVIEST, _LARGEST = 1e-15, 1e12, 1e6
+"""kg and m of a body: of mites, and of more than ships."""
+_APART: Final = 1e9
+"""Times as heavy as another body of one figure: solvers tell no more apart."""
 
 
 @dataclass(frozen=True)
@@ -88,14 +92,17 @@ class FigureMessage(Message):
     capsules: Annotated[Floats, Table((2, 3))]
     radii: Annotated[Floats, Table()]
     limits: Annotated[Floats, Table((3, 2))]
-    stiffness: Annotated[Floats, Table()]
-    damping: Annotated[Floats, Table()]
-    flow: Annotated[Floats, Table()]
+    stiffness: Annotated[Floats, Table((3,))]
+    damping: Annotated[Floats, Table((3,))]
+    flow: Annotated[Floats, Table((3,))]
     yield_torque: Annotated[Floats, Table(endless=True)]
 
     @classmethod
     def of(cls, figure: Figure) -> FigureMessage:
         own = {**vars(figure), **vars(figure.elements)}
+        for each in ("stiffness", "damping", "flow"):
+            # About a bone's three axes, alike or not.
+            own[each] = np.broadcast_to(own[each].T, (3, len(figure))).T
         own["parents"] = tuple(map(int, figure.parents))
         return cls(**{each.name: own[each.name] for each in fields(cls)})
 
@@ -111,8 +118,27 @@ class FigureMessage(Message):
             raise MessageError("a parent does not come before its child")
         if count == 0 or (self.masses <= 0.0).any() or (self.lengths <= 0.0).any():
             raise MessageError("a body without mass or length")
+        self._weigh()
         if (self.yield_torque < 0.0).any():
             raise MessageError("a joint that yields to less than nothing")
+        return self._made()
+
+    def _weigh(self) -> None:
+        """Refuse what no solver can move: its first step would make numbers that are none."""
+        masses, turning = self.masses, np.linalg.eigvalsh(self.inertias)
+        if masses.max() > _HEAVIEST or masses.min() < _LIGHTEST or self.lengths.max() > _LARGEST:
+            raise MessageError("a body of a mass or length that cannot be")
+        if masses.max() > _APART * masses.min():
+            raise MessageError("bodies of masses that do not go together")
+        reach = np.maximum(self.lengths, self.radii)
+        for values in (self.anchors, self.centres, self.capsules, self.radii):
+            if np.abs(values).max() > _LARGEST:
+                raise MessageError("a body of a size that cannot be")
+        heaviest = masses * np.maximum(reach, np.abs(self.capsules).max(axis=(1, 2))) ** 2
+        if turning.min() <= 0.0 or (turning.max(axis=1) > _APART * heaviest).any():
+            raise MessageError("a body that cannot turn like that")
+
+    def _made(self) -> Figure:
         return Figure(
             *(self.names, self.parents, self.anchors, self.rest, self.lengths, self.masses),
             *(self.centres, self.inertias, self.capsules, self.radii),

@@ -7,7 +7,6 @@ import socket
 from typing import Final
 
 _MOST_BYTES: Final = 262_144
-_MOST_READS: Final = 64
 """In one call: whoever sends without end does not keep a loop from going on."""
 
 
@@ -22,20 +21,16 @@ class Stream:
         """To be taken away by whoever reads it."""
         self.unsent = bytearray()
 
-    def receive(self) -> bool:
-        """Take in what has come; False once the peer has ended and nothing more came."""
-        before = len(self.received)
-        for _ in range(_MOST_READS):
-            try:
-                data = self._socket.recv(_MOST_BYTES)
-            except (BlockingIOError, InterruptedError):
-                return True
-            except OSError:
-                data = b""
-            if not data:
-                return len(self.received) > before
-            self.received += data
-        return True
+    def receive(self, most: int = _MOST_BYTES) -> bool:
+        """Take in so many bytes of what has come; False once the peer has ended and said all."""
+        try:
+            data = self._socket.recv(most)
+        except (BlockingIOError, InterruptedError):
+            return True
+        except OSError:
+            return False
+        self.received += data
+        return bool(data)
 
     def flush(self) -> bool:
         """Send what waits, as far as the peer takes it; False where the peer is gone."""

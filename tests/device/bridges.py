@@ -53,7 +53,7 @@ def children_of(process: int) -> list[int]:
     """Processes that a process started; Linux."""
     path = Path(f"/proc/{process}/task/{process}/children")
     try:
-        return [int(each) for each in path.read_text().split()]
+        return [int(each) for each in path.read_text(encoding="utf-8").split()]
     except OSError:
         return []
 
@@ -61,7 +61,9 @@ def children_of(process: int) -> list[int]:
 def alive(process: int) -> bool:
     """Whether a process runs; one that ended and waits to be asked why does not."""
     try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        state = (
+            Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
+        )
     except OSError:
         return False
     return state != "Z"

@@ -7,13 +7,14 @@ and features as packets and reads forces.
 
 from __future__ import annotations
 
+import os
 from dataclasses import astuple, dataclass
 
 from octo_motion.core.rotations.scalars import Quaternion, Vector
-from octo_motion.device.driver import Dynamics
+from octo_motion.device.driver import Dynamics, Sample
 from octo_motion.device.hid import force_profile as profile
-from octo_motion.device.sources import network
-from octo_motion.device.sources.network import NetworkFeatures, NetworkState
+from octo_motion.device.sources import packets
+from octo_motion.device.sources.packets import NetworkFeatures
 
 # --- The HID profile -----------------------------------------------------------------------------
 
@@ -102,27 +103,51 @@ class Force:
     torque: Vector
 
 
-def pack_packet(packet: NetworkFeatures | NetworkState, key: bytes) -> bytes:
-    """Write what a program sends."""
-    if isinstance(packet, NetworkFeatures):
-        name = packet.name.encode()[:64].decode(errors="ignore").encode()
-        return network.pack(network.FEATURES, key, packet.buttons, *astuple(packet.dynamics), name)
-    sample = packet.sample
-    return network.pack(
-        *(network.STATE, key, packet.sequence, sample.buttons, sample.held),
-        *(*sample.position, *sample.orientation, *sample.velocity, *sample.angular_velocity),
-    )
+class Program:
+    """The program's half of a meeting: it greets, answers the question, says what its hand does."""
 
+    def __init__(self, key: bytes) -> None:
+        self._key = key
+        self._theirs = os.urandom(packets.NONCE_BYTES)
+        self._ours = b""
+        self._meeting = b""
+        self.sequence = 0
 
-def parse_force(data: bytes, key: bytes) -> Force:
-    """Read what a program is sent.
+    def greeting(self) -> bytes:
+        return packets.pack(packets.GREETING, 0, self._theirs)
 
-    Raises:
-        PacketError: it is no force, or not whole.
-    """
-    size = network.SIZES[network.FORCE]
-    if len(data) != size or network.size_of(data, key) != size:
-        raise network.PacketError("no force")
-    body = network.BODIES[network.FORCE]
-    sequence, answered, watchdog, x, y, z, a, b, c = body.unpack_from(data, network.HEAD.size)
-    return Force(sequence, answered, watchdog, (x, y, z), (a, b, c))
+    def asked(self, data: bytes) -> None:
+        """Take the question; one that knows the key asked it."""
+        packet = packets.read(data)
+        assert packet.kind == packets.QUESTION
+        (self._ours,) = packet.values
+        self._meeting = packets.meeting_key(self._key, self._theirs, self._ours)
+        if not packets.is_tagged(data, self._meeting):
+            raise packets.PacketError("the port does not know the key")
+
+    def features(self, said: NetworkFeatures) -> bytes:
+        name = said.name.encode()[:64].decode(errors="ignore").encode()
+        numbers = (said.buttons, *astuple(said.dynamics))
+        return self._packed(packets.FEATURES, self._theirs, self._ours, *numbers, name)
+
+    def state(self, said: Sample, answered: int = 0) -> bytes:
+        return self._packed(
+            *(packets.STATE, answered, said.buttons, said.held, said.clock or 0.0),
+            *(*said.position, *said.orientation, *said.velocity, *said.angular_velocity),
+        )
+
+    def _packed(self, kind: int, *values: float | bytes) -> bytes:
+        self.sequence += 1
+        return packets.pack(kind, self.sequence, *values, key=self._meeting)
+
+    def force(self, data: bytes) -> Force:
+        """Read what the program is sent.
+
+        Raises:
+            PacketError: it is no force, not whole, or not from the port that was met.
+        """
+        packet = packets.read(data)
+        if packet.kind != packets.FORCE or not packets.is_tagged(data, self._meeting):
+            raise packets.PacketError("no force")
+        answered, watchdog, x, y, z, a, b, c = packet.values
+        return Force(packet.sequence, answered, watchdog, (x, y, z), (a, b, c))

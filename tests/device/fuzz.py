@@ -20,14 +20,14 @@ from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.descriptor import DescriptorError, parse_descriptor
 from octo_motion.device.hid.force_profile import ReportError
 from octo_motion.device.hid.space_mouse import MultiAxis
-from octo_motion.device.sources import haply, network
-from octo_motion.device.sources.network import PacketError
+from octo_motion.device.sources import haply, packets
+from octo_motion.device.sources.packets import PacketError
 from octo_motion.device.sources.websocket import FrameReader, WebSocketError, frame
 from tests.device import firmware
 from tests.device.parts import COMBINED, SPACE_MOUSE
 from tests.device.test_force_profile import DYNAMICS, state
 from tests.device.test_messages import EXAMPLES
-from tests.device.test_network import FEATURES, FORCE, KEY, STATE
+from tests.device.test_programs import FEATURES, STATE, met
 
 _SMALL = 4000
 """Bytes: of messages, the smaller ones show as much."""
@@ -74,15 +74,30 @@ def _report(data: bytes) -> None:
         assert all(-1.0 <= each <= 1.0 for each in mouse.push)
 
 
+def _packet(data: bytes) -> None:
+    packet = packets.read(data)
+    assert not packets.is_tagged(data, b"another meeting's")
+    if packet.kind == packets.FEATURES:
+        packets.features_of(packet.values)
+    elif packet.kind == packets.STATE:
+        packets.state_of(packet.values)
+
+
 def _haply(data: bytes) -> None:
     haply.parse(data.decode(errors="replace"))
 
 
+def _model(data: bytes) -> None:
+    haply.model_in(data.decode(errors="replace"))
+
+
+_VERSION = b'HTTP/1.1 200 OK\r\nContent-Length: 20\r\n\r\n{"git_tag": "3.5.0"}'
 _HAPLY = json.dumps(
     {
         "inverse3": [
             {
                 "device_id": "049D",
+                "config": {"type": "minverse", "device_info": {"type": "minverse"}},
                 "state": {
                     "cursor_position": {"x": 0.1, "y": 0.2, "z": 0.3},
                     "cursor_velocity": {"x": 0.1, "y": 0.2, "z": 0.3},
@@ -123,8 +138,8 @@ TARGETS = [
     ),
     Target(
         "network packets",
-        lambda data: network.parse_datagram(data, KEY),
-        [*(firmware.pack_packet(each, KEY) for each in (FEATURES, STATE)), FORCE],
+        _packet,
+        [met().features(FEATURES), met().state(STATE), met().greeting()],
         PacketError,
     ),
     Target(
@@ -134,6 +149,8 @@ TARGETS = [
         WebSocketError,
     ),
     Target("Haply's states", _haply, [_HAPLY], None),
+    Target("Haply's inventory", _model, [_HAPLY], None),
+    Target("Haply's version", haply.parse_version, [_VERSION], None),
 ]
 
 

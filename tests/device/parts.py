@@ -7,8 +7,9 @@ import base64
 import json
 import socket
 import threading
+import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -95,6 +96,17 @@ class FakeDriver(Driver):
         self.closed += 1
 
 
+def wait_for(what: Callable[[], object]) -> Any:
+    """What comes of asking until something does."""
+    end = time.monotonic() + 10.0
+    while True:
+        got = what()
+        if got:
+            return got
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
 class HaplyService:
     """A server that follows the published messages of Haply's service, one client at a time."""
 
@@ -102,6 +114,7 @@ class HaplyService:
         self.version = version
         self.with_device = with_device
         self.status = {"calibrated": True, "power_supply": True, "ready": True, "started": True}
+        self.config: dict[str, Any] = {}
         self.older: socket.socket | None = None
         self.received: list[dict[str, Any]] = []
         self.position = {"x": 0.01, "y": 0.02, "z": 0.03}
@@ -119,6 +132,7 @@ class HaplyService:
     def state(self) -> dict[str, Any]:
         inverse3 = {
             "device_id": "049D",
+            "config": self.config,
             "state": {
                 "cursor_position": self.position,
                 "cursor_velocity": {"x": 0.1, "y": 0.0, "z": -0.1},

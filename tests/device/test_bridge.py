@@ -290,9 +290,9 @@ def test_watching_prints_what_a_device_says(capsys: pytest.CaptureFixture[str]) 
     "wrong",
     [
         ["watch", "--udp", "5000"],
-        ["watch", "--udp", "5000", "--key", "zz" * 16],
-        ["watch", "--udp", "1", "--tcp", "2", "--key", "00" * 16],
-        ["watch", "--tcp", "70000", "--key", "00" * 16],
+        ["watch", "--udp", "5000", "--key", "00" * 16],
+        ["watch", "--udp", "1", "--tcp", "2", "--key-file", "key"],
+        ["watch", "--tcp", "70000", "--key-file", "key"],
     ],
 )
 def test_command_line_that_makes_no_sense_is_refused(wrong: list[str]) -> None:

@@ -17,7 +17,7 @@ from octo_motion.device.driver import Dynamics
 from octo_motion.device.haptics.force import DAMPER_SHARE, SHARE, STORED, gains_for
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.system import UDEV_FILE
-from octo_motion.device.sources import network
+from octo_motion.device.sources import packets
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PACKAGE = REPOSITORY / "octo_motion" / "device"
@@ -63,9 +63,11 @@ def test_every_field_of_the_profile_is_described() -> None:
 
 def test_every_packet_is_described_with_its_size() -> None:
     sizes = {
-        int(row[0].split(",")[0]): int(row[2]) for row in rows() if row[0][:2] in {"1,", "2,", "3,"}
+        int(row[0].split(",")[0]): int(row[2])
+        for row in rows()
+        if len(row) == 4 and re.match(r"\d, ", row[0])
     }
-    assert sizes == network.SIZES
+    assert sizes == packets.SIZES
 
 
 def name_of(codec: Codec) -> str:

@@ -7,7 +7,9 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -33,7 +35,9 @@ class Desk:
         monkeypatch.setattr(finding, "descriptor_fingerprint", lambda: None)
         monkeypatch.setattr(finding, "list_devices", self._list)
         monkeypatch.setattr(finding, "_EVERY_COSTLY", 0.0)
-        monkeypatch.setattr(finding.time, "monotonic", lambda: self.now)
+        # Its own clock alone: what is opened goes on by the real one.
+        clock = SimpleNamespace(monotonic=lambda: self.now, sleep=time.sleep)
+        monkeypatch.setattr(finding, "time", clock)
         for module in ("space_mouse", "force_profile"):
             monkeypatch.setattr(f"octo_motion.device.hid.{module}.open_device", self._open)
         self.discovery = Discovery(Sources(haply=False))
@@ -226,15 +230,106 @@ def test_what_was_found_and_not_taken_is_closed() -> None:
         discovery = Discovery(Sources(hid=False, haply_port=service.port))
         list(discovery.look())
         end = time.monotonic() + 20.0
-        while not discovery._search.drivers:
+        (search,) = discovery._searches
+        while not search.drivers:
             assert time.monotonic() < end
             time.sleep(0.002)
-        device = discovery._search.drivers[0]
+        device = search.drivers[0]
         discovery.close()
         assert isinstance(device, Haply)
         assert device._socket is None
     finally:
         service.close()
+
+
+def test_device_that_hangs_while_it_is_opened_delays_no_other(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Firmware that is stuck does not answer for seconds."""
+    hangs, answers = found(), replace(found(), path=b"/dev/hidraw8", serial="B2")
+    free = threading.Event()
+    opened = desk._open
+
+    def open_one(what: Found) -> FakeHandle:
+        if what.path == hangs.path:
+            free.wait(20.0)
+        return opened(what)
+
+    monkeypatch.setattr("octo_motion.device.hid.space_mouse.open_device", open_one)
+    desk.there = [hangs, answers]
+    desk.look()
+    desk.look()
+    assert desk.names() == [answers.identity], "and the one that hangs is not tried twice"
+    free.set()
+    end = time.monotonic() + 10.0
+    while len(desk.drivers) < 2:
+        desk.drivers += desk.discovery.look()
+        assert time.monotonic() < end
+    assert set(desk.names()) == {answers.identity, hangs.identity}
+
+
+def drip(connection: socket.socket) -> None:
+    """Answer for ever, a letter at a time."""
+    while True:
+        connection.sendall(b"H")
+        time.sleep(0.05)
+
+
+def answer(body: bytes) -> Callable[[socket.socket], None]:
+    """Answer with a body, and end."""
+    head = f"HTTP/1.1 200 OK\r\nContent-Length: {len(body)}\r\n\r\n".encode()
+
+    def said(connection: socket.socket) -> None:
+        connection.sendall(head + body)
+
+    return said
+
+
+def pour(connection: socket.socket) -> None:
+    """Send without end."""
+    while True:
+        connection.sendall(bytes(65536))
+
+
+@pytest.mark.parametrize(
+    "says",
+    [
+        drip,
+        pour,
+        answer(b'{"git_tag": "' + b"9" * 5000 + b'.1"}'),
+        answer(b"[" * 60_000 + b"]" * 60_000),
+    ],
+    ids=["drips", "pours", "a version of 5000 digits", "60,000 brackets"],
+)
+def test_whoever_answers_at_haplys_port_hides_no_hid_device(
+    desk: Desk, says: Callable[[socket.socket], None], caplog: pytest.LogCaptureFixture
+) -> None:
+    asked: list[bytes] = []
+
+    def talk(connection: socket.socket) -> None:
+        with connection, suppress(OSError):
+            asked.append(connection.recv(4096))
+            says(connection)
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            with suppress(OSError):
+                while True:
+                    connection, _ = server.accept()
+                    threading.Thread(target=talk, args=(connection,), daemon=True).start()
+
+        threading.Thread(target=serve, daemon=True).start()
+        desk.discovery.close()
+        desk.discovery = Discovery(Sources(haply_port=server.getsockname()[1]))
+        desk.there = [found()]
+        desk.look()
+        assert desk.names() == [found().identity]
+        before = len(asked)
+        # That it ends at all is asked here: who drips holds nobody for ever.
+        assert Haply.open(server.getsockname()[1]) is None
+        assert len(asked) > before, "it was talked to"
+    assert "failed" not in caplog.text
 
 
 def test_nothing_to_look_for_starts_no_thread() -> None:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import threading
 
 import pytest
 from hypothesis import given, settings
@@ -13,9 +15,10 @@ from octo_motion.core.errors import DeviceError
 from octo_motion.core.rotations.scalars import from_rotation_vector
 from octo_motion.device.driver import DeviceLostError, Dynamics, Sample
 from octo_motion.device.hid import force_profile as profile
+from octo_motion.device.hid import system
 from octo_motion.device.hid.force_profile import ForceDevice
 from tests.device import firmware
-from tests.device.parts import FakeHandle, found
+from tests.device.parts import FakeHandle, found, wait_for
 
 DYNAMICS = Dynamics(8.0, 0.4, 0.5, 0.001, 0.02, 0.0005, 1e-5, 1e-4, 0.001)
 metres = st.floats(-1.0, 1.0)
@@ -113,6 +116,13 @@ def test_any_bytes_are_a_report_or_are_refused(data: bytes, number: int) -> None
         assert all(map(math.isfinite, (*got.position, *got.velocity)))
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine takes its time with a thread."""
+    monkeypatch.setattr(system, "_WRITES_IN", 10.0)
+    monkeypatch.setattr(system, "_CLOSES_IN", 10.0)
+
+
 def opened() -> tuple[ForceDevice, FakeHandle]:
     handle = FakeHandle()
     return ForceDevice(
@@ -180,3 +190,53 @@ def test_device_that_says_nonsense_of_itself_is_refused_and_closed(
     assert handle.closed == 1
     assert ForceDevice.drives(found(page=0xFF4F, usage=1))
     assert not ForceDevice.drives(found())
+
+
+class StuckHandle(FakeHandle):
+    """A device that does not take what is written to it until it is freed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.free = threading.Event()
+
+    def write(self, data: bytes, /) -> int:
+        self.free.wait(20.0)
+        return super().write(data)
+
+
+def test_device_that_takes_nothing_stops_neither_the_loop_nor_its_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The system waits a second for it: the newest force is sent then, and no older one."""
+    monkeypatch.setattr(system, "_WRITES_IN", 0.0005)
+    monkeypatch.setattr(system, "_CLOSES_IN", 0.0005)
+    handle = StuckHandle()
+    device = ForceDevice(found(page=0xFF4F, usage=1), handle, profile.ForceFeatures(2, DYNAMICS))
+    for number in range(100):
+        device.send((0.01 * number, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert handle.written == []
+    device.close()
+    assert handle.closed == 0, "not while it is being written to"
+    handle.free.set()
+    wait_for(lambda: handle.closed)
+    commands = [firmware.parse_command(report) for report in handle.written]
+    assert len(commands) <= 3
+    assert not commands[-1].enabled
+
+
+def test_states_have_the_devices_clock_that_does_not_go_round_and_how_late_it_answers() -> None:
+    device, handle = opened()
+    device.send((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    clocks: list[float | None] = []
+    for clock in (0x7FFFFC18, 0x7FFFFFFF, 1, 1001):
+        handle.reports.append(firmware.pack_state(state(clock=clock, answered=1)))
+        sample = device.read()
+        assert sample
+        assert 0.0 < sample.delay < 60.0
+        clocks.append(sample.clock)
+    steps = [b - a for a, b in itertools.pairwise(map(float, filter(None, clocks)))]
+    assert steps == pytest.approx([0.000999, 2e-6, 0.001], abs=1e-9)
+    handle.reports.append(firmware.pack_state(state(answered=9)))
+    sample = device.read()
+    assert sample
+    assert sample.delay == 0.0, "a command that was never sent"

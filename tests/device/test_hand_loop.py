@@ -271,3 +271,19 @@ def test_goodbye_ends_the_loop_and_all_force(desk: Desk) -> None:
         go_on()
     desk.loop.close()
     assert left.sent[-1] == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_loop_ticks_seldom_while_nothing_is_held_and_a_push_goes_as_far(desk: Desk) -> None:
+    """So a hand that rests costs no processor; and a space mouse is as fast as ever."""
+    left = Named("left")
+    desk.discovery.coming = [left]
+    desk.ticks(3, left)
+    assert 125.0 <= 1.0 / desk.loop._schedule.period <= 250.0
+    (pointer,) = desk.loop.pointers
+    assert pointer.period == desk.loop._schedule.period
+    left.buttons = 1
+    desk.ticks(2, left)
+    assert desk.loop._schedule.period == pointer.period == PERIOD
+    left.buttons = 0
+    desk.ticks(60, left)
+    assert pointer.period > PERIOD

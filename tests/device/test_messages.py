@@ -25,7 +25,7 @@ from octo_motion.core.posing.solver.obstacle_shapes import (
 from octo_motion.device import messages as say
 from octo_motion.device.calibration import Calibration, Phase
 from octo_motion.device.codec import MessageError
-from tests.core.puppets import doll, posed, soft
+from tests.core.puppets import chain, doll, posed, soft
 
 CORNERS = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 0, 1], [0, 1, 1]]])
 FIGURE = doll(soft(20, 1.0, 2.0, 3.0, 4.0))
@@ -114,6 +114,42 @@ def test_figure_that_is_none_is_refused(change: dict[str, Any]) -> None:
     assert isinstance(got, say.FigureMessage)
     with pytest.raises(MessageError):
         got.figure()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"masses": np.array([1.0, 1.0, 1e300])},
+        {"masses": np.array([1.0, 1.0, 1e-300])},
+        {"masses": np.array([1e6, 1.0, 1e-6])},
+        {"lengths": np.array([1.0, 1.0, 1e200])},
+        {"radii": np.array([0.1, 0.1, 1e100])},
+        {"anchors": np.full((3, 3), 1e30)},
+        {"inertias": np.zeros((3, 3, 3))},
+        {"inertias": np.tile(1e200 * np.eye(3), (3, 1, 1))},
+        {"inertias": np.tile(-np.eye(3), (3, 1, 1))},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_figure_of_absurd_bodies_is_refused_when_it_is_read(changes: dict[str, Any]) -> None:
+    """Its first step would make numbers that are none, and a hand would hold them."""
+    good = say.FigureMessage.of(chain(3))
+    good.figure()
+    with pytest.raises(MessageError):
+        dataclasses.replace(good, **changes).figure()
+
+
+def test_mites_and_giants_are_figures() -> None:
+    for size in (1e-3, 1.0, 1e3):
+        good = say.FigureMessage.of(chain(3))
+        scaled = {
+            name: size * getattr(good, name)
+            for name in ("anchors", "lengths", "centres", "capsules", "radii")
+        }
+        inertias = size**5 * good.inertias
+        dataclasses.replace(
+            good, **scaled, masses=size**3 * good.masses, inertias=inertias
+        ).figure()
 
 
 @pytest.mark.parametrize(

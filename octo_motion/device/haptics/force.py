@@ -31,15 +31,21 @@ So damping alone cannot keep back a strong slow push, as of a puppet that was be
 than the hand did (the simulation's own coupling helps); while the store is nearly empty, what
 drives the hand fades, and smoothly, for a hand that trembles would feel leaps as a buzz.
 
+*Delays* that nobody told are the third: see ``Delays``.
+
 *The shaper* is last: how much force, how fast it may change, and when it ends.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from math import isfinite
 from typing import Final
 
+import numpy as np
+
+from ...core.rotations import Floats
 from ...core.rotations.scalars import (
     ZERO,
     Vector,
@@ -172,6 +178,104 @@ class Observer:
     def forget(self) -> None:
         """Start anew, at a grab: nothing is stored, nothing may be given."""
         self.energy, self._share = 0.0, 1.0
+
+
+# --- Delays that nobody told ---------------------------------------------------------------------
+
+_DOUBTED: Final = 0.02
+"""s: the longest delay that a device may have without saying so."""
+_KEPT: Final = 0.005
+"""J that any delay may give until the coupling is gone. It is a part of what may come back, for the
+rest comes from forces that are under way and cannot be called back."""
+_SOFTENS: Final = 0.5
+"""Share of that, below which the coupling gets softer."""
+_BEGINS: Final = 0.3
+_AGAIN: Final = 2.0
+_LONGEST: Final = 16.0
+"""s in which it comes after a grab, and comes back when nothing was left: twice as long each time
+that this was so."""
+_CALMS: Final = 2.0
+"""Times the device's own damping, that takes its place."""
+GROWS: Final = 0.05
+GROWS_TURNING: Final = 0.2
+"""s, at least, from no force to the most, and torque: of what grows faster, too much would be under
+way before anybody sees what it does. Fingers are heavier to push than to turn."""
+
+
+class Delays:
+    """Energy that a hand has left in the loop, for each delay that there may be.
+
+    A device that does not say how late it answers, or says it wrongly, gets forces that belong to
+    where its hand was, and a spring that answers late drives what it should hold: hand and device
+    swing for ever, each time with more. Which delay is true nobody knows. But the work of the
+    forces that were sent, delayed by any of them, over the way that the hand is seen to go can be
+    summed, and the worst of the sums counts, less what is under way. Between two of the delays the
+    work is between theirs; so whatever constant delay is true, the hand gets no more than is kept
+    and what it does itself to meet forces under way.
+
+    Where little is left the coupling fades, and damping takes its place: late as it may be, that
+    takes energy from all that a hand does, and so the coupling comes back, the more slowly the more
+    often it was gone. Without delay the same sums come out better, and nothing fades while a limb
+    is bent or held.
+    """
+
+    def __init__(self, period: float, most: float, grows: float, damping: float) -> None:
+        """For a loop (s), the most force (N, or N·m), s in which it grows, the device's damping."""
+        count = math.ceil(_DOUBTED / period) + 2
+        self._period = period
+        self._growth = most * period / grows
+        self._damping = _CALMS * damping
+        self._energy = np.full(count, _KEPT)
+        """J by delay, the longest first, at most what is kept."""
+        self._forces = np.zeros((2 * count, 3))
+        """Those of the last periods, twice: so that all of them are found in one piece."""
+        self._at = 0
+        self._share = 0.0
+        self._patience = _BEGINS
+        self._allowed = ZERO
+
+    def observe(self, force: Vector, moved: Vector) -> None:
+        """Account for one period: what was sent in it (N), and how the hand moved (m)."""
+        count = len(self._energy)
+        self._at = (self._at + 1) % count
+        self._forces[self._at] = self._forces[self._at + count] = force
+        self._energy -= self._last @ moved
+        np.minimum(self._energy, _KEPT, out=self._energy)
+
+    @property
+    def _last(self) -> Floats:
+        """(count, 3) the last forces, the oldest first."""
+        return self._forces[self._at + 1 : self._at + 1 + len(self._energy)]
+
+    def left(self, velocity: Vector) -> float:
+        """J left in the worst case, once all that is under way has come at this speed (m/s)."""
+        coming = self._last @ velocity
+        # What is under way at a delay is all that was sent since: of none it is nothing.
+        under_way = self._period * (coming.sum() - coming.cumsum())
+        return float(np.minimum(self._energy, self._energy - under_way).min())
+
+    def begin(self) -> None:
+        """A grab: the coupling grows from none. What was learned of the device stays."""
+        self._share, self._allowed = 0.0, ZERO
+        self._forces[:] = 0.0
+
+    def allowed(self, force: Vector, velocity: Vector) -> Vector:
+        """What is left of a coupling's force (N) on a hand of that speed (m/s)."""
+        wanted = max(0.0, min(1.0, self.left(velocity) / (_SOFTENS * _KEPT)))
+        if wanted <= self._share:
+            if wanted == 0.0 < self._share:
+                self._patience = min(_LONGEST, max(_AGAIN, 2.0 * self._patience))
+            self._share = wanted
+        else:
+            self._share = min(wanted, self._share + self._period / self._patience)
+            if self._share == 1.0:
+                self._patience = max(_BEGINS, self._patience - self._period)
+        wish, before = scale(force, self._share), self._allowed
+        grown = subtract(wish, before)
+        if dot(grown, before) >= 0.0:
+            wish = add(before, clamp_length(grown, self._growth))
+        self._allowed = wish
+        return add_scaled(wish, velocity, (self._share - 1.0) * self._damping)
 
 
 # --- Limits --------------------------------------------------------------------------------------

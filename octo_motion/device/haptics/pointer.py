@@ -27,7 +27,18 @@ from ...core.rotations.scalars import (
 from ..calibration import NONE, Calibration, Calibrator, corrected
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..messages import HandMessage, HeldMessage, Settings, Workspace
-from .force import DAMPING, STORED, Observer, Shaper, gains_for, wrench
+from .evidence import Evidence
+from .force import (
+    DAMPING,
+    GROWS,
+    GROWS_TURNING,
+    STORED,
+    Delays,
+    Gains,
+    Observer,
+    Shaper,
+    wrench,
+)
 from .local_model import LocalModel
 
 _FULL_PUSH: Final = 0.1
@@ -77,10 +88,15 @@ class Pointer:
         """All zeros where it has none."""
         self._kind = who.kind
         self._response = self.settings.response()
-        self.gains = gains_for(device, self.period)
         self._shaper = Shaper(device.force, device.torque)
         self._push = Observer(STORED, DAMPING * device.damping)
         self._turn = Observer(STORED, DAMPING * device.angular_damping)
+        self._delays = [Delays(self.period, device.force, GROWS, device.damping)]
+        """Of pushing, and of turning where the device can."""
+        if device.torque > 0.0:
+            turning = (device.torque, GROWS_TURNING, device.angular_damping)
+            self._delays.append(Delays(self.period, *turning))
+        self._evidence = Evidence(device, self.period, who.kind)
         self._model = LocalModel()
         self._answered = 0
         self._last_answer = -math.inf
@@ -102,6 +118,11 @@ class Pointer:
         return self._shaper.force
 
     @property
+    def gains(self) -> Gains:
+        """Of the coupling: softer the later the device answers."""
+        return self._evidence.gains
+
+    @property
     def torque(self) -> Vector:
         """N·m on the hand, the device's axes."""
         return self._shaper.torque
@@ -110,6 +131,10 @@ class Pointer:
     def given(self) -> float:
         """J that the hand got beyond what it had given."""
         return self._push.given + self._turn.given
+
+    def busy(self, now: float) -> bool:
+        """Whether its hand holds something, or feels anything yet."""
+        return bool(self.grab or self._answered) or now < self._test_until or self.force != ZERO
 
     # --- What is asked of it ---------------------------------------------------------------------
 
@@ -161,6 +186,8 @@ class Pointer:
             self._model.begin(message)
             self._push.forget()
             self._turn.forget()
+            for each in self._delays:
+                each.begin()
         self._last_answer = now
         self._silence = 0.0
 
@@ -186,7 +213,9 @@ class Pointer:
         elif sample is not None:
             self._press(sample.buttons)
             sample = corrected(sample, self._kind, self.calibration, self._response)
-            if self._answered and self._leaps(sample):
+            sample = self._evidence.of(sample)
+            stopped = now - self._evidence.clock_moved > FRESH_SECONDS
+            if self._answered and (stopped or self._leaps(sample)):
                 self._lift()
             self.sample = sample
             self._move(now)
@@ -204,6 +233,9 @@ class Pointer:
             self.want(grab=False)
             self._answered = 0
         if self._answered:
+            force = self._delays[0].allowed(force, velocity)
+            if len(self._delays) > 1:
+                torque = self._delays[1].allowed(torque, spin)
             force = self._push.allowed(force, velocity, self.period)
             torque = self._turn.allowed(torque, spin, self.period)
             force = add(force, self._push.damping(force, velocity, self.period))
@@ -300,6 +332,12 @@ class Pointer:
             self._push.observe(self._shaper.force, subtract(place, before))
             moved = to_rotation_vector(multiply(turn, conjugate(turn_before)))
             self._turn.observe(self._shaper.torque, moved)
+            if self._answered:
+                for delays, force, way in zip(
+                    *(self._delays, (self.force, self.torque), (subtract(place, before), moved)),
+                    strict=False,
+                ):
+                    delays.observe(force, way)
         self._last = place, turn
 
     def message(self, now: float) -> HandMessage:

@@ -3,7 +3,14 @@
 
 from .force_profile import REPORTS, SIZES, ForceDevice, report_descriptor
 from .space_mouse import SpaceMouse, model_of
-from .system import Found, HidDriver, descriptor_fingerprint, list_devices, open_device
+from .system import (
+    Found,
+    HidDriver,
+    descriptor_fingerprint,
+    list_devices,
+    open_device,
+    why_not_read,
+)
 
 __all__ = [
     "REPORTS",
@@ -17,4 +24,5 @@ __all__ = [
     "model_of",
     "open_device",
     "report_descriptor",
+    "why_not_read",
 ]

@@ -20,7 +20,15 @@ from typing import Final
 
 from ...core.errors import DeviceError
 from ...core.rotations.scalars import ZERO, Vector, normalized
-from ..driver import DeviceLostError, Dynamics, Kind, Sample, is_possible, numbered_buttons
+from ..driver import (
+    DeviceLostError,
+    Dynamics,
+    Kind,
+    Sample,
+    SentTimes,
+    is_possible,
+    numbered_buttons,
+)
 from .descriptor import item
 from .system import Found, Handle, HidDriver, claim, open_device
 
@@ -104,6 +112,8 @@ REPORTS: Final[dict[int, tuple[str, tuple[Item, ...]]]] = {
     ),
 }
 
+_ROUND: Final = 2.0**31 * 1e-6
+"""s after which the clock of states goes round."""
 _LIMITS: Final = {
     "B": (0, 0xFF),
     "H": (0, 0xFFFF),
@@ -171,7 +181,7 @@ def parse_state(report: bytes, time: float) -> Sample:
     Raises:
         ReportError: another report, too short, or a pose that cannot be.
     """
-    _sequence, _clock, _answered, buttons, flags, *rest = unpack(STATE, report)
+    _sequence, clock, _answered, buttons, flags, *rest = unpack(STATE, report)
     w, x, y, z = rest[3:7]
     size = (w * w + x * x + y * y + z * z) * ORIENTATION**2
     orientation = normalized((float(w), float(x), float(y), float(z)))
@@ -186,6 +196,7 @@ def parse_state(report: bytes, time: float) -> Sample:
         buttons=buttons,
         # Without power on its motors it gets no force, lest all come with the power.
         held=flags & 3 == 3,
+        clock=1e-6 * clock,
     )
     if not is_possible(sample):
         raise ReportError("the hand is too far away")
@@ -257,6 +268,9 @@ class ForceDevice(HidDriver):
         buttons = numbered_buttons(features.buttons)
         super().__init__(found, handle, Kind.POSE, buttons, dynamics=features.dynamics)
         self._sequence = 0
+        self._sent = SentTimes()
+        self._clock = 0.0
+        self._rounds = 0
         self._set_free = set_free
 
     @classmethod
@@ -293,12 +307,23 @@ class ForceDevice(HidDriver):
         """The newest pose; None where none came, or only damaged ones."""
         for report in reversed(self.reports()):
             with suppress(ReportError):
-                return parse_state(report, time.perf_counter())
+                sample = parse_state(report, time.perf_counter())
+                answered = unpack(STATE, report)[2]
+                late = self._sent.since(answered, sample.time)
+                return sample._replace(clock=self._unrolled(sample.clock or 0.0), delay=late)
         return None
+
+    def _unrolled(self, clock: float) -> float:
+        """The device's clock (s) as if it did not go round."""
+        if clock < self._clock - 0.5 * _ROUND:  # back by less is a device that began anew
+            self._rounds += 1
+        self._clock = clock
+        return clock + self._rounds * _ROUND
 
     def send(self, force: Vector, torque: Vector) -> None:
         """Ask for a force; the device's own watchdog ends it where no other follows."""
         self._sequence += 1
+        self._sent.note(self._sequence & 0xFFFF, time.perf_counter())
         self.write(pack_command(self._sequence, force, torque))
 
     def close(self) -> None:

@@ -8,13 +8,17 @@ USB directly and take the device away from the rest of the system.
 
 from __future__ import annotations
 
+import ctypes
+import hashlib
 import importlib
 import os
+import platform
 import sys
+import threading
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, ClassVar, Final, Protocol
 
@@ -28,6 +32,9 @@ MULTI_AXIS: Final = (0x01, 0x08)
 UDEV_FILE: Final = "/etc/udev/rules.d/70-octo-motion.rules"
 _MOST_REPORT_BYTES: Final = 256
 _MOST_REPORTS: Final = 64
+_WRITES_IN: Final = 0.0005
+_CLOSES_IN: Final = 0.05
+"""s for a device to take a report, and its last one."""
 
 
 class Handle(Protocol):
@@ -79,18 +86,50 @@ def hidapi() -> Any:
     """The module that reads HID devices on this system.
 
     Raises:
-        DeviceError: hidapi is not there.
+        DeviceError: hidapi is not there, or the system refuses to load it.
     """
     names = ("hidraw", "hid") if sys.platform == "linux" else ("hid",)
+    refused: ImportError | None = None
     for name in names:
         try:
             return importlib.import_module(name)
-        except ImportError:
+        except ModuleNotFoundError:
             continue
+        except ImportError as error:  # there, but not loaded: a signature, a library that it needs
+            refused = error
+    if refused is not None:
+        raise DeviceError(
+            f"Devices cannot be read: the system refuses hidapi ({refused}).",
+            "On a Mac, allow it in System Settings, Privacy & Security; else install the extension "
+            "anew.",
+        ) from refused
+    if (sys.platform, platform.machine().lower()) in _WITHOUT_WHEELS:
+        raise DeviceError(
+            "Devices cannot be read: hidapi is not made for computers like this one.",
+            "All else works: space mice that Blender has itself, and programs that are devices.",
+        )
     raise DeviceError(
         "Devices cannot be read: this Python has no hidapi.",
         "Install the extension from its zip, which brings it, or run pip install hidapi.",
     )
+
+
+_WITHOUT_WHEELS: Final = {
+    ("win32", "arm64"),
+    ("linux", "aarch64"),
+    ("darwin", "x86_64"),
+}
+"""System and processor for which there is no hidapi to be brought, in each Python of Blender's."""
+
+
+@cache
+def why_not_read() -> str:
+    """Why no HID device can be read here, for people; empty where they can."""
+    try:
+        hidapi()
+    except DeviceError as error:
+        return error.problem
+    return ""
 
 
 def list_devices() -> list[Found]:
@@ -145,12 +184,14 @@ def open_device(found: Found) -> Handle:
 def claim(found: Found) -> Callable[[], None]:
     """Keep others of us from a device that is open: two forces in turn would shake the hand.
 
-    On Linux alone; elsewhere nothing is kept from anyone. What comes back sets it free again; so
-    does the end of this process.
+    On Linux and Windows; on a Mac the system does it. What comes back sets it free again; so does
+    the end of this process.
 
     Raises:
         DeviceError: another Blender has it.
     """
+    if sys.platform == "win32":
+        return _claim_on_windows(found)
     if sys.platform != "linux":
         return lambda: None
     import fcntl  # noqa: PLC0415 - Linux's
@@ -163,11 +204,35 @@ def claim(found: Found) -> Callable[[], None]:
         fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         os.close(number)
-        raise DeviceError(
-            f"{found.name or 'The device'} is in use by another Blender.",
-            "End Pose with Device there.",
-        ) from error
+        raise _in_use(found) from error
     return partial(os.close, number)
+
+
+_EXISTS: Final = 183
+"""ERROR_ALREADY_EXISTS"""
+
+
+def _claim_on_windows(found: Found) -> Callable[[], None]:
+    """A mutex with the device's name: Windows keeps it as long as a process has it."""
+    # What other systems lack of it.
+    windows: Any = ctypes
+    kernel = windows.WinDLL("kernel32", use_last_error=True)
+    kernel.CreateMutexW.restype = ctypes.c_void_p
+    name = hashlib.sha256(found.path.lower()).hexdigest()[:32]
+    mutex = kernel.CreateMutexW(None, False, f"octo-motion-device-{name}")  # noqa: FBT003 - its order
+    taken = windows.get_last_error() == _EXISTS
+    set_free = partial(kernel.CloseHandle, ctypes.c_void_p(mutex))
+    if taken:
+        set_free()
+        raise _in_use(found)
+    return set_free
+
+
+def _in_use(found: Found) -> DeviceError:
+    return DeviceError(
+        f"{found.name or 'The device'} is in use by another Blender.",
+        "End Pose with Device there.",
+    )
 
 
 def _refusal(found: Found) -> DeviceError:
@@ -184,6 +249,12 @@ def _refusal(found: Found) -> DeviceError:
                 f"{begin} write this line into {UDEV_FILE}, then plug the device in again: "
                 f"{udev_rule(found.vendor, found.product)}",
             )
+    elif (found.page, found.usage) == MULTI_AXIS:
+        # 3Dconnexion's driver has it alone; two that read it would both move something.
+        return DeviceError(
+            f"{name} belongs to its own driver.",
+            "Blender has it itself then: just push it.",
+        )
     return DeviceError(
         f"{name} cannot be opened.",
         "Plug it in again, and close other programs that use it alone.",
@@ -234,6 +305,7 @@ class HidDriver(Driver):
             )
         )
         self._handle: Handle | None = handle
+        self._writer: _Writer | None = None
 
     @classmethod
     @abstractmethod
@@ -263,22 +335,76 @@ class HidDriver(Driver):
         return reports
 
     def write(self, report: bytes) -> None:
-        try:
-            written = self._there().write(report)
-        except (OSError, ValueError) as error:
-            raise DeviceLostError(self.description.name) from error
-        if written < 0:
+        """Hand a report over; one that has not been sent when the next comes is left out."""
+        handle = self._there()
+        if self._writer is None:
+            self._writer = _Writer(handle)
+        if not self._writer.write(report):
             raise DeviceLostError(self.description.name)
 
     def send(self, force: Vector, torque: Vector) -> None:
         """Nothing, where a device has no motors."""
 
     def close(self) -> None:
-        if self._handle is not None:
-            self._handle.close()
-            self._handle = None
+        handle, self._handle = self._handle, None
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
+        elif handle is not None:
+            handle.close()
 
     def _there(self) -> Handle:
         if self._handle is None:
             raise DeviceLostError(self.description.name)
         return self._handle
+
+
+class _Writer:
+    """A thread that writes the newest report to a device, and in the end closes it.
+
+    The system takes up to a second for a report to a device that does not listen, and a millisecond
+    for one that does. The loop waits for half of that, and then not until it has been taken.
+    """
+
+    def __init__(self, handle: Handle) -> None:
+        self._failed = False
+        """Whether the device is gone."""
+        self._handle = handle
+        self._report = b""
+        self._closing = False
+        self._wanted, self._done = threading.Event(), threading.Event()
+        self._done.set()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def write(self, report: bytes) -> bool:
+        """Hand a report over; False where the device is known to be gone."""
+        idle = self._done.is_set()
+        self._report = report
+        self._done.clear()
+        self._wanted.set()
+        if idle:
+            self._done.wait(_WRITES_IN)
+        return not self._failed
+
+    def close(self) -> None:
+        """Write what was handed over last, and close; whoever waits, waits for a moment alone."""
+        self._closing = True
+        self._wanted.set()
+        self._thread.join(_CLOSES_IN)
+
+    def _run(self) -> None:
+        while self._wanted.wait():
+            self._wanted.clear()
+            closing, report = self._closing, self._report
+            self._report = b""
+            try:
+                if report and not self._failed:
+                    self._failed = self._handle.write(report) < 0
+            except (OSError, ValueError):
+                self._failed = True
+            if not self._report:
+                self._done.set()
+            if closing:
+                self._handle.close()
+                return

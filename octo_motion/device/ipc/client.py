@@ -62,6 +62,8 @@ class Client:
     """To be shown, then cleared, by the caller."""
     heard: float = 0.0
     """``time.monotonic`` of the last message."""
+    log_file: Path | None = None
+    """Where the bridge's messages go; without one, to our console."""
     _placed: int = 0
     """How often the puppet was put into a pose."""
     _child: Child | None = None
@@ -84,7 +86,7 @@ class Client:
         self._forget_devices()
         self.times = self.hello = None
         self._placed = 0
-        self._child = Child.start(("bridge", *arguments), python)
+        self._child = Child.start(("bridge", *arguments), python, self.log_file)
         self._child.channel.most_waiting = _MOST_WAITING
         self.state = ClientState.RUNNING
         self.heard = time.monotonic()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import os
 import sys
 from pathlib import Path
 
@@ -31,9 +32,15 @@ def load() -> None:
 def main() -> int:
     """Run ``python -m octo_motion.device`` without a search path for it.
 
-    ``--library FOLDER``, as often as needed, says where numpy and hidapi are.
+    ``--library FOLDER``, as often as needed, says where numpy and hidapi are, ``--dlls FOLDER``
+    where Windows finds libraries that they need.
     """
     arguments = sys.argv[1:]
+    if "--dlls" in arguments:
+        at = arguments.index("--dlls")
+        if sys.platform == "win32":
+            os.add_dll_directory(arguments[at + 1])
+        del arguments[at : at + 2]
     while "--library" in arguments:
         at = arguments.index("--library")
         sys.path.extend(folder for folder in arguments[at + 1 : at + 2] if folder not in sys.path)

@@ -23,12 +23,22 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import BinaryIO, Final, NoReturn
 
 from ...core.errors import DeviceError
-from ..messages import HEADER, MAGIC, VERSION, Message, MessageError, pack, read_body, read_header
+from ..messages import (
+    HEADER,
+    MAGIC,
+    MOST_BYTES,
+    VERSION,
+    Message,
+    MessageError,
+    pack,
+    read_body,
+    read_header,
+)
 from ..stream import Stream
 
 log = logging.getLogger(__name__)
@@ -40,6 +50,8 @@ _ANSWER: Final = struct.Struct(f"<4sH{_NONCE}s32s")
 _PATIENCE: Final = 3.0
 """s that a connection may take to prove itself, on a machine that has much else to do."""
 _MOST_WAITING: Final = 8_000_000
+_AT_ONCE: Final = 1000
+"""Messages that are taken in one call."""
 _DROPPABLE_BEYOND: Final = 65_536
 """Bytes waiting from which on poses and the like are left out: the newest comes later anyway."""
 
@@ -95,22 +107,22 @@ class MessageChannel:
             raise ChannelClosedError
 
     def receive(self) -> list[Message]:
-        """All messages that have come whole.
+        """Messages that have come whole; of very many the rest next time.
 
         Raises:
             ChannelClosedError: the peer is gone, or sent something that is no message.
         """
         self.flush()
-        goes_on = self._stream.receive()
+        goes_on = len(self._stream.received) > MOST_BYTES or self._stream.receive()
         messages: list[Message] = []
         try:
-            while (message := self._next()) is not None:
+            while len(messages) < _AT_ONCE and (message := self._next()) is not None:
                 messages.append(message)
         except MessageError as error:
             log.warning("Connection closed: %s", error)
             self.close()
             raise ChannelClosedError(str(error)) from error
-        if not goes_on:
+        if not goes_on and not messages:
             if self._stream.received:
                 log.warning("Connection ended in the middle of a message")
             self.close()
@@ -236,8 +248,10 @@ def python_executable() -> Path:
     Raises:
         DeviceError: none was found.
     """
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    names = (f"python{version}", "python3", "python") if os.name != "nt" else ("python.exe",)
+    major, minor, *_ = sys.version_info
+    names: tuple[str, ...] = (f"python{major}.{minor}", "python3", "python")
+    if os.name == "nt":
+        names = ("python.exe",)
     prefixes = dict.fromkeys((sys.prefix, sys.base_prefix, sys.exec_prefix))
     below = (Path(*each) for each in itertools.product(prefixes, ("bin", "."), names))
     for path in (Path(sys.executable or "."), *below):
@@ -269,24 +283,35 @@ class Child:
         self.channel = channel
 
     @classmethod
-    def start(cls, arguments: Sequence[str], python: Path | None = None) -> Child:
+    def start(
+        cls, arguments: Sequence[str], python: Path | None = None, log_file: Path | None = None
+    ) -> Child:
         """Start ``python -m octo_motion.device`` with subcommand and options, and connect to it.
+
+        What it has to say besides, and whatever it starts, goes to the file, or to our own console.
 
         Raises:
             DeviceError: it does not start, or does not answer.
         """
         secret = new_secret()
         options = ("-I", "-X", "utf8", str(LAUNCHER), *arguments)
-        command = [str(python or python_executable()), *options]
+        python = python or python_executable()
+        command = [str(python), *options]
         for folder in library_folders():
             command += ["--library", folder]
+        runtime = runtime_folder(python)
+        if runtime is not None:
+            command += ["--dlls", str(runtime)]
         try:
-            process = subprocess.Popen(  # noqa: S603 - our own program
-                command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-            )
+            with _messages_to(log_file) as messages:
+                process = subprocess.Popen(  # noqa: S603 - our own program
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=messages,
+                    env=_environment(runtime),
+                    creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+                )
         except OSError as error:
             raise DeviceError(
                 f"The device's program does not start: {error.strerror}.",
@@ -300,10 +325,7 @@ class Child:
             channel = connect(port, secret)
         except (OSError, ValueError, ChannelClosedError) as error:
             _end(process)
-            raise DeviceError(
-                "The device's program does not answer.",
-                "Start it again; its messages are in Blender's console.",
-            ) from error
+            raise _silent(process.returncode, log_file) from error
         return cls(process, channel)
 
     @property
@@ -315,6 +337,52 @@ class Child:
         """End it: by closing its line and standard input and, if that does not help, by force."""
         self.channel.close()
         _end(self._process, seconds)
+
+
+def runtime_folder(python: Path) -> Path | None:
+    """Where Blender for Windows has Microsoft's C runtime: its Python alone does not find it."""
+    for folder in python.parents[:5]:
+        if (folder / "blender.crt").is_dir():
+            return folder / "blender.crt"
+    return None
+
+
+def _environment(runtime: Path | None) -> dict[str, str] | None:
+    if runtime is None:
+        return None
+    return {**os.environ, "PATH": f"{runtime}{os.pathsep}{os.environ.get('PATH', '')}"}
+
+
+@contextlib.contextmanager
+def _messages_to(log_file: Path | None) -> Iterator[BinaryIO | int | None]:
+    """Where what a process says besides goes: a file, or our console if we have one.
+
+    Blender for Windows has none, and a process cannot be given what is not there.
+    """
+    if log_file is not None:
+        with contextlib.suppress(OSError):
+            log_file.parent.mkdir(parents=True, exist_ok=True)
+            with log_file.open("wb") as file:
+                yield file
+                return
+    yield None if sys.stderr is not None else subprocess.DEVNULL
+
+
+_DLL_NOT_FOUND: Final = 0xC0000135
+"""Exit code of a Windows program that lacks a library."""
+
+
+def _silent(status: int | None, log_file: Path | None) -> DeviceError:
+    """Why a program that was started does not answer."""
+    if status is not None and status & 0xFFFFFFFF == _DLL_NOT_FOUND:
+        return DeviceError(
+            "The device's program does not start: Windows lacks VCRUNTIME140.dll.",
+            "Install Microsoft's Visual C++ Redistributable, or use a Blender from blender.org.",
+        )
+    where = log_file or "Blender's console"
+    return DeviceError(
+        "The device's program does not answer.", f"Start it again; its messages are in {where}."
+    )
 
 
 def _announced_port(process: subprocess.Popen[bytes]) -> int:

@@ -2,6 +2,5 @@
 """Where devices may come from."""
 
 from .discovery import HID_DRIVERS, Discovery, Sources, hid_driver_for
-from .network import KEY_BYTES
 
-__all__ = ["HID_DRIVERS", "KEY_BYTES", "Discovery", "Sources", "hid_driver_for"]
+__all__ = ["HID_DRIVERS", "Discovery", "Sources", "hid_driver_for"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Driver of Haply's Inverse3 through the maker's service on this computer.
+"""Driver of Haply's Inverse3, Inverse3x and Minverse through the maker's service on this computer.
 
 After the service's published messages (docs.haply.co, Inverse SDK 3.5: "WebSocket Protocol",
 "Simulation Channel", "Device Configuration", "HTTP"): a WebSocket at port 10001; the service sends
@@ -8,14 +8,17 @@ state that came. Its default axes are Blender's: X right, Y forward, Z up; metre
 first message names the session and its axes, the first one to a device says where to count from.
 What its version is, the service says by HTTP: at the same port, before 3.5 at the one below.
 
-The Inverse3 gives force alone. Orientation and buttons are those of the grip.
+All three stand in one list, with the same states and commands; which one it is, its configuration
+says. They give force alone. Orientation and buttons are those of the grip.
 """
 
 from __future__ import annotations
 
 import http.client
+import io
 import json
 import re
+import socket
 import time
 from contextlib import suppress
 from typing import Any, Final
@@ -23,7 +26,7 @@ from typing import Any, Final
 from ...core.errors import DeviceError
 from ...core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized, subtract
 from ..driver import Description, DeviceLostError, Driver, Dynamics, Kind, Sample, is_possible
-from .websocket import WebSocket, WebSocketError
+from .websocket import WebSocket, WebSocketError, received_until
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 10001
@@ -37,9 +40,15 @@ _BUTTONS: Final = ("a", "b", "c")
 _MIDDLE: Final[Vector] = (0.0, -0.14, 0.15)
 """m: about the middle of the reach, where a service before 3.5 cannot be asked to count from it."""
 
-INVERSE3: Final = Dynamics(force=8.0, damping=0.3, delay=0.001, resolution=1e-5)
-"""Cautious guesses: the service states none of these. What they leave open is the passivity
-controller's business."""
+_MODELS: Final = {
+    "inverse3": ("Haply Inverse3", Dynamics(8.0, damping=0.3, delay=0.001, resolution=1e-5)),
+    "inverse3x": ("Haply Inverse3x", Dynamics(8.0, damping=0.3, delay=0.001, resolution=1e-5)),
+    "minverse": ("Haply Minverse", Dynamics(3.0, damping=0.15, delay=0.001, resolution=1e-5)),
+}
+"""Names and mechanics. The latter are cautious guesses: the service states none of them. What they
+leave open is the passivity controller's business."""
+_INVENTORY_SECONDS: Final = 0.3
+"""For the service to say which device it has."""
 
 
 def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] | None:
@@ -63,38 +72,63 @@ def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] |
 
 def _answered_version(port: int, seconds: float) -> re.Match[str] | None:
     """The version that whoever listens at a port answers with."""
-    connection = http.client.HTTPConnection(HOST, port, timeout=seconds)
+    request = f"GET /version HTTP/1.1\r\nHost: {HOST}:{port}\r\nConnection: close\r\n\r\n"
+    end = time.monotonic() + seconds
     try:
-        connection.request("GET", "/version")
-        answer = connection.getresponse()
-        data: Any = json.loads(answer.read(65536)) if answer.status == 200 else None
-    except (OSError, http.client.HTTPException, ValueError, OverflowError):
+        with socket.create_connection((HOST, port), timeout=seconds) as connection:
+            connection.sendall(request.encode())
+            data = received_until(connection, b"", end)
+        return parse_version(data)
+    except (OSError, WebSocketError):
         return None
-    finally:
-        connection.close()
-    data = data.get("data", data) if isinstance(data, dict) else {}
-    if not isinstance(data, dict):
+
+
+def parse_version(data: bytes) -> re.Match[str] | None:
+    """The version in an answer of HTTP: a match whose groups are its first two numbers."""
+    answer = http.client.HTTPResponse(_Said(data))  # pyright: ignore[reportArgumentType]
+    try:
+        answer.begin()
+        said: Any = json.loads(answer.read()) if answer.status == 200 else None
+    except (OSError, http.client.HTTPException, ValueError, OverflowError, RecursionError):
         return None
-    return re.search(r"(\d+)\.(\d+)", str(data.get("git_tag") or data.get("git_describe") or ""))
+    said = said.get("data", said) if isinstance(said, dict) else {}
+    if not isinstance(said, dict):
+        return None
+    tag = str(said.get("git_tag") or said.get("git_describe") or "")
+    # No version has more digits, and numbers of thousands of them are not read.
+    return re.search(r"(?<!\d)(\d{1,4})\.(\d{1,4})(?!\d)", tag[:64])
+
+
+class _Said:
+    """Bytes that have come, for what reads them from a socket."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+
+    def makefile(self, *_: object) -> io.BytesIO:
+        return io.BytesIO(self._data)
 
 
 class Haply(Driver):
-    """One Inverse3, and the grip on it where there is one."""
+    """One device of Haply's, and the grip on it where there is one."""
 
-    def __init__(self, socket: WebSocket, version: tuple[int, int]) -> None:
-        self._socket: WebSocket | None = socket
+    def __init__(self, line: WebSocket, version: tuple[int, int], came: list[str]) -> None:
+        """``came`` is what the service has said already: its inventory."""
+        self._socket: WebSocket | None = line
+        self._came = came
         self._version = version
+        name, dynamics = _MODELS[model_in(came[-1] if came else "")]
         self._device = ""
         self._greeted = self._centred = version < _CONFIGURABLE
         self._asked = 0.0
         self._answered = self._last_state = time.perf_counter()
         super().__init__(
             Description(
-                name="Haply Inverse3",
+                name=name,
                 identity="haply",
                 kind=Kind.POSE,
                 buttons=("A", "B", "C"),
-                dynamics=INVERSE3,
+                dynamics=dynamics,
             )
         )
 
@@ -109,12 +143,16 @@ class Haply(Driver):
         if version is None:
             return None
         try:
-            return cls(WebSocket.connect(HOST, port), version)
+            line = WebSocket.connect(HOST, port)
+            end = time.monotonic() + _INVENTORY_SECONDS
+            while not (came := line.receive()) and time.monotonic() < end:
+                time.sleep(0.002)
+            return cls(line, version, came)
         except WebSocketError:
             return None
 
     def read(self) -> Sample | None:
-        texts = self._there().receive()
+        texts, self._came = self._came or self._there().receive(), []
         now = time.perf_counter()
         if not texts:
             if now - self._answered > _LOST_SECONDS:
@@ -196,6 +234,17 @@ def parse(text: str, device: str = "") -> tuple[str, Sample] | None:
         return None
     except (RecursionError, OverflowError):  # nested too deep, a number beyond all floats
         return None
+
+
+def model_in(text: str) -> str:
+    """Which model the first device is, in the service's JSON; an Inverse3 where it does not say."""
+    try:
+        first = json.loads(text)["inverse3"][0]
+        config = first.get("config") or {}
+        kind = config.get("type") or (config.get("device_info") or {}).get("type")
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError):
+        kind = ""
+    return kind if isinstance(kind, str) and kind in _MODELS else "inverse3"
 
 
 def _grip(message: dict[str, Any]) -> tuple[Quaternion, int]:

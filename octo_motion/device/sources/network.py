@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Any other program as a device: three packets of fixed layout over UDP or TCP, loopback only.
+"""Any other program as a device, over UDP or TCP, loopback only.
 
-docs/device.md publishes the layout. The program sends what its device can do, then poses; each pose
-is answered with a force. A key of 16 bytes in each packet keeps other programs out. What the
-program does, writing features and states and reading forces, is in tests/device/firmware.py.
+The program proves that it knows the key, says what its device can do, then sends poses; each is
+answered with a force. Packets are in ``packets``. Whoever has proved nothing holds no place: our
+question to a greeting follows from who asks, so that nothing is kept, and of connections that wait
+the oldest makes room.
 """
 
 from __future__ import annotations
@@ -11,133 +12,30 @@ from __future__ import annotations
 import contextlib
 import hmac
 import logging
+import secrets
 import socket
-import struct
 import time
-from dataclasses import astuple, dataclass
-from typing import Any, Final, NamedTuple
+from collections import deque
+from typing import Final
 
-from ...core.rotations.scalars import ZERO, Vector, normalized
-from ..driver import (
-    Description,
-    DeviceLostError,
-    Driver,
-    Dynamics,
-    Kind,
-    Sample,
-    is_possible,
-    numbered_buttons,
-)
+from ...core.rotations.scalars import ZERO, Vector
+from ..driver import Description, DeviceLostError, Driver, Kind, Sample, SentTimes, numbered_buttons
 from ..stream import Stream
+from . import packets
+from .packets import KEY_BYTES, NetworkFeatures, Packet, PacketError
 
 log = logging.getLogger(__name__)
 
-MAGIC: Final = b"OMDF"
-VERSION: Final = 1
-KEY_BYTES: Final = 16
-FEATURES, STATE, FORCE = 1, 2, 3
-HEAD: Final = struct.Struct(f"<4sHH{KEY_BYTES}s")
-BODIES: Final = {
-    FEATURES: struct.Struct("<B7x9d64s"),
-    STATE: struct.Struct("<IIB7x13d"),
-    FORCE: struct.Struct("<III4x6d"),
-}
-SIZES: Final = {kind: HEAD.size + body.size for kind, body in BODIES.items()}
-_WATCHDOG: Final = 20
-"""ms after which a force ends if no other follows."""
-_MOST: Final = 1000.0
-"""Newtons, and all else that a device says of itself."""
 _SILENCE: Final = 1.0
 """s without a packet after which the program counts as gone."""
+_AT_ONCE: Final = 64
+"""Packets that are taken in one call: whoever sends without end keeps no loop from going on."""
+_WAITING: Final = 32
+"""Connections that have proved nothing yet."""
+_ACCEPTED: Final = 16
+"""Of them, new ones in one call."""
 
-
-class PacketError(ValueError):
-    """The bytes are no packet of ours."""
-
-
-@dataclass(frozen=True)
-class NetworkFeatures:
-    """What the program's device can do."""
-
-    name: str
-    buttons: int
-    dynamics: Dynamics
-
-
-class NetworkState(NamedTuple):
-    """What its hand does."""
-
-    sequence: int
-    sample: Sample
-
-
-def pack(kind: int, key: bytes, *values: float | bytes) -> bytes:
-    """A packet of a kind, with the fields of its body."""
-    return HEAD.pack(MAGIC, VERSION, kind, key) + BODIES[kind].pack(*values)
-
-
-def pack_force(sequence: int, answered: int, force: Vector, torque: Vector, key: bytes) -> bytes:
-    """What the program's hand shall feel; ``answered`` is the sequence of the newest state."""
-    numbers = (sequence & 0xFFFFFFFF, answered & 0xFFFFFFFF, _WATCHDOG)
-    return pack(FORCE, key, *numbers, *force, *torque)
-
-
-def size_of(data: bytes | bytearray, key: bytes) -> int:
-    """Bytes of the packet that begins here, by its head; ``PacketError`` where it is no packet."""
-    if len(data) < HEAD.size:
-        raise PacketError("cut off")
-    magic, version, kind, theirs = HEAD.unpack_from(data)
-    if magic != MAGIC or kind not in SIZES:
-        raise PacketError("not one of our packets")
-    if version != VERSION:
-        raise PacketError(f"version {version} of the packets, not {VERSION}")
-    if not hmac.compare_digest(theirs, key):
-        raise PacketError("the key is wrong")
-    return SIZES[kind]
-
-
-def parse_datagram(data: bytes, key: bytes) -> NetworkFeatures | NetworkState:
-    """The packet of a program that these bytes are.
-
-    Raises:
-        PacketError: they are none, or say what cannot be.
-    """
-    if len(data) != size_of(data, key):
-        raise PacketError("of another length")
-    kind = HEAD.unpack_from(data)[2]
-    values = BODIES[kind].unpack_from(data, HEAD.size)
-    if kind == FORCE:
-        raise PacketError("a force, which is ours to send")
-    return _features(values) if kind == FEATURES else _state(values)
-
-
-def _state(values: tuple[Any, ...]) -> NetworkState:
-    sequence, buttons, held, x, y, z, *turn, vx, vy, vz, wx, wy, wz = values
-    orientation = normalized((turn[0], turn[1], turn[2], turn[3]))
-    if orientation is None:
-        raise PacketError("a pose that cannot be")
-    sample = Sample(
-        time=time.perf_counter(),
-        position=(x, y, z),
-        orientation=orientation,
-        velocity=(vx, vy, vz),
-        angular_velocity=(wx, wy, wz),
-        buttons=buttons,
-        held=bool(held),
-    )
-    if not is_possible(sample):
-        raise PacketError("a pose that cannot be")
-    return NetworkState(sequence, sample)
-
-
-def _features(values: tuple[Any, ...]) -> NetworkFeatures:
-    buttons, *numbers, name = values
-    dynamics = Dynamics(*numbers)
-    possible = all(0.0 <= each <= _MOST for each in astuple(dynamics))
-    if buttons > 32 or dynamics.force == 0.0 or not possible:
-        raise PacketError("a device that cannot be")
-    text = name.rstrip(b"\0").decode(errors="replace")
-    return NetworkFeatures("".join(each for each in text if each.isprintable()), buttons, dynamics)
+Address = tuple[str, int]
 
 
 class NetworkDevice(Driver):
@@ -146,6 +44,7 @@ class NetworkDevice(Driver):
     def __init__(self, port: Port, features: NetworkFeatures) -> None:
         self._port = port
         self._sequence = 0
+        self._sent = SentTimes()
         super().__init__(
             Description(
                 name=features.name or "Program",
@@ -158,13 +57,17 @@ class NetworkDevice(Driver):
 
     def read(self) -> Sample | None:
         """The newest pose that came; a program that is gone or silent is lost."""
-        sample = self._port.newest()
-        if sample is None and self._port.silent:
-            raise DeviceLostError(self.description.name)
-        return sample
+        state = self._port.newest()
+        if state is None:
+            if self._port.silent:
+                raise DeviceLostError(self.description.name)
+            return None
+        late = self._sent.since(state.answered, state.sample.time)
+        return state.sample._replace(delay=late)
 
     def send(self, force: Vector, torque: Vector) -> None:
         self._sequence += 1
+        self._sent.note(self._sequence, time.perf_counter())
         self._port.answer(self._sequence, force, torque)
 
     def close(self) -> None:
@@ -181,22 +84,23 @@ class Port:
             raise ValueError(f"the key has {len(key)} bytes, not {KEY_BYTES}")
         self._stream = kind == "tcp"
         self._key = key
-        self._socket = socket.socket(
-            socket.AF_INET, socket.SOCK_STREAM if self._stream else socket.SOCK_DGRAM
-        )
-        self._socket.bind(("127.0.0.1", number))
-        self._socket.settimeout(0.0)
-        if self._stream:
-            self._socket.listen(1)
-        self.number: int = self._socket.getsockname()[1]
-        self._peer: Stream | None = None
-        self._address: tuple[str, int] | None = None
-        self._known: NetworkFeatures | None = None
-        self._features: NetworkFeatures | None = None
-        self._sample: Sample | None = None
-        self._answered = 0
-        self._last_packet = 0.0
+        self.number = number
+        self._waiting: deque[tuple[Stream, Address]] = deque()
         self._complained = ""
+        self._peer: Stream | None = None
+        self._address: Address | None = None
+        """Over UDP, of the program that has proved itself."""
+        self._open()
+        self._forget()
+
+    def _open(self) -> None:
+        kind = socket.SOCK_STREAM if self._stream else socket.SOCK_DGRAM
+        self._socket = socket.socket(socket.AF_INET, kind)
+        self._socket.settimeout(0.0)
+        self._socket.bind(("127.0.0.1", self.number))
+        if self._stream:
+            self._socket.listen(_WAITING)
+        self.number = self._socket.getsockname()[1]
 
     def device(self) -> NetworkDevice | None:
         """The program that came, once it has said what its device can do."""
@@ -212,15 +116,15 @@ class Port:
         """Whether nothing has come for long."""
         return time.perf_counter() - self._last_packet > _SILENCE
 
-    def newest(self) -> Sample | None:
+    def newest(self) -> packets.NetworkState | None:
         """The newest pose since the last call."""
         self._fill()
-        sample, self._sample = self._sample, None
-        return sample
+        state, self._state = self._state, None
+        return state
 
     def answer(self, sequence: int, force: Vector, torque: Vector) -> None:
-        """Send a force to whoever sent the last pose; lost ones are the watchdog's business."""
-        data = pack_force(sequence, self._answered, force, torque, self._key)
+        """Send a force to the program; lost ones are the watchdog's business."""
+        data = packets.pack_force(sequence, self._sequence, force, torque, self._meeting)
         if self._peer is not None:
             # A program that does not read misses whole packets, never a part of one.
             if len(self._peer.unsent) < len(data):
@@ -228,31 +132,109 @@ class Port:
             self._peer.flush()
         elif self._address is not None:
             with contextlib.suppress(OSError):
-                self._socket.sendto(data, self._address)
+                self._socket.send(data)
 
     def forget(self) -> None:
         """Be ready for another program."""
         if self._peer is not None:
             self._peer.close()
+        if self._address is not None:  # a socket that is tied to one program stays so
+            self._socket.close()
+            with contextlib.suppress(OSError):  # taken in that moment: it stays closed
+                self._open()
+        self._forget()
+
+    def _forget(self) -> None:
         self._peer = self._address = None
-        self._features = self._sample = self._known = None
+        self._meeting = b""
+        self._question = secrets.token_bytes(KEY_BYTES)
+        """Drawn anew for each program: what was said to the one before is out of date."""
+        self._features: NetworkFeatures | None = None
+        self._known: NetworkFeatures | None = None
+        self._state: packets.NetworkState | None = None
+        self._sequence = 0
+        self._last_packet = 0.0
 
     def close(self) -> None:
-        self.forget()
+        while self._waiting:
+            self._waiting.pop()[0].close()
+        if self._peer is not None:
+            self._peer.close()
         self._socket.close()
+        self._forget()
+
+    # --- Whoever has proved nothing --------------------------------------------------------------
+
+    def _ours(self, theirs: bytes, address: Address) -> bytes:
+        """Our random number for a program and its own: worked out, so that none is kept."""
+        return hmac.digest(self._question, theirs + repr(address).encode(), "sha256")[
+            : packets.NONCE_BYTES
+        ]
+
+    def _greeted(self, data: bytes, address: Address) -> bytes:
+        """Our answer to a stranger; nothing is left to say once he has proved that he is none."""
+        packet = packets.read(data)
+        if packet.kind == packets.GREETING:
+            (theirs,) = packet.values
+            ours = self._ours(theirs, address)
+            meeting = packets.meeting_key(self._key, theirs, ours)
+            return packets.pack(packets.QUESTION, 0, ours, key=meeting)
+        if packet.kind != packets.FEATURES:
+            raise PacketError("nobody has proved to know the key")
+        theirs, ours = packet.values[:2]
+        meeting = packets.meeting_key(self._key, theirs, ours)
+        if not hmac.compare_digest(ours, self._ours(theirs, address)):
+            raise PacketError("an answer to another question")
+        if not packets.is_tagged(data, meeting):
+            raise PacketError("the key is wrong")
+        self._features = packets.features_of(packet.values)
+        self._meeting, self._sequence = meeting, packet.sequence
+        self._last_packet = time.perf_counter()
+        return b""
+
+    def _hear_strangers(self) -> None:
+        """Over TCP: answer those who wait, then let others in, of whom the oldest make room."""
+        for _ in range(len(self._waiting)):
+            self._hear(*self._waiting.popleft())
+        for _ in range(_ACCEPTED):
+            if self._meeting:
+                break
+            try:
+                connection, address = self._socket.accept()
+                stranger = Stream(connection)
+            except OSError:
+                break
+            self._hear(stranger, address)
+        while len(self._waiting) > (0 if self._meeting else _WAITING):
+            self._waiting.popleft()[0].close()
+
+    def _hear(self, stranger: Stream, address: Address) -> None:
+        """Hear what one has to say who waits, and let him wait on if he is neither in nor out."""
+        stays = not self._meeting and stranger.receive(_AT_ONCE * packets.HEAD.size)
+        try:
+            while stays and (data := self._packet_in(stranger)):
+                stranger.unsent += self._greeted(data, address)
+                if self._meeting:
+                    self._peer = stranger
+                    return
+            stays = stays and stranger.flush()
+        except PacketError as error:
+            self._complain(error)
+            stays = False
+        if stays:
+            self._waiting.append((stranger, address))
+        else:
+            stranger.close()
+
+    # --- What comes ------------------------------------------------------------------------------
 
     def _fill(self) -> None:
         if not self._stream:
             self._fill_from_datagrams()
-            return
-        # Who says nothing of a device keeps the port only until somebody else comes.
-        if self._peer is None or (self._known is None and self.silent):
-            self._accept()
-        try:
-            self._fill_from_stream()
-        except PacketError as error:
-            self._complain(error)
-            self.forget()
+        elif self._peer is None:
+            self._hear_strangers()
+        else:
+            self._fill_from_stream(self._peer)
 
     def _complain(self, error: PacketError) -> None:
         if str(error) != self._complained:
@@ -260,43 +242,78 @@ class Port:
             log.warning("Port %d: %s", self.number, error)
 
     def _fill_from_datagrams(self) -> None:
-        for _ in range(64):
+        came: list[bytes] = []
+        for _ in range(_AT_ONCE):
             try:
                 data, address = self._socket.recvfrom(2048)
             except OSError:
-                return
+                break
+            if address == self._address:
+                came.append(data)
+            elif self._address is None:
+                try:
+                    reply = self._greeted(data, address)
+                    if self._meeting:
+                        # From here on the system hands over what this program sends alone.
+                        self._socket.connect(address)
+                        self._address = address
+                    else:
+                        self._socket.sendto(reply, address)
+                except PacketError as error:
+                    self._complain(error)
+                except OSError:
+                    self._forget()
+        self._take(came)
+
+    def _fill_from_stream(self, peer: Stream) -> None:
+        goes_on = peer.receive(_AT_ONCE * packets.SIZES[packets.STATE])
+        came: list[bytes] = []
+        try:
+            while data := self._packet_in(peer):
+                came.append(data)
+        except PacketError as error:
+            self._complain(error)
+            goes_on = False
+        self._take(came)
+        if not goes_on:
+            self._last_packet = 0.0
+
+    @staticmethod
+    def _packet_in(stream: Stream) -> bytes:
+        """The next packet that has come whole; empty where none has."""
+        got = stream.received
+        if len(got) < packets.HEAD.size or len(got) < (size := packets.size_of(got)):
+            return b""
+        data = bytes(got[:size])
+        del got[:size]
+        return data
+
+    def _take(self, came: list[bytes]) -> None:
+        """Take over the newest state, and features that are not known yet."""
+        newest = self._sequence
+        for data in reversed(came):
             try:
-                self._take(parse_datagram(data, self._key))
-                self._address = address
+                packet = packets.read(data)
+                if packet.kind == packets.STATE and newest > self._sequence:
+                    continue  # an older one
+                self._check(data, packet)
+                if packet.kind == packets.STATE:
+                    self._state = packets.state_of(packet.values)
+                else:
+                    features = packets.features_of(packet.values)
+                    if features != self._known:  # some say it again, for it may get lost
+                        self._features = features
+                newest = max(newest, packet.sequence)
             except PacketError as error:
                 self._complain(error)
+        if newest > self._sequence:
+            self._sequence = newest
+            self._last_packet = time.perf_counter()
 
-    def _fill_from_stream(self) -> None:
-        if self._peer is None:
-            return
-        if not self._peer.receive():
-            self.forget()
-            self._last_packet = 0.0
-            return
-        got = self._peer.received
-        while len(got) >= HEAD.size:
-            size = size_of(got, self._key)
-            if len(got) < size:
-                return
-            self._take(parse_datagram(bytes(got[:size]), self._key))
-            del got[:size]
-
-    def _accept(self) -> None:
-        try:
-            peer, _ = self._socket.accept()
-        except OSError:
-            return
-        self.forget()
-        self._peer, self._last_packet = Stream(peer), time.perf_counter()
-
-    def _take(self, packet: NetworkFeatures | NetworkState) -> None:
-        self._last_packet = time.perf_counter()
-        if isinstance(packet, NetworkState):
-            self._answered, self._sample = packet
-        elif packet != self._known:  # some say it again and again, for it may get lost
-            self._features = packet
+    def _check(self, data: bytes, packet: Packet) -> None:
+        if packet.kind not in {packets.STATE, packets.FEATURES}:
+            raise PacketError("nothing that a program says after its features")
+        if packet.sequence <= self._sequence:
+            raise PacketError("it came before")
+        if not packets.is_tagged(data, self._meeting):
+            raise PacketError("the key is wrong")

@@ -8,13 +8,17 @@ import hashlib
 import os
 import socket
 import struct
+import time
 from typing import Final
 
 from ..driver import DeviceLostError
 from ..stream import Stream
 
 _GUID: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
-_MOST_BYTES: Final = 1_000_000
+_MOST_BYTES: Final = 65_536
+"""Of a message, and of what waits to be sent."""
+_MOST_FRAMES: Final = 64
+"""That came since the last look: one message for each of ours, and a few pings."""
 _TEXT, _CLOSE, _PING, _PONG = 0x1, 0x8, 0x9, 0xA
 
 
@@ -60,7 +64,11 @@ class FrameReader:
         """Opcode and payload of the messages and control frames that are whole now."""
         self._data += data
         done: list[tuple[int, bytes]] = []
+        frames = 0
         while (taken := self._frame()) is not None:
+            frames += 1
+            if frames > _MOST_FRAMES:
+                raise WebSocketError("it sends without end")
             last, opcode, payload = taken
             if opcode >= 0x8:
                 if not last or len(payload) > 125:
@@ -114,6 +122,8 @@ class WebSocket:
 
     @classmethod
     def connect(cls, host: str, port: int, seconds: float = 0.3) -> WebSocket:
+        """Open a connection within so many seconds, however slowly the server answers."""
+        end = time.monotonic() + seconds
         key = base64.b64encode(os.urandom(16))
         request = (
             f"GET / HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\n"
@@ -126,7 +136,7 @@ class WebSocket:
             raise WebSocketError("nobody is there") from error
         try:
             connection.sendall(request.encode())
-            return cls(connection, _read_upgrade(connection, key))
+            return cls(connection, _read_upgrade(connection, key, end))
         except (OSError, WebSocketError) as error:
             connection.close()
             raise WebSocketError(str(error)) from error
@@ -134,10 +144,12 @@ class WebSocket:
     def send(self, text: str) -> None:
         self._stream.unsent += frame(_TEXT, text.encode(), os.urandom(4))
         self._flush()
+        if len(self._stream.unsent) > _MOST_BYTES:
+            raise WebSocketError("it does not read")
 
     def receive(self) -> list[str]:
         self._flush()
-        if not self._stream.receive():
+        if not self._stream.receive(_MOST_BYTES):
             raise WebSocketError("the connection ended")
         messages = self._messages + self._reader.feed(self._stream.received)
         self._messages = []
@@ -162,15 +174,33 @@ class WebSocket:
         self._stream.close()
 
 
-def _read_upgrade(connection: socket.socket, key: bytes) -> bytes:
+def received_until(connection: socket.socket, mark: bytes, end: float) -> bytes:
+    """What comes until a mark is among it, all of it where there is none, or the time is over.
+
+    Raises:
+        OSError: the connection ends with an error.
+        WebSocketError: it is more than anybody has to say.
+    """
+    data = b""
+    while (not mark or mark not in data) and (left := end - time.monotonic()) > 0.0:
+        connection.settimeout(left)
+        try:
+            more = connection.recv(4096)
+        except TimeoutError:
+            break
+        if not more:
+            break
+        data += more
+        if len(data) > _MOST_BYTES:
+            raise WebSocketError("it sends without end")
+    return data
+
+
+def _read_upgrade(connection: socket.socket, key: bytes, end: float) -> bytes:
     """Check a server's answer; what came after it."""
-    answer = b""
-    while b"\r\n\r\n" not in answer:
-        data = connection.recv(4096)
-        if not data or len(answer) > 65536:
-            raise WebSocketError("no answer")
-        answer += data
-    head, rest = answer.split(b"\r\n\r\n", 1)
+    head, mark, rest = received_until(connection, b"\r\n\r\n", end).partition(b"\r\n\r\n")
+    if not mark:
+        raise WebSocketError("no answer")
     status, *lines = head.split(b"\r\n")
     values = {
         name.strip().lower(): value.strip()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other programs as devices: over UDP, TCP, and Haply's service."""
+"""Haply's service as a device, and the WebSocket that leads to it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import math
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -18,243 +18,18 @@ from hypothesis import strategies as st
 
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.rotations.scalars import IDENTITY
-from octo_motion.device.driver import DeviceLostError, Dynamics, Kind, Sample
-from octo_motion.device.sources import haply, network
+from octo_motion.device.driver import DeviceLostError, Kind, Sample
+from octo_motion.device.sources import haply
 from octo_motion.device.sources.haply import Haply
-from octo_motion.device.sources.network import (
-    NetworkFeatures,
-    NetworkState,
-    PacketError,
-    Port,
-    parse_datagram,
-)
 from octo_motion.device.sources.websocket import (
     FrameReader,
     WebSocket,
     WebSocketError,
+    accept_key,
     frame,
     masked,
 )
-from tests.device.firmware import Force, pack_packet, parse_force
-from tests.device.parts import HaplyService
-
-KEY = bytes(range(16))
-FEATURES = NetworkFeatures("My arm", 3, Dynamics(5.0, 0.2, 0.4))
-STATE = NetworkState(
-    9,
-    Sample(
-        time=0.0,
-        position=(0.1, 0.2, 0.3),
-        orientation=(1.0, 0.0, 0.0, 0.0),
-        velocity=(1.0, 2.0, 3.0),
-        angular_velocity=(4.0, 5.0, 6.0),
-        buttons=2,
-    ),
-)
-FORCE = network.pack_force(1, 9, (1.0, 0.0, 0.0), (0.0, 0.1, 0.0), KEY)
-
-
-def state(**changes: Any) -> NetworkState:
-    return STATE._replace(sample=STATE.sample._replace(**changes))
-
-
-def wait_for(what: Callable[[], object]) -> object:
-    end = time.monotonic() + 10.0
-    while True:
-        found = what()
-        if found:
-            return found
-        assert time.monotonic() < end
-        time.sleep(0.001)
-
-
-# --- Packets -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("packet", [FEATURES, STATE])
-def test_packet_arrives_as_it_was_sent(packet: NetworkFeatures | NetworkState) -> None:
-    data = pack_packet(packet, KEY)
-    got = parse_datagram(data, KEY)
-    if isinstance(got, NetworkState):
-        got = got._replace(sample=got.sample._replace(time=0.0))
-    assert got == packet
-    assert len(data) == {NetworkFeatures: 168, NetworkState: 144}[type(packet)]
-
-
-def test_force_arrives_as_it_was_sent_and_is_nothing_that_a_program_sends() -> None:
-    assert parse_force(FORCE, KEY) == Force(1, 9, 20, (1.0, 0.0, 0.0), (0.0, 0.1, 0.0))
-    assert len(FORCE) == 88
-    with pytest.raises(PacketError, match="ours to send"):
-        parse_datagram(FORCE, KEY)
-
-
-@pytest.mark.parametrize(
-    ("data", "said"),
-    [
-        (pack_packet(STATE, b"wrong key, sorry"), "key is wrong"),
-        (pack_packet(STATE, KEY)[:-1], "another length"),
-        (b"GET / HTTP/1.1\r\n\r\n0123456789", "not one of our packets"),
-        (b"OMDF\x02\0" + pack_packet(STATE, KEY)[6:], "version 2"),
-        (b"", "cut off"),
-        (pack_packet(state(velocity=(1e308, 0.0, 0.0)), KEY), "cannot be"),
-        (pack_packet(state(angular_velocity=(0.0, 0.0, -2e3)), KEY), "cannot be"),
-        (pack_packet(state(position=(math.nan, 0.0, 0.0)), KEY), "cannot be"),
-        (pack_packet(replace(FEATURES, dynamics=Dynamics(1e300)), KEY), "cannot be"),
-        (pack_packet(replace(FEATURES, dynamics=Dynamics(5.0, 0.2, 1e308)), KEY), "cannot be"),
-    ],
-)
-def test_packet_that_is_none_is_refused(data: bytes, said: str) -> None:
-    with pytest.raises(PacketError, match=said):
-        parse_datagram(data, KEY)
-
-
-@given(st.sampled_from([FEATURES, STATE]), st.lists(st.tuples(st.integers(0), st.integers(0, 255))))
-@settings(max_examples=300)
-def test_packet_with_bytes_changed_is_read_or_refused(
-    packet: NetworkFeatures | NetworkState, changes: list[tuple[int, int]]
-) -> None:
-    data = bytearray(pack_packet(packet, KEY))
-    for at, value in changes:
-        data[at % len(data)] = value
-    try:
-        got = parse_datagram(bytes(data), KEY)
-    except PacketError:
-        return
-    if isinstance(got, NetworkState):
-        assert all(map(math.isfinite, (*got.sample.position, *got.sample.velocity)))
-        assert math.isclose(sum(each**2 for each in got.sample.orientation), 1.0, rel_tol=1e-9)
-
-
-@pytest.fixture(params=["udp", "tcp"])
-def port(request: pytest.FixtureRequest) -> Iterator[tuple[Port, socket.socket]]:
-    """A port, and a program's socket that talks to it."""
-    port = Port(request.param, 0, KEY)
-    kind = socket.SOCK_DGRAM if request.param == "udp" else socket.SOCK_STREAM
-    program = socket.socket(socket.AF_INET, kind)
-    program.connect(("127.0.0.1", port.number))
-    program.settimeout(5.0)
-    yield port, program
-    program.close()
-    port.close()
-
-
-def test_program_is_a_device_once_it_says_what_it_can(port: tuple[Port, socket.socket]) -> None:
-    here, program = port
-    assert here.device() is None
-    program.sendall(pack_packet(FEATURES, KEY))
-    device = wait_for(here.device)
-    assert isinstance(device, network.NetworkDevice)
-    assert device.description.name == "My arm"
-    assert device.description.dynamics == FEATURES.dynamics
-    program.sendall(pack_packet(STATE, KEY))
-    sample = wait_for(device.read)
-    assert isinstance(sample, Sample)
-    assert sample.position == STATE.sample.position
-    assert sample.buttons == 2
-    device.send((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
-    got = parse_force(program.recv(2048), KEY)
-    assert got == Force(1, 9, 20, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
-
-
-def test_program_without_the_key_is_no_device(port: tuple[Port, socket.socket]) -> None:
-    here, program = port
-    program.sendall(pack_packet(FEATURES, b"another key 16b!"))
-    end = time.monotonic() + 0.2
-    while time.monotonic() < end:
-        assert here.device() is None
-        time.sleep(0.005)
-
-
-def test_program_that_falls_silent_is_lost(
-    port: tuple[Port, socket.socket], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    here, program = port
-    program.sendall(pack_packet(FEATURES, KEY))
-    device = wait_for(here.device)
-    assert isinstance(device, network.NetworkDevice)
-    assert device.read() is None
-    later = time.perf_counter() + 2.0
-    monkeypatch.setattr(network.time, "perf_counter", lambda: later)
-    with pytest.raises(DeviceLostError):
-        device.read()
-    device.close()
-    device.close()
-
-
-def test_program_may_say_again_what_its_device_can_do(port: tuple[Port, socket.socket]) -> None:
-    """Over UDP it may get lost, so careful programs repeat it: that is no other device."""
-    here, program = port
-    program.sendall(pack_packet(FEATURES, KEY))
-    device = wait_for(here.device)
-    assert isinstance(device, network.NetworkDevice)
-    program.sendall(pack_packet(FEATURES, KEY))
-    program.sendall(pack_packet(STATE, KEY))
-    assert wait_for(device.read)
-    assert here.device() is None
-    program.sendall(pack_packet(replace(FEATURES, name="Another"), KEY))
-    other = wait_for(here.device)
-    assert isinstance(other, network.NetworkDevice)
-    assert other.description.name == "Another"
-
-
-def test_garbage_does_not_keep_poses_from_arriving() -> None:
-    here = Port("udp", 0, KEY)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
-        program.connect(("127.0.0.1", here.number))
-        program.send(pack_packet(FEATURES, KEY))
-        device = wait_for(here.device)
-        assert isinstance(device, network.NetworkDevice)
-        for _ in range(30):
-            program.send(b"garbage")
-        program.send(pack_packet(STATE, KEY))
-        assert device.read() is not None, "loopback delivers at once"
-    here.close()
-
-
-def test_program_that_reads_slowly_gets_whole_packets() -> None:
-    here = Port("tcp", 0, KEY)
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as program:
-        program.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        program.connect(("127.0.0.1", here.number))
-        program.settimeout(5.0)
-        program.sendall(pack_packet(FEATURES, KEY))
-        device = wait_for(here.device)
-        assert isinstance(device, network.NetworkDevice)
-        for number in range(100_000):  # a minute and a half of them
-            device.send((float(number), 0.0, 0.0), (0.0, 0.0, 0.0))
-        got = b""
-        size = network.SIZES[network.FORCE]
-        last = 0
-        while last < 100_010:
-            device.send((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-            got += program.recv(1 << 20)
-            while len(got) >= size:
-                packet = parse_force(got[:size], KEY)
-                assert packet.sequence > last
-                got, last = got[size:], packet.sequence
-    here.close()
-
-
-def test_stranger_who_says_nothing_does_not_keep_the_port(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    here = Port("tcp", 0, KEY)
-    with socket.create_connection(("127.0.0.1", here.number)) as stranger:
-        wait_for(lambda: here.device() or here._peer)
-        with socket.create_connection(("127.0.0.1", here.number)) as program:
-            program.sendall(pack_packet(FEATURES, KEY))
-            later = time.perf_counter() + 2.0
-            monkeypatch.setattr(network.time, "perf_counter", lambda: later)
-            assert wait_for(here.device)
-        stranger.settimeout(5.0)
-        assert stranger.recv(1) == b""
-    here.close()
-
-
-def test_key_of_another_length_opens_no_port() -> None:
-    with pytest.raises(ValueError, match="16"):
-        Port("udp", 0, b"short")
-
+from tests.device.parts import HaplyService, wait_for
 
 # --- WebSocket -----------------------------------------------------------------------------------
 
@@ -264,7 +39,7 @@ def test_mask_taken_twice_is_none(payload: bytes, mask: bytes) -> None:
     assert masked(masked(payload, mask), mask) == payload
 
 
-@pytest.mark.parametrize("size", [0, 1, 125, 126, 65535, 65536, 200_000])
+@pytest.mark.parametrize("size", [0, 1, 125, 126, 65535, 65536])
 def test_frame_of_any_size_is_read_in_any_pieces(size: int) -> None:
     payload = bytes(index & 0xFF for index in range(size))
     data = frame(0x1, payload)
@@ -313,6 +88,95 @@ def test_server_that_is_no_websocket_is_refused() -> None:
 
 
 # --- Haply ---------------------------------------------------------------------------------------
+
+
+class Flood:
+    """A service at which everything is right, but that it sends without end once it is open."""
+
+    def __init__(self, what: bytes) -> None:
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._server.getsockname()[1]
+        self._what = what
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def _serve(self) -> None:
+        client, _ = self._server.accept()
+        with client, suppress(OSError):
+            request = client.recv(4096)
+            key = request.split(b"Sec-WebSocket-Key: ")[1].split(b"\r\n")[0]
+            client.sendall(
+                b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n"
+                b"Connection: Upgrade\r\nSec-WebSocket-Accept: " + accept_key(key) + b"\r\n\r\n"
+            )
+            while True:
+                client.sendall(self._what)
+
+    def close(self) -> None:
+        self._server.close()
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        frame(0x9, b"") * 20_000,
+        frame(0x1, b"{}") * 10_000,
+        frame(0x1, b"[" * 60_000),
+        bytes([0x01]) + frame(0x0, b"x" * 4000)[1:] + (bytes([0x00]) + frame(0x0, b"x" * 4000)[1:]),
+        b"\x81\x7f" + (1 << 40).to_bytes(8, "big"),
+    ],
+    ids=["pings", "states", "brackets", "one message", "a huge frame"],
+)
+def test_service_that_sends_without_end_neither_holds_the_loop_nor_fills_memory(
+    what: bytes,
+) -> None:
+    service = Flood(what)
+    line: WebSocket | None = None
+    try:
+        line = WebSocket.connect("127.0.0.1", service.port, 5.0)
+        ends = time.monotonic() + 0.5
+        while time.monotonic() < ends:
+            for text in line.receive():
+                haply.parse(text)
+            assert len(line._stream.received) + len(line._reader._data) <= 200_000
+            line.send("{}")
+            assert len(line._stream.unsent) <= 100_000
+    except WebSocketError:
+        pass  # sent away
+    finally:
+        if line is not None:
+            line.close()
+        service.close()
+
+
+def test_no_look_at_what_came_takes_more_than_it_has_to() -> None:
+    """Bounds of one look: 64 frames and 64 kB of what a service sends."""
+    with pytest.raises(WebSocketError, match="without end"):
+        FrameReader().feed(frame(0x9, b"") * 100)
+    with pytest.raises(WebSocketError, match="too long"):
+        FrameReader().feed(frame(0x1, b"x" * 70_000))
+    assert len(FrameReader().feed(frame(0x1, b"{}") * 3)) == 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("inverse3", "Haply Inverse3"),
+        ("inverse3x", "Haply Inverse3x"),
+        ("minverse", "Haply Minverse"),
+        ("another", "Haply Inverse3"),
+    ],
+)
+def test_haply_is_the_model_that_its_service_lists(kind: str, name: str) -> None:
+    service = HaplyService()
+    service.config = {"type": kind}
+    device = open_haply(service)
+    assert device.description.name == name
+    dynamics = device.description.dynamics
+    assert dynamics
+    assert (dynamics.force < 8.0) == (kind == "minverse"), "the small one is given less"
+    assert wait_for(device.read)
+    device.close()
+    service.close()
 
 
 @pytest.fixture
@@ -456,7 +320,7 @@ def test_haply_pulled_out_while_its_service_goes_on_is_a_lost_device(
     wait_for(device.read)
     service.with_device = False
     start, clock = time.perf_counter(), time.perf_counter
-    monkeypatch.setattr(haply.time, "perf_counter", lambda: start + 20.0 * (clock() - start))
+    monkeypatch.setattr(haply.time, "perf_counter", lambda: start + 4.0 * (clock() - start))
 
     def go_on() -> None:
         end = time.monotonic() + 10.0
