@@ -96,7 +96,7 @@ def test_removing_says_what_cannot_be_removed() -> None:
 
 def test_a_damaged_file_is_listed_and_says_so_when_loaded() -> None:
     path = presets.save_gait(my_gait())
-    path.write_text("{")
+    path.write_text("{", encoding="utf-8")
     assert presets.user_gait_names() == ["my walk"]
     with pytest.raises(GaitError, match=r"'my walk.json' is not JSON"):
         presets.load_gait("my walk")

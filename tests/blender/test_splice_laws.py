@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What must hold of splicing, on recorded motion."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from octo_motion.core.rotations import (
     rotate,
 )
 from octo_motion.core.splicing.clip.clip import Clip, posture_of, sample_clip, unposed
+from octo_motion.core.splicing.clip.rest_pose import average_pose
 from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
@@ -79,6 +80,18 @@ def load(path: Path, frames: Any = None) -> tuple[Clip, Landmarks]:
     armature = next(item for item in bpy.data.objects if item.type == "ARMATURE")
     clip = read_clip(armature, frames=frames)
     return clip, map_skeleton(clip.skeleton).landmarks
+
+
+def people(
+    shared_data: SharedData, names: Sequence[str], frames: int
+) -> dict[str, tuple[Clip, Landmarks]]:
+    """The first frames of clips with their landmarks, found as the add-on does."""
+    found = {}
+    for name in names:
+        clip, _ = load(shared_data(name))
+        clip = clip.taken(range(min(len(clip), frames)))
+        found[name] = clip, map_skeleton(clip.skeleton, average_pose(clip)).landmarks
+    return found
 
 
 def positions(clip: Clip) -> Floats:

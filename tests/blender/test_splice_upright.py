@@ -1,28 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Upright onto upright stays upright, on all pairs of recorded people, measured from joints."""
 
-from collections.abc import Callable
 from itertools import permutations
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from octo_motion.core.rotations import Floats
 from octo_motion.core.splicing.clip.clip import Clip, sample_clip
-from octo_motion.core.splicing.clip.rest_pose import average_pose
 from octo_motion.core.splicing.clip.splice_timing import Timing
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
-from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.parts import PARTS
 from octo_motion.core.splicing.transfer.splice import Splice
-from tests.blender.test_splice_laws import load
+from tests.blender.test_splice_laws import SharedData, load, people
 from tests.core.splice_bodies import spliced
 from tests.referee.clip_measures import angle, lean
 
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
-
-SharedData = Callable[[str], Path]
 
 PEOPLE = (
     "secondlife/avatar_walk.bvh",
@@ -56,19 +50,12 @@ def at(clip: Clip, marks: Landmarks, frames: Floats) -> dict[str, Floats]:
     }
 
 
-@pytest.mark.parametrize("name", PEOPLE)
 def test_who_stands_upright_stays_so_whatever_legs_or_trunk_are_spliced(
-    shared_data: SharedData, name: str
+    shared_data: SharedData,
 ) -> None:
-    people = {}
-    for each in PEOPLE:
-        clip, _ = load(shared_data(each))
-        clip = clip.taken(range(min(len(clip), 400)))
-        people[each] = clip, map_skeleton(clip.skeleton, average_pose(clip)).landmarks
-    base, landmarks = people[name]
-    for other, (clip, marks) in people.items():
-        if other == name:
-            continue
+    for (name, (base, landmarks)), (other, (clip, marks)) in permutations(
+        people(shared_data, PEOPLE, 400).items(), 2
+    ):
         timing = Timing(base.frames[0], clip.frames[0])
         lasts = (clip.frames[-1] - clip.frames[0]) / clip.rate * base.rate
         # Where the splice is in and has not begun to go.
@@ -83,8 +70,8 @@ def test_who_stands_upright_stays_so_whatever_legs_or_trunk_are_spliced(
             splice = Splice(PARTS[part], clip, timing, marks, travel=part == "legs")
             result = trunk(spliced(base, landmarks, splice).taken(rows), landmarks)
             off = np.abs(lean(result) - lean(wanted))
-            assert np.median(off) < 1.0, (part, other)
-            assert off.max() < 3.0, (part, other)
+            assert np.median(off) < 1.0, (part, name, other)
+            assert off.max() < 3.0, (part, name, other)
 
 
 def test_a_pelvis_that_happens_to_have_the_shape_of_another_is_not_taken_for_it(

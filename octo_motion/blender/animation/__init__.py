@@ -30,7 +30,7 @@ from .clips import (
     write_clip,
 )
 from .fcurves import lasting
-from .pose_keys import Keyed, PoseKeys
+from .pose_keys import Keyed, PoseKeys, mark_file_changed
 from .poses import (
     SCALE,
     PoseValues,
@@ -67,6 +67,7 @@ __all__ = [
     "key_counts",
     "key_points",
     "lasting",
+    "mark_file_changed",
     "may_replace",
     "note_of",
     "play_bones",

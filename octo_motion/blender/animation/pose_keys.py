@@ -37,6 +37,7 @@ from .actions import (
     writable_armature,
 )
 from .fcurves import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
+from .pose_layers import BLENDING, blend_about, is_dense
 
 Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
 
@@ -73,16 +74,34 @@ class _Before:
     """Whether that action was made for the keys."""
     track: str | None = None
     """The NLA track that was made, if one was."""
+    beneath: str = ""
+    """Name of the action that became a strip because it has a key on every frame."""
     fake_user: bool = False
     new_slot: int | None = None
     """Handle of the slot that was made in a chosen action."""
+
+
+@dataclass(frozen=True)
+class _Layer:
+    """What single keys go to where the action itself has keys on every frame."""
+
+    blend: float
+    bones: list[str]
+    frame: float
+
+    def is_needed(self, data: bpy.types.AnimData) -> bool:
+        action, slot = data.action, data.action_slot
+        if action is None or slot is None or BLENDING in action:
+            return False
+        return is_dense(action, slot, self.bones, self.frame)
 
 
 class PoseKeys:
     """Keys on one armature.
 
     They go to the action that it has (a new one if it has none), a copy of it, a new action over it
-    in the NLA, or a chosen one, as the target says.
+    in the NLA, or a chosen one, as the target says. Where that has a key on every frame, they go to
+    a new action over it, which comes in and goes out over ``blend`` frames.
 
     Raises:
         WriteError: it cannot be animated here, or the chosen action is gone or read-only.
@@ -93,14 +112,19 @@ class PoseKeys:
         armature: bpy.types.Object,
         target: Target = "CURRENT",
         chosen: bpy.types.Action | None = None,
+        *,
+        blend: float = 8.0,
     ) -> None:
         writable_armature(armature)
+        self._blend = blend
         self._target: Target = target
         self._chosen = _number(chosen)
         self._noted: list[_Before] = []
         """One for each action that got keys: artists may give the armature another meanwhile."""
         self.count = 0
         """How many times keys were made."""
+        self.layered = ""
+        """The action with a key on every frame over which the last keys lie, if they do."""
         if target == "CHOSEN":
             _chosen_action(self._chosen)
         data = armature.animation_data
@@ -128,8 +152,13 @@ class PoseKeys:
         scene = bpy.context.scene
         assert scene is not None
         known = len(self._noted)
-        self._prepare(armature)
+        self._prepare(armature, ([each.bone for each in bones], frame))
         options, kind = keying_options(scene, auto=auto), key_type(scene)
+        action, slot = _assigned(armature)
+        blends = BLENDING in action
+        if blends:
+            # What is there to be keyed is in the motion beneath.
+            options.discard("INSERTKEY_AVAILABLE")
         active = scene.keying_sets_all.active
         assert scene.tool_settings is not None
         if auto and not scene.tool_settings.use_keyframe_insert_keyingset:
@@ -153,7 +182,12 @@ class PoseKeys:
         if not done and len(self._noted) > known:
             # No action is left behind that nothing went into.
             _take_back(armature, self._noted.pop())
-        self.count += bool(done)
+        if done:
+            self.count += 1
+            mark_file_changed()
+            if blends:
+                blend_about(action, slot, self._noted[-1].curves, frame)
+        self.layered = self._noted[-1].beneath if done and blends else ""
         return [name for name in done if name]
 
     def check_motion(self, armature: bpy.types.Object) -> None:
@@ -216,6 +250,7 @@ class PoseKeys:
                 armature, channel, [bezier_arrays(keys, n) for n in range(channel.values.shape[1])]
             )
         self.count += 1
+        mark_file_changed()
         return len(found[0])
 
     def take_back(self, armature: bpy.types.Object) -> None:
@@ -228,8 +263,12 @@ class PoseKeys:
 
     # --- Where keys go ----------------------------------------------------------------------
 
-    def _prepare(self, armature: bpy.types.Object) -> None:
+    def _prepare(
+        self, armature: bpy.types.Object, near: tuple[list[str], float] | None = None
+    ) -> None:
         """Note how things are, and give the armature the action that keys go to.
+
+        Bones that are to get a single key at a frame are near.
 
         Raises:
             WriteError: there is none that could be written; nothing has changed then.
@@ -249,7 +288,8 @@ class PoseKeys:
             fake_user=data.action.use_fake_user if data.action else False,
         )
         try:
-            _give_action(armature, data, before, self._target, self._chosen)
+            layer = _Layer(self._blend, *near) if near is not None else None
+            _give_action(armature, data, before, (self._target, self._chosen), layer)
             assert data.action is not None
             _writable_action(data.action)
         except BaseException:
@@ -333,6 +373,25 @@ class PoseKeys:
             replace_stretch(curve, each)
 
 
+def mark_file_changed() -> None:
+    """Let Blender ask before it closes a file with what a session has changed so far.
+
+    Blender notes that with each undo step, and a session is one of them, at its end. Where
+    preferences want no undo steps at all, pushing one makes the note alone.
+    """
+    preferences = bpy.context.preferences
+    if bpy.data.is_dirty or preferences is None:
+        return
+    edit, unsaved = preferences.edit, preferences.is_dirty
+    steps = edit.undo_steps
+    edit.undo_steps = 0
+    try:
+        bpy.ops.ed.undo_push(message="Pose by Hand")
+    finally:
+        edit.undo_steps = steps
+        preferences.is_dirty = unsaved
+
+
 def _assigned(armature: bpy.types.Object) -> tuple[bpy.types.Action, bpy.types.ActionSlot]:
     """The action and the slot that keys go to, once the armature has them."""
     data = armature.animation_data
@@ -346,22 +405,24 @@ def _give_action(
     armature: bpy.types.Object,
     data: bpy.types.AnimData,
     before: _Before,
-    target: Target,
-    chosen_number: int,
+    where: tuple[Target, int],
+    layer: _Layer | None,
 ) -> None:
     """Give the armature the action that keys go to, and note which that is.
 
     Raises:
         WriteError: there is none that could be written.
     """
-    action, slot = data.action, data.action_slot
+    target, chosen_number = where
     if target == "CHOSEN":
         chosen = _chosen_action(chosen_number)
-        if chosen != action:
-            _keep(action)
+        if chosen != data.action:
+            _keep(data.action)
             data.action = chosen
             before.new_slot = _use_slot(data, armature)
-    elif target == "COPY" and action is not None:
+    action, slot = data.action, data.action_slot
+    blends = target != "LAYER" and layer is not None and layer.is_needed(data)
+    if target == "COPY" and action is not None and not blends:
         copy = action.copy()
         assert copy is not None
         before.made = True
@@ -370,22 +431,13 @@ def _give_action(
         data.action_slot = next(
             (each for each in copy.slots if slot and each.identifier == slot.identifier), None
         )
-    elif target == "LAYER" and action is not None and slot is not None:
+    elif (target == "LAYER" or blends) and action is not None and slot is not None:
         if not data.use_nla:
             raise WriteError(
                 f"The NLA of '{armature.name}' is switched off: no layer would be seen.",
-                "Switch it on in the NLA editor, or let the keys go to a copy.",
+                "Switch it on in the NLA editor, or let the keys go to another action.",
             )
-        track = data.nla_tracks.new()
-        track.name = f"{action.name} below"
-        before.track = track.name
-        strip = track.strips.new(action.name, round(action.frame_range[0]), action)
-        strip.action_slot = slot
-        _blend_alike(strip, data)
-        # Strips are made on whole frames; this one is to play what was played before.
-        length = strip.frame_end - strip.frame_start
-        strip.frame_start = action.frame_range[0]
-        strip.frame_end = strip.frame_start + length
+        before.track = _push_down(data, action, slot)
     if data.action is None or before.track is not None:
         made = bpy.data.actions.new(f"{armature.name} Pose")
         made.slots.new("OBJECT", armature.name)
@@ -394,6 +446,9 @@ def _give_action(
         before.made = True
         data.action_slot = made.slots[made.slots[0].identifier]
         data.action_blend_type, data.action_influence = "REPLACE", 1.0
+        if blends and layer is not None and action is not None:
+            data.action_blend_type = "COMBINE"
+            made[BLENDING], before.beneath = layer.blend, action.name
     assert data.action is not None
     _writable_action(data.action)
     if data.action_slot is None:
@@ -401,6 +456,22 @@ def _give_action(
     before.keyed, before.keyed_slot = _number(data.action), data.action_slot_handle
     channelbags = channelbags_of(*_assigned(armature))
     before.groups = {group.name for each in channelbags for group in each.groups}
+
+
+def _push_down(
+    data: bpy.types.AnimData, action: bpy.types.Action, slot: bpy.types.ActionSlot
+) -> str:
+    """Make an NLA strip of the action that is played; the name of its track."""
+    track = data.nla_tracks.new()
+    track.name = f"{action.name} below"
+    strip = track.strips.new(action.name, round(action.frame_range[0]), action)
+    strip.action_slot = slot
+    _blend_alike(strip, data)
+    # Strips are made on whole frames; this one is to play what was played before.
+    length = strip.frame_end - strip.frame_start
+    strip.frame_start = action.frame_range[0]
+    strip.frame_end = strip.frame_start + length
+    return track.name
 
 
 def _take_back(armature: bpy.types.Object, before: _Before) -> None:

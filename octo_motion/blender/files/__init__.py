@@ -10,14 +10,17 @@ from .saved_mappings import (
 )
 from .user_files import (
     SUFFIX,
+    file_named,
     gait_names,
     has_gait,
     load_calibrations,
     load_gait,
+    own_folder,
     read_gait_file,
     remove_gait,
     save_calibrations,
     save_gait,
+    unwritable,
     user_gait_names,
     write_gait,
 )
@@ -28,6 +31,7 @@ __all__ = [
     "SUFFIX",
     "curve_node",
     "ensure_weight_curve",
+    "file_named",
     "gait_names",
     "has_gait",
     "load_calibrations",
@@ -35,6 +39,7 @@ __all__ = [
     "load_mapping",
     "load_mappings",
     "mapping_names",
+    "own_folder",
     "read_gait_file",
     "remove_gait",
     "remove_mapping",
@@ -42,6 +47,7 @@ __all__ = [
     "save_calibrations",
     "save_gait",
     "save_mapping",
+    "unwritable",
     "user_gait_names",
     "write_gait",
 ]

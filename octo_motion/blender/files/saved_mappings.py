@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from ...core.errors import RigError
+from ...core.files import read_text
 from ...core.splicing.humanoid import SavedMapping, damaged_mapping, mapping_from_json
 from .user_files import (
     LONGEST_NAME,
@@ -113,7 +114,7 @@ def _load(name: str) -> SavedMapping | RigError:
         state = path.stat()
         written = state.st_mtime_ns, state.st_size
         if path not in _read or _read[path][0] != written:
-            _read[path] = written, _parsed(path.read_text(encoding="utf-8"), name)
+            _read[path] = written, _parsed(read_text(path), name)
     except (OSError, UnicodeDecodeError) as error:
         reason = (isinstance(error, OSError) and error.strerror) or "it is not text"
         return damaged_mapping(name, reason)

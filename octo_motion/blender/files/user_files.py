@@ -15,6 +15,7 @@ from typing import Any, Final
 import bpy
 
 from ...core.errors import DeviceError, GaitError, WriteError
+from ...core.files import BUSY, DEVICES, read_text, replace
 from ...core.locomotion.gait import (
     GaitTable,
     gait_from_json,
@@ -55,7 +56,7 @@ def write_whole(path: Path, text: str) -> None:
     try:
         with scratch.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
-        scratch.replace(path)
+        replace(scratch, path)
     except OSError as error:
         with contextlib.suppress(OSError):
             scratch.unlink(missing_ok=True)
@@ -64,6 +65,10 @@ def write_whole(path: Path, text: str) -> None:
 
 def unwritable(what: str, error: OSError) -> WriteError:
     """The error that says so."""
+    if getattr(error, "winerror", None) in BUSY:
+        return WriteError(
+            f"{what} is protected, or open in another program.", "Close it there, and try again."
+        )
     reason = error.strerror or type(error).__name__
     return WriteError(f"Octo Motion cannot write {what}: {reason}.", "Choose another place.")
 
@@ -79,7 +84,6 @@ systems take."""
 # What some file system refuses, and the escape itself.
 _UNSAFE: Final = re.compile(r'[\x00-\x1f<>:"/\\|?*%\x7f]|^[. ]|[. ]$')
 _ESCAPE: Final = re.compile("%([0-9a-f]{2})")
-_DEVICES: Final = re.compile(r"(?i)^(con|prn|aux|nul|com\d|lpt\d)(?=$|\.)")
 
 
 def user_folder(*, create: bool = False) -> Path:
@@ -172,7 +176,7 @@ def read_gait_file(path: Path) -> GaitTable:
         GaitError: it cannot be read, or is no gait.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         reason = (isinstance(error, OSError) and error.strerror) or "it is not text"
         raise GaitError(
@@ -197,7 +201,7 @@ def _path_of(name: str) -> Path:
 def file_named(folder: Path, name: str) -> Path:
     """The file of a name: any name has one, and no two names share one."""
     safe = _UNSAFE.sub(lambda found: f"%{ord(found.group()):02x}", name)
-    safe = _DEVICES.sub(lambda found: f"%{ord(found.group()[0]):02x}{found.group()[1:]}", safe)
+    safe = DEVICES.sub(lambda found: f"%{ord(found.group()[0]):02x}{found.group()[1:]}", safe)
     return folder / f"{safe}{SUFFIX}"
 
 

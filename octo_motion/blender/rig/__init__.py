@@ -29,6 +29,7 @@ from .armature import (
     world_matrix,
     world_of,
 )
+from .controlled_puppet import puppet_of
 from .puppet import Puppet
 from .puppet_reading import (
     bone_materials,
@@ -58,6 +59,7 @@ __all__ = [
     "may_play_otherwise",
     "may_stretch",
     "pose_of",
+    "puppet_of",
     "radii_of_skin",
     "read_rig",
     "read_skeleton",

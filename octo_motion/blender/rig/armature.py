@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from ...core.content_cache import ContentCache, content_key
@@ -28,7 +28,8 @@ _known: Final[ContentCache[Skeleton]] = ContentCache(4)
 
 def active_armature(context: bpy.types.Context) -> bpy.types.Object:
     """The armature that the user works on: the active object, the one that deforms it, the one
-    whose contact it marks, or the one whose route it is (a selected one first, of several).
+    whose contact it marks, or the one whose route or ground it is (a selected one first, of
+    several).
 
     Raises:
         RigError: there is no such object.
@@ -52,9 +53,9 @@ def _marked_armature(active: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def _on_route(active: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that goes along a curve."""
+    """The armature that goes along a curve, or over a mesh as its ground."""
     layer = context.view_layer
-    if active.type != "CURVE" or layer is None:
+    if layer is None:
         return None
     followers = [
         each
@@ -62,9 +63,13 @@ def _on_route(active: bpy.types.Object, context: bpy.types.Context) -> bpy.types
         if each.type == "ARMATURE"
         # Settings come into being when they are looked at: what has none is left without.
         and each.is_property_set("octo_motion")
-        and each.octo_motion.locomotion.route == active
+        and active in _goes_by(each.octo_motion.locomotion)
     ]
     return next((each for each in followers if each.select_get()), next(iter(followers), None))
+
+
+def _goes_by(settings: Any) -> tuple[Any, Any]:
+    return settings.route, settings.ground.object
 
 
 def armature_data(armature: bpy.types.Object) -> bpy.types.Armature:
@@ -678,3 +683,21 @@ def _radii(distance: Floats, along: Floats, otherwise: Floats) -> Floats:
     if not np.any(known):
         return otherwise
     return np.interp(places, places[known], radii[known])
+
+
+def set_rotation(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
+    """Turn a bone in its own rotation mode, on from the values that it has."""
+    mode = bone.rotation_mode
+    if mode == "QUATERNION":
+        turn.make_compatible(bone.rotation_quaternion)
+        bone.rotation_quaternion = turn
+    elif mode == "AXIS_ANGLE":
+        axis, angle = turn.to_axis_angle()
+        if Vector(np.array(bone.rotation_axis_angle)[1:].tolist()).dot(axis) < 0.0:
+            axis, angle = -axis, -angle
+        bone.rotation_axis_angle = (angle, *axis)  # type: ignore[assignment]
+    else:
+        angles = turn.to_euler(mode, bone.rotation_euler)
+        for axis in np.flatnonzero(np.array(bone.lock_rotation)).tolist():
+            angles[axis] = bone.rotation_euler[axis]
+        bone.rotation_euler = angles

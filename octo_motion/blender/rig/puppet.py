@@ -15,7 +15,7 @@ from mathutils import Quaternion, Vector
 from ...core.errors import RigError
 from ...core.posing.puppet import Figure, Pose
 from ...core.rotations import Floats, conjugate, from_matrix, multiply, rotate
-from .armature import carrying_axes, even_scale
+from .armature import carrying_axes, even_scale, set_rotation
 from .puppet_reading import PuppetRig, posed_bones, read_rig
 
 _NOTHING = 1e-9
@@ -110,6 +110,14 @@ class Puppet:
     def is_moved(self) -> bool:
         """Whether the armature object has been moved since ``forget``, or the start."""
         return not np.array_equal(np.array(self.armature().matrix_world), self._world)
+
+    def settle(self) -> str:
+        """See to it that the bones show the pose that was written; what cannot be, in words."""
+        return ""
+
+    def keyed(self, bodies: Iterable[int], *, all_bones: bool = False) -> list[tuple[str, bool]]:  # noqa: ARG002
+        """Bones that get keys for bodies, and whether they are placed as well as turned."""
+        return [(self.figure.names[body], self.places(body)) for body in bodies]
 
     def places(self, body: int) -> bool:
         """Whether a body's bone is placed by its location too, not only turned."""
@@ -208,24 +216,6 @@ def armature_bones(armature: bpy.types.Object) -> tuple[str, ...]:
     """Names of an armature's bones in their order."""
     data = armature.data
     return tuple(bone.name for bone in data.bones) if isinstance(data, bpy.types.Armature) else ()
-
-
-def set_rotation(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
-    """Turn a bone in its own rotation mode, on from the values that it has."""
-    mode = bone.rotation_mode
-    if mode == "QUATERNION":
-        turn.make_compatible(bone.rotation_quaternion)
-        bone.rotation_quaternion = turn
-    elif mode == "AXIS_ANGLE":
-        axis, angle = turn.to_axis_angle()
-        if Vector(np.array(bone.rotation_axis_angle)[1:].tolist()).dot(axis) < 0.0:
-            axis, angle = -axis, -angle
-        bone.rotation_axis_angle = (angle, *axis)  # type: ignore[assignment]
-    else:
-        angles = turn.to_euler(mode, bone.rotation_euler)
-        for axis in np.flatnonzero(np.array(bone.lock_rotation)).tolist():
-            angles[axis] = bone.rotation_euler[axis]
-        bone.rotation_euler = angles
 
 
 def _object_turn(armature: bpy.types.Object) -> Floats:

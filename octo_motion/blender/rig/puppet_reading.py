@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import bpy
@@ -19,6 +20,7 @@ from ...core.posing.puppet import (
     SIZE,
     SMALLEST,
     Figure,
+    JointCoefficients,
     JointLimits,
     Material,
     Pose,
@@ -39,12 +41,14 @@ from .armature import (
     read_skeleton,
     vertex_positions,
 )
+from .controls import control_names, goal_bones, hangs_on, ik_chain, reaches
 
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
 
 MATERIAL: Final = "octo_motion_material"
-"""Custom property of a bone: what its joint alone is made of, four numbers of ``Material``."""
+"""Custom property of a bone: what its joint alone is made of, four numbers of ``Material`` or ten
+of ``JointCoefficients``."""
 _NEVER: Final = -1.0
 """In place of what a joint bears that never yields: files of other programs know no infinity."""
 
@@ -55,6 +59,18 @@ _TOLERANT: Final = frozenset({"LIMIT_ROTATION", "LIMIT_LOCATION", "LIMIT_SCALE",
 """Constraints under which a bone still turns as its keys say."""
 _ANGLE_LIMIT: Final = 2.0 * np.pi - 1e-4
 """A range as wide as a whole turn limits nothing; less what single precision loses of it."""
+_PART: Final = re.compile(r"\.\d+$")
+"""What names of a limb's parts differ in."""
+_STRAIGHT: Final = float(np.cos(np.radians(3.0)))
+_SAME_JOINT: Final = 0.01
+"""Of the figure's size: joints closer than this are the same one."""
+_STRAIGHT_LIMB: Final = 1e-3
+_OWN_AXIS: Final = 0.95
+"""Cosine from which on a joint bends about an axis of its own."""
+_MOST_BENT: Final = 2.7
+"""Radians from straight, to which a knee bends."""
+_TOGETHER: Final = 0.01
+"""Of a bone's length: a gap that is none."""
 _MOST_VERTICES: Final = 6000
 """Of each mesh that are looked at: more make no better radius."""
 _LEAST_WEIGHT: Final = 0.35
@@ -71,6 +87,8 @@ class PuppetRig:
     pose: Pose
     unit: float
     """Puppet metres of one metre in the world: every puppet is simulated at the same size."""
+    needs: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    """Where limbs are posed through controls: for each limb's bone all bones that it depends on."""
 
     def body(self, bone: str, armature: str) -> int:
         """The body of a bone, or the one that a helper bone follows.
@@ -115,8 +133,9 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
         marks=bone_marks(armature),
         locked=_locked_bones(armature),
         smallest=smallest,
+        goals=frozenset(goal_bones(armature)),
     )
-    roles = find_roles(skeleton, facts, armature.name)
+    roles, needs = _roles(armature, skeleton, facts)
     if len(roles.bodies) > MOST_LIMBS:
         raise RigError(
             f"'{armature.name}' has {len(roles.bodies)} limbs, more than {MOST_LIMBS}.",
@@ -127,11 +146,84 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
     figure, pose = build_figure(
         skeleton,
         roles,
-        _scaled(posed, unit),
+        _scaled(_as_limbs(posed, skeleton, roles) if needs else posed, unit),
         skin={bone: points * unit for bone, points in skin.points.items()},
-        limits=joint_limits(armature),
+        limits=_hinges(armature, skeleton, roles) | joint_limits(armature, through_controls=True)
+        if needs
+        else joint_limits(armature),
     )
-    return PuppetRig(skeleton, roles, figure, pose, unit)
+    return PuppetRig(skeleton, roles, figure, pose, unit, needs)
+
+
+def _roles(
+    armature: bpy.types.Object, skeleton: Skeleton, facts: RigFacts
+) -> tuple[Roles, Mapping[str, frozenset[str]]]:
+    """Which bones are bodies; and what these depend on, if they are posed through controls.
+
+    They are where something else moves a limb, and no bone that could be turned in its place
+    carries it.
+    """
+    if not facts.moved:
+        return find_roles(skeleton, facts, armature.name), {}
+    needs = hangs_on(armature)
+    bent = frozenset(bent_bones(armature))
+    facts = replace(facts, carried={name: _carriers(name, needs, bent) for name in facts.moved})
+    controls = set(control_names(armature, skeleton.names))
+    controlled = replace(
+        facts,
+        controls={name: len(needs[name] & controls) for name in skeleton.names},
+        marks=_parts(skeleton, needs, controls) | dict(facts.marks),
+    )
+    try:
+        roles = find_roles(skeleton, facts, armature.name)
+        lost = [skeleton.names[each] for each in roles.driven]
+    except RigError:
+        roles, lost = None, sorted(facts.moved)
+    found = find_roles(skeleton, controlled, armature.name) if lost else None
+    if found is not None:
+        limbs = {skeleton.names[each] for each in found.bodies}
+        carried = {
+            skeleton.names[above] for each in found.bodies for above in skeleton.ancestors(each)
+        }
+        beside = set().union(*(needs[each] for each in lost if each in limbs)) - limbs - carried
+        if control_names(armature, beside):
+            return found, {name: frozenset(needs[name]) for name in limbs}
+    return roles or find_roles(skeleton, facts, armature.name), {}
+
+
+def _carriers(name: str, needs: Mapping[str, set[str]], bent: frozenset[str]) -> frozenset[str]:
+    """Bones that a bone depends on by way of no inverse kinematics."""
+    behind = set().union(*(needs[each] for each in needs[name] & bent))
+    return frozenset(needs[name] - behind)
+
+
+def _parts(skeleton: Skeleton, needs: Mapping[str, set[str]], controls: set[str]) -> dict[str, str]:
+    """Marks of bones that only go on where their parent ends: parts of one limb, for its twist."""
+    found: dict[str, str] = {}
+    along = skeleton.rest_matrices[:, :3, 1]
+    for bone, parent in enumerate(skeleton.parents):
+        name = skeleton.names[bone]
+        if parent < 0 or _PART.sub("", name) != _PART.sub("", skeleton.names[parent]):
+            continue
+        straight = along[bone] @ along[parent] > _STRAIGHT
+        gap = float(np.linalg.norm(skeleton.heads[bone] - skeleton.tails[parent]))
+        joined = gap < _TOGETHER * float(skeleton.lengths[bone])
+        same = needs[name] & controls == needs[skeleton.names[parent]] & controls
+        if straight and joined and same and skeleton.deform[bone] and skeleton.deform[parent]:
+            found[name] = FOLLOW
+    return found
+
+
+def _as_limbs(posed: PosedBones, skeleton: Skeleton, roles: Roles) -> PosedBones:
+    """Bones as long as the parts of their limbs together."""
+    lengths = posed.lengths.copy()
+    for bone, parent in enumerate(skeleton.parents):
+        body = roles.follows[bone]
+        name = _PART.sub("", skeleton.names[bone])
+        own = bone not in roles.bodies and parent >= 0 and body >= 0
+        if own and name == _PART.sub("", skeleton.names[roles.bodies[body]]):
+            lengths[roles.bodies[body]] += posed.lengths[bone]
+    return replace(posed, lengths=lengths)
 
 
 def _scaled(posed: PosedBones, unit: float) -> PosedBones:
@@ -177,18 +269,25 @@ def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
         for bone in armature.pose.bones
         if any(each.type not in _TOLERANT and _acts(each) for each in bone.constraints)
     }
-    for bone in armature.pose.bones:
-        for constraint in bone.constraints:
-            if constraint.type in {"IK", "SPLINE_IK"} and _acts(constraint):
-                count = getattr(constraint, "chain_count", 0)
-                chain = [bone, *bone.parent_recursive]
-                found.update(each.name for each in chain[: count or len(chain)])
+    found.update(bent_bones(armature))
     found.update(
         name
         for name, channel, driver in driven_channels(armature)
         if channel.startswith("rotation_") and not driver.mute
     )
     return frozenset(found)
+
+
+def bent_bones(armature: bpy.types.Object) -> set[str]:
+    """Names of the bones that inverse kinematics bend."""
+    assert armature.pose is not None
+    return {
+        each
+        for bone in armature.pose.bones
+        for constraint in bone.constraints
+        if constraint.type in {"IK", "SPLINE_IK"} and _acts(constraint)
+        for each in ik_chain(bone, constraint)
+    }
 
 
 def _acts(constraint: bpy.types.Constraint) -> bool:
@@ -214,27 +313,44 @@ def mark_bones(armature: bpy.types.Object, names: list[str], mark: str) -> None:
             del bones[name][MARK]
 
 
-def bone_materials(armature: bpy.types.Object) -> dict[str, Material]:
-    """Materials of single bones, as they were measured; what is damaged counts for nothing."""
-    found: dict[str, Material] = {}
+def bone_materials(armature: bpy.types.Object) -> dict[str, Material | JointCoefficients]:
+    """Materials and coefficients of single bones; what is damaged counts for nothing."""
+    found: dict[str, Material | JointCoefficients] = {}
     for bone in armature_data(armature).bones:
         values: Any = bone.get(MATERIAL)
-        if values is None:
-            continue
         try:
-            bears, springs, settles, gives = (float(each) for each in values)
+            numbers = [float(each) for each in values or ()]
         except (TypeError, ValueError):
             continue
-        known = not np.isnan((bears, springs)).any() and np.isfinite((settles, gives)).all()
-        if known and min(springs, settles) > 0.0 and gives >= 0.0 and bears != 0.0:
-            found[bone.name] = Material(
-                bears if bears > 0.0 else float(np.inf), springs, settles, gives
-            )
+        made_of = _material_of(numbers) if len(numbers) == 4 else _coefficients_of(numbers)
+        if made_of is not None:
+            found[bone.name] = made_of
     return found
 
 
-def set_bone_material(armature: bpy.types.Object, name: str, material: Material | None) -> None:
-    """Let a bone's joint be of a material of its own, or of the figure's again with None.
+def _material_of(numbers: list[float]) -> Material | None:
+    bears, springs, settles, gives = numbers
+    known = not np.isnan((bears, springs)).any() and np.isfinite((settles, gives)).all()
+    if not (known and min(springs, settles) > 0.0 and gives >= 0.0 and bears != 0.0):
+        return None
+    return Material(bears if bears > 0.0 else float(np.inf), springs, settles, gives)
+
+
+def _coefficients_of(numbers: list[float]) -> JointCoefficients | None:
+    if len(numbers) != 10 or not np.isfinite(numbers).all():
+        return None
+    *each, limit = numbers
+    if min(each) < 0.0 or min(each[6:]) <= 0.0 or (limit < 0.0 and limit != _NEVER):
+        return None
+    stiffness, damping, flow = ((each[at], each[at + 1], each[at + 2]) for at in (0, 3, 6))
+    return JointCoefficients(stiffness, damping, flow, limit if limit != _NEVER else float(np.inf))
+
+
+def set_bone_material(
+    armature: bpy.types.Object, name: str, material: Material | JointCoefficients | None
+) -> None:
+    """Let a bone's joint be of a material or coefficients of its own, or of the figure's again with
+    None.
 
     Raises:
         WriteError: the bones are linked.
@@ -250,25 +366,75 @@ def set_bone_material(armature: bpy.types.Object, name: str, material: Material 
         if MATERIAL in bone:
             del bone[MATERIAL]
         return
+    if isinstance(material, JointCoefficients):
+        limit = material.yield_torque if np.isfinite(material.yield_torque) else _NEVER
+        bone[MATERIAL] = [*material.stiffness, *material.damping, *material.flow, limit]
+        return
     bears = material.bears if np.isfinite(material.bears) else _NEVER
     bone[MATERIAL] = [bears, material.springs, material.settles, material.gives]
 
 
-def joint_limits(armature: bpy.types.Object) -> dict[str, JointLimits]:
+def joint_limits(
+    armature: bpy.types.Object, *, through_controls: bool = False
+) -> dict[str, JointLimits]:
     """Limits of bones, from Limit Rotation constraints and limits of inverse kinematics.
 
     About axes that are locked, bones stay as they are. A range that a constraint gives goes before
-    that of inverse kinematics about the same axis.
+    that of inverse kinematics about the same axis. Locks say nothing of bones that are
+    posed through controls.
     """
     assert armature.pose is not None
     found: dict[str, JointLimits] = {}
     for bone in armature.pose.bones:
         ranges = _ik_limits(bone) | _limit_constraint(bone)
-        x, y, z = np.array(bone.lock_rotation).tolist()
+        x, y, z = np.array(bone.lock_rotation).tolist() if not through_controls else (False,) * 3
         if ranges or x or y or z:
             found[bone.name] = JointLimits(
                 ranges.get("x", FREE), ranges.get("y", FREE), ranges.get("z", FREE), (x, y, z)
             )
+    return found
+
+
+def _hinges(armature: bpy.types.Object, skeleton: Skeleton, roles: Roles) -> dict[str, JointLimits]:
+    """Limits of the joints that inverse kinematics bend: to the one side that it bends them to.
+
+    That is the side to which the limb is bent at rest, or of a straight one that of its pole.
+    Joints that bend about none of their own axes are left free.
+    """
+    found: dict[str, JointLimits] = {}
+    bones = armature_data(armature).bones
+    bodies = list(roles.bodies)
+    near = _SAME_JOINT * float(np.ptp(skeleton.heads[bodies], axis=0).max())
+    for reach in reaches(armature):
+        if len(reach.chain) != 2:
+            continue
+        lower, upper = (bones[each] for each in reach.chain)
+        along = [
+            np.array(each.tail_local - each.head_local).astype(float) for each in (upper, lower)
+        ]
+        first, second = (each / np.linalg.norm(each) for each in along)
+        axis = np.cross(first, second)
+        if np.linalg.norm(axis) < _STRAIGHT_LIMB:
+            pole = bones.get(reach.pole)
+            if pole is None:
+                continue
+            axis = np.cross(np.array(pole.head_local - lower.head_local), first)
+        axis /= max(float(np.linalg.norm(axis)), 1e-12)
+        bent = float(np.arctan2(np.cross(first, second) @ axis, first @ second))
+        apart = np.linalg.norm(skeleton.heads[bodies] - np.array(lower.head_local), axis=1)
+        body = bodies[int(np.argmin(apart))]
+        own = skeleton.rest_matrices[body][:3, :3].T @ axis
+        number = int(np.argmax(np.abs(own)))
+        if apart.min() > near or number == 1 or abs(own[number]) < _OWN_AXIS:
+            continue
+        least, most = -bent, _MOST_BENT - bent
+        wanted = (least, most) if own[number] > 0.0 else (-most, -least)
+        still = (0.0, 0.0)
+        found[skeleton.names[body]] = JointLimits(
+            wanted if number == 0 else still,
+            still,
+            wanted if number == 2 else still,
+        )
     return found
 
 

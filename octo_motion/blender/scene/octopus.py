@@ -94,8 +94,9 @@ def _new_armature(
         if armature in context.view_layer.objects.values():
             context.view_layer.objects.active = armature
             armature.select_set(state=True)
-    # The skin would hide the bones.
+    # The skin would hide the bones; thin ones do not hide the skin.
     armature.show_in_front = True
+    data.display_type = "STICK"
     return armature
 
 

@@ -1,0 +1,352 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A puppet whose limbs something else moves: its pose is given to the rig's controls.
+
+Blender is asked what inverse kinematics, constraints and drivers make of the controls, until the
+limbs stand as the puppet does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ...core.errors import WriteError
+from ...core.posing.control_fit import ControlFit
+from ...core.posing.puppet import SIZE, Pose, closed, turned_bodies
+from ...core.rotations import Floats, conjugate, rotate
+from .controls import Channels, Reach, control_names, hangs_on, reaches
+from .puppet import Puppet
+from .puppet_reading import PuppetRig, bent_bones
+
+_CLOSE: Final = 6e-5
+"""Of the figure's size: where limbs stand as wanted, a tenth of a millimetre on a body."""
+_TOLD: Final = 4e-4
+"""Of the figure's size: what is farther off is told, a millimetre on a body."""
+_MOVED: Final = 3e-4
+"""Of the figure's size: a limb that has gone by more is to move."""
+_TWIST: Final = 0.01
+"""Of a limb's length, beside it: how much its twist counts against its place."""
+
+
+_SAME: Final = 0.01
+"""Of the figure's size: joints closer than this are the same joint."""
+_FAR: Final = 0.02
+"""Of the figure's size: a limb that is farther off is aimed anew."""
+_BENT: Final = 2e-3
+"""Of the figure's size: a limb whose middle is nearer to its line is straight."""
+_CARRIED: Final = 1e-3
+"""How much a limb counts at first that is carried by others and not turned itself."""
+_AGAIN: Final = 15
+"""Of how many poses that are written one looks for controls that are to move as well."""
+_WIDE: Final = 3
+"""From this stage of settling on, whatever moves a limb is taken, by its place too."""
+
+
+class ControlledPuppet(Puppet):
+    """A puppet that is posed through controls."""
+
+    def __init__(self, armature: bpy.types.Object, rig: PuppetRig) -> None:
+        super().__init__(armature, rig)
+        names = rig.figure.names
+        bent = bent_bones(armature)
+        found = control_names(armature, set().union(*rig.needs.values()))
+        self._limbs = {
+            control: frozenset(
+                body for body, name in enumerate(names) if control in rig.needs[name]
+            )
+            for control in found
+            if not (control in rig.needs and control in bent)
+        }
+        """Of each control the bodies that hang on it."""
+        self._needs = hangs_on(armature)
+        self._trunk = rig.roles.parents.index(-1)
+        self._leading: set[str] = set()
+        """Controls that lead inverse kinematics by their place, and carry nothing beside."""
+        self._size = SIZE / rig.unit
+        bones = armature.data.bones  # type: ignore[union-attr]
+        self._numbers = np.array([bones.find(each) for each in names])
+        self._goal = rig.pose
+        self._begin(armature, rig.pose)
+
+    # --- What is shown --------------------------------------------------------------------------
+
+    def read(self) -> Pose:
+        pose = super().read()
+        self._begin(self.armature(), pose)
+        return pose
+
+    def write(self, pose: Pose) -> list[str]:
+        """Lead the controls on towards a pose; names of those that are on their way."""
+        self._goal = pose
+        self._writes += 1
+        if self._fit is None or self._writes % _AGAIN == 0:
+            turned = self._turned()
+            self._weights = self._weigh(turned)
+            self._take(self._narrow(turned), placed=False)
+        if self._fit is not None:
+            self._fit.step(self._points_of(pose))
+        return [each.name for each in self._moving]
+
+    def settle(self) -> str:
+        goal, hard = self._points_of(self._goal), 6 * len(self.figure)
+        wanted = self._turned()
+        if wanted:
+            self._aim(goal)
+        off = self._misses(goal)
+        # First what has been bent, then what does not go along by itself, then whatever there is.
+        for stage in range(_WIDE + 1):
+            if off.max() <= (_CLOSE if stage == 0 else _TOLD):
+                return ""
+            missed = set(np.flatnonzero(off > _TOLD).tolist())
+            wanted |= missed if stage > 1 else set()
+            names = self._narrow(wanted) if stage < _WIDE else self._wide(missed | self._turned())
+            self._weights = self._weigh(wanted if stage == 0 else None)
+            self._take(names, placed=stage >= _WIDE, anew=stage == 1)
+            if self._fit is not None:
+                self._fit.settle(goal, hard, _CLOSE)
+            off = self._misses(goal)
+        if off.max() <= _TOLD:
+            return ""
+        body = int(np.argmax(off))
+        far = float(off.max()) * self._size
+        return f"{self.figure.names[body]} is {far:.3g} off: its controls do not reach"
+
+    def local(self, pose: Pose) -> tuple[Floats, Floats]:  # noqa: ARG002
+        """Of bones that something else moves no rotation could be recorded.
+
+        Raises:
+            WriteError: always.
+        """
+        raise WriteError(
+            f"'{self.name}' is posed through its controls: a drag cannot be recorded.",
+            "Key its poses with K.",
+        )
+
+    def forget(self) -> None:
+        super().forget()
+        self._fit, self._moving = None, []
+
+    def with_followers(self, bodies: Iterable[int]) -> list[int]:
+        return sorted(bodies)
+
+    def places(self, body: int) -> bool:  # noqa: ARG002
+        return False
+
+    def keyed(self, bodies: Iterable[int], *, all_bones: bool = False) -> list[tuple[str, bool]]:
+        wanted, armature = set(bodies), self.armature()
+        assert armature.pose is not None
+        found: list[tuple[str, bool]] = []
+        for name, limbs in self._limbs.items():
+            origin = self._origins[name]
+            turned, placed = origin.is_moved(armature.pose.bones[name])
+            # Controls give the pose together: what has moved is keyed whichever limb was asked for.
+            if (wanted and (turned or placed)) or (all_bones and limbs & wanted):
+                found.append((name, placed or (all_bones and origin.goes)))
+        return found
+
+    # --- Inside -----------------------------------------------------------------------------------
+
+    def _begin(self, armature: bpy.types.Object, pose: Pose) -> None:
+        """Go on from what is shown now."""
+        assert armature.pose is not None
+        bones = armature.pose.bones
+        self._origins = {name: Channels(bones[name]) for name in self._limbs}
+        self._base = self._goal = pose
+        self._fit: ControlFit | None = None
+        self._moving: list[Channels] = []
+        self._placed = False
+        self._writes = 0
+        self._weights = np.ones(9 * len(self.figure))
+        self._start = self._shown(armature).reshape(-1, 3)
+        self._find_reaches(armature)
+        heads, ends, sides = self._start.reshape(3, -1, 3)
+        back = conjugate(pose.orientations)
+        self._ends = rotate(back, (ends - heads) * self._size)
+        self._sides = rotate(back, (sides - heads) * self._size)
+        self._off = heads * self._size - closed(self.figure, pose).positions / self.rig.unit
+
+    def _points_of(self, pose: Pose) -> Floats:
+        """Heads, ends and sides (numbers,) of the limbs in a pose, in sizes of the figure."""
+        pose = closed(self.figure, pose)
+        heads = pose.positions / self.rig.unit + self._off
+        ends = heads + rotate(pose.orientations, self._ends)
+        sides = heads + rotate(pose.orientations, self._sides)
+        return np.stack([heads, ends, sides]).ravel() / self._size
+
+    def _shown(self, armature: bpy.types.Object) -> Floats:
+        """The same, as Blender shows it."""
+        shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert shown.pose is not None
+        buffer = np.empty(16 * len(shown.pose.bones), dtype=np.float32)
+        shown.pose.bones.foreach_get("matrix", buffer)
+        matrices = buffer.reshape(-1, 4, 4).transpose(0, 2, 1)[self._numbers].astype(np.float64)
+        world = np.array(shown.matrix_world, dtype=np.float64)
+        heads = matrices[:, :3, 3]
+        lengths = self.rig.skeleton.lengths[list(self.rig.roles.bodies)][:, None]
+        ends = heads + lengths * matrices[:, :3, 1]
+        sides = heads + _TWIST * lengths * matrices[:, :3, 0]
+        points = np.stack([heads, ends, sides]) @ world[:3, :3].T + world[:3, 3]
+        return points.ravel() / self._size
+
+    def _aim(self, goal: Floats) -> None:
+        """Bring goals and poles of inverse kinematics to where the limbs want them, about.
+
+        From there least squares find the rest: which way a knee bends they would not turn over.
+        """
+        armature = self.armature()
+        assert armature.pose is not None
+        bones, now = armature.pose.bones, self._shown(armature).reshape(-1, 3) * self._size
+        for reach, joints in self._reaches:
+            before, after = (
+                self._start[joints] * self._size,
+                goal.reshape(-1, 3)[joints] * self._size,
+            )
+            off = np.linalg.norm(after - now[joints], axis=1).max()
+            if np.abs(after - before).max() <= _MOVED * self._size or off < _FAR * self._size:
+                continue
+            ways = {reach.goal: after[2] - before[2]}
+            if reach.pole in self._poles:
+                place = self._poles[reach.pole]
+                ways[reach.pole] = _swivelled(place, before, after, self._size) - place
+            for name, way in ways.items():
+                if name in self._limbs and Channels(bones[name]).goes:
+                    matrix = self._leads[name].copy()
+                    back = armature.matrix_world.to_3x3().inverted_safe()
+                    matrix.translation += back @ Vector(way.tolist())
+                    bones[name].matrix = matrix
+            self._fit, self._moving = None, []
+
+    def _find_reaches(self, armature: bpy.types.Object) -> None:
+        """Of chains of inverse kinematics: at which joints theirs are, and what leads them."""
+        shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert shown.pose is not None
+        bones, world = shown.pose.bones, shown.matrix_world
+        points = self._start[: 2 * len(self.figure)] * self._size
+        self._reaches: list[tuple[Reach, list[int]]] = []
+        self._poles: dict[str, Floats] = {}
+        self._leads: dict[str, Matrix] = {}
+        for reach in reaches(armature):
+            middle = bones[reach.chain[len(reach.chain) // 2 - 1]]
+            own = (bones[reach.chain[-1]].head, middle.head, bones[reach.chain[0]].tail)
+            wanted = np.array([world @ each for each in own])
+            apart = np.linalg.norm(points[None] - wanted[:, None], axis=2)
+            if apart.min(axis=1).max() > _SAME * self._size:
+                continue
+            joints = apart.argmin(axis=1).tolist()
+            self._reaches.append((reach, joints))
+            above = self.figure.parents[joints[0] % len(self.figure)]
+            led = self._needs.get(reach.goal, set()) | self._needs.get(reach.pole, set())
+            self._leading |= {
+                name for name in led & set(self._limbs) if above not in self._limbs[name]
+            }
+            for name in {reach.goal, reach.pole} & set(self._limbs):
+                self._leads[name] = bones[name].matrix.copy()
+                self._poles[name] = np.array(world @ bones[name].head)
+
+    def _turned(self) -> set[int]:
+        """Bodies that are turned against what they hang on since the bones were read."""
+        return set(turned_bodies(self.figure, self._base, self._goal))
+
+    def _misses(self, goal: Floats) -> Floats:
+        """(bodies,) how far each limb is from where it is wanted, in sizes of the figure."""
+        now = self._shown(self.armature())
+        apart = np.linalg.norm((now - goal).reshape(3, -1, 3)[:2], axis=2)
+        return apart.max(axis=0)
+
+    def _weigh(self, wanted: set[int] | None) -> Floats:
+        """(numbers,) how much each point counts: at first little, where others carry it along."""
+        weights = np.ones((3, len(self.figure), 3))
+        if wanted is not None:
+            carried = np.flatnonzero(self._way() > _MOVED).tolist()
+            weights[:, [each for each in carried if each not in wanted]] = _CARRIED
+        return weights.ravel()
+
+    def _way(self) -> Floats:
+        """(bodies,) how far each limb is to go, in sizes of the figure."""
+        before, after = self._points_of(self._base), self._points_of(self._goal)
+        return np.linalg.norm((after - before).reshape(3, -1, 3)[:2], axis=2).max(axis=0)
+
+    def _wide(self, wanted: set[int]) -> list[str]:
+        return [name for name, limbs in self._limbs.items() if limbs & wanted]
+
+    def _narrow(self, wanted: set[int]) -> list[str]:
+        """Controls of bodies on which nothing hangs that is to stay where it is."""
+        moved = set(np.flatnonzero(self._way() > _MOVED).tolist()) | wanted
+        return [
+            name
+            for name in self._wide(wanted)
+            if name in self._leading or self._limbs[name] <= moved
+        ]
+
+    def _take(self, names: list[str], *, placed: bool, anew: bool = False) -> None:
+        """Let these controls be the ones that are moved; if they are already, they stay so."""
+        known = [each.name for each in self._moving]
+        if known == names and not anew and (self._placed or not placed):
+            if self._fit is not None:
+                self._fit.weights = self._weights
+            return
+        self._placed = placed
+        armature = self.armature()
+        assert armature.pose is not None
+        bones = armature.pose.bones
+        self._moving = [
+            Channels(
+                bones[name],
+                placed=name in self._leading or (placed and self._trunk in self._limbs[name]),
+            )
+            for name in names
+        ]
+        count = sum(each.count for each in self._moving)
+        moves = np.zeros((count, 3, len(self.figure), 3), dtype=bool)
+        start = 0
+        for each in self._moving:
+            moves[start : start + each.count, :, sorted(self._limbs[each.name])] = True
+            start += each.count
+        flat = moves.reshape(count, -1)
+        self._fit = ControlFit(self._shape, np.zeros(count), self._weights, flat) if count else None
+
+    def _shape(self, values: Floats) -> Floats:
+        armature = self.armature()
+        assert armature.pose is not None
+        start = 0
+        for each in self._moving:
+            bone = armature.pose.bones[each.name]
+            each.write(bone, values[start : start + each.count], self._size)
+            start += each.count
+        return self._shown(armature)
+
+
+def _swivelled(place: Floats, before: Floats, after: Floats, size: float) -> Floats:
+    """Where a pole (3,) goes for which a limb of joints (3, 3) bends to the side it is bent to.
+
+    It goes round the line from the limb's root to its end, and no farther. A straight limb bends to
+    no side, and leaves it where it is.
+    """
+    axes, bends = zip(*(_bend_axes(each) for each in (before, after)), strict=True)
+    if min(bends) < _BENT * size:
+        return place
+    was, now = axes[0].T @ (place - before[0]), axes[1].T @ (place - after[0])
+    turn = np.arctan2(was[2], was[1]) - np.arctan2(now[2], now[1])
+    c, s = np.cos(turn), np.sin(turn)
+    round_it = np.array([now[0], c * now[1] - s * now[2], s * now[1] + c * now[2]])
+    return after[0] + axes[1] @ round_it
+
+
+def _bend_axes(joints: Floats) -> tuple[Floats, float]:
+    """(3, 3) as columns: along a limb of joints (3, 3), to its bend, across; how far that is."""
+    along = joints[2] - joints[0]
+    along /= max(float(np.linalg.norm(along)), 1e-12)
+    bend = joints[1] - joints[0]
+    bend = bend - (bend @ along) * along
+    far = float(np.linalg.norm(bend))
+    bend /= max(far, 1e-12)
+    return np.stack([along, bend, np.cross(along, bend)], axis=1), far
+
+
+def puppet_of(armature: bpy.types.Object, rig: PuppetRig) -> Puppet:
+    """The puppet of an armature, posed by its bones or through controls."""
+    return ControlledPuppet(armature, rig) if rig.needs else Puppet(armature, rig)

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rig's controls: which bones an artist moves, and which limbs hang on each of them.
+
+Nothing here knows a kind of rig. What a bone hangs on is its parent, the targets of its constraints
+and the bones that its drivers read; whether and how it follows is left to Blender to work out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import bpy
+import numpy as np
+from mathutils import Quaternion, Vector
+
+from ...core.rotations import Floats
+from .armature import armature_data, driven_channels, set_rotation
+
+_MECHANISM: Final = re.compile(r"(DEF|ORG|MCH|VIS)-|.*tweak", re.IGNORECASE)
+"""Names of bones that are no controls, or that only correct what others do."""
+_READ_BONE: Final = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
+_FULL: Final = 1.0 - 1e-6
+
+
+def hangs_on(armature: bpy.types.Object) -> dict[str, set[str]]:
+    """For each bone all bones on whose poses its own depends, itself among them, as it stands.
+
+    Constraints that are muted or without influence count for nothing.
+    """
+    shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert shown.pose is not None
+    direct: dict[str, set[str]] = {}
+    chains: dict[str, set[str]] = {}
+    for bone in shown.pose.bones:
+        needed = {bone.parent.name} if bone.parent is not None else set()
+        for constraint in bone.constraints:
+            if constraint.mute or constraint.influence <= 0.0:
+                continue
+            targets = _targets(constraint, armature.name)
+            own: Any = constraint
+            replaces = own.type == "COPY_TRANSFORMS" and own.mix_mode == "REPLACE"
+            if replaces and targets and constraint.influence >= _FULL:
+                # Whatever came before is gone.
+                needed = targets
+                continue
+            needed |= targets
+            if constraint.type in {"IK", "SPLINE_IK"}:
+                for each in ik_chain(bone, own):
+                    chains.setdefault(each, set()).update(targets | {bone.name})
+        direct[bone.name] = needed
+    for name, more in chains.items():
+        direct[name] |= more
+    for name, read in _driven_by(armature).items():
+        direct.setdefault(name, set()).update(read)
+    return {name: _closure(name, direct) for name in direct}
+
+
+def ik_chain(bone: bpy.types.PoseBone, constraint: Any) -> list[str]:
+    """Names of the bones that a constraint of inverse kinematics on a bone bends."""
+    first = bone if getattr(constraint, "use_tail", True) else bone.parent
+    chain = [] if first is None else [first, *first.parent_recursive]
+    return [each.name for each in chain[: constraint.chain_count or len(chain)]]
+
+
+def goal_bones(armature: bpy.types.Object) -> set[str]:
+    """Bones that inverse kinematics reach for or point at, muted or not, and that it bends not."""
+    assert armature.pose is not None
+    goals: set[str] = set()
+    chained: set[str] = set()
+    for bone in armature.pose.bones:
+        for constraint in bone.constraints:
+            if constraint.type == "IK":
+                goals |= _targets(constraint, armature.name)
+                chained.update(ik_chain(bone, constraint))
+    carried = {
+        each.name
+        for name in chained
+        for each in armature_data(armature).bones[name].parent_recursive
+    }
+    return goals - chained - carried
+
+
+@dataclass(frozen=True)
+class Reach:
+    """One chain of inverse kinematics that is at work."""
+
+    chain: tuple[str, ...]
+    """Its bones, from the end to the root."""
+    goal: str
+    """The bone that it reaches for; empty if that is none of the rig's."""
+    pole: str
+
+
+def reaches(armature: bpy.types.Object) -> list[Reach]:
+    """Chains of two bones and more that inverse kinematics bend now."""
+    assert armature.pose is not None
+    found: list[Reach] = []
+    for bone in armature.pose.bones:
+        for each in bone.constraints:
+            own: Any = each
+            if own.type != "IK" or own.mute or own.influence <= 0.0:
+                continue
+            chain = ik_chain(bone, own)
+            goal = own.subtarget if own.target == armature else ""
+            pole = own.pole_subtarget if own.pole_target == armature else ""
+            if len(chain) > 1:
+                found.append(Reach(tuple(chain), goal, pole))
+    return found
+
+
+def _targets(constraint: Any, armature: str) -> set[str]:
+    found = set()
+    for kind in ("", "pole_"):
+        target = getattr(constraint, f"{kind}target", None)
+        name = getattr(constraint, f"{kind}subtarget", "")
+        if target is not None and name and target.name == armature:
+            found.add(name)
+    for each in getattr(constraint, "targets", ()):
+        weighs = getattr(each, "weight", 1.0) > 0.0
+        if each.target is not None and each.subtarget and each.target.name == armature and weighs:
+            found.add(each.subtarget)
+    return found
+
+
+def _driven_by(armature: bpy.types.Object) -> dict[str, set[str]]:
+    """For each bone whose place or rotation a driver moves, the bones that the driver reads."""
+    found: dict[str, set[str]] = {}
+    for name, channel, curve in driven_channels(armature):
+        if curve.mute or curve.driver is None or not channel.startswith(("location", "rotation")):
+            continue
+        for variable in curve.driver.variables:
+            for target in variable.targets:
+                read = _READ_BONE.match(target.data_path or "")
+                bone = target.bone_target or (read and bpy.utils.unescape_identifier(read[1]))
+                if target.id == armature and bone:
+                    found.setdefault(name, set()).add(bone)
+    return found
+
+
+def _closure(name: str, direct: Mapping[str, set[str]]) -> set[str]:
+    found, waiting = {name}, [name]
+    while waiting:
+        for each in direct.get(waiting.pop(), ()):
+            if each not in found:
+                found.add(each)
+                waiting.append(each)
+    return found
+
+
+def control_names(armature: bpy.types.Object, needed: Iterable[str]) -> list[str]:
+    """Of bones that others hang on, those that an artist moves: shown, free, and no mechanism."""
+    assert armature.pose is not None
+    names = set(needed)
+    driven = {
+        name
+        for name, channel, _ in driven_channels(armature)
+        if channel.startswith(("location", "rotation"))
+    }
+    return [
+        bone.name
+        for bone in armature.pose.bones
+        if bone.name in names
+        and bone.name not in driven
+        and not _MECHANISM.match(bone.name)
+        and is_shown(bone)
+        and Channels(bone).count
+    ]
+
+
+def is_shown(bone: bpy.types.PoseBone) -> bool:
+    """Whether a bone can be seen, and so be taken."""
+    own: Any = bone
+    if bone.bone.hide or getattr(own, "hide", False):
+        return False
+    collections = bone.bone.collections
+    return not collections or any(each.is_visible_effectively for each in collections)
+
+
+class Channels:
+    """What of a bone's pose can be moved, from how it stands: first it turns, then it goes."""
+
+    def __init__(self, bone: bpy.types.PoseBone, *, placed: bool = True) -> None:
+        self.name = bone.name
+        self._place = Vector(bone.location[:])
+        self._turn = _turn(bone)
+        held = np.array(bone.lock_rotation)
+        if bone.rotation_mode in {"QUATERNION", "AXIS_ANGLE"} and bone.lock_rotations_4d:
+            held = held | bone.lock_rotation_w
+        self._angles = np.array(bone.rotation_euler, dtype=np.float64)
+        self._euler = bone.rotation_mode not in {"QUATERNION", "AXIS_ANGLE"} and bool(held.any())
+        self._turns = np.flatnonzero(~held)
+        free = np.zeros(0, dtype=np.int64)
+        if placed and not (bone.bone.use_connect and bone.parent is not None):
+            free = np.flatnonzero(~np.array(bone.lock_location))
+        self._moves = free
+
+    @property
+    def goes(self) -> bool:
+        """Whether it can be moved, not only turned."""
+        return bool(len(self._moves))
+
+    @property
+    def count(self) -> int:
+        return len(self._turns) + len(self._moves)
+
+    def write(self, bone: bpy.types.PoseBone, values: Floats, size: float) -> None:
+        """Move the bone by values (count,): radians, and shares of a size."""
+        turn = np.zeros(3)
+        turn[self._turns] = values[: len(self._turns)]
+        if self._euler:
+            bone.rotation_euler = (self._angles + turn).tolist()
+        elif len(self._turns):
+            angle = float(np.linalg.norm(turn))
+            more = Quaternion(turn.tolist(), angle) if angle > 0.0 else Quaternion()
+            set_rotation(bone, self._turn @ more)
+        place = np.array(self._place, dtype=np.float64)
+        place[self._moves] += size * values[len(self._turns) :]
+        if len(self._moves):
+            bone.location = place.tolist()
+
+    def is_moved(self, bone: bpy.types.PoseBone) -> tuple[bool, bool]:
+        """Whether it is turned, and whether it is elsewhere, than it was."""
+        turned = self._turn.rotation_difference(_turn(bone)).angle
+        return min(turned, 2.0 * np.pi - turned) > 1e-4, (
+            (Vector(bone.location[:]) - self._place).length > 1e-6
+        )
+
+
+def _turn(bone: bpy.types.PoseBone) -> Quaternion:
+    return bone.matrix_basis.to_quaternion()

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arms point where they do in their clip, on all pairs of recorded people, measured from joints.
+
+The chest is that of its joints (shoulders, neck, spine) on average over the clip, carried by its
+bone: a shrug does not tilt it.
+"""
+
+from itertools import pairwise, permutations
+
+import numpy as np
+import pytest
+
+from octo_motion.core.rotations import Floats, multiply, to_matrix
+from octo_motion.core.splicing.clip.clip import Clip, sample_clip, sample_world
+from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
+from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.transfer.parts import PARTS
+from octo_motion.core.splicing.transfer.splice import Splice
+from tests.bench.splice_joints import joints_at
+from tests.blender.test_splice_laws import GOALS, SharedData, people
+from tests.core.splice_bodies import spliced
+from tests.referee.clip_measures import angle, chest
+
+pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+
+PEOPLE = (
+    "secondlife/avatar_walk.bvh",
+    "secondlife/avatar_dance1.bvh",
+    "cmu/12_01_walk.bvh",
+    "cmu/01_01_hops.bvh",
+    "cmu/02_02_walk_daz43.bvh",
+    "cmu/pirouette_threejs.bvh",
+    "animated_drawings/cmu1_jumping_jacks.bvh",
+    "animated_drawings/rokoko_jesse_dance.bvh",
+    "makehuman/walk1.bvh",
+)
+
+
+class Person:
+    """A clip, and its arms as seen from its chest."""
+
+    def __init__(self, clip: Clip, marks: Landmarks) -> None:
+        self.clip, self.marks = clip, marks
+        between = self._bone(clip, clip.frames).transpose(0, 2, 1) @ chest(
+            joints_at(clip, marks, clip.frames)
+        )
+        u, _, v = np.linalg.svd(between.mean(axis=0))
+        self._chest = u @ v
+
+    def _bone(self, clip: Clip, frames: Floats) -> Floats:
+        bone = clip.skeleton.index[self.marks["chest"]]
+        turned = multiply(
+            sample_world(clip, frames)[0], sample_clip(clip, frames).orientation(bone)
+        )
+        return to_matrix(turned)
+
+    def arm(self, clip: Clip, frames: Floats) -> Floats:
+        """(frames, 3) right shoulder to hand in lengths of the arm, in a clip of this skeleton."""
+        joints = joints_at(clip, self.marks, frames)
+        along = [joints[f"right_{each}"] for each in ("shoulder", "elbow", "hand")]
+        length = sum(np.linalg.norm(b - a, axis=-1) for a, b in pairwise(along))
+        axes = self._bone(clip, frames) @ self._chest
+        return np.einsum("mji,mj->mi", axes, along[2] - along[0]) / np.asarray(length)[:, None]
+
+
+def test_an_arm_points_from_the_chest_where_it_does_in_its_clip(shared_data: SharedData) -> None:
+    found = {name: Person(*each) for name, each in people(shared_data, PEOPLE, 300).items()}
+    for (name, base), (other, person) in permutations(found.items(), 2):
+        for goal in GOALS:
+            splice = Splice(
+                PARTS["right_arm"],
+                person.clip,
+                Timing(base.clip.frames[0], person.clip.frames[0]),
+                person.marks,
+                goal,
+            )
+            result = spliced(base.clip, base.marks, splice)
+            window = splice_window(splice.timing, base.clip, splice.clip)
+            fully = window.weights >= 1.0
+            ours = base.arm(result, base.clip.frames[window.frames][fully])
+            theirs = person.arm(person.clip, window.splice_frames[fully])
+            # How two chests are held on average differs by up to 1.9°; 0.3° is usual.
+            assert angle(ours, theirs).max(initial=0.0) < 3.0, (name, other, goal)
+            if goal == "exact":
+                # Past the chest as it is held, a hand goes the same way.
+                u, _, v = np.linalg.svd(theirs.T @ ours)
+                turned = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+                off = np.linalg.norm(ours - theirs @ turned, axis=-1)
+                reached = np.linalg.norm(theirs, axis=-1) < 0.97
+                assert off[reached].max(initial=0.0) < 0.02, (name, other, goal)
