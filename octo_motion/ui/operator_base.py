@@ -14,6 +14,7 @@ from bpy.props import EnumProperty
 from ..blender.animation import renumber_keys
 from ..blender.rig import active_armature, linked_names
 from ..core.errors import OctoMotionError, RigError
+from ..core.files import plain_name
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -56,9 +57,16 @@ class OctoOperator:
 
 
 class FileOperator(OctoOperator):
-    """Mix-in: asks for a file first."""
+    """Mix-in: asks for a file first, unless one was dropped."""
+
+    filepath = ""
+    """A property of the operator's."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
+        """Blender's entry point."""
+        return self.execute(context) if self.filepath else self.browse(context)
+
+    def browse(self, context: bpy.types.Context) -> set[Any]:
         """Open the file browser."""
         window_manager(context).fileselect_add(cast("bpy.types.Operator", self))
         return {"RUNNING_MODAL"}
@@ -235,6 +243,12 @@ class ArmaturePresetAdd(AddPresetBase):
         if found:
             cast("Any", cls).poll_message_set(found)
         return not found
+
+    @staticmethod
+    def as_filename(name: Any) -> Any:
+        """The name of a file; Blender itself would take that of a device on Windows."""
+        blenders: Any = AddPresetBase.as_filename
+        return plain_name(blenders(name))
 
     def execute(self, context: bpy.types.Context) -> Any:
         """Write the file, or remove it."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import wrap
-from typing import Any, Final, cast
+from typing import Any, ClassVar, Final, cast
 
 import bpy
 
 from ..blender.rig import active_armature
 from ..core.errors import RigError
+from .tool import tool_of
 
 _CHARACTER: Final = 6.5
 """Pixels that a letter of Blender's own font takes on the average, …"""
@@ -77,11 +78,17 @@ class TabPanel:
 
 
 class ArmaturePanel(TabPanel):
-    """A panel of the active armature's settings; without an armature it is not there."""
+    """A panel of the active armature's settings; without an armature it is not there, nor where
+    another tool is shown than the one that it belongs to.
+    """
+
+    tool: ClassVar[str] = ""
+    """Identifier of that tool; none for all of them."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return armature_in(context) is not None
+        armature = armature_in(context)
+        return armature is not None and cls.tool in {"", tool_of(armature)}
 
     def draw(self, context: bpy.types.Context) -> None:
         armature = armature_in(context)

@@ -4,18 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
-from . import at_work, locomotion, posing, splicing
+from . import at_work, findable, locomotion, posing, splicing
 from .declared_settings import PointerProperty, make_overridable
 from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion
 from .posing import OCTO_MOTION_PG_posing
 from .splicing import OCTO_MOTION_PG_splicing
-from .steps import Step, do_all, nothing, undo_all
+from .steps import Step, do_all, menu_entry, nothing, registered, undo_all
+from .tool import chosen, switch
 
 
 class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
@@ -41,6 +40,8 @@ class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
         description="How the armature is posed by hand, and what stops it",
         type=OCTO_MOTION_PG_posing,
     )
+    chosen_tool: chosen()
+    tool: switch()
 
 
 @persistent
@@ -71,6 +72,7 @@ Draw = Callable[[bpy.types.Menu, bpy.types.Context], None]
 MENUS: tuple[tuple[str, Draw], ...] = (
     *locomotion.MENUS,
     ("TOPBAR_MT_file_import", splicing.draw_in_import_menu),
+    *findable.MENUS,
 )
 
 CLASSES: tuple[type, ...] = (
@@ -78,26 +80,22 @@ CLASSES: tuple[type, ...] = (
     *splicing.SETTINGS,
     *splicing.CLASSES,
     *posing.CLASSES,
+    *findable.CLASSES,
     OCTO_MOTION_PG_object,
 )
 
 
 def _steps() -> list[Step]:
     """What is done, and how each of it is undone."""
-    register, unregister = bpy.utils.register_class, bpy.utils.unregister_class
     return [
-        *(Step(partial(register, each), partial(unregister, each)) for each in CLASSES),
+        *(registered(each) for each in CLASSES),
         Step(_give_settings, _take_settings),
         *locomotion.STEPS,
-        *(_entry(getattr(bpy.types, menu), draw) for menu, draw in MENUS),
+        *(menu_entry(menu, draw) for menu, draw in MENUS),
         *posing.STEPS,
         *splicing.STEPS,
         Step(nothing, at_work.stop_all),
     ]
-
-
-def _entry(menu: Any, draw: Draw) -> Step:
-    return Step(partial(menu.append, draw), partial(menu.remove, draw))
 
 
 def register() -> None:

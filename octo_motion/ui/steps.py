@@ -6,8 +6,9 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
-from typing import Final
+from typing import Any, Final
 
 import bpy
 
@@ -39,6 +40,21 @@ def undo_all(steps: Sequence[Step]) -> None:
             step.undo()
         except Exception:
             _logger.exception("Octo Motion could not go on with %s.", step.undo)
+
+
+def menu_entry(menu: str, draw: Callable[[Any, bpy.types.Context], None]) -> Step:
+    """A menu or panel of Blender's, by its identifier, and what is drawn at its end."""
+
+    def there() -> Any:  # one of ours is there from its own step on
+        return getattr(bpy.types, menu)
+
+    return Step(lambda: there().append(draw), lambda: there().remove(draw))
+
+
+def registered(cls: type) -> Step:
+    """A class that Blender is to know."""
+    register, unregister = bpy.utils.register_class, bpy.utils.unregister_class
+    return Step(partial(register, cls), partial(unregister, cls))
 
 
 def nothing() -> None:

@@ -13,10 +13,14 @@ from typing import Any
 import bpy
 import pytest
 
+from octo_motion.ui import tool
 from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from octo_motion.ui.panel_base import draw_sentence
+from octo_motion.ui.posing import panels as posing_panels
+from octo_motion.ui.splicing import splice_panels
 from tests.ui.rig import give_route, make_octopus
+from tests.ui.splicing.walkers import BODIES, make_body
 
 PANELS = list(panels.CLASSES)
 ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items.keys())
@@ -32,6 +36,8 @@ def check(function: str, arguments: Any) -> None:
 
 class Layout:
     """Writes down what is drawn."""
+
+    operator_context = "INVOKE_DEFAULT"
 
     def __init__(self, drawn: list[str] | None = None) -> None:
         self.drawn: list[str] = [] if drawn is None else drawn
@@ -106,6 +112,11 @@ class Layout:
         assert isinstance(getattr(data, name), bpy.types.ID)
         self.drawn.append("users")
 
+    def template_icon_view(self, data: Any, name: str, **more: Any) -> None:
+        check("template_icon_view", more)
+        assert data.bl_rna.properties[name].type == "ENUM"
+        self.drawn.append(name)
+
     def context_pointer_set(self, name: str, data: Any) -> None:
         assert "context_pointer_set" in FUNCTIONS
         assert isinstance(data, bpy.types.Object), name
@@ -143,22 +154,80 @@ def test_panels_come_in_the_order_of_the_work() -> None:
     make_octopus()
     top = [each for each in PANELS if not hasattr(each, "bl_parent_id")]
     labels = [each.bl_label for each in top]
-    assert labels == ["Rig", "Arms", "Route", "Gait", "Reaches", "Generate"]
-    # Of one order, they come as they are registered.
-    assert [each.bl_order for each in top] == [0, 1, 2, 3, 3, 4]
+    assert sorted(labels, key=lambda label: top[labels.index(label)].bl_order) == [
+        *("Rig", "Move", "Arms", "Route", "Gait", "Reaches"),
+    ]
     assert {each.bl_category for each in PANELS} == {"Octo Motion"}
 
 
-def test_advanced_parts_are_closed() -> None:
-    for each in PANELS:
-        if hasattr(each, "bl_parent_id"):
-            assert each.bl_options == {"DEFAULT_CLOSED"}
+def test_only_what_one_presses_and_changes_often_is_open() -> None:
+    make_octopus()
+    opened = [each.bl_label for each in PANELS if "DEFAULT_CLOSED" not in options(each)]
+    assert opened == ["Rig", "Move"]
+    drawn = [name for name in Tab()["generate"] if not name.startswith("octo_motion.")]
+    # With the switch of the tools.
+    assert len(drawn) < 12
+
+
+def options(panel: Any) -> set[str]:
+    """Those of a panel."""
+    return getattr(panel, "bl_options", set())
+
+
+def test_the_main_button_stands_above_all_that_comes_and_goes() -> None:
+    octopus = make_octopus()
+    before = Tab()["generate"]
+    assert before[:3] == ["octo_motion_setup", "octo_motion.generate_locomotion", "live"]
+    give_route(octopus)
+    locomotion_settings(octopus).live_error = "Something."
+    assert Tab()["generate"][:3] == before[:3]
+
+
+@pytest.mark.parametrize("tool", ["MOVE", "SPLICE", "POSE"])
+def test_the_tab_shows_one_tool(tool: str) -> None:
+    settings = make_octopus().octo_motion
+    assert settings.tool == "MOVE"
+    settings.tool = tool
+    shown = {
+        each.tool
+        for each in (*panels.CLASSES, *splice_panels.CLASSES, *posing_panels.CLASSES)
+        if getattr(each, "tool", "") and each.poll(bpy.context)
+    }
+    assert shown == {tool}
+
+
+def test_the_tool_is_the_one_that_the_rig_looks_like_until_another_is_chosen() -> None:
+    assert make_octopus().octo_motion.tool == "MOVE"
+    armature = make_body("Person", BODIES["like it"])
+    assert armature.octo_motion.tool == "SPLICE"
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert armature.octo_motion.tool == "SPLICE"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    armature.octo_motion.tool = "MOVE"
+    assert armature.octo_motion.tool == "MOVE"
+
+
+def test_bones_that_are_being_edited_are_left_alone_by_a_redraw(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    armature = make_body("Person", BODIES["like it"])
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    read: list[Any] = []
+    look = tool._is_humanoid
+    monkeypatch.setattr(tool, "_is_humanoid", lambda each: bool(read.append(each)) or look(each))
+    assert armature.octo_motion.tool == "MOVE"
+    assert not read
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert armature.octo_motion.tool == "SPLICE"
+    assert read == [armature]
 
 
 def test_a_route_is_offered_and_then_its_settings() -> None:
     octopus = make_octopus()
-    assert Tab()["route"] == ["route", "octo_motion.add_route"]
+    assert "octo_motion.add_route" in Tab()["generate"]
     give_route(octopus)
+    assert "octo_motion.add_route" not in Tab()["generate"]
     assert "speed_mode" in Tab()["route"]
     assert "spline" not in Tab()["route"]
     octopus.octo_motion.locomotion.route.data.splines.new("BEZIER")
@@ -211,9 +280,10 @@ def test_timing_shows_its_own_settings_and_the_result(timing: str) -> None:
     bpy.ops.octo_motion.generate_locomotion()
     settings.timing = timing
     drawn = Tab()["generate"]
+    assert "frame_start" in Tab()["frames"]
     own = {"CADENCE": "cycle_time", "SPEED": "speed", "RANGE": "frame_end"}
     assert {name for name in own.values() if name in drawn} == {own[timing]}
-    assert drawn[-2:] == ["Octopus Locomotion", "25 frames, 1.0 s"]
+    assert drawn[-3:] == ["Octopus Locomotion", "25 frames, 1.0 s", "octo_motion.write_job"]
 
 
 def test_of_a_linked_armature_the_tab_says_that_it_is_read_only(tmp_path: Path) -> None:

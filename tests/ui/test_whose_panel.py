@@ -34,6 +34,18 @@ def test_who_edits_a_route_works_on_the_armature_that_goes_along_it() -> None:
     assert armature_in(bpy.context) == armature
 
 
+def test_who_shapes_the_ground_works_on_the_armature_that_walks_on_it() -> None:
+    armature = make_octopus()
+    give_route(armature)
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    ground = bpy.context.object
+    assert armature_in(bpy.context) is None
+    locomotion_settings(armature).ground.object = ground
+    assert armature_in(bpy.context) == armature
+    assert click("generate_locomotion") == {"FINISHED"}
+    assert locomotion_settings(armature).result is not None
+
+
 def test_of_several_on_one_route_the_selected_one_is_meant() -> None:
     first, second = make_octopus("First"), make_octopus("Second")
     route = give_route(first)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Locomotion, as an artist sees it."""
 
-from . import operators, panels, settings
-from .operators import MENUS, STEPS
+from ..steps import Step
+from . import operators, panels, settings, target_overlay
+from .operators import MENUS
 from .settings import (
     ChangeItem,
     ContactItem,
@@ -16,6 +17,7 @@ from .settings import (
 )
 from .writing import Summary, generate_locomotion
 
+STEPS = (*operators.STEPS, Step(target_overlay.listen, target_overlay.listen_no_more))
 CLASSES = (*settings.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
 __all__ = [

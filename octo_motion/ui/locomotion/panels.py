@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sidebar tab, in the order of the work: rig, arms, route, gait, generate."""
+"""The sidebar tab, and in it the tool Move: what is pressed and changed often, then the rest."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ...blender.files import NODE, curve_node
 from ..panel_base import ArmaturePanel, TabPanel, armature_in, draw_sentence
 from .operators import (
     OCTO_MOTION_MT_gait,
+    OCTO_MOTION_MT_gaits,
     OCTO_MOTION_OT_add_octopus,
     OCTO_MOTION_OT_add_route,
     OCTO_MOTION_OT_generate_locomotion,
@@ -23,6 +24,8 @@ from .operators import (
     OCTO_MOTION_PT_setups,
     OCTO_MOTION_PT_table,
     draw_rest,
+    draw_setups,
+    shown_name,
 )
 from .settings import OCTO_MOTION_PG_locomotion, locomotion_settings, used
 
@@ -36,6 +39,7 @@ class _Panel(ArmaturePanel):
 class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
     bl_label = "Rig"
     bl_order = 0
+    bl_options = {"HIDE_HEADER"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = cast("Any", self).layout
@@ -44,35 +48,38 @@ class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
             column = layout.column(align=True)
             column.label(text="No armature is active.", icon="INFO")
             column.label(text="Select one, or add an octopus:", icon="BLANK1")
-        else:
+            layout.operator(
+                OCTO_MOTION_OT_add_octopus.bl_idname,
+                text="Add Octopus",
+                icon="OUTLINER_OB_ARMATURE",
+            )
+            return
+        if armature != context.object:
             layout.label(text=armature.name, icon="OUTLINER_OB_ARMATURE")
-            if not armature.is_editable:
-                column = layout.column(align=True)
-                column.label(text="Linked and read-only.", icon="LIBRARY_DATA_DIRECT")
-                column.label(text="Make a library override.", icon="BLANK1")
-        layout.operator(
-            OCTO_MOTION_OT_add_octopus.bl_idname, text="Add Octopus", icon="OUTLINER_OB_ARMATURE"
-        )
+        if not armature.is_editable:
+            column = layout.column(align=True)
+            column.label(text="Linked and read-only.", icon="LIBRARY_DATA_DIRECT")
+            column.label(text="Make a library override.", icon="BLANK1")
+            return
+        settings = armature.octo_motion  # type: ignore[attr-defined]
+        layout.row().prop(settings, "tool", expand=True)
 
 
 class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
     bl_label = "Route"
-    bl_order = 2
+    bl_order = 3
+    bl_options = {"DEFAULT_CLOSED"}
+    tool = "MOVE"
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        layout.prop(settings, "route", text="Curve")
         if settings.route is None:
-            layout.operator(
-                OCTO_MOTION_OT_add_route.bl_idname, text="Add Route", icon="CURVE_BEZCURVE"
-            )
+            layout.label(text="It has no route yet", icon="INFO")
             return
         # In place the ground goes by, evenly, and the route is kept for later.
         layout.active = settings.travel_on != "NONE"
         splines = getattr(settings.route.data, "splines", ())
         if len(splines) > 1 or settings.spline >= 0:
             layout.prop(settings, "spline")
-        if settings.table.manner != "SWIM" and settings.ground.use:
-            layout.prop(settings.ground, "object", text="Ground")
         layout.row().prop(settings, "speed_mode", expand=True)
         column = layout.column(align=True)
         column.prop(settings, "ease_in")
@@ -108,16 +115,15 @@ class OCTO_MOTION_PT_heading(_Panel, bpy.types.Panel):
 
 class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
     bl_label = "Gait"
-    bl_order = 3
-
-    def draw_header_preset(self, context: bpy.types.Context) -> None:  # noqa: ARG002
-        OCTO_MOTION_PT_setups.draw_panel_header(cast("Any", self).layout)
+    bl_order = 4
+    bl_options = {"DEFAULT_CLOSED"}
+    tool = "MOVE"
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         table = settings.table
         row = layout.row(align=True)
         row.alert = bool(used(table.curves)) and table.name != settings.gait
-        row.prop(settings, "gait")
+        row.menu(OCTO_MOTION_MT_gaits.__name__, text=shown_name(settings.gait))
         row.menu(OCTO_MOTION_MT_gait.__name__, text="", icon="DOWNARROW_HLT")
         layout.prop(table, "stride")
         layout.prop(settings, "contraction")
@@ -169,26 +175,56 @@ class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):
 
 
 class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
-    bl_label = "Generate"
-    bl_order = 4
+    bl_label = "Move"
+    bl_order = 1
+    tool = "MOVE"
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+        OCTO_MOTION_PT_setups.draw_panel_header(cast("Any", self).layout)
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
-        layout.row().prop(settings, "timing", expand=True)
-        column = layout.column(align=True)
-        if settings.timing == "CADENCE":
-            column.prop(settings, "cycle_time", text="Cycle Time")
-        elif settings.timing == "SPEED":
-            column.prop(settings, "speed", text="Speed")
-        column = layout.column(align=True)
-        column.prop(settings, "frame_start", text="Frame Start")
-        if settings.timing == "RANGE":
-            column.prop(settings, "frame_end")
+        draw_setups(layout)
+        row = layout.row(align=True)
+        row.scale_y = 1.5
+        # Split, the name of the switch would take half of the button's room.
+        row.use_property_split = False
+        row.operator(OCTO_MOTION_OT_generate_locomotion.bl_idname, icon="PLAY", text="Generate")
+        row.prop(settings, "live", toggle=True, icon="FILE_REFRESH")
+        column = layout.column()
+        travels = column.column()
+        travels.active = settings.travel_on != "NONE"
+        travels.prop(settings, "route")
+        if settings.route is None:
+            travels.operator(
+                OCTO_MOTION_OT_add_route.bl_idname, text="Add Route", icon="CURVE_BEZCURVE"
+            )
+        if settings.table.manner != "SWIM" and settings.ground.use:
+            travels.prop(settings.ground, "object", text="Ground")
+        column.row().prop(settings, "timing", expand=True)
+        values = {"CADENCE": "cycle_time", "SPEED": "speed", "RANGE": "frame_end"}
+        column.prop(settings, values[settings.timing])
+        column.row().prop(settings, "keys", expand=True)
+        # What comes and goes stands last: nothing jumps under the mouse.
+        if settings.live_error:
+            row = layout.row()
+            row.alert = True
+            draw_sentence(row, bpy.context, settings.live_error, "ERROR")
+        if settings.result is not None:
+            _draw_result(layout, settings.result)
+
+
+class OCTO_MOTION_PT_frames(_Panel, bpy.types.Panel):
+    bl_label = "Frames and Keys"
+    bl_parent_id = "OCTO_MOTION_PT_generate"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+        layout.prop(settings, "frame_start")
         layout.prop(settings, "extend_scene_range")
         layout.prop(settings, "travel_on")
         if settings.travel_on == "NONE":
             layout.prop(settings, "cycles")
             layout.prop(settings, "repeat")
-        layout.row().prop(settings, "keys", expand=True)
         if settings.keys == "REDUCED":
             column = layout.column(align=True)
             column.prop(settings, "key_angle", text="Tolerance Angle")
@@ -196,18 +232,6 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             layout.row().prop(settings, "key_columns", expand=True)
         layout.prop(settings, "keep_apart")
         layout.prop(settings, "tell_overlaps")
-        row = layout.row(align=True)
-        row.scale_y = 1.5
-        # Split, the name of the switch would take half of the button's room.
-        row.use_property_split = False
-        row.operator(OCTO_MOTION_OT_generate_locomotion.bl_idname, icon="PLAY", text="Generate")
-        row.prop(settings, "live", toggle=True, icon="FILE_REFRESH")
-        if settings.live_error:
-            row = layout.row()
-            row.alert = True
-            draw_sentence(row, bpy.context, settings.live_error, "ERROR")
-        if settings.result is not None:
-            _draw_result(layout, settings.result)
 
 
 def _draw_result(layout: Any, action: bpy.types.Action) -> None:
@@ -224,6 +248,9 @@ def _draw_result(layout: Any, action: bpy.types.Action) -> None:
 
 CLASSES: Final = (
     OCTO_MOTION_PT_rig,
+    OCTO_MOTION_PT_generate,
+    OCTO_MOTION_PT_frames,
+    OCTO_MOTION_PT_quality,
     OCTO_MOTION_PT_arms,
     OCTO_MOTION_PT_route,
     OCTO_MOTION_PT_ground,
@@ -234,6 +261,4 @@ CLASSES: Final = (
     OCTO_MOTION_PT_variation,
     OCTO_MOTION_PT_weights,
     OCTO_MOTION_PT_reaches,
-    OCTO_MOTION_PT_generate,
-    OCTO_MOTION_PT_quality,
 )

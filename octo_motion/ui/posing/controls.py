@@ -29,6 +29,7 @@ HELP: Final = (
     ("M", "measure"),
     ("R", "restore"),
     ("Ctrl Z", "back"),
+    ("Ctrl Shift Z", "forward"),
     ("Enter", "keep"),
     ("Esc", "as it was"),
 )
@@ -77,6 +78,7 @@ class Outcome(Enum):
 
     TAKEN = "taken"
     PASSED = "passed"
+    """The session has no use for it: ``left_to_blender`` says whether Blender gets it."""
     FINISH = "finish"
     CANCEL = "cancel"
 
@@ -226,9 +228,9 @@ class PoseControls:
             else:
                 session.restore()
                 self.message = "As at the start"
-        elif kind == "Z" and _modified(event) and not event.alt and not event.shift:
+        elif kind == "Z" and _modified(event) and not event.alt:
             self._lose()
-            self.message = "Back" if session.step_back() else "Nothing to take back"
+            self.message = undone(session, forward=event.shift)
         else:
             return Outcome.PASSED
         return Outcome.TAKEN
@@ -339,8 +341,23 @@ class PoseControls:
         report = session.report
         if report is not None and not report.resting and report.ratio < SLOW:
             parts.append(f"slower than real time: {100.0 * report.ratio:.0f} %")
-        parts += [each for each in (self.message, session.warning) if each]
+        parts += [each for each in (self.message, session.missed, session.warning) if each]
         return "    ".join(parts)
+
+
+class Undoable(Protocol):
+    """A session, or the hands at a device that pose it."""
+
+    def step_back(self) -> bool: ...
+
+    def step_forward(self) -> bool: ...
+
+
+def undone(what: Undoable, *, forward: bool) -> str:
+    """Take a step back or forward; what was done, in words."""
+    if forward:
+        return "Forward" if what.step_forward() else "Nothing to bring back"
+    return "Back" if what.step_back() else "Nothing to take back"
 
 
 def _modified(event: Any) -> bool:

@@ -123,6 +123,10 @@ class HandsBase:
         """Back to before the last grab or restoring, hands let go; whether there was one."""
         return self.session.step_back()
 
+    def step_forward(self) -> bool:
+        """On to what the last step back has undone, hands let go; whether there was one."""
+        return self.session.step_forward()
+
     def notices(self) -> list[Notice]:
         """What is to be shown to the user, each once."""
         notices, self.client.notices = self.client.notices, []
@@ -262,7 +266,12 @@ class DeviceHands(HandsBase):
         self._let_go()
 
     def step_back(self) -> bool:
-        done = super().step_back()
+        return self._stepped(super().step_back())
+
+    def step_forward(self) -> bool:
+        return self._stepped(super().step_forward())
+
+    def _stepped(self, done: bool) -> bool:  # noqa: FBT001 - what has come of the step
         if done:
             self._let_go()
         return done

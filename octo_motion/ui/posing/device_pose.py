@@ -10,13 +10,14 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, IntProperty
 
+from ...blender.files import own_folder
 from ...core.errors import DeviceError, OctoMotionError, SettingsError
 from ...core.rotations import Floats
 from ...device.driver import Kind
 from ...device.ipc import Client
 from ...device.messages import Buzz, Notice, Order
 from ..operator_base import OctoOperator
-from .controls import Outcome
+from .controls import Outcome, undone
 from .device_hands import (
     NDOF_GRAB_BUTTONS,
     NDOF_KEY_BUTTONS,
@@ -25,7 +26,7 @@ from .device_hands import (
     NdofHands,
     ViewRoom,
 )
-from .device_settings import device_settings, message
+from .device_settings import bridge_arguments, device_settings, message
 from .overlay import Overlay, device_lines, take_down_all
 from .pose_operator import SessionOperator, tell
 from .puppet_session import PuppetSession, active_session
@@ -38,6 +39,7 @@ HELP: Final = (
     ("O", "record"),
     ("R", "restore"),
     ("Ctrl Z", "back"),
+    ("Ctrl Shift Z", "forward"),
     ("Home", "pointer to the middle"),
     ("B", "start the device's program again"),
     ("Enter", "keep"),
@@ -122,8 +124,8 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
     def take_up(self, context: bpy.types.Context, session: PuppetSession) -> Overlay:
         """Start the bridge, and take the armature into its hands."""
         settings = device_settings(context.window_manager)
-        client = Client()
-        client.start(["--simulate"] if settings.simulate else [])
+        client = Client(log_file=own_folder() / "device.log")
+        client.start(bridge_arguments(settings))
         self._size = session.size * session.unit
         try:
             self._hands = DeviceHands(session, client, self._device_settings(settings))
@@ -233,7 +235,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
                 hands.restore()
                 hands.message = "As at the start"
             case "Z":
-                hands.message = "Back" if hands.step_back() else "Nothing to take back"
+                hands.message = undone(hands, forward=event.shift)
             case "HOME":
                 hands.recentre()
             case _ if isinstance(hands, DeviceHands):
@@ -254,8 +256,8 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
 
 
 def _is_undo(event: Any) -> bool:
-    """Whether Ctrl Z, or Cmd Z on a Mac, is pressed; Z alone and Ctrl Shift Z are Blender's."""
-    return (event.ctrl or event.oskey) and not event.shift
+    """Whether Ctrl Z or Ctrl Shift Z, or Cmd Z on a Mac, is pressed; Z alone is Blender's."""
+    return event.ctrl or event.oskey
 
 
 def line(hands: Hands) -> str:

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import Any, Final, cast
 
 import bpy
 from bpy.app.handlers import persistent
-from bpy.props import BoolProperty, FloatProperty, PointerProperty
+from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty
 
+from ...blender.files import own_folder
 from ...device.messages import Settings
 
 _Factor: Final = partial(FloatProperty, subtype="FACTOR", options={"SKIP_SAVE"})
@@ -58,11 +60,41 @@ class OCTO_MOTION_PG_device(bpy.types.PropertyGroup):
         name="Simulated Hand",
         description="Add a hand that moves by itself, to see what a force device would do",
     )
+    port: IntProperty(
+        name="Program's Port",
+        description="UDP port of this computer at which a program may be the device, such as one "
+        "that reads a force device with its maker's library. 0 for none. It must know the key in "
+        "the file that the panel names",
+        default=0,
+        min=0,
+        max=0xFFFF,
+        options={"SKIP_SAVE"},
+    )
 
 
 def device_settings(window_manager: bpy.types.WindowManager) -> Any:
     """The settings."""
     return cast("Any", window_manager).octo_motion_device
+
+
+def key_file(*, create: bool = False) -> Path:
+    """The file with the key of programs that are devices; made by the process that needs it.
+
+    Raises:
+        WriteError: its folder is to be made and cannot be.
+    """
+    return own_folder(create=create) / "device_key"
+
+
+def bridge_arguments(settings: Any) -> list[str]:
+    """What the bridge is started with."""
+    simulated = ["--simulate"] * settings.simulate
+    if not settings.port:
+        return simulated
+    return [
+        *(*simulated, "--udp", str(settings.port)),
+        *("--key-file", str(key_file(create=True))),
+    ]
 
 
 def message(settings: Any, size: float) -> Settings:

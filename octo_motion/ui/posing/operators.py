@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
 from ...blender.animation import writable_armature
 from ...blender.rig import (
+    Puppet,
     active_armature,
     bone_materials,
     mark_bones,
@@ -19,13 +20,13 @@ from ...blender.rig import (
     selected_bones,
     set_bone_material,
 )
-from ...core.errors import RigError, WriteError
-from ...core.posing.puppet import Bend, Figure
+from ...core.errors import OctoMotionError, RigError, WriteError
+from ...core.posing.puppet import Bend, Figure, JointCoefficients
 from ..operator_base import ArmatureOperator, OctoOperator
-from .measuring_hand import BEARS, coefficients, measured_joint
+from .measuring_hand import BEARS, check_joint, coefficients, measured_joint
 from .properties import OBSTACLES, posing_settings
 from .puppet_session import PuppetSession, active_session
-from .session_settings import keep_material
+from .session_settings import joints_of_now, keep_material
 
 
 class OCTO_MOTION_OT_pose_mark_bones(ArmatureOperator, bpy.types.Operator):
@@ -162,7 +163,7 @@ class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
         writable_armature(armature)
         settings: Any = posing_settings(armature)
         session = _session_of(armature)
-        figure, body = self._joint(context, armature, session)
+        figure, body = joint_of(context, armature, session, self.bone)
         bend = Bend(self.pull, self.bears, self.seconds, self.bends, self.stays, self.settles)
         measured, material = measured_joint(figure, body, settings.strength, bend)
         bone = figure.names[body] if self.bone_only else ""
@@ -172,20 +173,116 @@ class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
             keep_material(armature, settings, material, bone)
         self.report({"INFO"}, coefficients(figure.names[body], measured))
 
-    def _joint(
-        self, context: bpy.types.Context, armature: bpy.types.Object, session: PuppetSession | None
-    ) -> tuple[Figure, int]:
-        active = context.active_pose_bone
-        name = self.bone or (active.name if active is not None else "")
-        if not name:
-            raise RigError(
-                "No bone is active.", "Make the limb active in pose mode, or measure while posing."
-            )
+
+_AboutAxes: Final = partial(FloatVectorProperty, size=3, min=0.0, precision=4, subtype="XYZ")
+_ABOUT: Final = "about the bone's X, Y (twist) and Z, {}. {}"
+
+
+class OCTO_MOTION_OT_pose_coefficients(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_coefficients"
+    bl_label = "Joint Coefficients"
+    bl_description = (
+        "Type the coefficients of the active bone's joint, of the three-element model, about each "
+        "of its axes. They count for a figure that is 1.5 m across, as every puppet is"
+    )
+
+    bone: StringProperty(
+        name="Bone", description="The limb whose joint it is; empty for the active bone"
+    )
+    stiffness: _AboutAxes(
+        name="K_f, N·m/rad",
+        description="Spring " + _ABOUT.format("N·m/rad", "It springs back what it is bent by"),
+        default=(10.0,) * 3,
+    )
+    damping: _AboutAxes(
+        name="D_f, N·m·s/rad",
+        description="Damper beside the spring "
+        + _ABOUT.format("N·m·s/rad", "Against the spring it is how long springing back takes"),
+        default=(0.5,) * 3,
+    )
+    flow: _AboutAxes(
+        name="D_d, N·m·s/rad",
+        description="Damper in series "
+        + _ABOUT.format("N·m·s/rad", "The smaller, the faster the joint gives way"),
+        default=(1.0,) * 3,
+        min=1e-6,
+    )
+    yields: BoolProperty(
+        name="Gives Way", description="Keep a bend, instead of springing back always", default=True
+    )
+    yield_torque: FloatProperty(
+        name="Yields at, N·m",
+        description="Torque, N·m, that the joint bears without giving way; 0 creeps always",
+        default=1.0,
+        min=0.0,
+        precision=4,
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
+        """Begin with what the joint of the active bone has now."""
+        self.bone = ""
+        try:
+            armature = active_armature(context)
+            session = _session_of(armature)
+            figure, body = joint_of(context, armature, session, "")
+            if session is not None:
+                elements = session.figure.elements
+            else:
+                settings: Any = posing_settings(armature)
+                rig = read_rig(armature, smallest=settings.smallest)
+                elements = joints_of_now(Puppet(armature, rig))
+        except OctoMotionError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.bone = figure.names[body]
+        for name in ("stiffness", "damping", "flow"):
+            setattr(self, name, np.broadcast_to(getattr(elements, name)[body], 3))
+        limit = float(elements.yield_torque[body])
+        self.yields = bool(np.isfinite(limit))
+        self.yield_torque = limit if self.yields else 1.0
+        assert context.window_manager is not None
+        return cast("set[Any]", context.window_manager.invoke_props_dialog(self))
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        writable_armature(armature)
+        session = _session_of(armature)
+        figure, body = joint_of(context, armature, session, self.bone)
+        check_joint(figure, body)
+        stiffness, damping, flow = (
+            (each[0], each[1], each[2]) for each in (self.stiffness, self.damping, self.flow)
+        )
+        limit = self.yield_torque if self.yields else float(np.inf)
+        typed = JointCoefficients(stiffness, damping, flow, limit)
         if session is not None:
-            return session.figure, session.body(name)
-        settings: Any = posing_settings(armature)
-        rig = read_rig(armature, smallest=settings.smallest)
-        return rig.figure, rig.body(name, armature.name)
+            session.take_material(typed, figure.names[body])
+        else:
+            set_bone_material(armature, figure.names[body], typed)
+        self.report({"INFO"}, f"{figure.names[body]} has coefficients of its own")
+
+
+def joint_of(
+    context: bpy.types.Context,
+    armature: bpy.types.Object,
+    session: PuppetSession | None,
+    name: str,
+) -> tuple[Figure, int]:
+    """A figure and the body of a bone, of the active one without a name.
+
+    Raises:
+        RigError: there is none.
+    """
+    active = context.active_pose_bone
+    name = name or (active.name if active is not None else "")
+    if not name:
+        raise RigError(
+            "No bone is active.", "Make the limb active in pose mode, or measure while posing."
+        )
+    if session is not None:
+        return session.figure, session.body(name)
+    settings: Any = posing_settings(armature)
+    rig = read_rig(armature, smallest=settings.smallest)
+    return rig.figure, rig.body(name, armature.name)
 
 
 class OCTO_MOTION_OT_pose_forget_measured(ArmatureOperator, bpy.types.Operator):

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import bpy
-import gpu
 import numpy as np
-from gpu_extras.batch import batch_for_shader
 
 from ...core.posing.wireframe import arrow_lines, capsule_lines, load_colours, pin_lines
 from ...core.rotations import Floats
+from ..overlay_lines import Lines, draw_lines
 from .controls import PoseControls
 from .device_hands import DeviceHands, NdofHands
 from .properties import posing_settings
@@ -27,9 +26,6 @@ _HOLDING: Final = (1.0, 0.6, 0.1, 1.0)
 _STRONG: Final = (1.0, 0.1, 0.1, 1.0)
 _POINTER: Final = 0.03
 """Of the figure."""
-
-Lines = list[tuple[Floats, Floats, float]]
-"""Points (2 · lines, 3), colours (2 · lines, 4) and width in pixels."""
 
 
 def overlay_lines(
@@ -108,27 +104,7 @@ class Overlay:
             return
         settings: Any = posing_settings(armature)
         eye = np.array(context.region_data.view_matrix.inverted(), dtype=np.float64)[:3, 2]
-        shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
-        gpu.state.blend_set("ALPHA")
-        gpu.state.depth_test_set("NONE")
-        try:
-            for points, colours, width in self._lines(
-                self._controls, eye, loads=settings.show_loads
-            ):
-                if not len(points):
-                    continue
-                content: Any = {
-                    "pos": points.astype(np.float32),
-                    "color": colours.astype(np.float32),
-                }
-                batch = batch_for_shader(shader, "LINES", content)
-                shader.bind()
-                shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-                shader.uniform_float("lineWidth", width * context.preferences.system.pixel_size)
-                batch.draw(shader)
-        finally:
-            gpu.state.blend_set("NONE")
-            gpu.state.depth_test_set("NONE")
+        draw_lines(self._lines(self._controls, eye, loads=settings.show_loads))
 
 
 def device_lines(hands: DeviceHands | NdofHands, eye: Floats, *, loads: bool = True) -> Lines:

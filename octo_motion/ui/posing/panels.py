@@ -9,6 +9,7 @@ import bpy
 
 from ...device.calibration import Phase, reached
 from ...device.driver import Kind
+from ...device.hid import why_not_read
 from ...device.messages import DeviceMessage
 from ..operator_base import window_manager
 from ..panel_base import ArmaturePanel
@@ -20,8 +21,9 @@ from .device_pose import (
     OCTO_MOTION_OT_pose_device,
     active_hands,
 )
-from .device_settings import device_settings
+from .device_settings import device_settings, key_file
 from .operators import (
+    OCTO_MOTION_OT_pose_coefficients,
     OCTO_MOTION_OT_pose_forget_measured,
     OCTO_MOTION_OT_pose_mark_bones,
     OCTO_MOTION_OT_pose_measure,
@@ -44,9 +46,15 @@ class PosePanel(ArmaturePanel):
 
 class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
     bl_label = "Pose"
-    bl_order = 7
+    bl_order = 1
+    bl_options = set()
+    tool = "POSE"
 
     def show(self, layout: Any, settings: Any) -> None:
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator_context = "INVOKE_DEFAULT"
+        row.operator(OCTO_MOTION_OT_pose_start.bl_idname, icon="VIEW_PAN")
         layout.prop(settings, "material")
         if settings.material == CUSTOM:
             column = layout.column(align=True)
@@ -59,10 +67,6 @@ class OCTO_MOTION_PT_posing(PosePanel, bpy.types.Panel):
             column.prop(settings, "custom_settles")
         layout.prop(settings, "strength")
         layout.prop(settings, "root")
-        row = layout.row()
-        row.scale_y = 1.5
-        row.operator_context = "INVOKE_DEFAULT"
-        row.operator(OCTO_MOTION_OT_pose_start.bl_idname, icon="VIEW_PAN")
         if active_session() is not None:
             layout.label(text="Enter keeps, Esc takes back", icon="INFO")
 
@@ -98,6 +102,9 @@ class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):
         row.operator_context = "INVOKE_DEFAULT"
         row.operator(OCTO_MOTION_OT_pose_measure.bl_idname, icon="DRIVER_ROTATIONAL_DIFFERENCE")
         row.operator(OCTO_MOTION_OT_pose_forget_measured.bl_idname, text="", icon="X")
+        column = layout.column()
+        column.operator_context = "INVOKE_DEFAULT"
+        column.operator(OCTO_MOTION_OT_pose_coefficients.bl_idname, icon="PREFERENCES")
         layout.prop(settings, "smallest")
         layout.prop(settings, "show_loads")
         layout.operator_menu_enum(
@@ -115,6 +122,7 @@ class OCTO_MOTION_PT_posing_keys(PosePanel, bpy.types.Panel):
             row = layout.row()
             row.alert = settings.action is None
             row.prop(settings, "action")
+        layout.prop(settings, "key_blend")
         layout.prop(settings, "record_angle")
         layout.operator_context = "INVOKE_DEFAULT"
         layout.operator(OCTO_MOTION_OT_pose_script.bl_idname, icon="FILE_SCRIPT")
@@ -143,11 +151,16 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         hands = active_hands()
         if hands is not None:
             self._devices(layout, hands)
+        if why := why_not_read():
+            layout.label(text=why, icon="INFO")
         for name in ("force", "toggle", "speed", "scale", "reach"):
             layout.prop(own, name)
-        row = layout.row()
-        row.active = hands is None
-        row.prop(own, "simulate")
+        column = layout.column()
+        column.active = hands is None
+        column.prop(own, "simulate")
+        column.prop(own, "port")
+        if own.port:
+            column.label(text=str(key_file()), icon="LOCKED")
 
     @staticmethod
     def _devices(layout: Any, hands: Hands) -> None:

@@ -16,6 +16,7 @@ from .. import at_work
 from ..operator_base import ArmatureOperator
 from .controls import Outcome, PoseControls
 from .overlay import Overlay
+from .passing import left_to_blender
 from .puppet_session import PuppetSession, active_session
 from .viewport import frame_under, go_to, strip_under, view_under
 
@@ -77,7 +78,15 @@ class SessionOperator(ArmatureOperator):
             self._end(context, keep=True)
             return {"CANCELLED"}
         try:
+            if self._session.is_edited():
+                # Another workspace may bring its mode along: no error, and no popup.
+                name = self._session.puppet.name
+                self._end(context, keep=True)
+                self.report({"INFO"}, f"Posing has ended: {name} is in edit mode")  # type: ignore[attr-defined]
+                return {"FINISHED", "PASS_THROUGH"}
             outcome = self.turn(context, event)
+            if outcome is Outcome.PASSED:
+                outcome = left_to_blender(context.window, event, context.mode)
         except OctoMotionError as error:
             return self._fail(context, error)
         except BaseException:

@@ -182,6 +182,14 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         description="The action that gets the keys",
         type=bpy.types.Action,
     )
+    key_blend: props.IntProperty(
+        name="Blend",
+        description="Over how many frames a pose that is keyed over a motion with keys on every "
+        "frame comes in, and goes out again: such keys go to a layer of their own",
+        default=8,
+        min=1,
+        soft_max=48,
+    )
     record_angle: props.AngleProperty(
         name="Tolerance Angle",
         description="How far a recorded motion's keys may be off the motion of the hand, per bone",

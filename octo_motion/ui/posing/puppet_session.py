@@ -15,14 +15,29 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...blender.animation import Keyed, PoseKeys, pose_values, restore_pose, writable_armature
-from ...blender.rig import Puppet, read_rig
+from ...blender.animation import (
+    Keyed,
+    PoseKeys,
+    mark_file_changed,
+    pose_values,
+    restore_pose,
+    writable_armature,
+)
+from ...blender.rig import puppet_of, read_rig
 from ...core.errors import OctoMotionError, RigError, SettingsError
 from ...core.posing.picking import Hit, pick
-from ...core.posing.puppet import Elements, Figure, Material, Pose, capsules_in_world, joint_loads
+from ...core.posing.puppet import (
+    Elements,
+    Figure,
+    JointCoefficients,
+    Material,
+    Pose,
+    capsules_in_world,
+    joint_loads,
+)
 from ...core.posing.session import HandSample, Session, TickReport, hand_for
 from ...core.posing.solver import HandSpring, OneThread, WorldSettings
-from ...core.rotations import IDENTITY, Floats
+from ...core.rotations import IDENTITY, Floats, rotate
 from .measuring_hand import MeasuringHand, coefficients, measured_joint
 from .properties import posing_settings
 from .recording import Recording
@@ -43,7 +58,7 @@ class PosedPuppet:
         clock: Callable[[], float] | None,
     ) -> None:
         panel: Any = posing_settings(armature)
-        self.puppet = Puppet(armature, read_rig(armature, smallest=panel.smallest))
+        self.puppet = puppet_of(armature, read_rig(armature, smallest=panel.smallest))
         self.settings = SessionSettings.of(armature)
         self.materials = BoneMaterials(self.puppet)
         self.measuring: MeasuringHand | None = None
@@ -164,14 +179,10 @@ class PosedPuppet:
         Raises:
             RigError: there is no such bone.
         """
-        body = self.body(bone)
-        point, end = capsules_in_world(self.figure, self.core.pose)[body]
-        way = end - point
-        size = float(np.linalg.norm(way))
-        if size > 1e-9:
-            # Capsules end a radius before the limb does.
-            radius = self.figure.radii[body] * (way / size)
-            point = (point - radius) + share * (way + 2.0 * radius)
+        body, pose = self.body(bone), self.core.pose
+        # From the joint to the limb's end, in the middle of which its mass is: of a ball too.
+        way = 2.0 * share * self.figure.centres[body]
+        point = pose.positions[body] + rotate(pose.orientations[body], way)
         self.grab(body, point)
         return point / self.unit
 
@@ -223,8 +234,9 @@ class PosedPuppet:
         self.drop_measure()
         return coefficients(self.bone(body), measured)
 
-    def take_material(self, material: Material, bone: str) -> None:
-        """Let the figure, or one bone's joint, be of a material; taken back by ``cancel``.
+    def take_material(self, material: Material | JointCoefficients, bone: str) -> None:
+        """Let the figure, or one bone's joint, be of a material, or this one of coefficients; taken
+        back by ``cancel``.
 
         Raises:
             WriteError: the bones are linked.
@@ -269,7 +281,72 @@ def active_session() -> PuppetSession | None:
     return _active[0] if _active else None
 
 
-class PuppetSession(PosedPuppet):
+class KeyedPuppet(PosedPuppet):
+    """A puppet whose pose can be keyed.
+
+    Raises:
+        OctoMotionError: it cannot be posed, or not be keyed.
+    """
+
+    def __init__(
+        self,
+        armature: bpy.types.Object,
+        scene: bpy.types.Scene,
+        clock: Callable[[], float] | None,
+    ) -> None:
+        writable_armature(armature)
+        super().__init__(armature, scene, clock)
+        settings: Any = posing_settings(armature)
+        self.missed = ""
+        """What of the pose the rig's controls cannot give, if it is posed through these."""
+        self.keys = PoseKeys(armature, settings.keys_to, settings.action, blend=settings.key_blend)
+
+    def key(self, *, all_bones: bool = False, bones: Iterable[str] | None = None) -> list[str]:
+        """Key the bones that were touched, or all limbs, at the current frame; the bones that got a
+        key.
+        """
+        if bones is not None:
+            bodies = [self.body(each) for each in bones]
+        else:
+            bodies = list(range(len(self.figure))) if all_bones else self._touched()
+        return self._insert(bodies, all_bones=all_bones)
+
+    def words_for(self, keyed: list[str]) -> str:
+        """Which bones got keys now, or why none did, for people."""
+        if keyed:
+            told = f"Keyed {_counted(len(keyed), 'bone')} at frame {self.scene().frame_current}"
+            if beneath := self.keys.layered:
+                told += f", in a layer over {beneath}, which has keys on every frame"
+            return told
+        if self.core.touched():
+            return "Nothing keyed: by the settings of keying, no bone needs or takes a key"
+        return "Nothing to key: no bone was moved"
+
+    def settle(self) -> None:
+        """Let the bones show the pose that the figure has."""
+        self.missed = self.puppet.settle()
+
+    def _touched(self) -> list[int]:
+        """Bodies that are keyed; what no eye sees of others is put back."""
+        touched = self.puppet.with_followers(self.core.touched())
+        self.core.put_back()
+        self.puppet.write(self.core.pose)
+        return touched
+
+    def _insert(
+        self, bodies: Iterable[int], *, auto: bool = False, all_bones: bool = False
+    ) -> list[str]:
+        self.settle()
+        wanted = self.puppet.keyed(bodies, all_bones=all_bones)
+        keyed = [Keyed(bone, placed) for bone, placed in wanted]
+        if not keyed:
+            return []
+        frame, armature = self.scene().frame_current_final, self.puppet.armature()
+        with _pose_kept(armature):
+            return self.keys.insert(armature, keyed, frame, auto=auto)
+
+
+class PuppetSession(KeyedPuppet):
     """An armature in a hand, from start to end; without a clock it is repeatable.
 
     Raises:
@@ -289,10 +366,7 @@ class PuppetSession(PosedPuppet):
                 f"'{going_on.puppet.name}' is being posed already.",
                 "End that session first, with Enter or Esc over its viewport.",
             )
-        writable_armature(armature)
         super().__init__(armature, scene, clock)
-        settings: Any = posing_settings(armature)
-        self.keys = PoseKeys(armature, settings.keys_to, settings.action)
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
         self._recording: Recording | None = None
@@ -312,12 +386,22 @@ class PuppetSession(PosedPuppet):
         if self.held is None:
             return []
         self.core.release()
+        self.settle()
+        mark_file_changed()
         tools = self.scene().tool_settings
         if tools.use_keyframe_insert_auto and self._recording is None:
             return self._insert(self._touched(), auto=True)
         return []
 
     # --- Time -----------------------------------------------------------------------------------
+
+    def is_edited(self) -> bool:
+        """Whether the armature is in edit mode, where nothing is posed.
+
+        Raises:
+            RigError: it is gone.
+        """
+        return self.puppet.found().mode == "EDIT"
 
     def tick(
         self, seconds: float, position: Floats | None = None, turn: Floats | None = None
@@ -333,7 +417,7 @@ class PuppetSession(PosedPuppet):
         if trouble is not None:
             raise trouble
         armature = self.puppet.armature()
-        if armature.mode == "EDIT":
+        if self.is_edited():
             raise RigError(f"'{armature.name}' is in edit mode.", "Leave it and start again.")
         self.apply_settings(armature)
         if self._recording is None and self.puppet.is_moved():
@@ -369,35 +453,6 @@ class PuppetSession(PosedPuppet):
         self.measuring = MeasuringHand(self.figure, self.core.pose, body)
 
     # --- Keys -----------------------------------------------------------------------------------
-
-    def key(self, *, all_bones: bool = False, bones: Iterable[str] | None = None) -> list[str]:
-        """Key the bones that were touched, or all limbs, at the current frame; the bones that got a
-        key.
-        """
-        if bones is not None:
-            bodies = [self.body(each) for each in bones]
-        else:
-            bodies = list(range(len(self.figure))) if all_bones else self._touched()
-        return self._insert(bodies)
-
-    def words_for(self, keyed: list[str]) -> str:
-        """Which bones got keys now, or why none did, for people."""
-        if keyed:
-            return f"Keyed {_counted(len(keyed), 'bone')} at frame {self.scene().frame_current}"
-        if self.core.touched():
-            return "Nothing keyed: by the settings of keying, no bone needs or takes a key"
-        return "Nothing to key: no bone was moved"
-
-    def _touched(self) -> list[int]:
-        return self.puppet.with_followers(self.core.touched())
-
-    def _insert(self, bodies: Iterable[int], *, auto: bool = False) -> list[str]:
-        keyed = [Keyed(self.bone(body), self.puppet.places(body)) for body in bodies]
-        if not keyed:
-            return []
-        frame, armature = self.scene().frame_current_final, self.puppet.armature()
-        with _pose_kept(armature):
-            return self.keys.insert(armature, keyed, frame, auto=auto)
 
     @property
     def recording(self) -> bool:
@@ -443,12 +498,20 @@ class PuppetSession(PosedPuppet):
         """Back to the pose at the start; keys stay."""
         self.core.restore()
         self.puppet.write(self.core.pose)
+        self.settle()
 
     def step_back(self) -> bool:
         """Back to before the last grab; whether there was one."""
-        done = self.core.step_back()
+        return self._stepped(self.core.step_back())
+
+    def step_forward(self) -> bool:
+        """On to what the last step back has undone; whether there was one."""
+        return self._stepped(self.core.step_forward())
+
+    def _stepped(self, done: bool) -> bool:  # noqa: FBT001 - what has come of the step
         if done:
             self.puppet.write(self.core.pose)
+            self.settle()
         return done
 
     def finish(self) -> None:
@@ -462,6 +525,7 @@ class PuppetSession(PosedPuppet):
         try:
             self.drop_measure()
             self.release()
+            self.settle()
             if self._recording is not None:
                 self.stop_record()
         finally:

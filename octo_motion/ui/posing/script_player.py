@@ -12,6 +12,7 @@ from bpy.props import StringProperty
 
 from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
+from ...core.files import read_text
 from ...core.posing.pose_script import PoseScript, ScriptStep, parse_script
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
 from ..operator_base import ArmatureOperator, FileOperator
@@ -148,7 +149,7 @@ def play_file(armature: bpy.types.Object, scene: bpy.types.Scene, path: Path) ->
         OctoMotionError: the file or a step is wrong; the armature is as it was.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise SettingsError(f"'{path.name}' cannot be read: {error}.", "Choose another.") from None
     script = parse_script(text, path.name)

@@ -10,9 +10,15 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
-from ...blender.rig import Puppet, armature_data, bone_materials, is_part_of, set_bone_material
+from ...blender.rig import (
+    Puppet,
+    armature_data,
+    bone_materials,
+    is_part_of,
+    set_bone_material,
+)
 from ...blender.scene import read_obstacle
-from ...core.posing.puppet import Elements, Figure, Material, elements_for
+from ...core.posing.puppet import Elements, Figure, JointCoefficients, Material, elements_for
 from ...core.posing.session import Session
 from ...core.posing.solver import Obstacle, Plane
 from .properties import marked_obstacles, posing_settings
@@ -66,7 +72,7 @@ class SessionSettings(SimpleNamespace):
             "drag": _CALMING if calm else 0.0,
         }
 
-    def elements(self, figure: Figure, own: Mapping[int, Material]) -> Elements:
+    def elements(self, figure: Figure, own: Mapping[int, Material | JointCoefficients]) -> Elements:
         """Of the joints; some bodies may have a material of their own."""
         return elements_for(figure, *self.joints, own=own)
 
@@ -112,8 +118,8 @@ class BoneMaterials:
         names = self._puppet.figure.names
         self.by_body = {body: own[name] for body, name in enumerate(names) if name in own}
 
-    def take(self, material: Material, bone: str) -> None:
-        """Let the figure, or one bone's joint, be of a material.
+    def take(self, material: Material | JointCoefficients, bone: str) -> None:
+        """Let the figure, or one bone's joint, be of a material, or this one of coefficients.
 
         Raises:
             WriteError: the bones are linked.
@@ -129,6 +135,12 @@ class BoneMaterials:
             put_back(armature)
 
 
+def joints_of_now(puppet: Puppet) -> Elements:
+    """The elements that a session of an armature would have now."""
+    settings = SessionSettings.of(puppet.armature())
+    return settings.elements(puppet.figure, BoneMaterials(puppet).by_body)
+
+
 def chosen_material(settings: Any) -> str | Material:
     """What a figure is made of, for ``elements_for``, by settings or the like."""
     if settings.material != CUSTOM:
@@ -142,13 +154,16 @@ def chosen_material(settings: Any) -> str | Material:
     )
 
 
-def keep_material(armature: bpy.types.Object, settings: Any, material: Material, bone: str) -> None:
-    """Make the figure of a material, or with the name of a bone that one's joint.
+def keep_material(
+    armature: bpy.types.Object, settings: Any, material: Material | JointCoefficients, bone: str
+) -> None:
+    """Make the figure of a material, or with the name of a bone that one's joint, or its joint of
+    coefficients.
 
     Raises:
         WriteError: the bones are linked.
     """
-    if bone:
+    if bone or isinstance(material, JointCoefficients):
         set_bone_material(armature, bone, material)
         return
     settings.material = CUSTOM

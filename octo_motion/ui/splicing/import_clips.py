@@ -233,7 +233,7 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Open the file browser; files that were dropped need none."""
-        if self.files:
+        if self.files or self.filepath:
             return self._import(context)
         self._browsing = True
         window_manager(context).fileselect_add(self)

@@ -7,9 +7,7 @@ from itertools import pairwise
 from typing import Any, Final
 
 import bpy
-import gpu
 import numpy as np
-from gpu_extras.batch import batch_for_shader
 
 from ...blender.animation import read_clip
 from ...blender.rig import world_matrix
@@ -18,6 +16,7 @@ from ...core.rotations import Floats
 from ...core.splicing.clip import Clip, average_pose, with_rest_pose
 from ...core.splicing.humanoid import Landmarks
 from ...core.splicing.transfer import find_reference_pose, reference_doubts
+from ..overlay_lines import draw_lines
 from .bodies import known_landmarks
 from .splice_operators import StackOperator
 
@@ -111,13 +110,7 @@ def _draw(name: str, lines: Lines) -> None:
     size = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     points, colours = size * lines[0], lines[1]
     points = points + world[:3, 3] + [_BESIDE * float(np.ptp(points[:, 2])), 0.0, 0.0]
-    shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
-    content: Any = {"pos": points.astype(np.float32), "color": colours.astype(np.float32)}
-    batch = batch_for_shader(shader, "LINES", content)
-    shader.bind()
-    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-    shader.uniform_float("lineWidth", _WIDTH * context.preferences.system.pixel_size)
-    batch.draw(shader)
+    draw_lines([(points, colours, _WIDTH)])
 
 
 class OCTO_MOTION_OT_reference_show(StackOperator, bpy.types.Operator):

@@ -223,7 +223,7 @@ def _check_landmarks(source: Source) -> None:
         problem = source.problem or f"It is not known which bone is the {title(missing[0])}."
         raise ClipError(
             f"'{source.armature}' has no landmarks. {problem}",
-            f"Make '{source.armature}' active, click Find Landmarks in the panel Splicing > "
+            f"Make '{source.armature}' active, click Find Landmarks in the panel Splice > "
             "Landmarks and choose there what it cannot find.",
         )
 

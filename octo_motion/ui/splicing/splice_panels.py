@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Splicing: base and list, the active splice, its timing, landmarks."""
+"""The panel Splice: base and list, the active splice, its timing, landmarks."""
 
 from __future__ import annotations
 
@@ -42,33 +42,38 @@ class _SplicePanel(_Panel):
 
 
 class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
-    bl_label = "Splicing"
-    bl_order = 5
+    bl_label = "Splice"
+    bl_order = 1
+    bl_options = set()
+    tool = "SPLICE"
 
     def show(self, layout: Any, settings: Any) -> None:
-        _draw_action(layout, settings, "base", "base_slot")
-        layout.prop(settings, "visual")
+        row = layout.row()
+        row.scale_y = 1.5
+        row.operator(OCTO_MOTION_OT_splice_build.bl_idname, icon="PLAY", text="Build")
+        base = layout.column()
+        # It is asked for as soon as there is something to put on it.
+        base.alert = settings.base is None and len(settings.splices) > 0
+        _draw_action(base, settings, "base", "base_slot")
         buttons = (
             OCTO_MOTION_OT_splice_add,
             OCTO_MOTION_OT_splice_remove,
             OCTO_MOTION_OT_splice_move,
         )
         names = "splices", "active_splice"
-        draw_list(layout, OCTO_MOTION_UL_splices, settings, names, buttons, rows=4, maxrows=8)
+        draw_list(layout, OCTO_MOTION_UL_splices, settings, names, buttons, rows=4, maxrows=4)
         column = layout.column(align=True)
         column.operator_context = "INVOKE_DEFAULT"
         column.operator(OCTO_MOTION_OT_splice_drag_timing.bl_idname, icon="ARROW_LEFTRIGHT")
         column.operator(OCTO_MOTION_OT_splice_suggest_timing.bl_idname, icon="LIGHT")
         layout.row().prop(settings, "result_as", expand=True)
-        row = layout.row()
-        row.scale_y = 1.5
-        row.operator(OCTO_MOTION_OT_splice_build.bl_idname, icon="PLAY", text="Build")
+        layout.prop(settings, "visual")
         if settings.result is not None:
             layout.label(text=settings.result.name, icon="ACTION")
 
 
 class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
-    bl_label = "Splice"
+    bl_label = "The Splice"
     bl_parent_id = "OCTO_MOTION_PT_splicing"
 
     def show(self, layout: Any, settings: Any) -> None:
@@ -82,7 +87,9 @@ class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
         source.prop(item, "source")
         if kind is None and item.source is not None:
             layout.prop_search(item, "source_bone", item.source.data, "bones")
-        _draw_action(layout, item, "action", "slot")
+        action = layout.column()
+        action.alert = item.action is None
+        _draw_action(action, item, "action", "slot")
         if item.source is None or item.action is None:
             layout.label(text="Its source is gone: choose another", icon="ERROR")
         elif not item.source.users_scene:
@@ -183,14 +190,12 @@ class OCTO_MOTION_PT_landmarks(_Panel, bpy.types.Panel):
         draw_landmarks(layout, bpy.context, settings)
 
 
-def _draw_action(layout: Any, group: Any, action: str, slot: str) -> None:
-    column = layout.column()
-    column.alert = getattr(group, action) is None
+def _draw_action(column: Any, group: Any, action: str, slot: str) -> None:
     column.prop(group, action)
     chosen = getattr(group, action)
     # Most actions have one slot, which need not be chosen.
     if chosen is not None and (len(chosen.slots) > 1 or getattr(group, slot) not in chosen.slots):
-        layout.prop_search(group, slot, chosen, "slots")
+        column.prop_search(group, slot, chosen, "slots")
 
 
 CLASSES: Final = (

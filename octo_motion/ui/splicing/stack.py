@@ -214,7 +214,7 @@ def prepare_splices(armature: bpy.types.Object, *, between: bool = True) -> Stac
     writable_armature(armature)
     if len(settings.splices) == 0:
         raise ClipError(
-            f"'{armature.name}' has no splices.", "Add one in the panel Splicing (Add Splice)."
+            f"'{armature.name}' has no splices.", "Add one in the panel Splice (Add Splice)."
         )
     reader = ClipReader()
     base = reader.base(armature)
@@ -298,7 +298,7 @@ class ClipReader:
         if settings.base is None:
             raise ClipError(
                 f"'{armature.name}' has no base action, or it is gone.",
-                "Choose the base in the panel Splicing.",
+                "Choose the base in the panel Splice.",
             )
         if settings.visual and settings.result_as == "LAYER":
             raise ClipError(
@@ -315,7 +315,7 @@ class ClipReader:
         Raises:
             OctoMotionError: it is gone, or cannot be read.
         """
-        remedy = "Choose it in the panel Splicing, mute the splice or remove it."
+        remedy = "Choose it in the panel Splice, mute the splice or remove it."
         if item.source is None:
             raise ClipError("Its source armature is gone, or was never chosen.", remedy)
         if item.action is None:
@@ -346,7 +346,7 @@ class ClipReader:
                 if chosen is None:
                     raise ClipError(
                         f"Action '{action.name}' has no slot '{slot[2:]}'.",
-                        "Choose one of its slots in the panel Splicing, or leave the slot empty.",
+                        "Choose one of its slots in the panel Splice, or leave the slot empty.",
                     )
             clip = read_clip(armature, action, chosen, visual=visual)
             if between and not is_recorded(armature, action, chosen):
@@ -432,13 +432,13 @@ def _part(item: Any, base: Source, source: Source) -> Part:
     if name != CHAIN.name:
         return part_named(name)
     if not item.bone:
-        raise ClipError("Its chain has no first bone.", "Choose it in the panel Splicing.")
+        raise ClipError("Its chain has no first bone.", "Choose it in the panel Splice.")
     part = chain_part(item.bone, item.source_bone)
     for each, bone in ((base, part.root), (source, part.splice_root)):
         if bone not in each.clip.skeleton.index:
             raise ClipError(
                 f"'{each.armature}' has no bone '{bone}', the first of its chain.",
-                "Choose the first bones in the panel Splicing.",
+                "Choose the first bones in the panel Splice.",
             )
     return part
 
@@ -446,7 +446,7 @@ def _part(item: Any, base: Source, source: Source) -> Part:
 def _check_landmarks(splice: Splice, source: Source) -> None:
     """Ask for what cannot be told, with the name of whose it is."""
     remedy = (
-        f"Make '{source.armature}' active, click Find Landmarks in the panel Splicing > Landmarks "
+        f"Make '{source.armature}' active, click Find Landmarks in the panel Splice > Landmarks "
         "and choose there what it cannot find."
     )
     if source.landmarks is None:
@@ -479,7 +479,7 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
     if stack.base.landmarks is None or splice.landmarks is None:
         raise ClipError(
             "Timing is suggested from what the legs do, and one of the two has no landmarks.",
-            "Drag the timing instead, or fill the table in the panel Splicing > Landmarks.",
+            "Drag the timing instead, or fill the table in the panel Splice > Landmarks.",
         )
     found = suggest_timings(stack.base, splice.mapped, splice.timing, count)
     if not found:

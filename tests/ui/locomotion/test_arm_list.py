@@ -118,12 +118,16 @@ def test_detecting_again_keeps_what_the_artist_set() -> None:
     armature = new_octopus()
     call("detect_arms")
     arms(armature)[2].phase, arms(armature)[2].flip = 1.5, True
+    arms(armature)[2].use_weights, arms(armature)[2].weight_tip = True, 0.1
     arms(armature)[3].name, arms(armature)[3].enabled = "Curly", False
     before = listed(armature)
     arms(armature).move(2, 7)
     arms(armature)[0].side, arms(armature)[0].pair = "CENTER", 9
     call("detect_arms")
     assert listed(armature) == before
+    curly = next(arm for arm in arms(armature) if arm.phase > 0.0)
+    assert curly.use_weights
+    assert curly.weight_tip == pytest.approx(0.1)
 
 
 def test_an_arm_with_other_bones_starts_anew() -> None:

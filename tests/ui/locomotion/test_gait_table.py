@@ -197,7 +197,7 @@ def test_files_that_are_no_gait_are_told_and_change_nothing(settings: Any, tmp_p
     path = tmp_path / "gait.json"
     with pytest.raises(RuntimeError, match="cannot be read"):
         click("gait_import", filepath=str(path))
-    path.write_text("[]")
+    path.write_text("[]", encoding="utf-8")
     with pytest.raises(RuntimeError, match="not a gait"):
         click("gait_import", filepath=str(path))
     with pytest.raises(RuntimeError, match="No file is given"):

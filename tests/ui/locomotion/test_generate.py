@@ -15,6 +15,7 @@ from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser
 from octo_motion.core.locomotion.motion import pipeline
 from octo_motion.ui import at_work
+from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.operators.generate import OCTO_MOTION_OT_generate_locomotion
 from octo_motion.ui.locomotion.writing import shot as workflow
 from octo_motion.ui.modal_job import ModalJob
@@ -30,6 +31,7 @@ from tests.ui.rig import (
     make_octopus,
     scene_contents,
 )
+from tests.ui.test_panels import Layout
 
 OCTOPUS = Octopus(route=ROUTE, frames=60)
 """Four arms of six bones, one metre long, a route of about six metres."""
@@ -458,7 +460,7 @@ def test_undo_of_generating_again_brings_the_old_keys_back(octopus: Any) -> None
     assert name in bpy.data.objects
 
 
-def test_the_scene_is_extended_where_the_motion_lasts_longer_and_never_shortened(
+def test_the_scene_is_extended_where_the_motion_lasts_longer_and_no_shorter_than_it_was(
     octopus: Any,
 ) -> None:
     scene = bpy.context.scene
@@ -474,6 +476,63 @@ def test_the_scene_is_extended_where_the_motion_lasts_longer_and_never_shortened
     assert scene.frame_end == 400
     assert summary.notes == ("It lasts to frame 500, the scene ends at 400.",)
     assert summary.message.startswith("Walk of 500 frames")
+
+
+def test_what_was_extended_for_a_motion_is_taken_back_as_it_gets_shorter(octopus: Any) -> None:
+    scene, settings = bpy.context.scene, settings_of(octopus)
+    for last, end in ((400, 400), (300, 300), (100, 250), (500, 500)):
+        settings.frame_end = last
+        generate(octopus)
+        assert scene.frame_end == end
+    # What the artist sets is the artist's.
+    scene.frame_end = 450
+    settings.frame_end = 100
+    generate(octopus)
+    assert scene.frame_end == 450
+
+
+def test_message_and_panel_tell_the_same_of_every_motion(octopus: Any) -> None:
+    bpy.ops.octo_motion.setup_load(name="idle")
+    summary = workflow.generate_locomotion(octopus, bpy.context)
+    assert summary.message.startswith("Idle of ")
+    bpy.ops.octo_motion.setup_load(name="walk")
+    settings_of(octopus).timing = "RANGE"
+    for last in (355, 356):
+        settings_of(octopus).frame_end = last
+        summary = workflow.generate_locomotion(octopus, bpy.context)
+        assert f"({(last - 1) / 24:.1f} s)" in summary.message
+        layout = Layout()
+        panels._draw_result(layout, settings_of(octopus).result)
+        assert f"{last} frames, {(last - 1) / 24:.1f} s" in layout.drawn
+
+
+def test_all_that_are_selected_move_the_active_one_first(octopus: Any) -> None:
+    other, third, idle = make_octopus("Other"), make_octopus("Third"), make_octopus("Idle")
+    for each in (other, third):
+        give_route(each)
+        settings_of(each).timing, settings_of(each).frame_end = "RANGE", 30
+    for each in (other, octopus, idle):
+        each.select_set(state=True)
+    third.select_set(state=False)
+    bpy.context.view_layer.objects.active = octopus
+    assert bpy.ops.octo_motion.generate_locomotion() == {"FINISHED"}
+    moved = [each for each in (octopus, other, third, idle) if settings_of(each).result]
+    assert moved == [octopus, other]
+    alone = keys(other.animation_data.action)
+    generate(other)
+    assert keys(other.animation_data.action).keys() == alone.keys()
+    for place, values in keys(other.animation_data.action).items():
+        assert np.array_equal(values, alone[place])
+
+
+def test_if_one_of_several_cannot_move_none_does(octopus: Any) -> None:
+    other = make_octopus("Other")
+    give_route(other, [(0.0, 0.0, 0.0)] * 4)
+    octopus.select_set(state=True)
+    bpy.context.view_layer.objects.active = octopus
+    with pytest.raises(RuntimeError):
+        bpy.ops.octo_motion.generate_locomotion()
+    assert settings_of(octopus).result is None
 
 
 def test_frame_selection_and_mode_stay_as_they_are(octopus: Any) -> None:

@@ -97,6 +97,16 @@ def test_the_motion_follows_a_point_of_the_route(octopus: Any) -> None:
     assert motion(octopus) == followed  # as Generate makes it
 
 
+def test_another_set_up_is_followed_and_live_stays_on(octopus: Any) -> None:
+    before = motion(octopus)
+    bpy.ops.octo_motion.setup_load(name="tiptoe")
+    bpy.context.view_layer.update()
+    assert settings_of(octopus).live
+    assert live.pending()
+    assert settle()
+    assert motion(octopus) != before
+
+
 def test_a_route_in_edit_mode_is_followed_as_it_is(octopus: Any) -> None:
     """A drag is applied to what is edited, which the rest of Blender does not see yet."""
     route = settings_of(octopus).route

@@ -198,6 +198,23 @@ def test_an_object_is_carried_and_left(octopus: Any) -> None:
     assert all(np.allclose(again[path], values, atol=1e-5) for path, values in first.items())
 
 
+def test_suckers_carry_without_winding(octopus: Any) -> None:
+    give_route(octopus, [(0, 0, 0), (0, -0.7, 0), (0, -1.4, 0), (0, -2.0, 0)])
+    rod = thing(objects.rod(0.04, 0.6), (0.5, -0.85, 0.0))
+    reach(octopus, rod, mode="TOUCH", carry=True, frame_contact=34, frame_release=75)
+    generate(octopus)
+    placed = []
+    for frame in (34, 55, 75):
+        points = arm_joints(octopus, frame)
+        to_rod = rod.matrix_world.inverted()
+        local = np.array([to_rod @ Vector(each) for each in points])
+        placed.append(local[np.argsort(np.hypot(local[:, 0], local[:, 1]))[:2]])
+    # What lies on it goes along with it, and it goes along with the arm.
+    np.testing.assert_allclose(placed[1], placed[0], atol=1e-4)
+    np.testing.assert_allclose(placed[2], placed[0], atol=1e-4)
+    assert (rod.matrix_world.translation - Vector((0.5, -0.85, 0.0))).length > 0.3
+
+
 @pytest.fixture
 def carried(octopus: Any) -> tuple[Any, Any]:
     """A rod that is carried away, and its reach."""

@@ -139,7 +139,8 @@ def test_the_message_and_the_panel_tell_keys_before_and_after(octopus: Any) -> N
 
 def drawn(octopus: Any) -> str:
     layout = Layout()
-    panels.OCTO_MOTION_PT_generate.show(None, layout, settings_of(octopus))  # type: ignore[arg-type]
+    for panel in (panels.OCTO_MOTION_PT_generate, panels.OCTO_MOTION_PT_frames):
+        panel.show(None, layout, settings_of(octopus))  # type: ignore[arg-type]
     return " ".join(layout.drawn)
 
 

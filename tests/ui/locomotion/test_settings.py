@@ -34,8 +34,9 @@ NAMES = {
     *("weight_root", "weight_tip", "use_weight_curve", "weight_curve"),
     *("timing", "cycle_time", "speed", "frame_start", "frame_end"),
     *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),
-    *("result", "figures", "live", "live_error", "keep_apart", "tell_overlaps"),
+    *("result", "figures", "live", "live_error", "keep_apart", "tell_overlaps", "show_targets"),
     *("reaches", "active_reach", "cycles", "repeat", "breathing", "breath_time"),
+    *("setup", "extended_from", "extended_to"),
 }
 
 

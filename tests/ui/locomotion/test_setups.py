@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
 
+from octo_motion.blender.scene.curves import read_route
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.ui.declared_settings import plain
 from octo_motion.ui.locomotion.operators import setups
+from octo_motion.ui.locomotion.reading.motion import gait_settings
 from octo_motion.ui.locomotion.settings import locomotion_settings, read_gait
-from tests.ui.rig import click, make_octopus
+from tests.ui.rig import click, joints_in_world, make_octopus
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 SHIPPED = sorted(path.stem for path in (setups.PACKAGE / "presets" / setups.FOLDER).glob("*.py"))
@@ -101,6 +104,43 @@ def test_idle_and_curl_stay_and_the_next_setup_goes_again(settings: Any) -> None
     assert settings.travel_on == "BONE"
 
 
+@pytest.mark.parametrize("name", ["walk", "swim"])
+def test_as_published_arms_take_the_shape_that_sweeps_alone_give_them(
+    name: str, settings: Any
+) -> None:
+    bpy.ops.octo_motion.setup_load(name=f"{name}_as_published")
+    table = gait_settings(settings, read_gait(settings))
+    assert (table.softness, table.stretch_slack, table.smoothing_cycles) == (0.0, 0.0, 0.0)
+    assert (table.lateral_bend, table.raise_to_floor) == (0.0, False)
+    # Eq. 3.8-3.10 turn pitch and 3.15-3.17 head; links shorten in the walk alone.
+    knots = table.gait.curve(1).angles
+    turned, still = (1, 0) if name == "walk" else (0, 1)
+    assert abs(knots[..., turned]).max() > 1.0
+    assert not knots[..., [still, 2]].any()
+    assert table.contraction == (1.0 if name == "walk" else 0.0)
+    # Nothing but the curve's own parameter says how fast it goes (eq. 3.19), and nothing is held.
+    bpy.ops.octo_motion.add_route()
+    settings.timing, settings.frame_end = "RANGE", 9
+    click("generate_locomotion")
+    armature = settings.id_data
+    route = read_route(settings.route)
+    for frame in (1, 3, 6, 9):
+        place = joints_in_world(armature, frame)[0, 0]
+        # Where a cubic Bézier's parameter is at even times.
+        expected = bezier(settings.route, (frame - 1) / 8)
+        assert np.linalg.norm((place - expected)[:2]) < 1e-3 * route.length
+    assert {item.kind for item in settings.figures} <= {"MISS", "TURN", "OVERLAP"}
+
+
+def bezier(curve: Any, at: float) -> np.ndarray:
+    first, last = curve.data.splines[0].bezier_points
+    points = np.array([first.co, first.handle_right, last.handle_left, last.co])
+    shares = [(1 - at) ** 3, 3 * at * (1 - at) ** 2, 3 * at**2 * (1 - at), at**3]
+    return np.array(curve.matrix_world)[:3, :3] @ (shares @ points) + np.array(
+        curve.matrix_world.translation
+    )
+
+
 def test_setup_leaves_shot_rig_and_keys_alone(settings: Any) -> None:
     bpy.ops.octo_motion.add_route()
     settings.frame_start, settings.keys, settings.seed = 17, "REDUCED", 5
@@ -137,6 +177,43 @@ def test_loading_a_setup_is_one_undo_step(settings: Any) -> None:
     bpy.ops.octo_motion.setup_load("EXEC_DEFAULT", True, name="swim")  # noqa: FBT003 - undo
     bpy.ops.ed.undo()
     assert locomotion_settings(bpy.data.objects[armature]).table.manner == "WALK"
+
+
+def test_a_click_on_a_picture_loads_the_set_up_and_marks_it(settings: Any) -> None:
+    manager: Any = bpy.context.window_manager
+    assert manager.octo_motion_setup == "walk"
+    manager.octo_motion_setup = "tiptoe"
+    assert settings.gait == "tiptoe"
+    assert manager.octo_motion_setup == "tiptoe"
+    # Another armature has its own.
+    make_octopus("Other")
+    assert manager.octo_motion_setup == "walk"
+
+
+def test_names_below_the_pictures_outlive_what_blender_was_told() -> None:
+    # Blender keeps pointers to the texts of an enumeration, not the texts.
+    told = list(setups._offered(None, None))
+    again = setups._offered(None, None)
+    assert [item[0] for item in told] == list(setups.setup_paths())
+    assert all(
+        one is other
+        for first, second in zip(told, again, strict=True)
+        for one, other in zip(first[:3], second[:3], strict=True)
+    )
+
+
+def test_a_click_on_the_picture_of_a_damaged_set_up_leaves_all_as_it_was(
+    settings: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "walk.py").write_text("1 / 0")
+    paths = {**setups.setup_paths(), "walk": tmp_path / "walk.py"}
+    monkeypatch.setattr(setups, "setup_paths", lambda: paths)
+    bpy.ops.octo_motion.setup_load(name="swim")
+    before = state(settings)
+    manager: Any = bpy.context.window_manager
+    manager.octo_motion_setup = "walk"
+    assert state(settings) == before
+    assert manager.octo_motion_setup == "swim"
 
 
 def test_unknown_setup_is_refused_with_the_names_that_there_are(settings: Any) -> None:

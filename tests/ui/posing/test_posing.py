@@ -122,7 +122,7 @@ def test_hover_shows_what_would_be_grabbed(controls: PoseControls) -> None:
     assert controls.hover is None
 
 
-def test_click_beside_the_figure_is_left_to_blender(controls: PoseControls) -> None:
+def test_click_beside_the_figure_takes_hold_of_nothing(controls: PoseControls) -> None:
     assert controls.handle(Event("LEFTMOUSE"), VIEW, 4000.0, 4000.0) is Outcome.PASSED
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.rig.puppet_reading import MATERIAL, bone_materials
-from octo_motion.core.posing.puppet.materials import joint_loads
+from octo_motion.core.posing.puppet.materials import Material, joint_loads
+from octo_motion.core.rotations import to_matrix
 from octo_motion.ui.posing.controls import MEASURING, Outcome, PoseControls
 from octo_motion.ui.posing.puppet_session import PuppetSession
 from tests.core.world_probes import joint_turns
@@ -304,10 +305,86 @@ def test_measured_material_is_kept_with_the_file(octopus: Any, tmp_path: Path) -
     opened = bpy.data.objects[name]
     assert settings_of(opened).custom_springs == springs
     assert bone_materials(opened) == own
-    assert np.isinf(own[BONE].bears)
+    material = own[BONE]
+    assert isinstance(material, Material)
+    assert np.isinf(material.bears)
 
 
 def test_damaged_material_of_a_bone_counts_for_nothing(octopus: Any) -> None:
     for wrong in ("clay", [1.0, 2.0], [1.0, 0.0, 0.1, 1.0], 3.0):
         octopus.data.bones[BONE][MATERIAL] = wrong
         assert bone_materials(octopus) == {}
+
+
+# --- In numbers ----------------------------------------------------------------------------------
+
+TYPED = {
+    "stiffness": (20.0, 500.0, 30.0),
+    "damping": (0.4, 5.0, 0.6),
+    "flow": (0.5, 50.0, 2.0),
+    "yield_torque": 0.25,
+}
+
+
+def test_typed_coefficients_are_those_of_the_joint_whatever_the_strength(octopus: Any) -> None:
+    settings_of(octopus).strength = 3.0
+    assert bpy.ops.octo_motion.pose_coefficients(bone=BONE, **TYPED) == {"FINISHED"}
+    session = PuppetSession(octopus, bpy.context.scene, clock=None)
+    body, elements = session.body(BONE), session.figure.elements
+    for name in ("stiffness", "damping", "flow", "yield_torque"):
+        assert getattr(elements, name)[body] == pytest.approx(TYPED[name])
+    session.cancel()
+    assert set(bone_materials(octopus)) == {BONE}
+    assert bpy.ops.octo_motion.pose_forget_measured() == {"FINISHED"}
+    assert bone_materials(octopus) == {}
+
+
+def test_joint_gives_way_about_each_axis_of_its_bone_as_it_was_typed(octopus: Any) -> None:
+    bpy.ops.octo_motion.pose_coefficients(bone=BONE, **TYPED)
+    session = PuppetSession(octopus, bpy.context.scene, clock=None)
+    body = session.body(BONE)
+    session.core.pin(session.figure.parents[body], state=True)
+    turned = []
+    for axis in range(3):
+        before = joint_turns(session.core.world)[body]
+        bone = to_matrix(session.core.pose.orientations[body])[:, axis]
+        session.core.world.forces[body, 3:] = 0.5 * bone
+        session.core.wake()
+        for _ in range(30):
+            session.tick(TICK)
+        session.core.world.forces[:] = 0.0
+        for _ in range(30):
+            session.tick(TICK)
+        turned.append(_between(before, joint_turns(session.core.world)[body]))
+    session.cancel()
+    # Above yield by 0.25 N·m for half a second: 0.25 · 0.5/D_d, 14° about X, 0.14° twist, 3.6°.
+    assert turned == pytest.approx(np.degrees([0.25, 0.0025, 0.0625]), rel=0.15, abs=0.1)
+
+
+def test_typed_coefficients_count_in_a_session_and_are_taken_back_with_it(
+    octopus: Any, session: PuppetSession
+) -> None:
+    bpy.ops.octo_motion.pose_coefficients(bone=BONE, yields=False)
+    body = session.body(BONE)
+    assert np.isinf(session.figure.elements.yield_torque[body])
+    session.tick(TICK)
+    session.cancel()
+    assert bone_materials(octopus) == {}
+
+
+def test_typed_coefficients_are_kept_with_the_file(octopus: Any, tmp_path: Path) -> None:
+    name = octopus.name
+    bpy.ops.octo_motion.pose_coefficients(bone=BONE, **TYPED)
+    own = bone_materials(octopus)
+    path = str(tmp_path / "typed.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert bone_materials(bpy.data.objects[name]) == own
+
+
+@pytest.mark.parametrize(
+    "wrong", [[1.0] * 9, [1.0] * 6 + [0.0] * 3 + [1.0], [-1.0] * 10, [float("nan")] * 10]
+)
+def test_damaged_coefficients_of_a_bone_count_for_nothing(octopus: Any, wrong: list[float]) -> None:
+    octopus.data.bones[BONE][MATERIAL] = wrong
+    assert bone_materials(octopus) == {}

@@ -304,7 +304,9 @@ def test_undo_of_blenders_own_is_followed(octopus: Any, controls: PoseControls) 
 def test_script_that_fails_leaves_the_frame_as_it_was(tmp_path: Path) -> None:
     steps = [{"do": "frame", "frame": 20}, {"do": "grab", "bone": "nobody"}]
     path = tmp_path / "wave.json"
-    path.write_text(json.dumps({"format": "octo_motion.pose", "version": 1, "steps": steps}))
+    path.write_text(
+        json.dumps({"format": "octo_motion.pose", "version": 1, "steps": steps}), encoding="utf-8"
+    )
     with pytest.raises(RuntimeError, match="has no bone 'nobody'"):
         bpy.ops.octo_motion.pose_script(filepath=str(path))
     assert bpy.context.scene.frame_current == 1

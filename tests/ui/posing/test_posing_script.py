@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.animation.poses import pose_values
-from octo_motion.ui.posing.puppet_session import active_session
+from octo_motion.ui.posing.puppet_session import PuppetSession, active_session
 
 WAVE: tuple[dict[str, Any], ...] = (
     {"do": "key", "bones": "all"},
@@ -198,3 +198,44 @@ def test_walk_that_was_generated_is_posed_over(octopus: Any, play: Play) -> None
     data.action, data.action_slot = walk, walk.slots[0]
     assert values(octopus) == before
     assert np.isfinite(np.array(octopus.pose.bones["head"].matrix)).all()
+
+
+def test_limb_as_thick_as_it_is_long_is_held_where_the_script_says() -> None:
+    """Its capsule is a ball, which has no ends of its own."""
+    armature = stalk_with_a_head(0.4, thick=0.6)
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    try:
+        bone = armature.pose.bones["head"]
+        assert np.ptp(session.figure.capsules[session.body("head")], axis=0).max() < 1e-9
+        for share in (0.0, 0.25, 1.0):
+            place = session.grab_bone("head", share)
+            wanted = bone.head + share * (bone.tail - bone.head)
+            assert place == pytest.approx(np.array(wanted), abs=1e-5)
+            assert session.held_point() == pytest.approx(place)
+    finally:
+        session.cancel()
+
+
+def stalk_with_a_head(length: float, thick: float) -> Any:
+    """Two bones one above the other, the second with a skin of points that are far from it."""
+    data = bpy.data.armatures.new("Stalk")
+    armature: Any = bpy.data.objects.new("Stalk", data)
+    bpy.context.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    stalk, head = data.edit_bones.new("stalk"), data.edit_bones.new("head")
+    stalk.head, stalk.tail, head.head = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)
+    head.tail = (0.0, 0.0, 1.0 + length)
+    head.parent = stalk
+    bpy.ops.object.mode_set(mode="OBJECT")
+    angles = np.linspace(0.0, 2.0 * np.pi, 40)
+    points = [(thick * np.cos(each), thick * np.sin(each), 1.0 + 0.5 * length) for each in angles]
+    mesh = bpy.data.meshes.new("Skin")
+    mesh.from_pydata(points, [], [])
+    skin: Any = bpy.data.objects.new("Skin", mesh)
+    bpy.context.collection.objects.link(skin)
+    skin.vertex_groups.new(name="head").add(list(range(len(points))), 1.0, "REPLACE")
+    skin.parent = armature
+    skin.modifiers.new("Armature", "ARMATURE").object = armature
+    bpy.context.view_layer.update()
+    return armature

@@ -247,7 +247,7 @@ BVH = Path("docs/examples/clips").resolve()
 def test_all_files_of_a_folder_leave_actions_and_nothing_else(tmp_path: Path) -> None:
     for name in ("walk", "punch"):
         (tmp_path / f"{name}.bvh").write_bytes((BVH / f"{name}.bvh").read_bytes())
-    (tmp_path / "broken.bvh").write_text("HIERARCHY\n")
+    (tmp_path / "broken.bvh").write_text("HIERARCHY\n", encoding="utf-8")
     hero = make_body("Hero", BODIES["short legs, wide hips"])
     select(hero)
     objects = set(bpy.data.objects)

@@ -569,6 +569,8 @@ def test_arms_that_stretch_go_on_stretching_and_bring_their_stretch_along() -> N
     one, other = make_octopus("One"), make_octopus("Other")
     for number, each in enumerate((one, other)):
         give_route(each)
+        # All that are selected would move.
+        select(each)
         generate(each)
         assert each.data.bones["Arm1_2.L"].parent == each.data.bones["Arm1_1.L"]
         for bone in each.data.bones:
@@ -1138,13 +1140,15 @@ def drawn() -> dict[str, list[str]]:
     return found
 
 
-def test_the_panel_is_there_for_armatures_alone_and_closed_at_first() -> None:
+def test_the_panel_is_there_for_armatures_alone_and_its_parts_are_closed_at_first() -> None:
     assert drawn() == {}
     hero, _ = hero_and_source()
     assert set(drawn()) == {"splicing", "retarget", "landmarks"}
     OPERATORS.splice_add()
     assert set(drawn()) == {"splicing", "splice", "splice_timing", "retarget", "landmarks"}
-    assert all(panel.bl_options == {"DEFAULT_CLOSED"} for panel in splice_panels.CLASSES)
+    tool, *parts = splice_panels.CLASSES
+    assert not tool.bl_options
+    assert all(panel.bl_options == {"DEFAULT_CLOSED"} for panel in parts)
     assert "with_travel" not in drawn()["splice"]
     assert "with_clavicle" in drawn()["splice"]
     stack_of(hero).splices[0].part = "LEGS"

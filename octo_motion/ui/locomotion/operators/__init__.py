@@ -11,11 +11,11 @@ from .adding import (
 )
 from .arms import OCTO_MOTION_PT_arms
 from .contacts import OCTO_MOTION_PT_contact, OCTO_MOTION_PT_ground, draw_rest
-from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_PT_table
+from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_MT_gaits, OCTO_MOTION_PT_table
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .quality import OCTO_MOTION_PT_quality
 from .reaches import OCTO_MOTION_PT_change, OCTO_MOTION_PT_reaches
-from .setups import OCTO_MOTION_PT_setups
+from .setups import OCTO_MOTION_PT_setups, draw_setups, shown_name
 
 CLASSES = (
     *own_classes(arms, adding, gait_table, generate, contacts, setups, quality, reaches),
@@ -36,6 +36,7 @@ __all__ = [
     "MENUS",
     "STEPS",
     "OCTO_MOTION_MT_gait",
+    "OCTO_MOTION_MT_gaits",
     "OCTO_MOTION_OT_add_octopus",
     "OCTO_MOTION_OT_add_route",
     "OCTO_MOTION_OT_generate_locomotion",
@@ -47,4 +48,6 @@ __all__ = [
     "OCTO_MOTION_PT_setups",
     "OCTO_MOTION_PT_table",
     "draw_rest",
+    "draw_setups",
+    "shown_name",
 ]

@@ -12,13 +12,19 @@ from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntPrope
 from bpy_extras.object_utils import AddObjectHelper, add_object_align_init
 from mathutils import Matrix
 
-from ....blender.scene import add_octopus, add_route_curve, suggested_control_points
+from ....blender.scene import (
+    add_octopus,
+    add_route_curve,
+    show_selected,
+    suggested_control_points,
+)
 from ....core.errors import WriteError
 from ....core.locomotion.octopus import ARMS, JOINTS, OctopusShape
 from ....core.locomotion.path import Route
 from ...operator_base import OctoOperator, show_in_local_view
 from ...panel_base import armature_in
 from ..settings import locomotion_settings
+from .arms import list_arms
 
 _Distance: Final = partial(FloatProperty, subtype="DISTANCE", precision=3, step=1)
 _DEFAULT: Final = OctopusShape()
@@ -85,6 +91,17 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         default=True,
     )
 
+    ready: BoolProperty(
+        name="Ready to Move",
+        description="List its arms, and show it as large as the views can",
+        options={"SKIP_SAVE"},
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
+        """Clicked, it is ready to move; a script that says nothing gets the rig alone."""
+        self.ready = True
+        return self.execute(context)
+
     def draw(self, context: bpy.types.Context) -> None:  # noqa: ARG002 - Blender's signature
         layout = cast("Any", self).layout
         layout.use_property_split = True
@@ -102,6 +119,11 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         shape = OctopusShape(**{name: getattr(self, name) for name in _SHAPE})
         armature = add_octopus(context, shape, self._place(context), with_skin=self.with_mesh)
         show_in_local_view(context, armature, *armature.children)
+        if self.ready:
+            # What was placed a moment ago counts.
+            context.view_layer.update()
+            list_arms(armature, locomotion_settings(armature))
+            show_selected(context)
 
     def _place(self, context: bpy.types.Context) -> Matrix:
         """Where Blender puts new objects; without a 3D view there is none to align them to."""

@@ -20,7 +20,14 @@ from ....blender.rig import (
     world_directions,
 )
 from ....core.errors import RigError
-from ....core.locomotion.rig import ArmChain, body_frame, chain_of, detect_arms, place_added
+from ....core.locomotion.rig import (
+    ArmChain,
+    Detection,
+    body_frame,
+    chain_of,
+    detect_arms,
+    place_added,
+)
 from ...declared_settings import assign
 from ...operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
@@ -76,6 +83,19 @@ def _axis(name: str, description: str) -> Any:
     )
 
 
+def list_arms(
+    armature: bpy.types.Object, settings: Any, *, up: Any = None, front: Any = None
+) -> tuple[Detection, int]:
+    """Find an armature's arms and list them; what was found, and how many arms of a linked file
+    had to be switched off.
+    """
+    skeleton = read_skeleton(armature)
+    found = detect_arms(skeleton, *world_directions(armature), up=up, front=front)
+    left_over = write_arms(settings, found.arms)
+    write_body(settings, found)
+    return found, left_over
+
+
 class OCTO_MOTION_OT_detect_arms(ListOperator, bpy.types.Operator):
     bl_idname = "octo_motion.detect_arms"
     bl_label = "Detect Arms"
@@ -96,11 +116,7 @@ class OCTO_MOTION_OT_detect_arms(ListOperator, bpy.types.Operator):
             before if chosen == "AUTO" else chosen
             for chosen, before in zip((self.up, self.front), set_before, strict=True)
         )
-        found = detect_arms(
-            read_skeleton(armature), *world_directions(armature), up=up, front=front
-        )
-        left_over = write_arms(settings, found.arms)
-        write_body(settings, found)
+        found, left_over = list_arms(armature, settings, up=up, front=front)
         self.report({"INFO"}, _summary(found.arms))
         for note in found.notes:
             self.report({"WARNING"}, note)
@@ -227,7 +243,9 @@ class OCTO_MOTION_OT_arm_select(ItemOperator, bpy.types.Operator):
 
 class OCTO_MOTION_PT_arms(ArmaturePanel, bpy.types.Panel):
     bl_label = "Arms"
-    bl_order = 1
+    bl_order = 2
+    bl_options = {"DEFAULT_CLOSED"}
+    tool = "MOVE"
     settings_of = staticmethod(locomotion_settings)
 
     def show(self, layout: Any, settings: Any) -> None:
@@ -266,8 +284,12 @@ def _draw_details(column: Any, arm: Any) -> None:
     missing = [bone.name for bone in arm.bones if bone.name not in arm.id_data.data.bones]
     if missing:
         column.label(text=f"No bone '{missing[0]}': detect again", icon="ERROR")
-    for name in ("side", "pair", "phase", "flip"):
+    for name in ("side", "pair", "phase", "flip", "use_weights"):
         column.prop(arm, name)
+    if arm.use_weights:
+        weights = column.column(align=True)
+        weights.prop(arm, "weight_root", text="Weight Root")
+        weights.prop(arm, "weight_tip")
 
 
 def _summary(arms: Sequence[ArmChain]) -> str:

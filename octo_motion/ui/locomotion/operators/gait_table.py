@@ -191,12 +191,12 @@ class OCTO_MOTION_OT_gait_export(_GaitFile, ArmatureOperator, bpy.types.Operator
 
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Propose the gait's name, in the file browser."""
         if not self.filepath:
             name = bpy.path.clean_name(locomotion_settings(active_armature(context)).gait)
             self.filepath = f"{name}{SUFFIX}"
-        return super().invoke(context, event)
+        return self.browse(context)
 
     def check(self, context: bpy.types.Context) -> bool:  # noqa: ARG002
         proper = bpy.path.ensure_ext(self.filepath, SUFFIX)
@@ -375,6 +375,19 @@ class OCTO_MOTION_MT_gait_offset(bpy.types.Menu):
             layout.label(text="Detect the arms first", icon="INFO")
 
 
+class OCTO_MOTION_MT_gaits(bpy.types.Menu):
+    bl_label = "Gaits"
+    bl_description = "Load another gait into the table"
+
+    def draw(self, context: bpy.types.Context | None) -> None:  # noqa: ARG002
+        layout = cast("Any", self).layout
+        for name in gait_names():
+            button = layout.operator(
+                OCTO_MOTION_OT_gait_load.bl_idname, text=bpy.path.display_name(name)
+            )
+            button.name = name
+
+
 class OCTO_MOTION_MT_gait(bpy.types.Menu):
     bl_label = "Gait"
     bl_description = "Load, save, import and export gaits"
@@ -404,6 +417,7 @@ class OCTO_MOTION_PT_table(ArmaturePanel, bpy.types.Panel):
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         table = settings.table
+        layout.prop(settings, "show_targets")
         layout.row().prop(table, "manner", expand=True)
         if table.manner == "SWIM":
             layout.prop(table, "power_phase")

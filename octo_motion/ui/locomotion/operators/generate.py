@@ -12,7 +12,7 @@ Blender is not kept waiting: thousands of objects may move with each frame.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
@@ -36,7 +36,7 @@ from ..settings import (
     once_called,
     read_overrides,
 )
-from ..writing import RESULTS, Shot, Summary, generate_locomotion, prepare
+from ..writing import RESULTS, Shot, Summary, make, prepare
 
 PATIENCE: Final = 1.5
 """Seconds that the window may stand still; a longer job shows its progress and can be stopped."""
@@ -46,35 +46,38 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
     bl_idname = "octo_motion.generate_locomotion"
     bl_label = "Generate Locomotion"
     bl_description = (
-        "Let the armature walk or swim along its route. What was generated before is made anew "
-        "in place; an action that you have edited is kept, and a new one is made"
+        "Let the armature walk or swim along its route, and all others that are selected and have "
+        "one. What was generated before is made anew in place; an action that you have edited is "
+        "kept, and a new one is made"
     )
 
-    _shot: Shot | None = None
+    _shots: Sequence[Shot] = ()
 
     def run(self, context: bpy.types.Context) -> None:
-        armature = active_armature(context)
-        self._tell(generate_locomotion(armature, context))
-        made(armature)
+        self._shots = [prepare(each, context) for each in _meant(context)]
+        for _ in make(self._shots):
+            pass
+        self.conclude(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Run at once if that is quick, else go on with progress and Esc."""
         try:
-            self._shot = prepare(active_armature(context), context)
+            self._shots = [prepare(each, context) for each in _meant(context)]
         except OctoMotionError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        return self.begin(context, self._shot.make(), PATIENCE)
+        return self.begin(context, make(self._shots), PATIENCE)
 
     def conclude(self, context: bpy.types.Context) -> None:  # noqa: ARG002
-        assert self._shot is not None
-        assert self._shot.summary is not None
-        self._tell(self._shot.summary)
-        made(bpy.data.objects[self._shot.armature, None])  # type: ignore[index]
+        # Blender's status bar keeps the last: that of the active armature.
+        for shot in reversed(self._shots):
+            assert shot.summary is not None
+            self._tell(shot.summary)
+            made(bpy.data.objects[shot.armature, None])  # type: ignore[index]
 
     def give_up(self, context: bpy.types.Context) -> set[Any]:
-        """Change nothing; a motion that is there and only being measured stays."""
-        if self._shot is None or self._shot.summary is None:
+        """Change nothing; motions that are there and only being measured stay."""
+        if any(shot.summary is None for shot in self._shots):
             return ModalJob.give_up(self, context)
         self._finish(context)
         self.report({"WARNING"}, "Not measured as it plays: Quality is that of its keys alone.")
@@ -88,6 +91,20 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         # Blender's status bar keeps the last, which is to be the one that says most.
         for warning in reversed(summary.warnings):
             self.report({"WARNING"}, warning)
+
+
+def _meant(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The active armature, then all others that are selected and could move as well."""
+    active = active_armature(context)
+    return [active, *(each for each in context.selected_objects if each != active and _goes(each))]
+
+
+def _goes(item: bpy.types.Object) -> bool:
+    # Settings come into being when they are looked at: what has none is left without.
+    if item.type != "ARMATURE" or not item.is_editable or not item.is_property_set("octo_motion"):
+        return False
+    settings = locomotion_settings(item)
+    return settings.route is not None or settings.travel_on == "NONE"
 
 
 # --- What is known while a motion is live ---------------------------------------------------------

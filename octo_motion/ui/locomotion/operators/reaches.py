@@ -95,6 +95,10 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
         item.frame_contact = scene.frame_current
         item.frame_start = item.frame_contact - round(_SECONDS_TO_REACH * rate)
         item.frame_release = item.frame_contact + round(_SECONDS_TO_HOLD * rate)
+        if mode == "MOUTH":
+            # It stays at the mouth as long as the arm would hold it, and it is a long way back.
+            item.frame_release += item.coil_frames + item.bring_frames
+            item.back_frames *= 2
         settings.active_reach = len(settings.reaches) - 1
 
     def _target(
@@ -148,8 +152,9 @@ class OCTO_MOTION_OT_reach_remove(RemoveOperator, bpy.types.Operator):
 
 class OCTO_MOTION_PT_reaches(ArmaturePanel, bpy.types.Panel):
     bl_label = "Reaches"
+    bl_order = 5
     bl_options = {"DEFAULT_CLOSED"}
-    bl_order = 3
+    tool = "MOVE"
     settings_of = staticmethod(locomotion_settings)
 
     def show(self, layout: Any, settings: Any) -> None:
@@ -162,12 +167,14 @@ class OCTO_MOTION_PT_reaches(ArmaturePanel, bpy.types.Panel):
             return
         layout = layout.column()
         layout.active = not item.mute
-        layout.row().prop(item, "mode", expand=True)
+        layout.prop(item, "mode")
         if item.mode != "CURL":
             layout.prop(item, "target")
         layout.prop_search(item, "arm", settings, "arms")
-        if item.mode == "COIL":
+        winds = item.mode in {"COIL", "MOUTH"}
+        if winds:
             layout.prop(item, "turns")
+        if item.mode in {"COIL", "TOUCH"}:
             layout.prop(item, "carry")
         if item.mode != "CURL":
             layout.prop(item, "axis")
@@ -176,8 +183,10 @@ class OCTO_MOTION_PT_reaches(ArmaturePanel, bpy.types.Panel):
         column.prop(item, "frame_contact", text="Closed" if item.mode == "CURL" else "Contact")
         column.prop(item, "frame_release", text="Release")
         column = layout.column(align=True)
-        if item.mode == "COIL":
+        if winds:
             column.prop(item, "coil_frames", text="Frames to Coil")
+            if item.mode == "MOUTH":
+                column.prop(item, "bring_frames", text="Bring")
             column.prop(item, "back_frames", text="Back")
         else:
             column.prop(item, "back_frames", text="Frames Back")

@@ -19,7 +19,7 @@ from bpy.props import StringProperty
 from ....blender.animation import writable_armature
 from ....blender.files import load_gait
 from ....blender.rig import active_armature
-from ....core.errors import SettingsError
+from ....core.errors import OctoMotionError, SettingsError
 from ...declared_settings import assign, plain
 from ...operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd, window_manager
 from ..settings import (
@@ -40,13 +40,14 @@ PACKAGE: Final = Path(__file__).resolve().parents[3]
 
 ORDER: Final = (
     *("walk", "hurry", "prowl", "tiptoe", "crawl", "settle", "swim", "jet_escape"),
-    *("idle", "curl"),
+    *("idle", "curl", "walk_as_published", "swim_as_published"),
 )
 """In which set-ups that come with the add-on are shown; others follow by name."""
 
 APART: Final = frozenset(
     {
         *("table", "change", "name", "seed", "active_arm", "active_reach", "cycles", "repeat"),
+        *("setup", "live", "live_error", "extended_from", "extended_to", "show_targets"),
         *("tell_overlaps", "body_front", "body_up", "root_bone", "spline", "height", "height_mode"),
         *("ground.start_at_rest", "ground.come_to_rest", "ground.rest_within"),
         *("heading", "heading_angle", "gait", "timing", "speed", "frame_start", "frame_end"),
@@ -166,6 +167,9 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
                 f"The set-up '{self.name}' is damaged: {str(error).rstrip('.')}.",
                 "Remove it, or keep it anew.",
             ) from error
+        settings.setup = self.name
+        # What is live follows: Blender itself tells nobody what a script sets.
+        armature.update_tag(refresh={"OBJECT"})
 
 
 class OCTO_MOTION_MT_setups(bpy.types.Menu):
@@ -204,27 +208,16 @@ class OCTO_MOTION_PT_setups(PresetPanel, bpy.types.Panel):
     bl_label = "Set-Ups"
     bl_space_type = "VIEW_3D"
     bl_region_type = "HEADER"
-    # Wide enough for every name below its picture.
-    bl_ui_units_x = 14
     preset_subdir = FOLDER
     preset_operator = OCTO_MOTION_OT_setup_load.bl_idname
     preset_add_operator = OCTO_MOTION_OT_setup_add.bl_idname
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Pictures of the add-on's own, then the user's, then a field to keep one more."""
+        """The user's own, then a field to keep one more."""
         layout = cast("Any", self).layout
         layout.operator_context = "EXEC_DEFAULT"
-        grid = layout.grid_flow(row_major=True, columns=4, even_columns=True, align=True)
-        own = []
-        for name, icon in _icons():
-            if icon:
-                box = grid.column(align=True)
-                box.template_icon(icon_value=icon, scale=5.0)
-                _button(box, name, text=shown_name(name))
-            else:
-                own.append(name)
         column = layout.column(align=True)
-        for name in own:
+        for name in (name for name, icon in _icons() if not icon):
             row = column.row(align=True)
             _button(row, name, text=shown_name(name))
             remove = row.operator(self.preset_add_operator, text="", icon="REMOVE")
@@ -233,6 +226,59 @@ class OCTO_MOTION_PT_setups(PresetPanel, bpy.types.Panel):
         row.prop(window_manager(context), "preset_name", text="")
         add = row.operator(self.preset_add_operator, text="", icon="ADD")
         add.name = cast("Any", window_manager(context)).preset_name
+
+
+def draw_setups(layout: Any) -> None:
+    """The picture of the set-up that was chosen last: a click shows those of all."""
+    layout.template_icon_view(
+        window_manager(bpy.context), _SHOWN, show_labels=True, scale=5.0, scale_popup=5.0
+    )
+
+
+_SHOWN: Final = "octo_motion_setup"
+"""A property of the window manager: the armature's set-up, to see and to choose."""
+_items: dict[tuple[str, int, int], tuple[str, str, str, int, int]] = {}
+"""Blender keeps no text of its own, and draws later: what it was told once has to stay."""
+
+
+def _offered(_manager: Any, _context: bpy.types.Context | None) -> Any:
+    return [_item(name, icon, number) for number, (name, icon) in enumerate(_icons())]
+
+
+def _item(*key: Any) -> tuple[str, str, str, int, int]:
+    if key not in _items:
+        name, icon, number = key
+        shown = shown_name(name)
+        _items[key] = name, shown, f"Move like this: {shown}", icon, number
+    return _items[key]
+
+
+def _current(_manager: Any) -> int:
+    """Which one the armature has; a file of an earlier version tells its gait alone."""
+    try:
+        settings = locomotion_settings(active_armature(bpy.context))
+    except OctoMotionError:
+        return 0
+    names = list(setup_paths())
+    chosen = settings.setup or settings.gait
+    return names.index(chosen) if chosen in names else 0
+
+
+def _choose(_manager: Any, number: int) -> None:
+    name = list(setup_paths())[number]
+    load: Any = bpy.ops.octo_motion.setup_load  # type: ignore[attr-defined]
+    try:
+        # One step of undo, which a property of the window manager is not.
+        load("EXEC_DEFAULT", True, name=name)  # noqa: FBT003 - Blender takes it so
+    except RuntimeError as error:
+        if bpy.app.background:
+            raise
+        told = str(error).removeprefix("Error: ").strip()
+
+        def tell(menu: Any, _context: bpy.types.Context) -> None:
+            menu.layout.label(text=told)
+
+        window_manager(bpy.context).popup_menu(tell, title="Set-Up", icon="ERROR")
 
 
 def _button(layout: Any, name: str, **look: Any) -> None:
@@ -258,6 +304,16 @@ def _icons() -> Iterator[tuple[str, int]]:
 def register() -> None:
     """Make the add-on's set-ups known to Blender, and a place for their pictures."""
     bpy.utils.register_preset_path(str(PACKAGE))
+    shown = bpy.props.EnumProperty(
+        name="Set-Up",
+        description="How it moves: gait, stance and rhythm. Arms, route, ground, frames and keys "
+        "stay as they are",
+        items=_offered,
+        get=_current,
+        set=_choose,
+        options={"SKIP_SAVE"},
+    )
+    setattr(bpy.types.WindowManager, _SHOWN, shown)
     _previews.append(bpy.utils.previews.new())
 
 
@@ -265,4 +321,5 @@ def unregister() -> None:
     """Take that back."""
     while _previews:
         bpy.utils.previews.remove(_previews.pop())
+    delattr(bpy.types.WindowManager, _SHOWN)
     bpy.utils.unregister_preset_path(str(PACKAGE))

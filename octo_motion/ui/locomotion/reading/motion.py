@@ -272,7 +272,8 @@ def read_reaches(
 
 
 def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
-    closed = item.frame_contact + (item.coil_frames if item.mode == "COIL" else 0)
+    winds, brings = item.mode in {"COIL", "MOUTH"}, item.mode == "MOUTH"
+    closed = item.frame_contact + (item.coil_frames if winds else 0)
     timeline = Timeline(
         *(item.frame_start, item.frame_contact, min(closed, item.frame_release)),
         *(item.frame_release, item.frame_release + item.back_frames),
@@ -289,13 +290,14 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
             f"'{item.target.name}' hangs on '{armature.name}', which reaches for it.",
             "Clear its parent and its constraints to the armature.",
         )
-    carry = item.carry and item.mode == "COIL"
+    carry = item.carry or brings
     if carry:
         writable_object(item.target)
         if not can_be_carried(item.target):
             raise SettingsError(
                 f"'{item.target.name}' moves by itself and cannot be carried.",
-                "Remove its action, constraints and physics, or switch Carry off.",
+                "Remove its action, constraints and physics, or "
+                + ("let the arm coil." if brings else "switch Carry off."),
             )
     axis = np.array(_AXES[item.axis]) if item.axis in _AXES else None
     profile = profile_of(*read_form(item.target), axis)
@@ -312,5 +314,5 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
         positions[last + 1 :], rotations[last + 1 :] = positions[last], rotations[last]
     return Reach(
         item.name, item.arm, item.mode, item.turns, timeline, item.target.name, profile,
-        positions, rotations, carry,
+        positions, rotations, carry, timeline.closed + item.bring_frames if brings else None,
     )  # fmt: skip

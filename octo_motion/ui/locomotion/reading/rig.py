@@ -104,7 +104,8 @@ def write_arms(settings: OCTO_MOTION_PG_locomotion, arms: Iterable[ArmChain]) ->
 
 
 def _set_by_hand(item: Any) -> dict[str, Any]:
-    values = {"phase": item.phase, "flip": item.flip, "enabled": item.enabled}
+    kept = ("phase", "flip", "enabled", "use_weights", "weight_root", "weight_tip")
+    values = {name: getattr(item, name) for name in kept}
     if not _GIVEN_NAME.fullmatch(item.name):
         values["name"] = item.name
     return values
@@ -243,6 +244,7 @@ def listed_arms(
             pair=item.pair,
             phase=item.phase,
             flip=item.flip,
+            weights=(item.weight_root, item.weight_tip) if item.use_weights else (),
         )
         for item in settings.arms
         if item.enabled

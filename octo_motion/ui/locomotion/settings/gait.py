@@ -24,6 +24,7 @@ from ....core.locomotion.gait import (
     CYCLE,
     LINKS,
     GaitCurve,
+    GaitSettings,
     GaitTable,
     check_gait,
     gait_from_json,
@@ -55,6 +56,18 @@ def _gait_names(_owner: Any, _context: Any, _text: str) -> list[str]:
 
 GaitName: Final = partial(props.StringProperty, search=_gait_names, search_options=set())
 """A property that names a gait, and offers those that there are."""
+
+
+def weight_property(name: str, end: int) -> Any:
+    """The weight of the joints at an arm's root, end 0, or its tip, end −1."""
+    place, other = ("root", "tip") if end == 0 else ("tip", "root")
+    return props.FactorProperty(
+        name=name,
+        description=f"How readily joints at the arm's {place} bend, against those at its {other}: "
+        f"the higher of the two has the bends. Alike, they change next to nothing",
+        default=GaitSettings.weights[end],
+        min=0.01,
+    )
 
 
 def _unused() -> Any:

@@ -19,7 +19,7 @@ from ....core.locomotion.ground import ContactOverride, StanceSettings
 from ....core.rotations import Floats
 from ... import declared_settings as props
 from ...declared_settings import declared, emptied
-from .gait import SIDES, GaitName
+from .gait import SIDES, GaitName, weight_property
 
 
 def may_be_ground(settings: Any, candidate: bpy.types.Object) -> bool:
@@ -364,6 +364,12 @@ class ArmItem(bpy.types.PropertyGroup):
         description="Mirror this arm's motion: forward and twist turn the other way, for an arm "
         "that moves backward where others move forward",
     )
+    use_weights: props.BoolProperty(
+        name="Own Weights",
+        description="Joint weights of this arm's own, in place of those of Joint Weights",
+    )
+    weight_root: weight_property("Root", 0)
+    weight_tip: weight_property("Tip", -1)
     enabled: props.BoolProperty(
         name="Enabled",
         description="Move this arm. Switched off, it gets no keys and keeps its pose",
@@ -405,6 +411,15 @@ MODES: Final = (
     ("COIL", "Coil", "Wind about the object, hold it, and let go", 0),
     ("TOUCH", "Touch", "Lay the arm on the object", 1),
     ("CURL", "Curl", "Curl the arm up and stretch it again; needs no object", 2),
+    (
+        "MOUTH",
+        "Bring to Mouth",
+        (
+            "Wind about the object, draw it in under the body to the mouth, and let the arms "
+            "beside close over it with the web. The object gets keys for that"
+        ),
+        3,
+    ),
 )
 
 
@@ -435,8 +450,8 @@ class ReachItem(bpy.types.PropertyGroup):
     )
     carry: props.BoolProperty(
         name="Carry",
-        description="Take the object along, from when the arm is wound until it lets go. The "
-        "object gets keys for that; it must have none of its own",
+        description="Take the object along, from when the arm is wound, or its suckers have taken "
+        "hold, until it lets go. The object gets keys for that; it must have none of its own",
     )
     axis: props.EnumProperty(
         name="Axis",
@@ -465,6 +480,13 @@ class ReachItem(bpy.types.PropertyGroup):
         name="Coil",
         description="Frames from the touch until the arm is wound all the way",
         default=20,
+        min=1,
+        soft_max=100,
+    )
+    bring_frames: props.IntProperty(
+        name="Bring",
+        description="Frames from when the arm is wound until the object is at the mouth",
+        default=40,
         min=1,
         soft_max=100,
     )

@@ -22,7 +22,15 @@ from ....core.locomotion.metrics import Figure
 from ....core.locomotion.path import TravelSettings
 from ... import declared_settings as props
 from ...declared_settings import declared, emptied, make_overridable
-from .gait import DEFAULT_GAIT, GaitName, OCTO_MOTION_PG_gait_table, fill_table, read_table, used
+from .gait import (
+    DEFAULT_GAIT,
+    GaitName,
+    OCTO_MOTION_PG_gait_table,
+    fill_table,
+    read_table,
+    used,
+    weight_property,
+)
 from .lists import ArmList, OCTO_MOTION_PG_change, OCTO_MOTION_PG_ground, Reaches
 
 KINDS: Final = (
@@ -112,6 +120,11 @@ class Movement:
         default=DEFAULT_GAIT,
         update=_load_gait,
     )
+    setup: props.StringProperty(
+        name="Set-Up",
+        description="The set-up that was loaded last",
+        options={"HIDDEN"},
+    )
     table: props.PointerProperty(
         name="Gait Table",
         description="The gait itself: angles of the arms over one cycle",
@@ -123,6 +136,11 @@ class Movement:
     steady: declared(GaitSettings, "smoothing_cycles")
     sway: declared(GaitSettings, "lateral_bend")
     stand: declared(GaitSettings, "raise_to_floor")
+    show_targets: props.BoolProperty(
+        name="Show Targets",
+        description="Draw what the gait has the active arm reach for over the viewport: its three "
+        "links from Q0 to Q3, and the joints that are to end there, as an overlay",
+    )
     phase_spread: declared(GaitSettings, "phase_spread")
     turning: declared(GaitSettings, "turning")
     variation_min: props.AngleProperty(
@@ -146,20 +164,8 @@ class Movement:
         step=100,
     )
     seed: declared(GaitSettings, "seed")
-    weight_root: props.FactorProperty(
-        name="Weight Root",
-        description="How readily joints at the arm's root bend. Lower weights spread a bend over "
-        "more joints",
-        default=GaitSettings.weights[0],
-        min=0.01,
-    )
-    weight_tip: props.FactorProperty(
-        name="Tip",
-        description="How readily joints at the arm's tip bend. Lower than at the root, the bend "
-        "moves to the root",
-        default=GaitSettings.weights[-1],
-        min=0.01,
-    )
+    weight_root: weight_property("Weight Root", 0)
+    weight_tip: weight_property("Tip", -1)
     use_weight_curve: props.BoolProperty(
         name="Curve",
         description="Draw the weights as a curve from the arm's root, left, to its tip, right",
@@ -421,6 +427,16 @@ class Outcome:
         description="The action that was generated last. It is made anew in place until you edit "
         "it; then it is yours, and the next one is a new action",
         type=bpy.types.Action,
+    )
+    extended_from: props.IntProperty(
+        name="Extended From",
+        description="Where the scene ended before it was extended for this motion",
+        options={"HIDDEN"},
+    )
+    extended_to: props.IntProperty(
+        name="Extended To",
+        description="Where it ends since; 0 if it was not extended",
+        options={"HIDDEN"},
     )
     keep_apart: props.BoolProperty(
         name="Keep Apart",

@@ -39,7 +39,7 @@ from ....core.locomotion.motion import (
 from ....core.locomotion.reaching import Carried
 from ....core.locomotion.rig import Detection
 from ....core.rotations import Floats
-from ...declared_settings import plain
+from ...declared_settings import assign, plain
 from ..reading import (
     bones_of,
     previous_action,
@@ -88,6 +88,8 @@ class Summary:
     frame_end: int
     seconds: float
     """Length of the motion."""
+    lasts: float
+    """Seconds from its first key to its last."""
     miss: float
     """Largest distance of a group of joints from its target, in arm lengths."""
     keys: int
@@ -103,7 +105,7 @@ class Summary:
     def message(self) -> str:
         """One sentence, and the notes."""
         told = (
-            f"{self.manner.capitalize()} of {self.frames} frames ({self.seconds:.1f} s): "
+            f"{bpy.path.display_name(self.gait)} of {self.frames} frames ({self.lasts:.1f} s): "
             f"'{self.action}'."
         )
         fewer = f"{self.keys:,} keys instead of {self.dense_keys:,}."
@@ -167,19 +169,6 @@ class Shot:
     summary: Summary | None = None
     """What :meth:`write` has made."""
 
-    def make(self) -> Iterator[float]:
-        """Compute, write, and measure what plays, yielding the share that is done: 0…1.
-
-        Raises:
-            OctoMotionError: something is wrong that the user can put right; nothing has changed.
-        """
-        computing = 1.0 - _PLAYING * self._plays_otherwise()
-        for share in self.compute():
-            yield computing * share
-        self.write()
-        for share in self.measure():
-            yield computing + (1.0 - computing) * share
-
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
         self.result = yield from compute(self.job)
@@ -223,7 +212,7 @@ class Shot:
                 show_contacts(armature, made.plan, self.edits)
         write_carried(armature, made.carried)
         write_figures(settings, made.figures)
-        notes = self._extend_range(int(made.frames[-1]))
+        notes = self._extend_range(settings, int(made.frames[-1]))
         keys, dense_keys = key_counts(action)
         self.summary = Summary(
             gait=made.plan.first.table.name,
@@ -233,6 +222,7 @@ class Shot:
             frame_start=int(made.frames[0]),
             frame_end=int(made.frames[-1]),
             seconds=made.plan.schedule.seconds,
+            lasts=float(made.frames[-1] - made.frames[0]) / self.job.timing.rate,
             miss=made.miss,
             keys=keys,
             dense_keys=dense_keys,
@@ -248,7 +238,7 @@ class Shot:
         Yields the share that is done; the scene is as it was found between any two steps.
         """
         made = self.result
-        if made is None or made.measured is None or not self._plays_otherwise():
+        if made is None or made.measured is None or not self.plays_otherwise():
             return
         arms = self.job.creature.arms
         names = [name for arm in arms for name in arm.bones]
@@ -286,7 +276,7 @@ class Shot:
         warnings = (*self.result.warnings, *warnings_for_figures(found))
         self.summary = replace(self.summary, figures=found, warnings=warnings)
 
-    def _plays_otherwise(self) -> bool:
+    def plays_otherwise(self) -> bool:
         """Whether more than keys moves the arms."""
         armature = bpy.data.objects.get((self.armature, None))
         names = [name for arm in self.job.creature.bones for name in arm]
@@ -330,15 +320,23 @@ class Shot:
         rest_bones(armature, scaled - animated_bones(action, SCALE), SCALE)
         return action
 
-    def _extend_range(self, last: int) -> tuple[str, ...]:
+    def _extend_range(self, settings: OCTO_MOTION_PG_locomotion, last: int) -> tuple[str, ...]:
         """Let the scene end with the motion, if that is wanted; what there is to say of it."""
         scene = bpy.data.scenes.get(self.scene)
-        if scene is None or last <= scene.frame_end:
+        if scene is None:
             return ()
-        if self.extend_scene_range and scene.is_editable:
-            scene.frame_end = last
-            return (f"The scene now ends at frame {last}.",)
-        return (f"It lasts to frame {last}, the scene ends at {scene.frame_end}.",)
+        if not (self.extend_scene_range and scene.is_editable):
+            over = last > scene.frame_end
+            told = f"It lasts to frame {last}, the scene ends at {scene.frame_end}."
+            return (told,) if over else ()
+        before = scene.frame_end
+        # What it was extended for itself is taken back, unless somebody has changed it since.
+        own = before if before != settings.extended_to else settings.extended_from
+        scene.frame_end = max(own, last)
+        assign(settings, "extended_from", own)
+        assign(settings, "extended_to", scene.frame_end if last > own else 0)
+        changed = scene.frame_end != before
+        return (f"The scene now ends at frame {scene.frame_end}.",) if changed else ()
 
 
 def show_contacts(
@@ -358,8 +356,31 @@ def show_contacts(
     return len(contacts)
 
 
-RESULTS: Final = frozenset({"result", "shown", "figures", "live", "live_error"})
+RESULTS: Final = frozenset(
+    {
+        *("result", "shown", "figures", "live", "live_error", "show_targets"),
+        *("extended_from", "extended_to"),
+    }
+)
 """What is no setting, though it is kept with them."""
+
+
+def make(shots: Sequence[Shot]) -> Iterator[float]:
+    """Compute all shots, write them, and measure what plays, yielding the share that is done: 0…1.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right; nothing has changed.
+    """
+    count = len(shots)
+    computing = 1.0 - _PLAYING * any(shot.plays_otherwise() for shot in shots)
+    for number, shot in enumerate(shots):
+        for share in shot.compute():
+            yield computing * (number + share) / count
+    for shot in shots:
+        shot.write()
+    for number, shot in enumerate(shots):
+        for share in shot.measure():
+            yield computing + (1.0 - computing) * (number + share) / count
 
 
 def generate_locomotion(armature: bpy.types.Object, context: bpy.types.Context) -> Summary:
@@ -369,7 +390,7 @@ def generate_locomotion(armature: bpy.types.Object, context: bpy.types.Context) 
         OctoMotionError: something is wrong that the user can put right; nothing has changed.
     """
     shot = prepare(armature, context)
-    for _ in shot.make():
+    for _ in make([shot]):
         pass
     assert shot.summary is not None
     return shot.summary

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The swim to the letter of the thesis: nothing evened out, no glide.
+import bpy
+
+active = bpy.context.object
+armature = active if active.type == "ARMATURE" else active.find_armature()
+settings = armature.octo_motion.locomotion
+
+settings.gait = "swim"
+settings.ground.use = False
+settings.stand = False
+settings.keep_apart = False
+settings.softness = 0.0
+settings.give = 0.0
+settings.steady = 0.0
+settings.sway = 0.0
+settings.speed_mode = "NATURAL"
+settings.ease_in = 0.0
+settings.ease_out = 0.0
+settings.burst = 0.0
+settings.contraction = 0.0

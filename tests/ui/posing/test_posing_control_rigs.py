@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Control rigs: a limb of the character is pulled, and the controls get the keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from octo_motion.core.rotations import Floats
+from octo_motion.ui.posing.puppet_session import PuppetSession
+
+from .test_posing_odd_rigs import rig
+
+TICK = 1.0 / 60.0
+MILLIMETRE = 1e-3
+"""On bodies of 1.7 m."""
+LIMBS = ("hips", "thigh", "shin", "foot")
+
+
+def body() -> Any:
+    """Hips, and a leg of 0.9 m beneath; all of it 1.7 m tall."""
+    return rig(
+        root=("", (0, 0, 0), (0, 0.3, 0)),
+        hips=("root", (0, 0, 0.95), (0, 0, 1.2)),
+        chest=("hips", (0, 0, 1.2), (0, 0, 1.7)),
+        thigh=("hips", (0.1, 0, 0.95), (0.1, -0.02, 0.5)),
+        shin=("thigh", (0.1, -0.02, 0.5), (0.1, 0, 0.08)),
+        foot=("shin", (0.1, 0, 0.08), (0.1, -0.15, 0.02)),
+        goal=("root", (0.1, 0, 0.08), (0.1, 0.15, 0.08)),
+        pole=("root", (0.1, -0.8, 0.5), (0.1, -0.8, 0.7)),
+    )
+
+
+def constrain(armature: Any, bone: str, kind: str, target: str, **settings: Any) -> Any:
+    found = armature.pose.bones[bone].constraints.new(kind)
+    found.target, found.subtarget = armature, target
+    for name, value in settings.items():
+        setattr(found, name, value)
+    bpy.context.view_layer.update()
+    return found
+
+
+def by_goal_and_pole() -> Any:
+    """The leg is led by inverse kinematics; the foot is turned by itself."""
+    armature = body()
+    for name in ("root", "goal", "pole"):
+        armature.data.bones[name].use_deform = False
+    ik = constrain(armature, "shin", "IK", "goal", chain_count=2)
+    ik.pole_target, ik.pole_subtarget, ik.pole_angle = armature, "pole", float(np.radians(-90.0))
+    return armature
+
+
+def deforming(armature: Any) -> Any:
+    """Bones that deform copy those of the rig, which nobody sees."""
+    bpy.ops.object.mode_set(mode="EDIT")
+    bones = armature.data.edit_bones
+    for name in ("hips", "chest", "thigh", "shin", "foot"):
+        copy = bones.new(f"DEF-{name}")
+        copy.head, copy.tail, copy.roll = bones[name].head, bones[name].tail, bones[name].roll
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for bone in armature.data.bones:
+        bone.use_deform = bone.name.startswith("DEF-")
+    for name in ("hips", "chest", "thigh", "shin", "foot"):
+        constrain(armature, f"DEF-{name}", "COPY_TRANSFORMS", name)
+    for name in ("thigh", "shin"):
+        armature.data.bones[name].hide = True
+    return armature
+
+
+def by_driver() -> Any:
+    """The shin copies a lever's rotation, as far as a driver lets it; thigh and hips are keyed."""
+    armature = body()
+    bpy.ops.object.mode_set(mode="EDIT")
+    lever = armature.data.edit_bones["goal"]
+    lever.name = "lever"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for name in ("root", "lever", "pole"):
+        armature.data.bones[name].use_deform = False
+    bone = armature.pose.bones["shin"]
+    bone.rotation_mode = "XYZ"
+    for axis in range(3):
+        driver = bone.driver_add("rotation_euler", axis).driver
+        variable = driver.variables.new()
+        variable.type = "TRANSFORMS"
+        target = variable.targets[0]
+        target.id, target.bone_target = armature, "lever"
+        target.transform_type = f"ROT_{'XYZ'[axis]}"
+        target.transform_space = "LOCAL_SPACE"
+        driver.expression = f"{variable.name} * 2"
+    bpy.context.view_layer.update()
+    return armature
+
+
+RIGS: dict[str, tuple[Callable[[], Any], str, set[str]]] = {
+    "goal and pole": (by_goal_and_pole, "", {"goal", "pole"}),
+    "hidden beneath": (lambda: deforming(by_goal_and_pole()), "DEF-", {"goal", "pole"}),
+    "driver": (by_driver, "", {"lever", "thigh"}),
+}
+
+
+def drag(session: PuppetSession, bone: str, by: tuple[float, float, float]) -> None:
+    start = session.grab_bone(bone, 1.0)
+    for number in range(1, 41):
+        session.tick(TICK, start + min(number / 30.0, 1.0) * np.array(by))
+    session.release()
+    for _ in range(30):
+        session.tick(TICK)
+
+
+def joints(armature: Any, prefix: str) -> Floats:
+    """Heads and tails (limbs, 2, 3) of the limbs as they are shown, world."""
+    bpy.context.view_layer.update()
+    bones = (armature.pose.bones[prefix + name] for name in LIMBS)
+    world = armature.matrix_world
+    return np.array([[world @ each.head, world @ each.tail] for each in bones])
+
+
+def wanted(session: PuppetSession, prefix: str) -> Floats:
+    """(limbs, 3) where the puppet has the joints."""
+    places = [session.body(prefix + name) for name in LIMBS]
+    return session.core.pose.positions[places] / session.unit
+
+
+def keyed(armature: Any) -> set[str]:
+    action = armature.animation_data.action
+    paths = (
+        curve.data_path
+        for layer in action.layers
+        for strip in layer.strips
+        for bag in strip.channelbags
+        for curve in bag.fcurves
+    )
+    return {path.partition('"')[2].partition('"')[0] for path in paths}
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_controls_get_the_keys_that_give_the_pose_of_a_limb_that_was_pulled(name: str) -> None:
+    build, prefix, controls = RIGS[name]
+    armature, scene = build(), bpy.context.scene
+    scene.frame_set(10)
+    before = joints(armature, prefix)
+    session = PuppetSession(armature, scene, clock=None)
+    session.core.change(step=4e-3)
+    drag(session, prefix + "shin", (0.1, -0.25, 0.2))
+    names = session.key()
+    goal = wanted(session, prefix)
+    session.finish()
+    assert session.missed == ""
+    assert set(names) == keyed(armature)
+    assert set(names) & controls
+    # Nothing of what a constraint or a driver moves is keyed: its keys would have no effect.
+    assert not set(names) & ({"shin"} | {f"DEF-{each}" for each in LIMBS})
+    for control in armature.pose.bones:
+        control.matrix_basis.identity()
+    scene.frame_set(11)
+    scene.frame_set(10)
+    after = joints(armature, prefix)
+    assert np.linalg.norm(after - before, axis=2).max() > 0.1
+    assert np.linalg.norm(after[:, 0] - goal, axis=1).max() < MILLIMETRE
+
+
+def test_goal_and_pole_stay_where_they_are_unless_they_are_needed() -> None:
+    armature = by_goal_and_pole()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    assert set(session.figure.names) == {"hips", "chest", "thigh", "shin", "foot"}
+    drag(session, "chest", (0.0, -0.2, 0.0))
+    names = session.key()
+    session.cancel()
+    assert names == ["chest"]
+
+
+@pytest.mark.parametrize("muted", [False, True])
+def test_pole_is_not_carried_by_its_goal(muted: bool) -> None:  # noqa: FBT001
+    armature = by_goal_and_pole()
+    for name in ("goal", "pole"):
+        armature.data.bones[name].use_deform = True
+        bpy.ops.object.mode_set(mode="EDIT")
+        armature.data.edit_bones[name].parent = None
+        bpy.ops.object.mode_set(mode="OBJECT")
+    if muted:
+        for bone in armature.pose.bones:
+            for constraint in bone.constraints:
+                constraint.mute = True
+    bpy.context.view_layer.update()
+    start = np.array(armature.pose.bones["pole"].head)
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "shin", (0.0, -0.2, 0.1))
+    bpy.context.view_layer.update()
+    assert np.linalg.norm(np.array(armature.pose.bones["pole"].head) - start) < (
+        1e-6 if muted else 0.3
+    )
+    session.cancel()
+
+
+def test_what_the_controls_cannot_reach_is_said() -> None:
+    armature = by_goal_and_pole()
+    for name in ("root", "hips", "pole", "goal"):
+        armature.pose.bones[name].lock_location = (name != "pole",) * 3
+        armature.pose.bones[name].lock_rotation = (True, True, True)
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    session.settle()
+    assert "its controls do not reach" in session.missed
+    session.cancel()
+
+
+def test_escape_gives_the_controls_back() -> None:
+    armature = by_goal_and_pole()
+    before = [np.array(each.matrix_basis) for each in armature.pose.bones]
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    session.key()
+    session.cancel()
+    after = [np.array(each.matrix_basis) for each in armature.pose.bones]
+    assert np.array_equal(before, after)
