@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from .command_line import COMMAND, parse
+from .command_line import COMMAND, STOPPED, parse
+from .stopping import stoppable
 
-__all__ = ["COMMAND", "main", "parse", "register", "unregister"]
+__all__ = ["COMMAND", "STOPPED", "main", "parse", "register", "stoppable", "unregister"]
 
 _handles: list[Any] = []
 

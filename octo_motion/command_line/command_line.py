@@ -4,17 +4,31 @@
 from __future__ import annotations
 
 import argparse
+import io
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
+from ..core.errors import OctoMotionError, WriteError
 from .schema import Kind, Number, Unfit
 from .shot_schema import KINDS, Option
 
 COMMAND: Final = "octo_motion"
 """Name of the command."""
 
-_STATUS: Final = "Exit status: 0 all went well, 1 something failed, 2 wrong arguments or job."
+FAILED: Final = 1
+WRONG: Final = 2
+FINAL: Final = 3
+CRASHED: Final = 4
+STOPPED: Final = 130
+"""As shells have it."""
+
+_STATUS: Final = (
+    "Exit status: 0 all is done, or was unchanged; 1 something failed here, try again; 2 wrong "
+    "arguments or job; 3 it fails each time, for the limits, rig or files are so; 4 Blender "
+    "crashed; 130 stopped."
+)
 
 _GENERATE: Final = """\
 Let one armature walk or swim along a curve, and save the result as a new file.
@@ -119,6 +133,11 @@ radians, texts may be in degrees.
 """
 
 
+def status_of(error: OctoMotionError) -> int:
+    """The exit status for an error in what was to be made."""
+    return FAILED if isinstance(error, WriteError) else FINAL
+
+
 def parser(program: str, *, has_open_file: bool) -> argparse.ArgumentParser:
     """The parser of all commands; the file may be left out where Blender has one open."""
     main = argparse.ArgumentParser(
@@ -197,6 +216,21 @@ def _number(kind: Number) -> Callable[[str], float]:
     return number
 
 
+def _places(text: str) -> tuple[range, ...]:
+    """Places in a list, counted from 1: "3,7,20-29"."""
+    found = []
+    for part in text.split(","):
+        first, sign, last = part.strip().partition("-")
+        try:
+            place = range(int(first), int(last if sign else first) + 1)
+        except ValueError:
+            place = range(0)
+        if not place or place.start < 1:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a list of places, such as 1-10")
+        found.append(place)
+    return tuple(found)
+
+
 def _add_bake(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     command = _command(
         commands, "bake", "make many shots from a job file", _BAKE, f"{_JOB}\n{_STATUS}"
@@ -218,18 +252,46 @@ def _add_bake(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     command.add_argument(
         "--shot",
         metavar="NAME",
-        action="append",
+        nargs="+",
+        action="extend",
         default=[],
         dest="only",
-        help="only this shot; may be repeated",
+        help="only these shots",
+    )
+    command.add_argument(
+        "--index",
+        metavar="PLACES",
+        type=_places,
+        default=(),
+        help="only the shots at these places, such as 1-10 or 3,7,20-29",
     )
     command.add_argument("--check", action="store_true", help="only say what would be done")
+    command.add_argument("--list", action="store_true", help="only print all names, as JSON")
+    command.add_argument(
+        "--files", action="store_true", help="only print what is read and written, as JSON"
+    )
+    command.add_argument(
+        "--gather",
+        action="store_true",
+        help="only write the report, from what runs with --shot and --index have recorded",
+    )
+    command.add_argument(
+        "--here", action="store_true", help="make shots in this Blender, one after the other"
+    )
+    command.add_argument("--quiet", action="store_true", help="say nothing but what is wrong")
+    command.add_argument(
+        "--progress", action="store_true", help="print lines of progress that render farms read"
+    )
 
 
 def parse(
     arguments: Sequence[str], program: str, *, has_open_file: bool
 ) -> argparse.Namespace | int:
     """The arguments, or the exit status where there is no more to do."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A console of Windows may not know all letters.
+            stream.reconfigure(errors="replace")
     try:
         return parser(program, has_open_file=has_open_file).parse_args(arguments)
     except SystemExit as end:

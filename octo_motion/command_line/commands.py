@@ -7,22 +7,21 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import bpy
 
 from ..core.errors import OctoMotionError, SettingsError, WriteError
 from ..ui.locomotion import Summary
-from .command_line import parse
-from .job import STOPPED, bake
+from .bake import Wanted, bake
+from .command_line import STOPPED, WRONG, parse, status_of
 from .job_report import figures_in_words
 from .outputs import commit, staged
 from .shot_runner import perform
 from .shot_schema import KINDS, ShotRequest, is_motion
+from .stopping import stoppable
 from .vocabulary import make_request
-from .worker import RUN_SHOT, run_shot, stoppable
-
-_WRONG: Final = 2
+from .worker import RUN_SHOT, run_shot
 
 
 def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
@@ -36,10 +35,10 @@ def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
         with stoppable():
             if options.command == "bake":
                 said = {name: value for name, value in vars(options).items() if name != "command"}
-                return bake(**said)
+                return bake(Wanted(**said))
             return _make(_requested(options))
     except OctoMotionError as error:
-        return _complain(error, _WRONG)
+        return _complain(error, WRONG)
     except KeyboardInterrupt:
         print("Stopped.", file=sys.stderr)
         return STOPPED
@@ -52,7 +51,7 @@ def _make(shot: ShotRequest) -> int:
             performed = perform(shot, places)
             commit(places)
     except OctoMotionError as error:
-        return _complain(error, 1)
+        return _complain(error, status_of(error))
     summary = performed.summary
     for warning in summary.warnings:
         print(f"Warning: {warning}", flush=True)
@@ -69,7 +68,7 @@ def _requested(options: argparse.Namespace) -> ShotRequest:
     if not (options.file or bpy.data.filepath):
         raise OctoMotionError("No file is open.", "Give the .blend file to read.")
     read = _resolved(options.file or bpy.data.filepath)
-    table: dict[str, Any] = {"name": read.stem, "kind": options.command}
+    table: dict[str, Any] = {"name": "shot", "kind": options.command}
     for name, key in KINDS[options.command].items():
         value = getattr(options, name, None)
         if key.option is not None and value:
@@ -91,14 +90,23 @@ def _requested(options: argparse.Namespace) -> ShotRequest:
 
 def _check_outputs(shot: ShotRequest, read: Path, *, overwrite: bool) -> None:
     """Make sure that no file is lost: that no output is there already, or is read."""
-    if len(set(shot.outputs)) < len(shot.outputs):
+    if len({str(path).casefold() for path in shot.outputs}) < len(shot.outputs):
         raise WriteError("Two outputs have the same path.", "Give each its own.")
     for path in shot.outputs:
-        if path in shot.inputs and path != read:
+        is_read = _same(path, read)
+        if any(_same(path, each) for each in shot.inputs) and not is_read:
             raise WriteError(f"'{path}' is a clip that is read.", "Give another path.")
         if path.exists() and not overwrite:
-            what = "is the file that is read" if path == read else "is there already"
+            what = "is the file that is read" if is_read else "is there already"
             raise WriteError(f"'{path}' {what}.", "Give another path, or --overwrite.")
+
+
+def _same(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one file, whatever its names are."""
+    try:
+        return one.samefile(other)
+    except OSError:
+        return one == other
 
 
 def _resolved(text: str) -> Path:

@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
@@ -17,7 +18,7 @@ from typing import Any, Final, Literal
 
 from ..core.errors import OctoMotionError, WriteError
 from ..core.locomotion.metrics import Figure
-from .outputs import write_json
+from .outputs import commit, staged, unwritable
 from .shot_schema import NAMES
 
 
@@ -148,7 +149,14 @@ def _value_above(value: float, limit: float) -> str:
 FORMAT: Final = "octo_motion.report"
 FORMAT_VERSION: Final = 1
 
+RECORD_FORMAT: Final = "octo_motion.record"
+REPORT_ENDING: Final = ".report.json"
+
 Status = Literal["done", "skipped", "failed"]
+Cause = Literal["", "again", "final", "crash"]
+"""Of a failure: it may go well if it is tried again, or on another machine; it will not, for it is
+the rig's, the limits' or the files'; or Blender came to its end.
+"""
 
 
 @dataclass(frozen=True)
@@ -190,6 +198,15 @@ class ShotRecord:
     """Of a failed shot: what an earlier run has written, and is still there."""
     log: str = ""
     """Of a failed shot: the last that Blender said."""
+    cause: Cause = ""
+    motion: str = ""
+    """Digest of all keys, the same wherever the shot is made."""
+    action: str = ""
+    """Name of its action in the .blend file."""
+
+    def wrote(self, path: str, found: str) -> bool:
+        """Whether a file with a digest is this job's work."""
+        return found in {self.earlier_outputs.get(path), self.outputs.get(path)}
 
     @property
     def written(self) -> dict[str, str]:
@@ -226,12 +243,16 @@ def judge(
     shot is skipped, otherwise it must not be baked. The digest is "" where there is no file.
     """
     paths = list(wanted)
-    written = record.written if record else {}
     found = {path: digest(path) for path in paths}
-    changed = tuple(path for path, value in found.items() if value and value != written.get(path))
+    changed = tuple(
+        path
+        for path, value in found.items()
+        if value and not (record and record.wrote(path, value))
+    )
     if (
         record is not None
-        and record.status != "failed"
+        # One that failed has outputs if it was stopped while they took their places.
+        and (record.status != "failed" or found == record.outputs)
         and record.fingerprint == fingerprint
         and set(inputs) <= set(record.inputs)
         and all(digest(path) == value for path, value in record.inputs.items())
@@ -242,7 +263,8 @@ def judge(
     if not changed:
         return Verdict(skip=False)
     path = changed[0]
-    what = "has been changed since it was baked" if path in written else "is there already"
+    known = record is not None and path in record.written
+    what = "has been changed since it was baked" if known else "is there already"
     return Verdict(
         skip=False, reason=f"'{path}' {what}. Move it away, or give --force to overwrite it."
     )
@@ -258,11 +280,7 @@ def read_report(path: Path) -> dict[str, ShotRecord]:
         content = json.loads(path.read_text(encoding="utf-8"))
         if (content["format"], content["format_version"]) != (FORMAT, FORMAT_VERSION):
             raise _not_a_report(path)
-        known = {each.name for each in fields(ShotRecord)}
-        records = [
-            ShotRecord(**{key: value for key, value in shot.items() if key in known})
-            for shot in content["shots"]
-        ]
+        records = [_record(shot) for shot in content["shots"]]
     except FileNotFoundError:
         return {}
     except OSError as error:
@@ -281,24 +299,73 @@ def _not_a_report(path: Path) -> OctoMotionError:
     )
 
 
-def write_report(path: Path, job: Path, records: Iterable[ShotRecord]) -> None:
-    """Write the report, whole or not at all.
+def write_report(path: Path, job: Path, records: Iterable[ShotRecord]) -> Counter[str]:
+    """Write the report, whole or not at all; how many shots have each status.
+
+    Records are taken one after the other: there may be more than the memory holds.
 
     Raises:
         WriteError: it cannot be written.
     """
-    shots = list(records)
-    content: dict[str, Any] = {
+    counts: Counter[str] = Counter()
+    head = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "octo_motion": version(),
         "job": job.name,
-        **{status: count(shots, status) for status in ("done", "skipped", "failed")},
-        "shots": [asdict(shot) for shot in shots],
     }
-    write_json(path, content)
+    with staged([path]) as places:
+        try:
+            with places[path].open("w", encoding="utf-8", newline="\n") as file:
+                file.write(f'{_json(head)[:-2]},\n "shots": [')
+                for record in records:
+                    file.write(f"{',' if counts else ''}\n{_json(asdict(record))}")
+                    counts[record.status] += 1
+                told = {status: counts[status] for status in ("done", "skipped", "failed")}
+                file.write(f"\n ],{_json(told)[1:]}\n")
+        except OSError as error:
+            raise unwritable(f"'{path}'", error) from error
+        commit(places)
+    return counts
 
 
-def count(records: Iterable[ShotRecord], status: str) -> int:
-    """How many shots have a status."""
-    return sum(record.status == status for record in records)
+def _json(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def read_record(path: Path) -> ShotRecord | None:
+    """The record of one shot; None if there is none, or it is damaged: then the shot is looked at
+    as if it had none.
+
+    Raises:
+        WriteError: it is there and cannot be read.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if (content["format"], content["format_version"]) == (RECORD_FORMAT, FORMAT_VERSION):
+            return _record(content["shot"])
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise WriteError(
+            f"The record '{path}' cannot be read: {error.strerror}.", "Try again."
+        ) from error
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
+    return None
+
+
+def record_file(job: Path, record: ShotRecord) -> dict[str, Any]:
+    """What the file of a shot's record has."""
+    return {
+        "format": RECORD_FORMAT,
+        "format_version": FORMAT_VERSION,
+        "octo_motion": version(),
+        "job": job.name,
+        "shot": asdict(record),
+    }
+
+
+def _record(shot: Mapping[str, Any]) -> ShotRecord:
+    known = {each.name for each in fields(ShotRecord)}
+    return ShotRecord(**{key: value for key, value in shot.items() if key in known})

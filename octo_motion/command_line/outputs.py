@@ -8,8 +8,8 @@ taking its place is one step of the file system. Only when all of them are compl
 from __future__ import annotations
 
 import json
-import os
 import secrets
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +17,13 @@ from typing import Any, Final
 
 import bpy
 
+from ..blender import files
 from ..core.errors import RigError, WriteError
+from ..core.files import replace
+
+_LONGEST_ON_WINDOWS: Final = 259
+_ADDED: Final = 16
+"""Letters that the name of an unfinished file has more."""
 
 
 @contextmanager
@@ -51,9 +57,9 @@ def commit(places: Mapping[Path, Path]) -> None:
             raise WriteError(f"'{path}' was not written.", "See what Blender said.")
     for path, place in places.items():
         try:
-            place.replace(path)
+            replace(place, path)
         except OSError as error:
-            raise _unwritable(path, error) from error
+            raise unwritable(f"'{path}'", error) from error
 
 
 def remove_staged(place: Path) -> None:
@@ -72,12 +78,20 @@ def write_json(path: Path, content: Any) -> None:
     Raises:
         WriteError: it cannot be written.
     """
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all.
+
+    Raises:
+        WriteError: it cannot be written.
+    """
     with staged([path]) as places:
         try:
-            text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
             places[path].write_text(text, encoding="utf-8")
         except OSError as error:
-            raise _unwritable(path, error) from error
+            raise unwritable(f"'{path}'", error) from error
         commit(places)
 
 
@@ -90,12 +104,19 @@ def _check_writable(path: Path, place: Path) -> None:
         # An exporter must not find a file there that it has not written itself.
         place.unlink()
     except OSError as error:
-        raise _unwritable(path, error) from error
+        raise unwritable(f"'{path}'", error) from error
 
 
-def _unwritable(path: Path, error: OSError) -> WriteError:
-    reason = error.strerror or os.fspath(type(error).__name__)
-    return WriteError(f"'{path}' cannot be written: {reason}.", "Choose another place.")
+def unwritable(what: str, error: OSError) -> WriteError:
+    """The error that says that a path, in quotation marks, cannot be written."""
+    letters = len(what) - 2
+    if sys.platform == "win32" and letters + _ADDED > _LONGEST_ON_WINDOWS:
+        return WriteError(
+            f"Octo Motion cannot write {what}: its path has {letters} letters, and Windows takes "
+            f"{_LONGEST_ON_WINDOWS - _ADDED}.",
+            "Choose a folder nearer to the drive.",
+        )
+    return files.unwritable(what, error)
 
 
 # --- What Blender's own operators report when they fail, in one line ------------------------------

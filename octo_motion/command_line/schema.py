@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..core.errors import OctoMotionError, SettingsError
+from ..core.files import name_fault
 from ..core.locomotion.gait import GaitTable
 
 _TRUE: Final = {"true", "yes", "on", "1"}
@@ -39,6 +40,8 @@ class Known:
     """Settings by name, of all tables that have what a group of properties has."""
     gait: Callable[[str], GaitTable]
     """A gait by name; raises GaitError."""
+    actions: Callable[[Path], list[str]] = lambda _: []
+    """Names of the actions of a .blend file; raises OctoMotionError."""
 
 
 @dataclass(frozen=True)
@@ -177,13 +180,20 @@ class File:
     what: str = ""
     """What files with other endings are not."""
     suffixes: tuple[str, ...] = ()
+    is_written: bool = False
+    """Whether its name has to be one that every system takes."""
 
     def __call__(self, given: Any, reading: Reading) -> Path:
         path = Path(Text()(given, reading))
+        resolved = reading.resolve(given)
         if self.suffixes and path.suffix.lower() not in self.suffixes:
             valid = ", ".join(self.suffixes)
             raise SettingsError(f"'{path.name}' is no {self.what}. Valid: {valid}.")
-        return reading.resolve(given)
+        if self.is_written:
+            for part in path.parts:
+                if part not in {path.anchor, ".."} and (fault := name_fault(part)):
+                    raise SettingsError(fault, "Give the file another name.")
+        return resolved
 
 
 @dataclass(frozen=True)

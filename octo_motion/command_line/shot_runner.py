@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any, Final
 import bpy
 from mathutils import Matrix
 
-from ..blender.animation import writable_armature
+from ..blender.animation import curves_of, key_points, writable_armature
 from ..blender.rig import linked_names, read_skeleton, world_matrix
 from ..blender.scene import add_octopus, add_route_curve, remove_markers
 from ..core.errors import OctoMotionError, RigError, SettingsError, WriteError
@@ -49,10 +50,18 @@ class Performed:
     armature: str
     libraries: tuple[str, ...]
     """Paths of the files that the scene is linked from, and of those that clips consist of."""
+    motion: str
+    """Digest of all keys."""
+    action: str
+    """Name of the armature's action."""
 
 
-def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
-    """Make a shot and write each of its outputs to its place.
+def perform(
+    shot: ShotRequest,
+    places: Mapping[Path, Path],
+    note: Callable[[Performed], None] | None = None,
+) -> Performed:
+    """Make a shot and write each of its outputs to its place; ``note`` is called before that.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -87,13 +96,30 @@ def perform(shot: ShotRequest, places: Mapping[Path, Path]) -> Performed:
             check_limits(shot.limits, summary)
         if shot.octopus is not None or motion is not None:
             scene.frame_start, scene.frame_end = summary.frame_start, summary.frame_end
+        read = (*libraries, *(str(path) for path in clips.read))
+        data = armature.animation_data
+        action = data.action.name if data is not None and data.action is not None else ""
+        performed = Performed(summary, armature.name, read, _motion(), action)
+        if note is not None:
+            note(performed)
         if shot.output is not None:
             _save(places[shot.output], compress=compress)
         # Whatever the exports need of the scene, the file has been saved before.
         for path in shot.export:
             export(places[path], armature, scene, summary.frame_start, summary.frame_end)
-    libraries += [str(path) for path in clips.read]
-    return Performed(summary, armature.name, tuple(libraries))
+    return performed
+
+
+def _motion() -> str:
+    """Digest of all keys of the open file's own actions: their curves, frames, values, handles."""
+    found = hashlib.sha256()
+    for action in sorted(bpy.data.actions, key=lambda each: each.name):
+        if action.library is None:
+            for curve in curves_of(action):
+                found.update(f"{action.name}\0{curve.data_path}\0{curve.array_index}\0".encode())
+                for name in ("co", "handle_left", "handle_right"):
+                    found.update(key_points(curve, name).tobytes())
+    return found.hexdigest()
 
 
 def _find(shot: ShotRequest) -> tuple[bpy.types.Object, bpy.types.Scene]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ..core.errors import SettingsError
+from ..core.files import name_fault, read_text
 from ..core.locomotion.gait import gait_to_json
 from ..core.locomotion.metrics import KINDS as FIGURES
 from ..core.locomotion.octopus import OctopusShape
@@ -194,13 +195,22 @@ def _gait(given: Any, reading: Reading) -> str | Path:
     return gait_to_json(reading.known.gait(name))
 
 
+def _shot_name(given: Any, reading: Reading) -> str:
+    """The name of a shot, of which files are named: folders may be in it."""
+    name = Text()(given, reading)
+    for part in name.split("/"):
+        if fault := name_fault(part) or ("" if part.strip(". ") else f"'{name}' is no name."):
+            raise SettingsError(fault, "Give the shot another name.")
+    return name
+
+
 def _script(given: Any, reading: Reading) -> Path:
     """A pose script, which is read to see whether it makes sense."""
     path = File()(given, reading)
     if not path.is_file():
         raise SettingsError(f"There is no file '{path}'.", "Give the path of a pose script.")
     try:
-        parse_script(path.read_text(encoding="utf-8"), path.name)
+        parse_script(read_text(path), path.name)
     except (OSError, UnicodeDecodeError) as error:
         raise SettingsError(f"The script '{path.name}' cannot be read: {error}.") from error
     return path
@@ -210,7 +220,7 @@ def _export(given: Any, reading: Reading) -> Path:
     name = Path(Text()(given, reading)).name
     if name.lower().endswith(".gltf"):
         raise SettingsError(f"'{name}' would be several files: export to .glb, the same in one.")
-    return File("format to export to", _EXPORT_SUFFIXES)(given, reading)
+    return File("format to export to", _EXPORT_SUFFIXES, is_written=True)(given, reading)
 
 
 def _exports(given: Any, reading: Reading) -> tuple[Path, ...] | None:
@@ -402,11 +412,11 @@ def _kind(own: dict[str, Key], exported: str) -> dict[str, Key]:
     )
     output = Option("the .blend file to write", "FILE", ("-o", "--output"))
     return {
-        "name": Key(Text()),
+        "name": Key(_shot_name),
         "kind": Key(Choice(("generate", "splice", "pose", "retarget"), "kind")),
         **own,
         "fps": Key(Number(1.0, HIGHEST_FPS), Option("frames per second of the scene", "FPS")),
-        "output": Key(File("format to save to", (".blend",)), output),
+        "output": Key(File("format to save to", (".blend",), is_written=True), output),
         "export": Key(_exports, export),
     }
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +29,8 @@ from .shot_schema import ShotRequest, gait_name, is_motion, read_shot
 
 _OWN_KEYS = {"name", "gait"}
 """No settings: Blender's own name of a group, and the gait, which a shot names itself."""
+BACKSLASHES = "Write / between folders: every system takes it."
+"""What to do about paths as Windows writes them."""
 _LISTED = {"changes": ChangeItem, "reaches": ReachItem, "contacts": ContactItem}
 """What the items are of the lists that a shot may have."""
 
@@ -51,7 +55,29 @@ def known() -> Known:
             **{name: dict(_of_item(item)) for name, item in _LISTED.items()},
         },
         load_gait,
+        action_names,
     )
+
+
+def action_names(file: Path) -> list[str]:
+    """Names of the actions that a .blend file has, without opening it.
+
+    Raises:
+        OctoMotionError: Blender cannot read the file.
+    """
+    if not file.is_file():
+        raise OctoMotionError(f"There is no file '{file}'.", "Give the path of a .blend file.")
+    if bpy.data.filepath and file.samefile(bpy.data.filepath):
+        # Blender does not look into the file that is open.
+        return [each.name for each in bpy.data.actions]
+    try:
+        library: Any = bpy.data.libraries.load(str(file))
+        with library as (inside, _taken):
+            return list(inside.actions)
+    except OSError as error:
+        raise OctoMotionError(
+            f"'{file}' is not a file that this Blender can read.", "Give a .blend file."
+        ) from error
 
 
 def _of_item(item: Any) -> Iterator[tuple[str, Kind]]:
@@ -90,14 +116,36 @@ def _settings(group: Any, before: str = "") -> Iterator[tuple[str, Kind]]:
             yield name, Number(each.hard_min, each.hard_max, whole=whole, is_angle=is_angle)
 
 
-def resolver(job: Path, name: str) -> Callable[[str], Path]:
-    """The paths that the texts of a shot mean, by the job's path and the shot's name."""
+def resolver(job: Path, name: str, *, follow: bool = True) -> Callable[[str], Path]:
+    """The paths that the texts of a shot mean, by the job's path and the shot's name; links are
+    followed, unless nothing is to be looked up.
+    """
 
     def resolve(text: str) -> Path:
+        check_path(text)
+        path = job.parent / Path(text.replace("{name}", name)).expanduser()
         # An output that is a link is written where the link leads.
-        return (job.parent / Path(text.replace("{name}", name)).expanduser()).resolve()
+        return path.resolve() if follow else Path(os.path.normpath(path))
 
     return resolve
+
+
+def check_path(text: str) -> None:
+    """Make sure that a path of a job file is one, on every system.
+
+    Raises:
+        SettingsError: a backslash was read as something else, or would be, on another system.
+    """
+    if any(ord(letter) < 32 for letter in text):
+        raise SettingsError(
+            f"The path {text!r} has letters that cannot be seen: a backslash in double quotes "
+            "means something else.",
+            BACKSLASHES,
+        )
+    if "\\" in text and sys.platform != "win32":
+        raise SettingsError(
+            f"The path '{text}' has backslashes, which Windows alone takes.", BACKSLASHES
+        )
 
 
 def make_request(

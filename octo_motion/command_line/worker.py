@@ -20,13 +20,18 @@ from typing import Any, Final
 
 import bpy
 
-from ..core.errors import OctoMotionError
+from ..core.errors import OctoMotionError, WriteError
 from ..ui.locomotion import Summary
 from .command_line import COMMAND
-from .job_report import LimitError, quality
+from .job_report import Cause, LimitError, digest, quality
 from .outputs import remove_staged, write_json
-from .shot_runner import AnySummary, perform
+from .records import Records, sign
+from .shot_runner import AnySummary, Performed, perform
 from .vocabulary import make_request, resolver
+
+if sys.platform == "win32":
+    import ctypes
+    import msvcrt
 
 _GRACE: Final = 5.0
 """Seconds that a process has to end before it is ended."""
@@ -138,25 +143,18 @@ def dying_with_parent(clean_up: Callable[[], None]) -> Iterator[None]:
     Whatever ends that one, its end of our standard input closes.
     """
     done = threading.Event()
+    parent_is_there = _watched_pipe()
+    if parent_is_there is None:
+        # No pipe: then this process ends by itself.
+        yield
+        return
 
     def watch() -> None:
         while not done.wait(_HEARTBEAT):
-            try:
-                alive = os.read(0, 1) != b""
-            except BlockingIOError:
-                alive = True
-            except OSError:
-                alive = False
-            if not alive:
+            if not parent_is_there():
                 clean_up()
                 os._exit(1)
 
-    try:
-        os.set_blocking(0, False)
-    except (OSError, AttributeError):
-        # No pipe, or Windows before Python 3.12: then this process ends by itself.
-        yield
-        return
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
     try:
@@ -167,31 +165,39 @@ def dying_with_parent(clean_up: Callable[[], None]) -> Iterator[None]:
         watcher.join()
 
 
-@contextlib.contextmanager
-def stoppable() -> Iterator[None]:
-    """Let Ctrl-C and a request to terminate raise KeyboardInterrupt, also within Blender.
-
-    Blender in the background takes Ctrl-C for itself.
+def _watched_pipe() -> Callable[[], bool] | None:
+    """What says whether somebody holds the other end of our standard input; None if it is no pipe
+    that can be asked.
     """
-
-    def stop(_signal: int, _frame: object) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {each: signal.signal(each, stop) for each in (signal.SIGINT, signal.SIGTERM)}
+    if sys.platform == "win32":
+        # There no pipe can be read without waiting before Python 3.12.
+        peek = ctypes.WinDLL("kernel32").PeekNamedPipe
+        try:
+            pipe = ctypes.c_void_p(msvcrt.get_osfhandle(0))
+        except OSError:
+            return None
+        if not peek(pipe, None, 0, None, None, None):
+            return None
+        return lambda: bool(peek(pipe, None, 0, None, None, None))
     try:
-        yield
-    finally:
-        for each, handler in before.items():
-            # None stands for a handler that is not Python's own, and cannot be put back.
-            signal.signal(each, signal.SIG_DFL if handler is None else handler)
+        os.set_blocking(0, False)
+    except OSError:
+        return None
+
+    def is_held() -> bool:
+        try:
+            return os.read(0, 1) != b""
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+
+    return is_held
 
 
 def processors() -> int:
     """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
+    if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
@@ -247,26 +253,41 @@ def child_environment(scratch: Path) -> dict[str, str]:
     root = Path(__file__).resolve().parents[1 + len(_PACKAGE.split("."))]
     paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH", "")])]
     temporary = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(scratch))
-    python = {"PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1"}
+    python = {
+        "PYTHONPATH": os.pathsep.join(paths),
+        "PYTHONUNBUFFERED": "1",
+        "PYTHONUTF8": "1",  # what they say is read as UTF-8
+    }
     return {**os.environ, **temporary, **python}
 
 
-def write_request(
-    path: Path, job: Path, table: Mapping[str, Any], places: Mapping[Path, Path]
-) -> None:
-    """Write down what a process is to do; ``run_shot`` does it.
+@dataclass(frozen=True)
+class Request:
+    """What is to be made: a shot's table in a job file, and where each output is to be written."""
 
-    It is told the job file, the shot's table there, and where each output is to be written.
-    """
-    plain = {str(output): str(place) for output, place in places.items()}
-    text = json.dumps({"job": str(job), "table": table, "places": plain})
-    path.write_text(text, encoding="utf-8")
+    job: Path
+    table: Mapping[str, Any]
+    places: Mapping[Path, Path]
+    fingerprint: str
+
+    def write(self, path: Path) -> None:
+        """Write it down for another process; ``run_shot`` does it."""
+        plain = {str(output): str(place) for output, place in self.places.items()}
+        content = {**vars(self), "job": str(self.job), "places": plain}
+        path.write_text(json.dumps(content), encoding="utf-8")
+
+    @classmethod
+    def read(cls, path: Path) -> Request:
+        """What was written down."""
+        content = json.loads(path.read_text(encoding="utf-8"))
+        places = {Path(output): Path(place) for output, place in content["places"].items()}
+        return cls(Path(content["job"]), content["table"], places, content["fingerprint"])
 
 
 def read_answer(path: Path) -> dict[str, Any]:
     """What a process has said of its shot, nothing if it ended before it could.
 
-    ``error`` if it failed, ``libraries`` that it has read, and what a report says of the motion.
+    ``error`` and its ``cause`` if it failed, else what its record says of it.
     """
     try:
         return json.loads(path.read_text(encoding="utf-8"))
@@ -276,30 +297,54 @@ def read_answer(path: Path) -> dict[str, Any]:
 
 def run_shot(request: Path, answer: Path) -> int:
     """Make the shot that is asked for, in the process of its own; the exit status."""
-    asked = json.loads(request.read_text(encoding="utf-8"))
-    places = {Path(output): Path(place) for output, place in asked["places"].items()}
+    asked = Request.read(request)
 
     def clean_up() -> None:
-        for place in places.values():
+        for place in asked.places.values():
             remove_staged(place)
         # Requests, answers and logs of a run that is no more.
         shutil.rmtree(request.parent, ignore_errors=True)
 
-    said: dict[str, Any]
-    try:
-        with dying_with_parent(clean_up):
-            resolve = resolver(Path(asked["job"]), asked["table"]["name"])
-            performed = perform(make_request(asked["table"], resolve), places)
-        said = {**_said(performed.summary), "libraries": performed.libraries}
-    except LimitError as error:
-        said = {"error": str(error), **_said(error.summary)}
-    except OctoMotionError as error:
-        said = {"error": str(error)}
-    except Exception as error:  # noqa: BLE001 - a fault of ours is one shot's, and is told
-        traceback.print_exc()
-        said = {"error": f"{type(error).__name__}: {error}"}
+    with dying_with_parent(clean_up):
+        said = make_shot(asked)
     write_json(answer, said)
     return 1 if "error" in said else 0
+
+
+def make_shot(asked: Request) -> dict[str, Any]:
+    """Make a shot in this Blender: fields of its record, or ``error`` and ``cause``."""
+    name = asked.table["name"]
+    records = Records(asked.job, asked.job)
+
+    def told(performed: Performed) -> dict[str, Any]:
+        read = [*shot.inputs, *map(Path, performed.libraries)]
+        inputs = {records.relative(path): digest(path) for path in read}
+        return {
+            **_said(performed.summary),
+            "inputs": inputs,
+            "motion": performed.motion,
+            "action": performed.action,
+        }
+
+    def note(performed: Performed) -> None:
+        mark = {"name": name, "status": "done", "fingerprint": asked.fingerprint}
+        sign({**told(performed), **mark})
+
+    try:
+        shot = make_request(asked.table, resolver(asked.job, name))
+        return told(perform(shot, asked.places, note))
+    except LimitError as error:
+        return {"error": str(error), "cause": "final", **_said(error.summary)}
+    except OctoMotionError as error:
+        return {"error": str(error), "cause": cause_of(error)}
+    except Exception as error:  # noqa: BLE001 - a fault of ours is one shot's, and is told
+        traceback.print_exc()
+        return {"error": f"{type(error).__name__}: {error}", "cause": "again"}
+
+
+def cause_of(error: OctoMotionError) -> Cause:
+    """Whether it makes sense to try again: a disk may be full for a while, or on one machine."""
+    return "again" if isinstance(error, WriteError) else "final"
 
 
 def _said(summary: AnySummary) -> dict[str, Any]:
@@ -308,7 +353,7 @@ def _said(summary: AnySummary) -> dict[str, Any]:
         "frames": summary.frames,
         "frame_start": summary.frame_start,
         "frame_end": summary.frame_end,
-        "warnings": summary.warnings,
+        "warnings": list(summary.warnings),
     }
     if isinstance(summary, Summary):
         said["quality"] = quality(summary.figures)

@@ -456,4 +456,6 @@ def test_fingerprint_changes_with_the_entry_and_the_gait_alone() -> None:
 
 
 def test_version_is_the_manifests() -> None:
-    assert f'version = "{version()}"' in (REPOSITORY / "blender_manifest.toml").read_text()
+    assert f'version = "{version()}"' in (REPOSITORY / "blender_manifest.toml").read_text(
+        encoding="utf-8"
+    )

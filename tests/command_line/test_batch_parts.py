@@ -29,6 +29,7 @@ from octo_motion.command_line.job_report import (
 from octo_motion.command_line.outputs import blender_said, commit, remove_staged, staged, write_json
 from octo_motion.command_line.schema import Known, Reading
 from octo_motion.command_line.shot_schema import KINDS, LIMITS
+from octo_motion.command_line.stopping import stoppable
 from octo_motion.command_line.worker import (
     Ended,
     Task,
@@ -36,7 +37,6 @@ from octo_motion.command_line.worker import (
     last_lines,
     processors,
     run_processes,
-    stoppable,
 )
 from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError
 from octo_motion.core.locomotion.gait.table import gait_presets
@@ -250,22 +250,22 @@ def test_outputs_take_their_places_together_and_nothing_else_is_left(tmp_path: P
     with staged([first, second]) as places:
         for path, place in places.items():
             assert (place.parent, place.suffix) == (path.parent, path.suffix)
-            place.write_text(path.name)
+            place.write_text(path.name, encoding="utf-8")
         commit(places)
     assert sorted(path.name for path in first.parent.iterdir()) == ["a.blend", "a.glb"]
-    assert second.read_text() == "a.glb"
+    assert second.read_text(encoding="utf-8") == "a.glb"
 
 
 def test_unfinished_outputs_leave_what_was_there_before(tmp_path: Path) -> None:
     first, second = tmp_path / "a.blend", tmp_path / "a.glb"
-    first.write_text("before")
+    first.write_text("before", encoding="utf-8")
     with staged([first, second]) as places:
-        places[first].write_text("after")
-        places[first].with_name(places[first].name + "@").write_text("half")
+        places[first].write_text("after", encoding="utf-8")
+        places[first].with_name(places[first].name + "@").write_text("half", encoding="utf-8")
         with pytest.raises(WriteError, match="was not written"):
             commit(places)
     assert [path.name for path in tmp_path.iterdir()] == ["a.blend"]
-    assert first.read_text() == "before"
+    assert first.read_text(encoding="utf-8") == "before"
 
 
 def test_output_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:
@@ -273,7 +273,7 @@ def test_output_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -
     (tmp_path / "file").touch()
     with pytest.raises(WriteError, match="is a folder"), staged([tmp_path / "folder.blend"]):
         pass
-    with pytest.raises(WriteError, match="cannot be written"), staged([tmp_path / "file/a.blend"]):
+    with pytest.raises(WriteError, match="cannot write"), staged([tmp_path / "file/a.blend"]):
         pass
 
 

@@ -62,7 +62,7 @@ def test_script_that_fails_writes_nothing(
 ) -> None:
     output = tmp_path / "posed.blend"
     wrong = script(tmp_path, {"do": "grab", "bone": "nose"})
-    assert run("pose", file, "--script", wrong, "-o", output) == 1
+    assert run("pose", file, "--script", wrong, "-o", output) == 3
     assert "has no bone 'nose'" in capfd.readouterr().err
     assert not output.exists()
 
@@ -89,7 +89,7 @@ def test_arguments_that_make_no_sense_are_said(  # noqa: PLR0917
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path = str(script(tmp_path, *STEPS))
-    assert run("pose", file, *(word.replace("{script}", path) for word in words)) in {1, 2}
+    assert run("pose", file, *(word.replace("{script}", path) for word in words)) in {2, 3}
     assert said in capfd.readouterr().err
     assert not (tmp_path / "posed.blend").exists()
 
@@ -104,7 +104,9 @@ def test_the_script_of_a_shot_is_an_input_of_it(tmp_path: Path) -> None:
 
 def job(folder: Path, *lines: str) -> Path:
     path = folder / "job.toml"
-    path.write_text("\n".join(["[[shots]]", 'name = "wave"', 'kind = "pose"', *lines]))
+    path.write_text(
+        "\n".join(["[[shots]]", 'name = "wave"', 'kind = "pose"', *lines]), encoding="utf-8"
+    )
     return path
 
 
