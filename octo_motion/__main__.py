@@ -6,13 +6,23 @@ from __future__ import annotations
 import sys
 from importlib.util import find_spec
 
+from .command_line import STOPPED, parse, stoppable
 from .command_line import main as run_command
-from .command_line import parse
 
 PROGRAM = "python -m octo_motion"
 
 
 def main() -> int:
+    """Run the command; the exit status. It can be stopped at any time."""
+    try:
+        with stoppable():
+            return _run()
+    except KeyboardInterrupt:
+        print("Stopped.", file=sys.stderr)
+        return STOPPED
+
+
+def _run() -> int:
     """Run the command with the add-on registered; the exit status."""
     arguments = sys.argv[1:]
     if not arguments or arguments[0] in {"-h", "--help"} or arguments[1:] in (["-h"], ["--help"]):

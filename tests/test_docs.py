@@ -120,9 +120,16 @@ def test_gait_file_that_is_shown_can_be_imported(block: str, clean_blender: Path
 
 @pytest.mark.parametrize("block", code_blocks(BATCH, "toml"))
 def test_job_that_is_shown_has_no_faults(block: str, clean_blender: Path) -> None:
+    import bpy
+
     from octo_motion.command_line.job import read_job
     from octo_motion.command_line.vocabulary import known
 
+    # What a table is repeated for has to be there.
+    (clean_blender / "clips").mkdir()
+    (clean_blender / "clips" / "walk.bvh").touch()
+    bpy.data.actions.new("Walk").use_fake_user = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(clean_blender / "hero.blend"), copy=True)
     file = clean_blender / "job.toml"
     file.write_text(block, encoding="utf-8")
     assert read_job(file, known(), clean_blender / "job.report.json").shots
@@ -372,7 +379,7 @@ def test_every_key_of_a_job_is_described() -> None:
     from octo_motion.command_line.shot_schema import KINDS
 
     keys = {key for keys in KINDS.values() for key in keys}
-    assert set(rows(section("## Job files", BATCH))) == keys
+    assert set(rows(section("## Job files", BATCH))) == keys | {"each"}
 
 
 def test_every_parameter_of_a_new_octopus_is_named_for_jobs() -> None:

@@ -17,7 +17,7 @@ REASON = "# In one piece"
 
 def _definitions() -> Iterator[tuple[str, ast.FunctionDef | ast.ClassDef]]:
     for path in sorted(PACKAGE.rglob("*.py")):
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
         lines = text.splitlines()
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):

@@ -66,7 +66,24 @@ def cycle_pictures(
         phases: how many.
         name: what is written into the pictures, with the phase; none for all there is to say.
     """
-    frames = performance.cycle(phases)
+    moments = np.arange(phases) / phases
+    notes = []
+    for moment, frame in zip(moments, performance.at(moments), strict=True):
+        phase = f"{round(360 * moment)}°"
+        whole = f"{performance.shot.gait}, {view.name}, {phase}, frame {frame:.0f}"
+        notes.append(f"{name}, {phase}" if name else whole)
+    return pictures_at(performance, view, size, moments, notes)
+
+
+def pictures_at(
+    performance: Performance,
+    view: View,
+    size: tuple[int, int],
+    moments: Points,
+    notes: Sequence[str],
+) -> list[Pixels]:
+    """Moments of one cycle, 0 to 1, a picture each with a note."""
+    frames = performance.at(moments)
     points = stage.skin_points(performance.octopus, frames)
     bodies, axes = _travel(performance.octopus, frames, view)
     # Right, up and back from the body, as this view has them: (frames, points, 3).
@@ -85,10 +102,7 @@ def cycle_pictures(
         stage.go_to(frame)
         stage.look(camera, -axes[number][:, 2], axes[number][:, 1])
         camera.location = Vector(bodies[number] + axes[number] @ middle)
-        phase = f"{360 * number // phases}°"
-        whole = f"{performance.shot.gait}, {view.name}, {phase}, frame {frame:.0f}"
-        note = f"{name}, {phase}" if name else whole
-        pictures.append(stage.render_pixels(*size, note=note))
+        pictures.append(stage.render_pixels(*size, note=notes[number]))
     bpy.data.objects.remove(camera)
     scene.camera = usual
     return pictures

@@ -30,7 +30,7 @@ CLIPS: Final = Path(__file__).resolve().parent.parent / "examples" / "clips"
 VARIABLE: Final = "OCTO_MOTION_CLIPS"
 """Environment variable that may name another folder."""
 
-_PLAIN: Final[Colour] = (0.66, 0.66, 0.64)
+PLAIN: Final[Colour] = (0.66, 0.66, 0.64)
 _RIGHT: Final[Colour] = (0.86, 0.28, 0.05)
 _LEFT: Final[Colour] = (0.03, 0.42, 0.50)
 _SKY: Final[Colour] = (0.60, 0.66, 0.70)
@@ -89,13 +89,13 @@ def sheet(clips: Clips, cell: tuple[int, int] = _CELL, columns: int = _COLUMNS) 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = stage.the_scene()
     scene.render.fps = 30
-    walker, thrower, puncher = (_imported(path) for path in (clips.walk, clips.right, clips.left))
-    long = [_span(each)[1] - _span(each)[0] for each in (thrower, puncher)]
+    walker, thrower, puncher = (imported(path) for path in (clips.walk, clips.right, clips.left))
+    long = [span(each)[1] - span(each)[0] for each in (thrower, puncher)]
     _lengthen(walker, round(0.9 * long[0] + long[1]) + 21)
-    figures.dress(walker, {"arm.R": _RIGHT, "arm.L": _LEFT}, _PLAIN)
-    figures.dress(thrower, {"arm.R": _RIGHT}, _PLAIN)
-    figures.dress(puncher, {"arm.L": _LEFT}, _PLAIN)
-    first, last = _span(walker)
+    figures.dress(walker, {"arm.R": _RIGHT, "arm.L": _LEFT}, PLAIN)
+    figures.dress(thrower, {"arm.R": _RIGHT}, PLAIN)
+    figures.dress(puncher, {"arm.L": _LEFT}, PLAIN)
+    first, last = span(walker)
     base: Any = walker.animation_data
     action = base.action
     timings = (
@@ -103,44 +103,46 @@ def sheet(clips: Clips, cell: tuple[int, int] = _CELL, columns: int = _COLUMNS) 
         (first + 6.0 + 0.6 * long[1], first + 6.0),
     )
     for part, source in (("RIGHT_ARM", thrower), ("LEFT_ARM", puncher)):
-        _select(walker)
+        select(walker)
         bpy.ops.octo_motion.splice_add(part=part, source=source.name)
     plain = walker.animation_data.action.name
     shown = tuple(np.linspace(first, last, columns).tolist())
-    _prepare_stage()
+    prepare_stage()
     rows = [Row("walk", walker.name, plain, shown)]
     rows += [
         Row(
             name,
             each.name,
             each.animation_data.action.name,
-            tuple(np.linspace(*_span(each), columns).tolist()),
+            tuple(np.linspace(*span(each), columns).tolist()),
         )
-        for name, each in (("throw", thrower), ("punch", puncher))
+        for name, each in ((clips.right.stem, thrower), (clips.left.stem, puncher))
     ]
-    pictures = [_row_pixels(row, cell, plain=row.armature == walker.name) for row in rows]
+    pictures = [row_pixels(row, cell, plain=row.armature == walker.name) for row in rows]
     splices = walker.octo_motion.splicing.splices
     for number, starts in enumerate(timings, 1):
         for splice, start in zip(splices, starts, strict=True):
             splice.base_start = start
-        _select(walker)
+        select(walker)
         bpy.ops.octo_motion.splice_build()
         result = walker.octo_motion.splicing.result
         title = f"timing {number}"
-        pictures.append(_row_pixels(Row(title, walker.name, result.name, shown), cell))
+        pictures.append(row_pixels(Row(title, walker.name, result.name, shown), cell))
         told = ", ".join(f"{splice.name} from frame {splice.base_start:.0f}" for splice in splices)
         print(f"{title}: {told}", file=sys.stderr)
     assert action.name == plain
     return contact_sheet.joined(pictures)
 
 
-def _imported(path: Path) -> Any:
+def imported(path: Path) -> Any:
+    """The armature of a clip's file."""
     bpy.ops.octo_motion.import_clips(filepath=str(path), fit="NONE", frame_view=False)
     armature: Any = bpy.context.object
     return armature
 
 
-def _span(armature: Any) -> tuple[float, float]:
+def span(armature: Any) -> tuple[float, float]:
+    """First and last frame of what an armature plays."""
     start, end = armature.animation_data.action.frame_range
     return float(start), float(end)
 
@@ -150,13 +152,15 @@ def _lengthen(armature: Any, frames: int) -> None:
     _assign(armature, lasting(armature.animation_data.action, frames))
 
 
-def _select(armature: Any) -> None:
+def select(armature: Any) -> None:
+    """Make an armature the active one, and the only one selected."""
     for each in bpy.data.objects:
         each.select_set(each == armature)
     bpy.context.view_layer.objects.active = armature
 
 
-def _prepare_stage() -> None:
+def prepare_stage() -> None:
+    """Light and camera."""
     scene = stage.the_scene()
     stage.set_light(scene)
     assert scene.world is not None
@@ -165,7 +169,7 @@ def _prepare_stage() -> None:
     stage.look(camera, _FORWARD, _UP)
 
 
-def _row_pixels(row: Row, cell: tuple[int, int], *, plain: bool = False) -> Sequence[Pixels]:
+def row_pixels(row: Row, cell: tuple[int, int], *, plain: bool = False) -> Sequence[Pixels]:
     """A row of poses, all seen from one side and in one scale; the camera goes along.
 
     Args:
@@ -211,7 +215,7 @@ def _without_colours(armature: Any) -> dict[str, tuple[float, ...]]:
     for limb in armature.children:
         material = limb.data.materials[0]
         before[material.name] = tuple(material.diffuse_color)
-        material.diffuse_color = (*_PLAIN, 1.0)
+        material.diffuse_color = (*PLAIN, 1.0)
     return before
 
 

@@ -295,6 +295,26 @@ def throw() -> Acting:
     return acting
 
 
+def turn(acting: Acting | None = None) -> Acting:
+    """The right arm goes round at the shoulder, forwards, twice; standing, or in what is given."""
+    standing = acting is None
+    acting = acting or _acting(3.0)
+    times = acting.times
+    whole = 720.0 * np.clip((times - 0.2) / 2.5, 0.0, 1.0)
+    if standing:
+        sway = np.sin(np.radians(whole))
+        acting.turns["Chest"] = _turns(_about(_Y, 5.0 * sway), _about(_Z, 3.0 * sway))
+        _stand(
+            acting,
+            {"Left": (0.10, 0.02, 8.0), "Right": (-0.10, -0.02, 8.0)},
+            0.925 + 0.0 * times,
+        )
+        still = np.zeros(len(times))
+        _arm(acting, "Left", still + 4.0, still + 9.0, still + 18.0)
+    _arm(acting, "Right", whole, np.full(len(times), 14.0), 14.0 + 6.0 * np.cos(np.radians(whole)))
+    return acting
+
+
 def punch() -> Acting:
     """Fists up, and the left one straight ahead."""
     acting = _acting(1.8)

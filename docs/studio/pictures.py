@@ -23,6 +23,7 @@ import reaching
 import setups
 import shots
 import stage
+import weights
 from stage import Pixels
 
 import octo_motion
@@ -152,9 +153,11 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "setups": setups.gallery,
     "rig": rig,
     "gaits": gaits,
+    "weights": weights.strip,
     "reach": reaching.reach,
     "coil": reaching.coil,
     "hold": reaching.hold,
+    "mouth": reaching.mouth,
     "pose_octopus": puppets.octopus,
     "pose_doll": puppets.doll,
     "puppet_plots": puppet_plots,

@@ -54,21 +54,21 @@ def gait_pixels(tables: Sequence[GaitTable], size: tuple[int, int]) -> Pixels:
 def _plot(table: GaitTable, left: float) -> None:
     for degrees in (-120, -60, 0, 60, 120):
         y = degrees / _MOST
-        _line([(left, y), (left + _WIDTH, y)], _INK if degrees == 0 else _FAINT, 0.004)
-        _text(f"{degrees}°", left - 0.04, y, "RIGHT", _INK)
+        line([(left, y), (left + _WIDTH, y)], _INK if degrees == 0 else _FAINT, 0.004)
+        text(f"{degrees}°", left - 0.04, y, "RIGHT", _INK)
     for phase in (0, 90, 180, 270, 360):
         x = left + _WIDTH * phase / 360.0
-        _line([(x, -1.0), (x, 1.0)], _FAINT, 0.004)
-        _text(f"{phase}°", x, -1.09, "CENTER", _INK)
-    _text("phase", left + 0.5 * _WIDTH, -1.22, "CENTER", _INK)
-    _text("head", left - 0.04, 1.0, "RIGHT", _INK)
-    _text(table.name, left, 1.16, "LEFT", _INK, size=0.15)
+        line([(x, -1.0), (x, 1.0)], _FAINT, 0.004)
+        text(f"{phase}°", x, -1.09, "CENTER", _INK)
+    text("phase", left + 0.5 * _WIDTH, -1.22, "CENTER", _INK)
+    text("head", left - 0.04, 1.0, "RIGHT", _INK)
+    text(table.name, left, 1.16, "LEFT", _INK, size=0.15)
     curve = table.curve(1)
     x = left + _WIDTH * curve.phases / (2.0 * np.pi)
     for link, (name, colour) in enumerate(_LINKS):
         y = np.degrees(curve.angles[:, link, 0]) / _MOST
-        _line(np.stack([x, y], axis=1).tolist(), colour, 0.014, height=0.1 * (link + 1))
-        _text(name, left + 0.6 + 0.35 * link, 1.16, "LEFT", colour, size=0.1)
+        line(np.stack([x, y], axis=1).tolist(), colour, 0.014, height=0.1 * (link + 1))
+        text(name, left + 0.6 + 0.35 * link, 1.16, "LEFT", colour, size=0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ class Panel:
     x: Floats
     """(samples,)"""
     curves: dict[str, Floats]
-    """(samples,) by name; not below 0."""
+    """(samples,) by name."""
 
 
 def curves_pixels(panels: Sequence[Panel], size: tuple[int, int]) -> Pixels:
@@ -103,30 +103,31 @@ def curves_pixels(panels: Sequence[Panel], size: tuple[int, int]) -> Pixels:
 def _panel(panel: Panel, left: float) -> None:
     longest = float(panel.x[-1])
     highest = max(float(curve.max()) for curve in panel.curves.values())
-    across, up = _round_step(longest), _round_step(highest)
-    top = np.ceil(highest / up) * up
-    for value in np.arange(0.0, top + 0.5 * up, up):
-        y = float(value / top)
-        _line([(left, y), (left + _WIDTH, y)], _FAINT if value else _INK, 0.004)
-        _text(f"{value:.4g}", left - 0.04, y, "RIGHT", _INK)
+    lowest = min(0.0, *(float(curve.min()) for curve in panel.curves.values()))
+    across, up = _round_step(longest), _round_step(highest - lowest)
+    bottom, top = np.floor(lowest / up) * up, np.ceil(highest / up) * up
+    for value in np.arange(bottom, top + 0.5 * up, up):
+        y = float((value - bottom) / (top - bottom))
+        line([(left, y), (left + _WIDTH, y)], _FAINT if abs(value) > 1e-9 else _INK, 0.004)
+        text(f"{value + 0.0:.4g}", left - 0.04, y, "RIGHT", _INK)
     for value in np.arange(0.0, longest + 0.01 * across, across):
         x = left + _WIDTH * float(value) / longest
-        _line([(x, 0.0), (x, 1.0)], _FAINT if value else _INK, 0.004)
-        _text(f"{value:.4g}", x, -0.08, "CENTER", _INK)
-    _text(panel.along, left + 0.5 * _WIDTH, -0.2, "CENTER", _INK)
-    _text(panel.up, left - 0.04, 1.14, "RIGHT", _INK)
-    _text(panel.title, left, 1.14, "LEFT", _INK, size=0.12)
+        line([(x, 0.0), (x, 1.0)], _FAINT if value else _INK, 0.004)
+        text(f"{value:.4g}", x, -0.08, "CENTER", _INK)
+    text(panel.along, left + 0.5 * _WIDTH, -0.2, "CENTER", _INK)
+    text(panel.up, left - 0.04, 1.14, "RIGHT", _INK)
+    text(panel.title, left, 1.14, "LEFT", _INK, size=0.12)
     kept = np.unique(np.linspace(0, len(panel.x) - 1, 250).astype(int))
     for number, (name, curve) in enumerate(panel.curves.items()):
         colour = _LINKS[number][1]
         x = left + _WIDTH * panel.x[kept] / longest
-        _line(
-            np.stack([x, curve[kept] / top], axis=1).tolist(),
+        line(
+            np.stack([x, (curve[kept] - bottom) / (top - bottom)], axis=1).tolist(),
             colour,
             0.014,
             height=0.1 * (number + 1),
         )
-        _text(name, left + _WIDTH - 0.05, 0.93 - 0.12 * number, "RIGHT", colour)
+        text(name, left + _WIDTH - 0.05, 0.93 - 0.12 * number, "RIGHT", colour)
 
 
 def _round_step(most: float) -> float:
@@ -136,9 +137,10 @@ def _round_step(most: float) -> float:
     return float(next(step for step in steps if most / step <= 8.0))
 
 
-def _line(
+def line(
     points: Sequence[Sequence[float]], colour: Colour, width: float, height: float = 0.0
 ) -> None:
+    """A tube through points (x, y), so high above the paper."""
     data = bpy.data.curves.new("Line", "CURVE")
     data.dimensions = "3D"
     data.bevel_depth = 0.5 * width
@@ -152,12 +154,22 @@ def _line(
     _link(data, colour)
 
 
-def _text(body: str, x: float, y: float, align: str, colour: Colour, *, size: float = 0.1) -> None:
+def text(
+    body: str,
+    x: float,
+    y: float,
+    align: str,
+    colour: Colour,
+    *,
+    size: float = 0.1,
+    over: float = 0.5,
+) -> None:
+    """A line of text, so high above the paper; ``align`` is LEFT, CENTER or RIGHT."""
     data = bpy.data.curves.new("Text", "FONT")
     assert isinstance(data, bpy.types.TextCurve)
     data.body, data.size = body, size
     data.align_x, data.align_y = align, "CENTER"
-    _link(data, colour).location = Vector((x, y, 0.5))
+    _link(data, colour).location = Vector((x, y, over))
 
 
 def _link(data: bpy.types.Curve, colour: Colour) -> bpy.types.Object:

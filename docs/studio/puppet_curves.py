@@ -12,9 +12,9 @@ from stage import Pixels
 
 from octo_motion.core.posing.puppet.figure import Elements, Figure, Pose
 from octo_motion.core.posing.puppet.materials import elements_for
-from octo_motion.core.posing.puppet.plastic_element import PlasticLaw
 from octo_motion.core.posing.solver.world import World, WorldSettings
-from octo_motion.core.rotations import to_matrix
+from tests.core.world_probes import energy_of
+from tests.papers.plastic import D_D, FORCE, LOADED, STEP, stepped
 
 _BONES: Final = 6
 _LENGTH: Final = 0.15
@@ -29,28 +29,17 @@ def pixels(size: tuple[int, int]) -> Pixels:
 
 
 def _experiment() -> plot.Panel:
-    """[Plastic, Fig. 5]: 0.1 kg on the three elements, pushed with 1 N for five seconds."""
-    step, count = 0.02, 1500
-    axis = np.array([[1.0, 0.0, 0.0]])
-    law = PlasticLaw(Elements(1.0 * axis, 10.0 * axis, 100.0 * axis, np.zeros(1)), step)
-    times = step * np.arange(float(count + 1))
-    moved, springs = np.zeros(count + 1), np.zeros(count + 1)
-    speed = spring = 0.0
-    for number in range(count):
-        force = 1.0 if number * step < 5.0 else 0.0
-        answer = law.respond(spring * axis, speed * axis)
-        speed += step * (force + answer.load[0, 0]) / (0.1 + step * answer.slope[0, 0, 0])
-        answer = law.respond(spring * axis, speed * axis)
-        flow = 0.0 if answer.flows is None else float(answer.flow_of(np.array([0]))[0, 0])
-        spring += step * (speed - flow)
-        moved[number + 1] = moved[number] + step * speed
-        springs[number + 1] = spring
+    """[Plastic, Fig. 5]: 0.1 kg on the three elements, pushed for a while; the force and how long,
+    1 N for five seconds, are ours.
+    """
+    times, moved, _, springs = stepped(STEP, 30.0)
+    residue = FORCE * LOADED / D_D
     return plot.Panel(
         "1 N for 5 s, then none",
         "s",
         "m",
         times,
-        {"moved": moved, "spring": springs, "residue F·T/D": np.full(count + 1, 0.05)},
+        {"moved": moved, "spring": springs, "residue F·T/D": np.full(len(times), residue)},
     )
 
 
@@ -73,8 +62,8 @@ def _energy() -> plot.Panel:
         else:
             world.release(grab)
         world.step()
-        kinetic, elastic = _kinetic(world), _elastic(world)
-        rows.append((kinetic, elastic, kinetic + elastic))
+        energy = energy_of(world)
+        rows.append((energy.kinetic, energy.elastic, energy.kinetic + energy.elastic))
     kinetic, elastic, total = 1000.0 * np.array(rows).T
     return plot.Panel(
         "an arm, let go after 0.8 s",
@@ -83,20 +72,6 @@ def _energy() -> plot.Panel:
         world.settings.step * np.arange(1.0, 2001.0),
         {"kinetic": kinetic, "springs": elastic, "both": total},
     )
-
-
-def _kinetic(world: World) -> float:
-    """Joules of motion."""
-    velocities, turned = world.velocities(), to_matrix(world.pose().orientations)
-    own = (velocities[:, None, 3:] @ turned)[:, 0]
-    spin = (world.figure.inertias @ own[:, :, None])[:, :, 0]
-    moving = world.figure.masses[:, None] * velocities[:, :3] ** 2
-    return 0.5 * float(moving.sum() + (own * spin).sum())
-
-
-def _elastic(world: World) -> float:
-    """Joules in the springs."""
-    return 0.5 * float((world.figure.elements.stiffness * world.joint_springs() ** 2).sum())
 
 
 def _arm() -> Figure:

@@ -63,6 +63,21 @@ def coil() -> Pixels:
     return contact_sheet.stacked([rods, balls])
 
 
+def mouth() -> Pixels:
+    """An arm brings a ball to the mouth, and those beside it close over it."""
+    octopus = _octopus()
+    steps = np.linspace(0.0, math.pi, 33)
+    outline = [(0.035 * math.sin(each), -0.035 * math.cos(each)) for each in steps]
+    thing = _turned("Prey", outline, _BLUE)
+    thing.location = (0.2, -0.33, 0.035)
+    _reach(octopus, thing)
+    item = octopus.octo_motion.locomotion.reaches[0]
+    item.mode, item.frame_release = "MOUTH", 125
+    octopus.octo_motion.locomotion.frame_end = 170
+    view = View((-0.45, 0.85, -0.12))
+    return _sheet(octopus, thing, (14, 26, 58, 72, 78, 82, 86, 98), view)
+
+
 def hold() -> Pixels:
     """An arm holds on to a bottle while the body walks by."""
     octopus = _octopus(in_place=False)

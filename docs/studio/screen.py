@@ -363,7 +363,8 @@ def register_panels(opened: Collection[str], present: Collection[str]) -> None:
         if panel.is_registered:
             bpy.utils.unregister_class(panel)
     for name, panel in PANELS.items():
-        panel.bl_options = set() if name in opened else {"DEFAULT_CLOSED"}
+        if "HIDE_HEADER" not in getattr(panel, "bl_options", ()):
+            panel.bl_options = set() if name in opened else {"DEFAULT_CLOSED"}
         if name in present:
             bpy.utils.register_class(panel)
 

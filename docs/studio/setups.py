@@ -136,7 +136,8 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
     bpy.ops.octo_motion.add_route(**dict(zip(("b0", "b1", "b2", "b3"), route, strict=True)))
     scene.frame_end = 1
     stays = settings.travel_on == "NONE"
-    if not swims and not stays:
+    level = not swims and not stays and not settings.ground.use
+    if not swims and not stays and not level:
         settings.ground.object = add_bumps(route, unit)
     bpy.ops.octo_motion.generate_locomotion()
     octopus.show_in_front = False
@@ -144,6 +145,8 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
     stage.set_light(scene)
     if swims:
         stage.add_ground(points, float(points[..., 2].min()) - 0.4 * unit)
+    if level:
+        stage.add_ground(points, float(points[..., 2].min()))
     if stays:
         stage.add_ground(points, _floor(octopus, points))
     camera = stage.add_camera("Camera", lens=50.0)

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -65,25 +66,31 @@ class Performance:
 
         They start at phase 0: easing in, the gait has come half as far as at full speed.
         """
+        return self.at(np.arange(pictures) / pictures)
+
+    def at(self, phases: Points) -> list[float]:
+        """The same at phases of the cycle, 0 to 1."""
         settings = self.octopus.octo_motion.locomotion
         scene = stage.the_scene()
         if settings.travel_on == "NONE":
             loop = (scene.frame_end - scene.frame_start) / settings.cycles
-            return (scene.frame_start + loop * np.arange(pictures) / pictures).tolist()
+            return (scene.frame_start + loop * phases).tolist()
         seconds = (scene.frame_end - scene.frame_start) / RATE
         behind = 0.5 * settings.ease_in * seconds
         first = math.ceil(behind / settings.cycle_time)
         starts = behind + first * settings.cycle_time
-        steps = starts + np.arange(pictures) * (settings.cycle_time / pictures)
-        return (scene.frame_start + RATE * steps).tolist()
+        return (scene.frame_start + RATE * (starts + settings.cycle_time * phases)).tolist()
 
 
-def perform(shot: Shot, resolution: tuple[int, int]) -> Performance:
+def perform(
+    shot: Shot, resolution: tuple[int, int], change: Callable[[Any], None] = lambda _: None
+) -> Performance:
     """Start from an empty file: an octopus, a route, a gait, the motion, and the stage.
 
     Args:
         shot: what to do.
         resolution: of the pictures that the camera is framed for.
+        change: is handed the octopus' settings before the motion is made.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = stage.the_scene()
@@ -96,6 +103,7 @@ def perform(shot: Shot, resolution: tuple[int, int]) -> Performance:
     b0, b1, b2, b3 = shot.route
     bpy.ops.octo_motion.add_route(b0=b0, b1=b1, b2=b2, b3=b3)
     octopus.octo_motion.locomotion.gait = shot.gait
+    change(octopus.octo_motion.locomotion)
     # The scene shall end with the motion, which may be shorter than its 250 frames.
     scene.frame_end = 1
     bpy.ops.octo_motion.generate_locomotion()

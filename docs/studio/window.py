@@ -33,6 +33,7 @@ import octo_motion
 PICTURES: Final[dict[str, Callable[[], window_scenes.Taking]]] = {
     "panel": window_scenes.panel,
     "gait_table": window_scenes.gait_table,
+    "targets": window_scenes.targets,
     "splicing": window_scenes.splicing,
     "posing": window_scenes.posing,
     "device_hand": window_devices.four_moments,

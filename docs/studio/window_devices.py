@@ -79,6 +79,7 @@ def _start(screen: Screen, present: tuple[str, ...] | None = None) -> Steps:
     yield from screen.open(("posing", "posing_device"), present)
     doll: Any = puppets.make_doll()
     doll.select_set(state=True)
+    doll.octo_motion.tool = "POSE"
     doll.octo_motion.posing.strength = 0.25
     points = stage.skin_points(doll, [1]).reshape(-1, 3)
     yield from screen.look(_FRONT, points, margin=0.08)

@@ -43,6 +43,27 @@ def gait_table() -> Taking:
     return (yield from screen.take_panels())
 
 
+def targets() -> Taking:
+    """What the swim has an arm reach for, beside the table that says so."""
+    screen = Screen(940, 620)
+    yield from screen.open(("gait", "table"), present=("gait", "table"))
+    octopus = _add_octopus(screen)
+    settings = octopus.octo_motion.locomotion
+    with screen.override():
+        bpy.ops.octo_motion.detect_arms()
+        bpy.ops.octo_motion.setup_load(name="swim")
+        bpy.ops.octo_motion.add_route()
+        _select(octopus)
+        bpy.ops.octo_motion.generate_locomotion()
+        bpy.ops.octo_motion.gait_load()
+    settings.route.hide_set(state=True)
+    settings.active_arm, settings.show_targets = 1, True
+    octopus.show_in_front = False
+    stage.the_scene().frame_set(90)
+    yield from screen.look(_turned(70.0, 70.0), _skin(octopus), margin=0.08)
+    return (yield from screen.take())
+
+
 def splicing() -> Taking:
     """Two arms of other clips on a walk."""
     screen = Screen(940)
@@ -66,6 +87,7 @@ def posing() -> Taking:
     screen = Screen(940, 530)
     yield from screen.open(("posing",))
     octopus = _add_octopus(screen)
+    octopus.octo_motion.tool = "POSE"
     yield from screen.look(_turned(66.0, 25.0), _skin(octopus), margin=0.1)
     with screen.override():
         bpy.ops.octo_motion.pose_start("INVOKE_DEFAULT")

@@ -17,19 +17,21 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from tests.bench import apart, comparison, live_speed, posing, splice_speed
+from tests.bench import apart, comparison, device_loop, live_speed, posing, splice_speed
 from tests.bench.comparison import Options
 
 REPOSITORY: Final = Path(__file__).resolve().parents[2]
 FIGURES: Final = Path(__file__).with_name("figures.json")
-PAGES: Final = ("speed.md", "quality.md", "apart.md")
+PAGES: Final = ("speed.md", "quality.md", "apart.md", "device.md")
 _TORN_STEPS: Final = 1000
 _RECORDED: Final = ("secondlife", "cmu", "animated_drawings")
 _RECORDED_BASES: Final = ("avatar_walk", "12_01_walk", "02_02_walk")
+_KILLS: Final = 5
+_INPUTS: Final = 1_000_000
 _DIGITS: Final = 6
 """Of a number in the JSON."""
 
@@ -83,6 +85,10 @@ SECTIONS: Final[dict[str, Section]] = {
         _splicing_said,
     ),
     "recorded": Section(_recorded, _splicing_text, _splicing_said),
+    "device": Section(lambda _: asdict(device_loop.measure(10.0)), device_loop.text),
+    "floods": Section(lambda _: device_loop.flooded(5.0), device_loop.text_flooded),
+    "kills": Section(lambda _: device_loop.killed(_KILLS), device_loop.text_killed),
+    "fuzz": Section(lambda _: device_loop.fuzzed(_INPUTS), device_loop.text_fuzzed),
     "apart": Section(lambda _: apart.measure(), apart.text, apart.said),
     "apart_turn": Section(
         lambda _: apart.measure(("walk", "hurry", "prowl", "crawl", "settle"), "turn", 3),
@@ -95,7 +101,7 @@ SECTIONS: Final[dict[str, Section]] = {
 def write(names: Iterable[str], options: Options) -> None:
     """Measure some sections, or all, keep the figures and write them into the pages."""
     kept = read()
-    machine = _machine()
+    where = machine()
     for name in names or SECTIONS:
         print(f"Measuring: {name}", file=sys.stderr, flush=True)
         start = time.perf_counter()
@@ -103,9 +109,9 @@ def write(names: Iterable[str], options: Options) -> None:
         if found is None:
             print(f"Left as it was, for its data are not here: {name}", file=sys.stderr)
             continue
-        run = machine | {"took": round(time.perf_counter() - start)}
+        run = where | {"took": round(time.perf_counter() - start)}
         print(f"It took {run['took']} s.", file=sys.stderr, flush=True)
-        kept[name] = {"run": run, "figures": _rounded(found)}
+        kept[name] = {"run": run, "figures": rounded(found)}
         # At once: what was measured is not lost where a later section fails.
         FIGURES.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     write_pages()
@@ -128,7 +134,7 @@ def block(name: str, kept: dict[str, Any]) -> str:
     """What stands between the marks of a section, marks included."""
     section, own = SECTIONS[name], kept[name]
     table = "\n".join(line.rstrip() for line in section.text(own["figures"]).splitlines())
-    paragraphs = [_told(own["run"]), f"```text\n{table}\n```", *section.said(own["figures"])]
+    paragraphs = [told(own["run"]), f"```text\n{table}\n```", *section.said(own["figures"])]
     return "\n\n".join([f"<!-- figures: {name} -->", *paragraphs, "<!-- end of figures -->"])
 
 
@@ -152,7 +158,8 @@ def unmarked(text: str) -> str:
 _MARKED: Final = re.compile(r"<!-- figures: (?P<name>\w+) -->.*?<!-- end of figures -->", re.DOTALL)
 
 
-def _told(run: dict[str, Any]) -> str:
+def told(run: dict[str, Any]) -> str:
+    """When and where figures were measured."""
     load = run["load"]
     others = (
         "other programs running"
@@ -171,7 +178,8 @@ _QUIET: Final = 0.5
 """Programs that want a processor on the mean of a minute."""
 
 
-def _machine() -> dict[str, Any]:
+def machine() -> dict[str, Any]:
+    """When and where figures are measured."""
     import bpy
 
     return {
@@ -201,12 +209,12 @@ def _commit() -> str:
     return (git("rev-parse", "--short=10", "HEAD") or "unknown") + " with changes" * bool(changed)
 
 
-def _rounded(value: Any) -> Any:
+def rounded(value: Any) -> Any:
     """The same with fewer digits: the rest is noise."""
     if isinstance(value, float):
         return float(f"{value:.{_DIGITS}g}")
     if isinstance(value, dict):
-        return {key: _rounded(each) for key, each in value.items()}
+        return {key: rounded(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
-        return [_rounded(each) for each in value]
+        return [rounded(each) for each in value]
     return value

@@ -157,7 +157,9 @@ def _middle_and_worst(seconds: Floats) -> tuple[float, float]:
 
 
 def _mujoco(figures: dict[str, Figure], steps: int) -> list[Measured]:
-    found = subprocess.run([".ci/venv", "mujoco"], capture_output=True, text=True, check=False)
+    found = subprocess.run(
+        [".ci/dev", "venv", "mujoco"], capture_output=True, text=True, check=False
+    )
     if found.returncode != 0:
         _warn("could not be set up", found.stderr)
         return []

@@ -160,7 +160,7 @@ def _takes(files: Sequence[Path]) -> tuple[list[Take], list[str]]:
     left_out: list[str] = []
     for path in files:
         try:
-            take = _read(path)
+            take = read_take(path)
         except OctoMotionError as error:
             left_out.append(f"{path.name}: {error.problem}")
             continue
@@ -171,7 +171,7 @@ def _takes(files: Sequence[Path]) -> tuple[list[Take], list[str]]:
     return takes, left_out
 
 
-def _read(path: Path) -> Take:
+def read_take(path: Path) -> Take:
     """A file at its own frame rate."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
@@ -199,7 +199,7 @@ def _pairs(takes: Sequence[Take], words: Sequence[str]) -> list[tuple[Take, Take
 def measure(base: Take, other: Take) -> list[Measured]:
     """All parts of a clip on a base, by all ways."""
     seconds = (len(other.clip) - 1) / other.clip.rate
-    whole = _lengthened(base.clip, seconds + 4.0 * _EASE)
+    whole = lengthened(base.clip, seconds + 4.0 * _EASE)
     rate = whole.rate
     # Between the ends of the base, so that there are two seams.
     lasting = min(seconds * rate, whole.frames[-1] - whole.frames[0] - 4.0 * _EASE * rate)
@@ -260,7 +260,7 @@ def _slip(result: Clip, base: Clip, landmarks: Landmarks, splice: Splice) -> Flo
     return 1000.0 * _LEG / leg * foot_slip(shown, landmarks, still)
 
 
-def _lengthened(clip: Clip, seconds: float) -> Clip:
+def lengthened(clip: Clip, seconds: float) -> Clip:
     """A walk that goes on for at least so long: cycle after cycle, each from where the last led."""
     count = round(seconds * clip.rate) + 1
     if count <= len(clip):

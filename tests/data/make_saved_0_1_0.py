@@ -106,7 +106,9 @@ def main(folder: Path) -> None:
     change_all(own.posing, data)
     change_all(marker.octo_motion.contact, data)
     told = {each.name: plain(each.octo_motion) for each in (armature, marker)}
-    (folder / "saved_0_1_0.json").write_text(json.dumps(told, indent=1, sort_keys=True) + "\n")
+    (folder / "saved_0_1_0.json").write_text(
+        json.dumps(told, indent=1, sort_keys=True) + "\n", encoding="utf-8"
+    )
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "saved_0_1_0.blend"), compress=True)
     octo_motion.unregister()
 

@@ -26,7 +26,7 @@ def list_traces() -> Iterator[str]:
         yield f"class {name}"
         blender_class = getattr(bpy.types, name)
         if rna := getattr(blender_class, "bl_rna", None):
-            yield from (f"property {name}.{key}" for key, _ in rna.properties.items())
+            yield from (f"property {name}.{each.identifier}" for each in rna.properties)
         for function in getattr(getattr(blender_class, "draw", None), "_draw_funcs", ()):
             # Where an entry was ever appended, Blender keeps the menu's own in the same list.
             if function.__qualname__ != f"{name}.draw":
@@ -75,6 +75,19 @@ def start_bridge() -> Iterator[str]:
     client.stop()
 
 
+def first_walk() -> int:
+    """Frames of the walk that a newcomer gets: three clicks."""
+    bpy.ops.octo_motion.add_octopus()
+    octopus = bpy.context.object
+    bpy.ops.octo_motion.add_route()
+    assert bpy.ops.octo_motion.generate_locomotion() == {"FINISHED"}
+    assert octopus is not None
+    data = octopus.animation_data
+    assert data is not None
+    assert data.action is not None
+    return int(data.action.frame_range[1])
+
+
 def install(archive: str) -> None:
     """Install, disable, enable and uninstall; print operators, bridge and hidapi's file."""
     extensions = Path(bpy.utils.resource_path("USER")) / "extensions"
@@ -85,6 +98,7 @@ def install(archive: str) -> None:
     )
     installed = traces()
     print(*dir(bpy.ops.octo_motion))
+    print(f"walk {first_walk()}")
     print(*start_bridge())
     print(*(path.name for path in (extensions / ".local" / "lib").rglob("hid.*")))
 

@@ -16,8 +16,7 @@ import bpy
 import pytest
 
 from octo_motion import command_line
-from octo_motion.command_line import commands
-from octo_motion.command_line import job as bake
+from octo_motion.command_line import bake, commands
 from octo_motion.core.errors import WriteError
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
@@ -127,7 +126,7 @@ def test_job_makes_its_good_shots_and_tells_of_the_bad_ones(scene: Path, tmp_pat
 
     ended = run("bake", job, "--jobs", "2")
 
-    assert ended.returncode == 1, ended.stdout + ended.stderr
+    assert ended.returncode == 3, ended.stdout + ended.stderr
     told = report(job)
     assert {name: shot["error"] for name, shot in told.items()} == {
         "wall": "",
@@ -180,7 +179,7 @@ def test_motion_worse_than_its_limits_fails_its_shot_and_the_report_has_the_figu
         '[[shots]]\nname = "bad"\nlimits = { turn = 0.5 }\n'
     )
     job = write(tmp_path / "job.toml", shots)
-    assert run_here("bake", job) == 1
+    assert run_here("bake", job) == 3
     told = report(job)
 
     good, bad = told["good"], told["bad"]
@@ -246,10 +245,11 @@ def test_second_run_makes_only_what_is_new_or_changed(tmp_path: Path) -> None:
     assert run_here("bake", job) == 0
     assert statuses(job) == {"a": "skipped", "b": "skipped"}
     write(job, text + shot.format("a") + shot.format("b"))
-    assert run_here("bake", job) == 1
+    assert run_here("bake", job) == 3
     assert "has been changed since it was baked" in report(job)["b"]["error"]
     assert digest(tmp_path / "b.blend") == by_hand
     assert run_here("bake", job, "--force", "--shot", "b") == 0
+    assert run_here("bake", job, "--gather") == 0
     assert statuses(job) == {"a": "skipped", "b": "done"}
     assert digest(tmp_path / "b.blend") != by_hand
 
@@ -350,7 +350,7 @@ def test_blender_that_is_killed_while_it_writes_leaves_nothing_behind(tmp_path: 
 
     ended = run("bake", job, **environment)
 
-    assert ended.returncode == 1, ended.stdout + ended.stderr
+    assert ended.returncode == 4, ended.stdout + ended.stderr
     assert report(job)["a"]["error"] == "Blender crashed or was ended (SIGKILL)."
     assert names(tmp_path / "out") == set()
     assert run_here("bake", job) == 0
@@ -369,9 +369,9 @@ def test_fault_of_ours_is_one_shots_and_leaves_its_traceback_in_the_report(tmp_p
 
 
 @posix
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
 def test_run_that_is_stopped_leaves_no_process_and_no_unfinished_file(
-    tmp_path: Path, how: signal.Signals
+    tmp_path: Path, name: str
 ) -> None:
     text = f'[defaults]\noutput = "out/{{name}}.blend"\n{SMALL}{ROUTE}{RANGE}'
     job = write(tmp_path / "job.toml", text + '[[shots]]\nname="a"\n[[shots]]\nname="b"\n')
@@ -395,15 +395,15 @@ def test_run_that_is_stopped_leaves_no_process_and_no_unfinished_file(
         if len(arrived) == 1:
             arrived += pipe.read(1)
         assert len(names(tmp_path / "out")) == 4
-        process.send_signal(how)
+        process.send_signal(signal.Signals[name])
         status = process.wait()
         assert pipe.read() == b""  # which comes when both have ended
 
     assert arrived == b".."
     assert names(tmp_path / "out") == set()
     assert not list((tmp_path / "tmp").glob("octo-motion-*"))
-    if how == signal.SIGKILL:
-        assert status == -signal.SIGKILL
+    if name == "SIGKILL":
+        assert status == -signal.Signals[name]
     else:
         assert status == 130
         assert {shot["error"] for shot in report(job).values()} == {"Stopped before it was done."}
@@ -453,7 +453,7 @@ def test_file_is_written_only_if_its_motion_keeps_to_the_limits(
     given = ("generate", scene, "-o", output, "--route", "Wall", "--set", "timing=RANGE")
     assert run_here(*given, "--limit", "slide=1") == 2
     assert "There is no figure 'slide'. Did you mean 'slip'?" in capsys.readouterr().err
-    assert run_here(*given, "--limit", "depth=9", "--limit", "turn=0.1") == 1
+    assert run_here(*given, "--limit", "depth=9", "--limit", "turn=0.1") == 3
     told = capsys.readouterr().err
     assert "Error: Turn is " in told
     assert "above its limit of 0.1." in told
@@ -497,16 +497,16 @@ def test_open_file_is_used_where_no_other_is_named(scene: Path, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("none.blend",), (1, "There is no file '{folder}/none.blend'.")),
-        (("torn.blend",), (1, "'{folder}/torn.blend' cannot be opened: ")),
-        (("reef.blend",), (1, "'Octopus' has no route.")),
+        (("none.blend",), (3, "There is no file '{folder}/none.blend'.")),
+        (("torn.blend",), (3, "'{folder}/torn.blend' cannot be opened: ")),
+        (("reef.blend",), (3, "'Octopus' has no route.")),
         (
             ("reef.blend", "--armature", "Squid"),
-            (1, "There is no object 'Squid'. Name the armature"),
+            (3, "There is no object 'Squid'. Name the armature"),
         ),
-        (("reef.blend", "--armature", "Lamp"), (1, "'Lamp' is not an armature.")),
-        (("reef.blend", "--route", "Wal"), (1, "There is no curve 'Wal'. Name one of Wall.")),
-        (("reef.blend", "--route", "Lamp"), (1, "'Lamp' is not a curve.")),
+        (("reef.blend", "--armature", "Lamp"), (3, "'Lamp' is not an armature.")),
+        (("reef.blend", "--route", "Wal"), (3, "There is no curve 'Wal'. Name one of Wall.")),
+        (("reef.blend", "--route", "Lamp"), (3, "'Lamp' is not a curve.")),
         (("reef.blend", "--gait", "hop"), (2, "There is no gait 'hop'.")),
         (("reef.blend", "--gait", "hop.json"), (2, "'hop.json' cannot be read: No such file")),
         (("reef.blend", "--set", "speeed=1"), (2, "There is no setting 'speeed'. Did you mean")),
@@ -561,7 +561,7 @@ def test_of_several_armatures_the_one_with_arms_is_meant(
 
     bpy.context.view_layer.objects.active = bpy.data.objects["Wall"]
     bpy.ops.wm.save_as_mainfile(filepath=str(scene))
-    assert run_here("generate", scene, "-o", tmp_path / "c.blend", *short) == 1
+    assert run_here("generate", scene, "-o", tmp_path / "c.blend", *short) == 3
     assert (
         "2 armatures could be meant. Name the armature: Octopus, Octopus.001."
         in capsys.readouterr().err
@@ -624,8 +624,8 @@ def test_alembic_without_a_mesh_is_refused(tmp_path: Path) -> None:
     job = write(
         tmp_path / "job.toml", f'[[shots]]\nname = "a"\nexport = "a.abc"\n{SMALL}{ROUTE}{RANGE}'
     )
-    assert run_here("bake", job) == 1
+    assert run_here("bake", job) == 3
     assert report(job)["a"]["error"] == (
         "'Octopus' has no mesh, and Alembic keeps no bones. Export to .glb or .fbx."
     )
-    assert names(tmp_path) == {"job.toml", "job.report.json"}
+    assert names(tmp_path) == {"job.toml", "job.report.json", "job.records"}

@@ -74,12 +74,12 @@ def main() -> int:
         # Blender 4.5 may wait for ever at its own end.
         os._exit(0)
     names = _scenes(wanted)
-    limits = json.loads(LIMITS.read_text()) if LIMITS.exists() else {}
+    limits = json.loads(LIMITS.read_text(encoding="utf-8")) if LIMITS.exists() else {}
     with ThreadPoolExecutor(wanted.processes) as pool:
         rows = dict(zip(names, pool.map(lambda name: _process(name, wanted), names), strict=True))
     beyond = _print(rows, limits)
     if wanted.json:
-        Path(wanted.json).write_text(json.dumps(rows, indent=1) + "\n")
+        Path(wanted.json).write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     if wanted.write:
         LIMITS.write_text(json.dumps(_tightened(limits, rows), indent=1, sort_keys=True) + "\n")
     print(f"\n{beyond} figures are beyond their limits." if beyond else "\nAll within limits.")

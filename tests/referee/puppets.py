@@ -75,7 +75,7 @@ def _played(
     steps.append({"do": "key", "bones": "all"})
     script = {"format": "octo_motion.pose", "version": 1, "settings": {"material": material}}
     file = folder / f"{material}.json"
-    file.write_text(json.dumps({**script, "steps": steps}))
+    file.write_text(json.dumps({**script, "steps": steps}), encoding="utf-8")
     bpy.ops.octo_motion.pose_script(filepath=str(file))
     played = record(armature, np.array([BEFORE, AFTER], float), with_skin=False)
     return played, tip, played.chain([name for arm in arms[1:] for name in arm])

@@ -42,7 +42,7 @@ class Bvh:
     @classmethod
     def read(cls, path: Path) -> Bvh:
         """A file that is well formed."""
-        words = iter(path.read_text().split())
+        words = iter(path.read_text(encoding="utf-8").split())
         joints: list[Joint] = []
         open_joints: list[int] = []
         ending = False
@@ -81,7 +81,7 @@ class Bvh:
         self._describe(0, 0, lines)
         lines += ["MOTION", f"Frames: {len(self.motion)}", f"Frame Time: {self.frame_time:.9f}"]
         lines += [" ".join(f"{value:.9f}" for value in row) for row in self.motion]
-        path.write_text("\n".join(lines) + "\n")
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
         return path
 
     def _describe(self, number: int, depth: int, lines: list[str]) -> None:

@@ -19,7 +19,7 @@ pytestmark = [
 @pytest.mark.parametrize("scene", SHORT)
 def test_what_plays_is_within_the_limits(scene: str) -> None:
     row = measured(scene)
-    limits = json.loads(LIMITS.read_text())
+    limits = json.loads(LIMITS.read_text(encoding="utf-8"))
     assert row.keys() <= limits[scene].keys()
     assert {key: row[key] for key in beyond_limits(scene, row, limits)} == {}
 
@@ -27,6 +27,6 @@ def test_what_plays_is_within_the_limits(scene: str) -> None:
 @pytest.mark.parametrize("scene", ["octopus/walk/plane", "octopus/idle/plane"])
 def test_what_plays_pops_no_more_than_it_may(scene: str) -> None:
     row = popping(scene)
-    limits = json.loads(LIMITS.read_text())
+    limits = json.loads(LIMITS.read_text(encoding="utf-8"))
     assert "pop" in limits[scene]
     assert beyond_limits(scene, row, limits) == []
