@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -15,6 +14,7 @@ from octo_motion.core.posing.puppet.figure import Figure, Pose
 from octo_motion.device import messages as say
 from octo_motion.device.ipc.client import Client, ClientState
 from tests.core.puppets import chain, posed, soft
+from tests.processes import alive, children_of, end
 
 OPTIONS = ("--simulate", "--no-haply", "--no-hid")
 FIGURE: Figure = chain(3, elements=soft(3, 40.0, 2.0, 100.0, 1.0))
@@ -25,16 +25,19 @@ PATIENCE = 20.0
 
 def wait_for(client: Client, what: Callable[[], object], why: str) -> None:
     """Poll until something is true."""
-    end = time.monotonic() + PATIENCE
+    latest = time.monotonic() + PATIENCE
     while not what():
         client.poll()
-        assert time.monotonic() < end, f"waited in vain: {why}; {client.state}, {client.notices}"
+        assert time.monotonic() < latest, f"waited in vain: {why}; {client.state}, {client.notices}"
         time.sleep(0.002)
 
 
 def bridge_of(client: Client) -> int | None:
-    """The process that the client has started."""
-    return client._child._process.pid if client._child else None
+    """The process that the client has started, or that which this one has become on Windows."""
+    if not client._child:
+        return None
+    started = client._child._process.pid
+    return client.hello.process if client.hello else started
 
 
 def holding(client: Client) -> None:
@@ -47,26 +50,6 @@ def holding(client: Client) -> None:
     client.send(say.Workspace(0, (x, y, z)))
     client.send(say.Grab(0, grab=True))
     wait_for(client, lambda: 0 in client.pointers and client.pointers[0].body == 2, "it holds")
-
-
-def children_of(process: int) -> list[int]:
-    """Processes that a process started; Linux."""
-    path = Path(f"/proc/{process}/task/{process}/children")
-    try:
-        return [int(each) for each in path.read_text(encoding="utf-8").split()]
-    except OSError:
-        return []
-
-
-def alive(process: int) -> bool:
-    """Whether a process runs; one that ended and waits to be asked why does not."""
-    try:
-        state = (
-            Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0]
-        )
-    except OSError:
-        return False
-    return state != "Z"
 
 
 def seconds_to_end(processes: list[int]) -> float:
@@ -90,12 +73,12 @@ def kill_bridge_and_start_again() -> tuple[float, float]:
         bridge = bridge_of(client)
         assert bridge
         hands = children_of(bridge)
-        assert len(hands) == 1
+        assert hands
         wait_for(client, lambda: client.steps > 20, "it moves")
         last = client.pose
         assert last
         start = time.monotonic()
-        os.kill(bridge, signal.SIGKILL)
+        end(bridge)
         wait_for(client, lambda: client.state is ClientState.LOST, "the client notices")
         noticed = time.monotonic() - start
         ended = seconds_to_end(hands)
@@ -115,7 +98,8 @@ def kill_bridge_and_start_again() -> tuple[float, float]:
 BLENDER = """
 import os, sys, time
 from octo_motion.device.ipc.client import Client
-from tests.device.bridges import bridge_of, children_of, holding
+from tests.device.bridges import bridge_of, holding
+from tests.processes import children_of
 client = Client()
 holding(client)
 print(bridge_of(client), *children_of(bridge_of(client)), flush=True)
@@ -136,7 +120,7 @@ def kill_blender() -> float:
     assert blender.stdout
     with blender.stdout:
         started = [int(each) for each in blender.stdout.readline().split()]
-    assert len(started) == 2
+    assert len(started) >= 2
     assert all(map(alive, started))
     blender.kill()
     blender.wait()
@@ -150,9 +134,9 @@ def kill_hands() -> float:
         holding(client)
         bridge = bridge_of(client)
         assert bridge
-        (hands,) = children_of(bridge)
+        hands = children_of(bridge)[-1]
         start = time.monotonic()
-        os.kill(hands, signal.SIGKILL)
+        end(hands)
         wait_for(client, lambda: not client.devices, "the hand is gone")
         wait_for(client, lambda: client.devices, "the hand is back")
         assert client.state is ClientState.RUNNING

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -33,11 +34,16 @@ from tests.device.bridges import (
     kill_hands,
     wait_for,
 )
+from tests.processes import alive, children_of
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOON = 5.0
 """s: on a machine that has other things to do; python -m tests.device.kill says how soon it is."""
-linux = pytest.mark.skipif(sys.platform != "linux", reason="finds processes through /proc")
+
+
+def write(path: Path, text: str) -> None:
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text, encoding="utf-8")
 
 
 @pytest.fixture
@@ -51,7 +57,9 @@ def test_hand_grabs_the_nearest_limb_and_bends_the_puppet(client: Client) -> Non
     holding(client)
     hello = client.hello
     assert hello
-    assert hello.process == bridge_of(client)
+    assert client._child
+    started = client._child._process.pid
+    assert hello.process in {started, *children_of(started)}
 
     def bent() -> bool:
         assert client.pose
@@ -135,26 +143,22 @@ def test_bridge_that_is_stopped_ends_at_once_and_is_not_lost(client: Client) -> 
     client.stop()
     assert client.state is ClientState.OFF
     assert bridge_of(client) is None
-    with pytest.raises(ProcessLookupError):
-        os.kill(process_id, 0)
+    assert not alive(process_id)
     client.stop()
     assert client.poll() == []
     client.send(say.Grab(0, grab=True))
     assert client.notices == []
 
 
-@linux
 def test_killed_bridge_is_told_keeps_the_pose_and_can_be_started_again() -> None:
     noticed, ended = kill_bridge_and_start_again()
     assert max(noticed, ended) < SOON
 
 
-@linux
 def test_killed_blender_leaves_no_process_behind() -> None:
     assert kill_blender() < SOON
 
 
-@linux
 def test_killed_process_at_the_devices_is_started_again() -> None:
     kill_hands()
 
@@ -193,7 +197,7 @@ def test_program_that_does_not_start_says_what_to_do(tmp_path: Path) -> None:
         Client().start(OPTIONS, python=tmp_path / "no-python")
     if os.name != "nt":
         silent = tmp_path / "python3"
-        silent.write_text("#!/bin/sh\nexit 1\n")
+        write(silent, "#!/bin/sh\nexit 1\n")
         silent.chmod(0o755)
         with pytest.raises(DeviceError, match="does not answer"):
             Client().start(OPTIONS, python=silent)
@@ -222,9 +226,9 @@ def test_program_runs_from_where_blender_installs_it(tmp_path: Path) -> None:
     """Below bl_ext the package has another name, and beside it lie folders that must stay out."""
     installed = tmp_path / "extensions" / "user_default" / "octo_motion"
     installed.parent.mkdir(parents=True)
-    installed.symlink_to(REPOSITORY / "octo_motion", target_is_directory=True)
-    (installed.parent / "json").mkdir()
-    (installed.parent / "json" / "__init__.py").write_text("raise SystemExit('the wrong json')")
+    skipped = shutil.ignore_patterns("__pycache__", "presets", "ui", "blender", "splicing")
+    shutil.copytree(REPOSITORY / "octo_motion", installed, ignore=skipped)
+    write(installed.parent / "json" / "__init__.py", "raise SystemExit('the wrong json')")
     launcher = process.LAUNCHER.relative_to(REPOSITORY / "octo_motion")
     run = subprocess.run(
         [process.python_executable(), "-I", installed / launcher, "descriptor"],
@@ -236,7 +240,7 @@ def test_program_runs_from_where_blender_installs_it(tmp_path: Path) -> None:
 
 
 def test_libraries_that_came_with_the_extension_are_handed_over(tmp_path: Path) -> None:
-    (tmp_path / "octo_test_library.py").write_text("")
+    write(tmp_path / "octo_test_library.py", "")
     script = (
         "import sys, runpy; sys.argv = ['launch.py', '--library', sys.argv[1], 'descriptor']\n"
         f"try: runpy.run_path({str(process.LAUNCHER)!r}, run_name='__main__')\n"
