@@ -31,12 +31,10 @@ def unregister() -> None:
 
 def _steps() -> list[Step]:
     from . import command_line  # noqa: PLC0415
-    from .command_line import operators  # noqa: PLC0415
     from .ui import registration  # noqa: PLC0415
     from .ui.steps import Step  # noqa: PLC0415
 
     return [
         Step(registration.register, registration.unregister),
-        *operators.steps(),
-        Step(command_line.register, command_line.unregister),
+        *command_line.steps(),
     ]

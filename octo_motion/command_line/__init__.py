@@ -8,12 +8,24 @@ shown without, and artists who never use a command line do not wait for it when 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .command_line import COMMAND, STOPPED, parse
 from .stopping import stoppable
 
-__all__ = ["COMMAND", "STOPPED", "main", "parse", "register", "stoppable", "unregister"]
+if TYPE_CHECKING:
+    from ..ui.steps import Step
+
+__all__ = [
+    "COMMAND",
+    "STOPPED",
+    "main",
+    "parse",
+    "register",
+    "steps",
+    "stoppable",
+    "unregister",
+]
 
 _handles: list[Any] = []
 
@@ -23,6 +35,14 @@ def main(arguments: Sequence[str], program: str, *, has_open_file: bool) -> int:
     from . import commands  # noqa: PLC0415
 
     return commands.main(arguments, program, has_open_file=has_open_file)
+
+
+def steps() -> list[Step]:
+    """What the add-on does to have its operators for jobs, and its command line."""
+    from ..ui.steps import Step  # noqa: PLC0415
+    from . import operators  # noqa: PLC0415
+
+    return [*operators.steps(), Step(register, unregister)]
 
 
 def register() -> None:
