@@ -9,7 +9,7 @@ Any other action is left exactly as it is.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from operator import itemgetter
 from typing import Any, Final
@@ -798,12 +798,21 @@ def acting_curves(data: bpy.types.AnimData | None) -> Iterator[bpy.types.FCurve]
     """Curves by which a data-block is moved at present: its action's, and its NLA strips'."""
     if data is None:
         return
-    acting = [(data.action, data.action_slot)]
-    tracks = [track for track in data.nla_tracks if not track.mute] if data.use_nla else []
-    strips = (strip for track in tracks for strip in flattened(track.strips) if not strip.mute)
-    acting += [(strip.action, strip.action_slot) for strip in strips]
-    for action, slot in acting:
-        if action is not None and slot is not None:
+    if data.action is not None and data.action_slot is not None:
+        yield from shown_curves(data.action, data.action_slot)
+    yield from strip_curves(data)
+
+
+def strip_curves(
+    data: bpy.types.AnimData | None, left_out: Collection[bpy.types.Action] = ()
+) -> Iterator[bpy.types.FCurve]:
+    """Curves by which NLA strips move a data-block at present, but for those of some actions."""
+    if data is None or not data.use_nla:
+        return
+    tracks = [track for track in data.nla_tracks if not track.mute]
+    for strip in (strip for track in tracks for strip in flattened(track.strips)):
+        action, slot = strip.action, strip.action_slot
+        if action is not None and slot is not None and not strip.mute and action not in left_out:
             yield from shown_curves(action, slot)
 
 

@@ -11,11 +11,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
-from ...core.keyframes import in_rotation_mode, rotation_property
+from ...core.keyframes import Channel, constant_keys, in_rotation_mode, rotation_property
 from ...core.rotations import Floats, from_mode_values
 from ...core.skeleton import Skeleton
 from ..rig import bone_and_property, carrying_axes
-from .actions import acting_curves, curves_of, is_generated, key_points
+from .actions import acting_curves, curves_of, is_generated, key_points, strip_curves
 
 AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
     "location": (0.0, 0.0, 0.0),
@@ -33,6 +33,8 @@ _UNSHEARED: Final = 1e-3
 """Factors that are no scale, and cosines that are no shear."""
 _TINY: Final = 1e-6
 """Factor below which a bone is scaled to nothing, and has no orientation."""
+_UNMOVED: Final = 1e-6
+"""By how much a value may be off that at rest and be it: single precision."""
 _STILL: Final = 0.01
 """Bone lengths, radians and factors by which a bone may be off its rest pose unnoticed."""
 
@@ -46,17 +48,12 @@ def animated_bones(
     return {name for name, channel in found if name and channel.startswith(channels)}
 
 
-def rest_bones(
-    armature: bpy.types.Object,
-    names: Iterable[str],
-    channels: Sequence[str] = ("location", "rotation"),
-) -> None:
-    """Put channels of bones back to what they are at rest; names that are no bone's are passed."""
+def rest_properties(armature: bpy.types.Object, paths: Iterable[str]) -> None:
+    """Put bones' properties, by data path, back to what they are at rest; others are passed."""
     bones = armature.pose.bones if armature.pose is not None else {}
-    for bone in (bones[name] for name in names if name in bones):
-        for channel in channels:
-            own = rotation_property(bone.rotation_mode) if channel == "rotation" else channel
-            setattr(bone, own, AT_REST[own])
+    for name, channel in map(bone_and_property, paths):
+        if name in bones and channel in AT_REST:
+            setattr(bones[name], channel, AT_REST[channel])
 
 
 def standing_of(
@@ -142,6 +139,48 @@ def displaced_bones(
         if np.abs(basis - np.eye(4)).max() > _STILL:
             found.append(name)
     return found
+
+
+def posed_channels(
+    armature: bpy.types.Object,
+    names: Iterable[str],
+    *,
+    passing: Collection[str] = (),
+    own: Collection[bpy.types.Action] = (),
+) -> list[tuple[str, str]]:
+    """Bones and properties of theirs that are not at rest now, or that NLA strips move.
+
+    Args:
+        armature: the armature object.
+        names: of the bones looked at; those that are no bone's are passed.
+        passing: data paths of what does not stay as it is: of these what strips move counts alone.
+        own: actions whose strips do not count.
+    """
+    if armature.pose is None:
+        return []
+    strips = strip_curves(armature.animation_data, own)
+    bones, beneath = armature.pose.bones, {curve.data_path for curve in strips}
+    found: list[tuple[str, str]] = []
+    for name in dict.fromkeys(names):
+        bone = bones.get(name)
+        if bone is None:
+            continue
+        for channel in ("location", rotation_property(bone.rotation_mode), "scale"):
+            now, path = getattr(bone, channel), bone.path_from_id(channel)
+            away = not np.allclose(now, AT_REST[channel], rtol=0.0, atol=_UNMOVED)
+            if (away and path not in passing) or path in beneath:
+                found.append((name, channel))
+    return found
+
+
+def rest_channel(
+    armature: bpy.types.Object, name: str, channel: str, frames: Floats, *, few: bool
+) -> Channel:
+    """A bone's property that is at rest at frames (frames,), few: by a single key."""
+    assert armature.pose is not None
+    values = np.tile(AT_REST[channel], (len(frames), 1))
+    path = armature.pose.bones[name].path_from_id(channel)
+    return Channel(path, values, name, constant_keys(frames[0], values[0]) if few else None)
 
 
 # --- A pose that is only shown: put on an armature for a while, without keys, and taken off again

@@ -294,6 +294,15 @@ class BezierKeys:
         return len(self.frames)
 
 
+def constant_keys(frame: float, values: Floats) -> BezierKeys:
+    """A single key of values (components,) that hold for ever."""
+    own = np.stack(np.broadcast_arrays(frame, values), axis=-1)[None].astype(np.float32)
+    reach = np.array([1.0, 0.0], dtype=np.float32)
+    return BezierKeys(
+        own[:, 0, 0], own[..., 1], own - reach, own + reach, np.ones(1, dtype=np.bool_)
+    )
+
+
 def bezier_keys(
     frames: Floats, values: Floats, out: Floats, into: Floats, smooth: Booleans
 ) -> BezierKeys:

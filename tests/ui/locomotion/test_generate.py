@@ -848,6 +848,7 @@ def test_a_root_bone_that_is_posed_and_gets_keys_moves_nothing(
 def test_a_pose_that_moves_the_arms_is_told_and_kept(octopus: Any) -> None:
     settings_of(octopus).tell_overlaps = False
     settings_of(octopus).frame_end = 120
+    settings_of(octopus).keep_pose = True
     assert workflow.generate_locomotion(octopus, bpy.context).warnings == ()
     octopus.pose.bones["Arm1_1.L"].location.x = 0.1
     octopus.pose.bones["Arm1_2.L"].scale.y = 2.0

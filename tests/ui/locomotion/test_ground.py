@@ -102,6 +102,7 @@ def test_arms_hold_the_ground_where_a_posed_body_carries_them(octopus: Any) -> N
     root = octopus.pose.bones["root"]
     root.location, root.rotation_mode = (0.02, 0.03, -0.01), "XYZ"
     root.rotation_euler = (0.15, 0.1, 0.3)
+    octopus.octo_motion.locomotion.keep_pose = True
     bpy.context.view_layer.update()
     assert warnings(octopus) == []
     assert tuple(root.location) == pytest.approx((0.02, 0.03, -0.01))
@@ -115,6 +116,7 @@ def test_arms_hold_the_ground_where_a_posed_body_carries_them(octopus: Any) -> N
 
 def test_a_body_scaled_unequally_cannot_be_reckoned_with_and_is_told(octopus: Any) -> None:
     octopus.pose.bones["root"].scale = (1.0, 0.8, 0.8)
+    octopus.octo_motion.locomotion.keep_pose = True
     bpy.context.view_layer.update()
     (told,) = warnings(octopus)
     assert told.startswith("The pose of one bone moves the arms ('root')")

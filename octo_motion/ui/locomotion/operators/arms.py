@@ -269,6 +269,7 @@ class OCTO_MOTION_PT_arms(ArmaturePanel, bpy.types.Panel):
         column.prop(settings, "body_front")
         column.prop(settings, "body_up")
         column.prop_search(settings, "root_bone", settings.id_data.data, "bones")
+        column.prop(settings, "keep_pose")
 
 
 def _split_column(layout: Any) -> Any:

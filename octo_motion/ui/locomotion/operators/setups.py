@@ -49,6 +49,7 @@ APART: Final = frozenset(
         *("table", "change", "name", "seed", "active_arm", "active_reach", "cycles", "repeat"),
         *("setup", "live", "live_error", "extended_from", "extended_to", "show_targets"),
         *("tell_overlaps", "body_front", "body_up", "root_bone", "spline", "height", "height_mode"),
+        "keep_pose",
         *("ground.start_at_rest", "ground.come_to_rest", "ground.rest_within"),
         *("heading", "heading_angle", "gait", "timing", "speed", "frame_start", "frame_end"),
         *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),

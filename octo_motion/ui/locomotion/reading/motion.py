@@ -260,7 +260,10 @@ def read_reaches(
         return None
     creature = rig.creature
     bones, arms = creature.bones, creature.arms
-    anew = keyed_anew(settings, armature, creature.root_bone)
+    if settings.keep_pose:
+        anew = keyed_anew(settings, armature, creature.root_bone)
+    else:
+        anew = set(creature.skeleton.names)
     return Reaching(
         arms=arms,
         frames=tuple(frames_of_arm(creature.at_rest, each, rig.rest_body) for each in bones),

@@ -179,8 +179,13 @@ def read_creature(
     arms, rest_body, detection = listed_arms(settings, armature, at_rest)
     root_bone = chosen_root_bone(settings, armature, detection)
     skeleton, body = at_rest, rest_body
-    carriers = posed_carriers(settings, armature, skeleton, arms, root_bone)
+    for arm in arms:
+        # Complains of bones that are gone.
+        chain_of(skeleton, arm.bones)
     turned = [bone for arm in arms for bone in arm.bones]
+    carriers: list[str] = []
+    if settings.keep_pose:
+        carriers = posed_carriers(settings, armature, skeleton, arms, root_bone)
     if carriers and (posed := as_posed(armature, skeleton, carriers, turned)) is not None:
         # Arms hang where the bones that carry them are.
         skeleton, carriers = posed, []
@@ -211,7 +216,9 @@ def read_creature(
             *(detection.notes if detection else warnings_for_driven_arms(skeleton, arms)),
             *warnings_for_driven(settings, armature, skeleton, root_bone),
         ),
-        poses=tuple(warnings_for_poses(settings, armature, arms, carriers)),
+        poses=tuple(
+            warnings_for_poses(settings, armature, arms, carriers) if settings.keep_pose else ()
+        ),
     )
 
 
@@ -396,9 +403,6 @@ def posed_carriers(
     root_bone: str,
 ) -> list[str]:
     """Bones that carry arms, get no keys and are posed: by an artist, or by an imported file."""
-    for arm in arms:
-        # Complains of bones that are gone.
-        chain_of(skeleton, arm.bones)
     turned = {bone for arm in arms for bone in arm.bones}
     carrying = {each for bone in turned for each in skeleton.ancestors(skeleton.index[bone])}
     own = {skeleton.names[number] for number in carrying} - turned

@@ -402,6 +402,13 @@ class ArmList:
         name="Root Bone",
         description="Bone that carries the whole body; it can take the travel along the route",
     )
+    keep_pose: props.BoolProperty(
+        name="Keep Pose",
+        description="Let bones that carry the arms stay as they are posed, and work the motion out "
+        "from there. Off, the motion is that of the rig at rest, whatever pose or frame it stands "
+        "in: what the action before has moved goes back to rest, and what is posed by hand gets "
+        "keys at rest",
+    )
 
 
 # --- Reaches --------------------------------------------------------------------------------------

@@ -12,19 +12,21 @@ import bpy
 import numpy as np
 
 from ....blender.animation import (
-    SCALE,
-    animated_bones,
+    curves_of,
     key_counts,
     play_bones,
+    posed_channels,
     read_object_channels,
-    rest_bones,
+    rest_channel,
+    rest_properties,
     unedited_with_note,
     writable_armature,
     write_action,
 )
-from ....blender.rig import armature_data, may_play_otherwise, world_matrix
+from ....blender.rig import armature_data, bone_and_property, may_play_otherwise, world_matrix
 from ....blender.scene import CARRIED, Contact, put_back, read_route, write_markers
 from ....core.errors import RouteError, WriteError
+from ....core.keyframes import Channel
 from ....core.locomotion.metrics import Figure, Played, figures, played_arm, warnings_for_figures
 from ....core.locomotion.motion import (
     Breathing,
@@ -42,6 +44,7 @@ from ....core.rotations import Floats
 from ...declared_settings import assign, plain
 from ..reading import (
     bones_of,
+    playing_action,
     previous_action,
     read_changes,
     read_creature,
@@ -167,7 +170,9 @@ class Shot:
     result: MotionResult | None = None
     """What :meth:`compute` has come to."""
     summary: Summary | None = None
-    """What :meth:`write` has made."""
+    """What :meth:`write` has made …"""
+    told: tuple[str, ...] = ()
+    """… and what there is to know of the poses that it found."""
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
@@ -228,7 +233,7 @@ class Shot:
             dense_keys=dense_keys,
             warnings=(*made.warnings, *warnings_for_figures(made.figures)),
             figures=made.figures,
-            notes=(*notes, *made.notes),
+            notes=(*notes, *self.told, *made.notes),
         )
         return self.summary
 
@@ -292,11 +297,18 @@ class Shot:
     ) -> bpy.types.Action:
         """Write the keys, and lay to rest what the action before moved and this one does not."""
         previous = previous_action(armature, settings)
-        left_behind = animated_bones(previous) if previous is not None else set[str]()
-        scaled = animated_bones(previous, SCALE) if previous is not None else set[str]()
+        before = {previous}
+        if not settings.keep_pose:
+            # Whoever made it: its pose of one frame is nobody's.
+            before.add(playing_action(armature))
+        old = [action for action in before if action is not None]
         # An arm that was switched off is left to the artist, in the pose that it has.
-        for item in settings.arms:
-            left_behind.difference_update(() if item.enabled else bones_of(item))
+        left = {bone for item in settings.arms if not item.enabled for bone in bones_of(item)}
+        passing = {curve.data_path for action in old for curve in curves_of(action)}
+        passing = {path for path in passing if bone_and_property(path)[0] not in left}
+        channels = made.channels
+        if not settings.keep_pose:
+            channels = [*channels, *self._at_rest(armature, made, passing, old)]
         # The settings' own pointer must not count as a user when it comes to saving an edited
         # action from being purged.
         settings.result = None
@@ -305,7 +317,7 @@ class Shot:
                 armature,
                 f"{armature.name} Locomotion",
                 made.frames,
-                made.channels,
+                channels,
                 previous=previous,
                 settings_note=self.note,
                 repeats=self.job.repeats,
@@ -316,9 +328,37 @@ class Shot:
             settings.result = previous
             raise
         settings.result = action
-        rest_bones(armature, left_behind - animated_bones(action))
-        rest_bones(armature, scaled - animated_bones(action, SCALE), SCALE)
+        rest_properties(armature, passing - {each.data_path for each in channels})
         return action
+
+    def _at_rest(
+        self,
+        armature: bpy.types.Object,
+        made: MotionResult,
+        passing: set[str],
+        old: Sequence[bpy.types.Action],
+    ) -> list[Channel]:
+        """Channels of what carries the arms, and of the mantle, that would stay in some pose.
+
+        What passing paths lead to goes back to rest by itself: it was moved by old actions.
+        """
+        creature, keyed = self.job.creature, {each.data_path for each in made.channels}
+        numbers = [creature.skeleton.index[name] for arm in creature.bones for name in arm]
+        carrying = {each for number in numbers for each in creature.skeleton.ancestors(number)}
+        names = [creature.skeleton.names[each] for each in sorted({*numbers, *carrying})]
+        names += [*made.plan.schedule.head, creature.root_bone]
+        found = [
+            rest_channel(armature, *each, made.frames, few=self.job.tolerances is not None)
+            for each in posed_channels(armature, names, passing=passing, own=old)
+        ]
+        found = [each for each in found if each.data_path not in keyed]
+        if bones := sorted({each.group for each in found}):
+            one = len(bones) == 1
+            told = (
+                f"'{bones[0]}' is" if one else f"'{bones[0]}' and {len(bones) - 1} more bones are"
+            )
+            self.told = (f"{told} posed, and keyed at rest; Keep Pose lets that pose count.",)
+        return found
 
     def _extend_range(self, settings: OCTO_MOTION_PG_locomotion, last: int) -> tuple[str, ...]:
         """Let the scene end with the motion, if that is wanted; what there is to say of it."""
