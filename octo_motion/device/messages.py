@@ -39,7 +39,7 @@ from .codec import (
 )
 from .driver import Axes
 
-VERSION: Final = 3
+VERSION: Final = 4
 MAGIC: Final = b"OMDV"
 HEADER: Final = struct.Struct("<4sHHI")
 MOST_BYTES: Final = 4_000_000
@@ -96,6 +96,8 @@ class FigureMessage(Message):
     damping: Annotated[Floats, Table((3,))]
     flow: Annotated[Floats, Table((3,))]
     yield_torque: Annotated[Floats, Table(endless=True)]
+    owners: Annotated[tuple[int, ...], Many(U16, 4096)] = ()
+    heavy: Annotated[tuple[int, ...], Many(U8, 4096)] = ()
 
     @classmethod
     def of(cls, figure: Figure) -> FigureMessage:
@@ -103,7 +105,8 @@ class FigureMessage(Message):
         for each in ("stiffness", "damping", "flow"):
             # About a bone's three axes, alike or not.
             own[each] = np.broadcast_to(own[each].T, (3, len(figure))).T
-        own["parents"] = tuple(map(int, figure.parents))
+        for each in ("parents", "owners", "heavy"):
+            own[each] = tuple(map(int, own[each]))
         return cls(**{each.name: own[each.name] for each in fields(cls)})
 
     def figure(self) -> Figure:
@@ -116,6 +119,8 @@ class FigureMessage(Message):
             raise MessageError("arrays of different lengths")
         if any(not -1 <= parent < index for index, parent in enumerate(self.parents)):
             raise MessageError("a parent does not come before its child")
+        if {len(self.owners), len(self.heavy)} - {0, count}:
+            raise MessageError("arrays of different lengths")
         if count == 0 or (self.masses <= 0.0).any() or (self.lengths <= 0.0).any():
             raise MessageError("a body without mass or length")
         self._weigh()
@@ -144,6 +149,8 @@ class FigureMessage(Message):
             *(self.centres, self.inertias, self.capsules, self.radii),
             self.limits,
             Elements(self.stiffness, self.damping, self.flow, self.yield_torque),
+            self.owners,
+            tuple(map(bool, self.heavy)),
         )
 
 
@@ -404,6 +411,8 @@ class ObstacleMessage(Message):
     """Radius of sphere and capsule, thickness of a mesh."""
     points: Annotated[Floats, Table((3,), MOST_POINTS)] = field(default_factory=_no_points)
     """Ends of a capsule, half sizes of a box, three corners for each triangle; own frame."""
+    body: Annotated[int, I32] = -1
+    """The body whose shape it is, −1 for none."""
 
     @classmethod
     def of(cls, number: int, obstacle: Obstacle | None) -> ObstacleMessage:
@@ -418,6 +427,7 @@ class ObstacleMessage(Message):
             *(number, kind, tuple(obstacle.position), tuple(obstacle.orientation)),
             size=getattr(obstacle, shape.size, 0.0),
             points=getattr(obstacle, shape.points, _no_points()).reshape(-1, 3),
+            body=obstacle.body,
         )
 
     def obstacle(self) -> Obstacle | None:
@@ -434,6 +444,7 @@ class ObstacleMessage(Message):
             return shape.kind(
                 position=np.array(self.position),
                 orientation=np.array(turn),
+                body=max(self.body, -1),
                 **{name: value for name, value in own.items() if name},
             )
         except ValueError as error:

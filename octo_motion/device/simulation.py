@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ..core.posing.picking import nearest_body
-from ..core.posing.puppet import Figure, Pose, capsules_in_world
+from ..core.posing.puppet import Figure, Pose, bodies_with, capsules_in_world, part_of
 from ..core.posing.session import HandSample, Session, StepLength
 from ..core.posing.solver import Coupling, HandSpring, World, WorldSettings
 from ..core.rotations import Floats, conjugate, multiply, rotate
@@ -164,7 +164,13 @@ class Simulation:
             return
         # A machine too slow for the measurement goes on without: the body then keeps its velocity.
         mobility, angular = (0.0, 0.0) if self.cost > _TOO_SLOW else self._mobility(body, point)
-        coupling = coupling_for(session.figure, session.pose, hand.device, hand.scale)
+        which, pose = bodies_with(session.figure, body), session.pose
+        coupling = coupling_for(
+            part_of(session.figure, body),
+            Pose(pose.positions[which], pose.orientations[which]),
+            hand.device,
+            hand.scale,
+        )
         hand.spring = session.grab(body, point, np.array(message.orientation), coupling)
         hand.grab = message.grab
         hand.pull = Pull(

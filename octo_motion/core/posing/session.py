@@ -23,7 +23,7 @@ from ..rotations import (
     multiply,
     to_rotation_vector,
 )
-from .puppet import Elements, Figure, Flags, Pose, joints_of, turned_bodies
+from .puppet import Elements, Figure, Flags, Pose, joints_of, part_of, turned_bodies
 from .solver import Coupling, HandSpring, Obstacle, World, WorldSettings, WorldSnapshot
 
 COARSEST: Final = 4e-3
@@ -171,7 +171,7 @@ class Session:
         clock: Callable[[], float] | None = time.perf_counter,
     ) -> None:
         self.world = World(figure, pose, settings, obstacles)
-        self.coupling = hand_for(figure)
+        self.coupling = hand_for(part_of(figure, 0))
         """How firmly the next grab holds, if it does not say so itself."""
         self.time = 0.0
         """Simulated seconds."""
@@ -228,9 +228,16 @@ class Session:
         """Take hold of a body with one more hand, see ``World.grab``."""
         self.remember()
         self._note_touched()
-        spring = self.world.grab(body, point, orientation, coupling or self.coupling)
+        spring = self.world.grab(body, point, orientation, coupling or self._coupling_at(body))
         self.wake()
         return spring
+
+    def _coupling_at(self, body: int) -> Coupling:
+        owners = self.figure.owners
+        if not owners or owners[body] == owners[0]:
+            return self.coupling
+        # Another figure, or a thing, is held as is right for its own weight.
+        return hand_for(part_of(self.figure, body))
 
     def release(self, spring: HandSpring | None = None) -> None:
         """Let one hand go, or all of them."""

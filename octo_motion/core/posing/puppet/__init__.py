@@ -2,7 +2,27 @@
 """What a puppet is: bodies, joints, their limits and materials."""
 
 from .bone_roles import BODY, FOLLOW, SMALLEST, RigFacts, Roles, diagonal, find_roles
-from .build import FREE, SIZE, JointLimits, PosedBones, build_figure, joints_of, turned_bodies
+from .build import (
+    DENSITY,
+    FREE,
+    SIZE,
+    JointLimits,
+    PosedBones,
+    build_figure,
+    joints_of,
+    turned_bodies,
+)
+from .company import (
+    bodies_with,
+    inertia_of,
+    joined,
+    joined_elements,
+    joined_poses,
+    part_of,
+    resized,
+    solid_moments,
+    thing,
+)
 from .figure import (
     Elements,
     Figure,
@@ -31,6 +51,7 @@ from .plastic_element import ElementResponse, PlasticLaw, law_of
 
 __all__ = [
     "BODY",
+    "DENSITY",
     "FOLLOW",
     "FREE",
     "SIZE",
@@ -51,6 +72,7 @@ __all__ = [
     "RigFacts",
     "Roles",
     "bends",
+    "bodies_with",
     "build_figure",
     "capsules_in_world",
     "closed",
@@ -58,14 +80,22 @@ __all__ = [
     "distances_to_axes",
     "elements_for",
     "find_roles",
+    "inertia_of",
+    "joined",
+    "joined_elements",
+    "joined_poses",
     "joint_loads",
     "joints_of",
     "law_of",
     "material_of",
     "measure_bend",
     "measure_shown",
+    "part_of",
     "pose_of",
+    "resized",
     "rest_pose",
     "slopes",
+    "solid_moments",
+    "thing",
     "turned_bodies",
 ]

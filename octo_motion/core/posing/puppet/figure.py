@@ -49,6 +49,11 @@ class Figure:
     """(bodies, 3, 2) least and greatest bend about X, twist about Y (the bone) and bend about Z, in
     the bone's axes at rest (see ``joint_limits``); −π and π where there is no end."""
     elements: Elements
+    owners: tuple[int, ...] = ()
+    """(bodies,) which of several figures and things each body belongs to, from 0 on, where they are
+    simulated together: different ones push each other away. Empty where all is one figure."""
+    heavy: tuple[bool, ...] = ()
+    """(bodies,) what has weight even in a world without; empty for none."""
 
     def __len__(self) -> int:
         return len(self.names)

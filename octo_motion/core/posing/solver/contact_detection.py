@@ -19,9 +19,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...rotations import Floats, rotate, to_matrix
-from ..puppet import Figure, Flags, Integers, capsules_in_world, rest_pose
-from .obstacle_shapes import Box, Obstacle, Plane
+from ...rotations import Floats, rotate
+from ..puppet import Figure, Flags, Integers, Pose, capsules_in_world, rest_pose
+from .moving_shapes import MovingShapes, Placed, Touches, placed
+from .obstacle_shapes import Box, Hull, Obstacle, Plane, nearest_on_segments
 
 _MOST_SAMPLES: Final = 9
 _TINY: Final = 1e-12
@@ -73,22 +74,26 @@ class _Touched:
 class Detector:
     """Finds the contacts of one figure; what hangs on the figure alone is worked out once."""
 
-    def __init__(self, figure: Figure, *, self_collision: bool) -> None:
+    def __init__(self, figure: Figure, *, self_collision: bool, apart: Flags | None = None) -> None:
+        """Bodies of different owners push each other away but for those that are not ``apart``
+        (bodies, bodies), see ``apart_at``.
+        """
         self._radii = figure.radii
         self._ends = figure.capsules.copy()
         self._first_label = len(figure) ** 2
-        keep = _separate_ends(figure)
-        self._keep = keep
-        # (2 bodies,) how far from a plane both ends of each capsule touch it; never some.
-        self._end_radii = np.where(keep, figure.radii[:, None], -np.inf).ravel()
+        self._separate = _separate_ends(figure)
+        self._owners = np.array(figure.owners or (0,) * len(figure))
+        self._shapes = MovingShapes()
         lengths = np.linalg.norm(figure.capsules[:, 1] - figure.capsules[:, 0], axis=-1)
         self._long = lengths > 1e-6 * figure.radii + _TINY
         most = float(np.max(lengths / np.maximum(figure.radii, _TINY), initial=1.0))
         self._samples = int(min(max(np.ceil(most) + 1, 3), _MOST_SAMPLES))
-        self._pairs = _pairs(figure) if self_collision else None
+        self._all_pairs = _pairs(figure, self._owners, self_collision=self_collision)
+        if apart is not None and self._all_pairs is not None:
+            self._all_pairs &= apart
         # What was worked out of obstacles, kept as long as they are the same ones.
         self._planes: WeakKeyDictionary[Plane, _Touched] = WeakKeyDictionary()
-        self._world_boxes: WeakKeyDictionary[Obstacle, Floats] = WeakKeyDictionary()
+        self._use_shapes(())
         self.forget()
         self._reach = float(figure.radii.max(initial=0.0))
 
@@ -107,25 +112,51 @@ class Detector:
             return _NONE
         ends = self._ends @ matrices.transpose(0, 2, 1)
         ends += positions[:, None]
-        found: list[Contacts] = []
+        found: list[Contacts | None] = []
         boxes: tuple[Floats, Floats] | None = None
+        moving = [each for each in obstacles if each.body >= 0]
+        if moving or self._shaped:
+            moving = [each for each in moving if _has_shape(each, len(self._radii))]
+            self._use_shapes(tuple(each.body for each in moving))
+            obstacles = [each for each in obstacles if each.body < 0]
         # Three places on each capsule: its ends and between.
         label = self._first_label
         for obstacle in obstacles:
             if isinstance(obstacle, Plane):
-                contacts = self._on_plane(ends, obstacle, margin, label)
+                found.append(self._on_plane(ends, obstacle, margin, label))
             else:
-                if boxes is None:
-                    boxes = self._boxes(ends, margin)
-                contacts = self._on_solid(ends, boxes, obstacle, margin, label)
+                boxes = boxes or self._boxes(ends, margin)
+                there = self._shapes.standing(obstacle)
+                found.append(self._on_solid(ends, boxes, there, margin, label))
             label += 3 * len(self._radii)
-            if contacts is not None:
-                found.append(contacts)
+        if moving:
+            boxes = boxes or self._boxes(ends, margin)
+            there = [
+                placed(each, each.body, matrices[each.body], positions[each.body])
+                for each in moving
+            ]
+            for each in there:
+                found.append(self._on_solid(ends, boxes, each, margin, label))
+                label += 3 * len(self._radii)
+            found += map(_touching, self._shapes.find(there, obstacles, margin, label))
         if self._pairs is not None:
-            contacts = self._on_itself(ends, boxes or self._boxes(ends, margin), margin)
-            if contacts is not None:
-                found.append(contacts)
-        return _joined(found)
+            found.append(self._on_itself(ends, boxes or self._boxes(ends, margin), margin))
+        return _joined([each for each in found if each is not None])
+
+    def _use_shapes(self, bodies: tuple[int, ...]) -> None:
+        """Let bodies that have a shape not touch by their capsules."""
+        if getattr(self, "_shaped", None) == bodies:
+            return
+        self._shaped = bodies
+        bare = np.ones(len(self._radii), dtype=bool)
+        bare[list(bodies)] = False
+        self._bare = bare
+        self._keep = self._separate & bare[:, None]
+        # (2 bodies,) how far from a plane both ends of each capsule touch it; never some.
+        self._end_radii = np.where(self._keep, self._radii[:, None], -np.inf).ravel()
+        self._planes.clear()
+        pairs = self._all_pairs
+        self._pairs = pairs if pairs is None or not bodies else pairs & bare & bare[:, None]
 
     def _boxes(self, ends: Floats, margin: float) -> tuple[Floats, Floats]:
         around = (self._radii + margin)[:, None]
@@ -158,15 +189,14 @@ class Detector:
         self,
         ends: Floats,
         boxes: tuple[Floats, Floats],
-        obstacle: Obstacle,
+        there: Placed,
         margin: float,
         label: int,
     ) -> Contacts | None:
-        near = self._around(obstacle, boxes)
+        near, obstacle, frame = self._around(there, boxes), there.shape, there.frame
         if not len(near):
             return None
-        frame = to_matrix(obstacle.orientation)
-        local = (ends[near] - obstacle.position) @ frame
+        local = (ends[near] - there.position) @ frame
         start, along = local[:, :1], local[:, 1:] - local[:, :1]
         reach = self._reach + margin
         shares = np.broadcast_to(
@@ -212,8 +242,8 @@ class Detector:
             return None
         radii = self._radii[bodies]
         normals = outward @ frame.T
-        points = centres @ frame.T + obstacle.position - radii[:, None] * normals
-        return _with_obstacle(bodies, points, normals, apart - radii, labels)
+        points = centres @ frame.T + there.position - radii[:, None] * normals
+        return _with_obstacle(bodies, points, normals, apart - radii, labels, there.body)
 
     def _see_from_outside(
         self, box: Obstacle, near: Integers, ends: Floats, distances: Floats, outs: Floats
@@ -239,13 +269,15 @@ class Detector:
                 distances[body, sample] = side * ends[body, end, face] - box.half[face]
         self._outside[box] = now
 
-    def _around(self, obstacle: Obstacle, boxes: tuple[Floats, Floats]) -> Integers:
-        """The bodies whose boxes touch that of an obstacle."""
+    def _around(self, there: Placed, boxes: tuple[Floats, Floats]) -> Integers:
+        """The bodies whose capsules' boxes touch that of an obstacle."""
         low, high = boxes
-        box = self._world_box(obstacle)
-        if box is None:
-            return np.arange(len(low))
-        return np.flatnonzero(((low <= box[1]) & (high >= box[0])).all(axis=1))
+        touch = self._bare
+        if there.box is not None:
+            touch = ((low <= there.box[1]) & (high >= there.box[0])).all(axis=1) & touch
+        if there.body >= 0:
+            touch = touch & (self._owners != self._owners[there.body])
+        return np.flatnonzero(touch)
 
     def _on_itself(
         self, ends: Floats, boxes: tuple[Floats, Floats], margin: float
@@ -280,41 +312,30 @@ class Detector:
             self._planes[plane] = known
         return known
 
-    def _world_box(self, obstacle: Obstacle) -> Floats | None:
-        """Lower and upper corner in the world."""
-        known, bounds = self._world_boxes.get(obstacle), obstacle.bounds
-        if known is not None or bounds is None:
-            return known
-        frame = to_matrix(obstacle.orientation)
-        middle = frame @ bounds.mean(axis=0) + obstacle.position
-        half = np.abs(frame) @ (0.5 * (bounds[1] - bounds[0]))
-        known = self._world_boxes[obstacle] = np.stack([middle - half, middle + half])
-        return known
 
-
-def _with_obstacle(
-    bodies: Integers, points: Floats, normals: Floats, gaps: Floats, labels: Integers
+def _with_obstacle(  # noqa: PLR0917
+    bodies: Integers,
+    points: Floats,
+    normals: Floats,
+    gaps: Floats,
+    labels: Integers,
+    other: int = -1,
 ) -> Contacts:
     others = np.empty(len(bodies), np.int64)
-    others.fill(-1)
+    others.fill(other)
     return Contacts(bodies, others, points, normals, gaps, labels)
 
 
-def nearest_on_segments(first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Nearest points of segments ``(…, 2 ends, 3)``, on each; clamping after Ericson (2005)."""
-    p, d = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
-    q, e = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
-    r = p - q
-    dd, ee, de = (d * d).sum(-1), (e * e).sum(-1), (d * e).sum(-1)
-    dr, er = (d * r).sum(-1), (e * r).sum(-1)
-    determinant = dd * ee - de * de
-    # Parallel: any point will do, take the middle of the first.
-    skew = determinant > 1e-9 * dd * ee + _TINY**2
-    s = np.where(skew, (de * er - dr * ee) / np.where(skew, determinant, 1.0), 0.5)
-    s = np.clip(s, 0.0, 1.0)
-    t = np.clip((de * s + er) / np.maximum(ee, _TINY), 0.0, 1.0)
-    s = np.clip((de * t - dr) / np.maximum(dd, _TINY), 0.0, 1.0)
-    return p + s[..., None] * d, q + t[..., None] * e
+def _touching(touches: Touches) -> Contacts:
+    count = len(touches.gaps)
+    bodies = np.full(count, touches.body)
+    place = (touches.points, touches.normals, touches.gaps, touches.labels)
+    return _with_obstacle(bodies, *place, touches.other)
+
+
+def _has_shape(obstacle: Obstacle, bodies: int) -> bool:
+    """Whether it is a shape that one of so many bodies can have."""
+    return obstacle.body < bodies and isinstance(obstacle, Box | Hull)
 
 
 def _middle(shares: Floats, distances: Floats, slack: Floats) -> Floats:
@@ -341,23 +362,32 @@ def _separate_ends(figure: Figure) -> Flags:
     return keep
 
 
-def _pairs(figure: Figure) -> Flags:
-    """(bodies, bodies) which capsules may collide: no neighbours, none that overlap at rest."""
-    count = len(figure)
+def _pairs(figure: Figure, owners: Integers, *, self_collision: bool) -> Flags | None:
+    """(bodies, bodies) which capsules may collide: those of different owners, and limbs of one
+    figure that are no neighbours and do not overlap at rest. None where none may.
+    """
+    strangers = np.triu(owners[:, None] != owners, 1)
+    if not self_collision:
+        return strangers if strangers.any() else None
     parents = np.array(figure.parents)
-    allowed = np.triu(np.ones((count, count), dtype=bool), 1)
+    allowed = np.triu(owners[:, None] == owners, 1)
     for body, parent in enumerate(parents):
         if parent >= 0:
             allowed[parent, body] = False
             allowed[np.ix_([body], np.flatnonzero(parents == parent))] = False
-    ends = capsules_in_world(figure, rest_pose(figure))
-    first, second = np.nonzero(allowed)
-    if len(first):
-        a, b = nearest_on_segments(ends[first], ends[second])
-        room = np.linalg.norm(a - b, axis=-1) - figure.radii[first] - figure.radii[second]
-        overlapping = room <= 0.0
-        allowed[first[overlapping], second[overlapping]] = False
-    return allowed
+    return (allowed & apart_at(figure, rest_pose(figure))) | strangers
+
+
+def apart_at(figure: Figure, pose: Pose) -> Flags:
+    """(bodies, bodies) which capsules, the first before the second, do not overlap in a pose."""
+    count = len(figure)
+    first, second = np.triu_indices(count, 1)
+    ends = capsules_in_world(figure, pose)
+    a, b = nearest_on_segments(ends[first], ends[second])
+    room = np.linalg.norm(a - b, axis=-1) - figure.radii[first] - figure.radii[second]
+    apart = np.zeros((count, count), dtype=bool)
+    apart[first, second] = room > 0.0
+    return apart
 
 
 _columns: Final = attrgetter(*(each.name for each in fields(Contacts)))

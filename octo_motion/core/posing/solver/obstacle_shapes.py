@@ -25,7 +25,8 @@ _MOST_EACH: Final = 64
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Obstacle:
-    """A rigid thing that stands still, or is put elsewhere; nothing pushes it back.
+    """A rigid thing that stands still, or is put elsewhere; nothing pushes it back. Or the shape of
+    a body that can be pushed about.
 
     ``closest`` is what the kinds differ in; they have no other behaviour.
     """
@@ -34,6 +35,9 @@ class Obstacle:
     """(3,) of its origin, world, metres."""
     orientation: Floats = field(default_factory=IDENTITY.copy)
     """(4,)"""
+    body: int = -1
+    """The body whose shape it is, in place of its capsule: a box or a hull, which then goes where
+    the body goes, and its own place and turn count for nothing. −1 stands in the world."""
 
     def closest(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
         """Signed distances ``(…)`` of points ``(…, 3)``, less than 0 inside, and the ways out.
@@ -145,6 +149,11 @@ class _Triangles(Obstacle):
             )
         object.__setattr__(self, "corners", given[~flat])
         object.__setattr__(self, "_normals", normalized(normals[~flat]))
+
+    @property
+    def normals(self) -> Floats:
+        """(triangles, 3) unit."""
+        return self._normals
 
     @property
     def bounds(self) -> Floats:
@@ -322,6 +331,23 @@ def nearest_on_triangles(points: Floats, corners: Floats) -> Floats:
         best = np.where(nearer, squared, best)
         edge = np.where(nearer[..., None], candidate, edge)
     return np.where(inside[..., None], foot, edge)
+
+
+def nearest_on_segments(first: Floats, second: Floats) -> tuple[Floats, Floats]:
+    """Nearest points of segments ``(…, 2 ends, 3)``, on each; clamping after Ericson (2005)."""
+    p, d = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
+    q, e = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
+    r = p - q
+    dd, ee, de = (d * d).sum(-1), (e * e).sum(-1), (d * e).sum(-1)
+    dr, er = (d * r).sum(-1), (e * r).sum(-1)
+    determinant = dd * ee - de * de
+    # Parallel: any point will do, take the middle of the first.
+    skew = determinant > 1e-9 * dd * ee + _TINY**2
+    s = np.where(skew, (de * er - dr * ee) / np.where(skew, determinant, 1.0), 0.5)
+    s = np.clip(s, 0.0, 1.0)
+    t = np.clip((de * s + er) / np.maximum(ee, _TINY), 0.0, 1.0)
+    s = np.clip((de * t - dr) / np.maximum(dd, _TINY), 0.0, 1.0)
+    return p + s[..., None] * d, q + t[..., None] * e
 
 
 def _from_core(away: Floats, radius: float) -> tuple[Floats, Floats]:

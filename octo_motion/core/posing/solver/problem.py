@@ -93,6 +93,7 @@ SPATIAL: Final = _spatial_map()
 
 
 _STOP_GAIN = 1e3
+GRAVITY: Final = 9.81
 _BLOW = 50.0
 """m/s²: a change of speed in a step that only a blow makes."""
 
@@ -107,13 +108,18 @@ class ProblemBuilder:
         self._figure = figure
         self._tree = tree
         self._step = step
-        self._kept = 1.0 / (1.0 + step * drag)
+        heavy = np.array(figure.heavy or (False,) * count)
+        kept = 1.0 / (1.0 + step * drag)
+        # What has weight by itself falls through no water.
+        self._kept = np.where(heavy, 1.0, kept)[:, None] if drag else None
         self._masses = np.tile(figure.masses[:, None], 3)
         self._lightness = 1.0 / self._masses
         self._moments = moments(figure.masses, figure.centres, figure.inertias)
         # (bodies, 6) h m g.
         self._weight = np.zeros((count, 6))
         self._weight[:, 3:] = step * self._masses * np.array(gravity, dtype=np.float64)
+        if not any(gravity):
+            self._weight[heavy, 5] = -step * GRAVITY * figure.masses[heavy]
         self._stops = JointStops(figure, _STOP_GAIN * carried_inertias(figure))
 
     def problem(
@@ -140,7 +146,7 @@ class ProblemBuilder:
             momenta[:, :3] = h * forces[:, 3:]
         momenta[:, :3] += (skewed @ linear[:, :, None])[:, :, 0]
         momenta[:, :3] += bodies.kept_spin()
-        if self._kept < 1.0:
+        if self._kept is not None:
             momenta *= self._kept
         stops = ()
         if len(self._stops.joints):

@@ -22,10 +22,10 @@ import numpy as np
 
 from ...errors import SettingsError
 from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rotate
-from ..puppet import Elements, Figure, Flags, Integers, Pose, law_of
+from ..puppet import Elements, Figure, Flags, Integers, Pose, law_of, part_of
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
-from .contact_detection import Contacts, Detector
+from .contact_detection import Contacts, Detector, apart_at
 from .holds import Coupling, HandSpring, Hold, HoldBuilder
 from .newton import InitialGuess, Newton, Solution
 from .obstacle_shapes import Obstacle
@@ -103,12 +103,15 @@ class World:
         """The solver's answer in the last step."""
         self.contacts: Contacts | None = None
         """What touched, or nearly, in the last step."""
-        self._size = typical_size(figure)
+        # Of several figures and things, as the first has it.
+        self._size = typical_size(part_of(figure, 0)) if len(figure) else 1.0
         self._springs: list[HandSpring] = []
         self._pins: dict[int, Hold] = {}
         self._yielding: Flags | None = None
         settings = settings or WorldSettings()
         settings.check(figure)
+        # Limbs of two figures that are in each other from the start would be thrown apart.
+        self._apart = apart_at(figure, pose) | _same(figure) if figure.owners else None
         self._tree = Tree(figure)
         self._bodies = Bodies(figure, self._tree, pose)
         self._warm = WarmStart(self._tree)
@@ -122,7 +125,7 @@ class World:
         self._newton = Newton(
             self._tree, tolerance=settings.tolerance, iterations=settings.iterations
         )
-        self._detector = Detector(figure, self_collision=settings.self_collision)
+        self._detector = Detector(figure, self_collision=settings.self_collision, apart=self._apart)
         # A blow is not held on to: no more than twice the figure's weight on a point.
         self._firmest = 2.0 * _WEIGHT * settings.step * mass * settings.friction
         self._builder = ProblemBuilder(
@@ -262,7 +265,7 @@ class World:
         at = np.array(point, dtype=np.float64)
         spring = HandSpring(
             body=body,
-            coupling=coupling or Coupling.for_figure(self.figure),
+            coupling=coupling or Coupling.for_figure(part_of(self.figure, body)),
             point=rotate(conjugate(own), at - self._bodies.positions[body]),
             grip=multiply(conjugate(hand), own),
             target_position=at,
@@ -376,6 +379,11 @@ class World:
             elements = replace(elements, yield_torque=limits)
         self._law = law_of(elements, self.settings.step)
         self._warm.use_law(self._law)
+
+
+def _same(figure: Figure) -> Flags:
+    owners = np.array(figure.owners)
+    return owners[:, None] == owners
 
 
 _NOBODY = np.zeros(0, np.int64)
