@@ -61,10 +61,8 @@ def hull_of(half: Floats, body: int = -1) -> Hull:
     return Hull(corners=faces(signs * half), body=body)
 
 
-def world_of(
-    figures: list[Figure], poses: list[Pose], solid: list[Obstacle], **settings: float
-) -> World:
-    return World(joined(figures), joined_poses(poses), WorldSettings(step=STEP, **settings), solid)
+def world_of(figures: list[Figure], poses: list[Pose], solid: list[Obstacle]) -> World:
+    return World(joined(figures), joined_poses(poses), WorldSettings(step=STEP), solid)
 
 
 def at(place: tuple[float, float, float], turn: tuple[float, float, float] = (0, 0, 0)) -> Pose:
@@ -175,11 +173,11 @@ def _push_on(world: World, box: int) -> float:
 def test_a_hand_shoves_a_box_and_feels_its_weight_and_its_friction() -> None:
     session, box = _arm_and_box()
     session.world.unpin(0)
-    tip = session.pose.positions[2] + [0.0, 0.2, 0.0]
+    tip = session.pose.positions[2] + np.array([0.0, 0.2, 0.0])
     spring = session.grab(2, tip, np.array(IDENTITY))
     forces, felt = [], []
     for number in range(90):
-        target = tip + [0.0, 0.004 * number, 0.0]
+        target = tip + np.array([0.0, 0.004 * number, 0.0])
         session.tick(1.0 / 60.0, {spring: HandSample(target, np.array(IDENTITY))})
         felt.append(float(spring.wrench[1]))
         forces.append(_push_on(session.world, box))
@@ -199,7 +197,7 @@ def test_a_box_in_the_hand_is_lifted_and_falls_when_it_is_let_go() -> None:
     start = session.pose.positions[box].copy()
     spring = session.grab(box, start)
     for number in range(60):
-        target = start + [0.0, 0.0, 0.005 * number]
+        target = start + np.array([0.0, 0.0, 0.005 * number])
         session.tick(1.0 / 60.0, {spring: HandSample(target, np.array(IDENTITY))})
     assert session.pose.positions[box, 2] > 0.3
     session.release()
@@ -217,7 +215,7 @@ def test_two_figures_touch_each_other_and_their_own_limbs_do_not() -> None:
     session.pin(0, state=True)
     spring = session.grab(2, session.pose.positions[2])
     for number in range(60):
-        target = pose.positions[2] + [0.008 * number, 0.0, 0.0]
+        target = pose.positions[2] + np.array([0.008 * number, 0.0, 0.0])
         session.tick(1.0 / 60.0, {spring: HandSample(target, np.array(IDENTITY))})
     gone = np.linalg.norm(session.pose.positions - pose.positions, axis=1)
     assert gone[3:].max() > 0.05, "the other one was not pushed"

@@ -96,9 +96,10 @@ def features_facing(facing: Facing, margin: float) -> tuple[Floats, Floats, Inte
 
 
 _Pair = tuple[Integers, Integers]
+_Crossing = tuple[_Pair, tuple[Floats, Floats], tuple[_Pair, _Pair]]
 
 
-def _crossings(one: _Feature, two: _Feature) -> tuple[_Pair, tuple[Floats, Floats], tuple] | None:
+def _crossings(one: _Feature, two: _Feature) -> _Crossing | None:
     """Edges that cross: numbers of both that never change, where along each, and their ends."""
     (a, b), (c, d) = one.edges(), two.edges()
     if not len(a) or not len(c):
@@ -117,15 +118,13 @@ def _crossings(one: _Feature, two: _Feature) -> tuple[_Pair, tuple[Floats, Float
     if not len(first):
         return None
     ends = (a[first], b[first]), (c[second], d[second])
-    numbers = tuple(
-        _edge_number(feature.numbers[begin], feature.numbers[end])
-        for feature, (begin, end) in zip((one, two), ends, strict=True)
-    )
-    return numbers, (share[found], part[found]), ends  # type: ignore[return-value]
+    numbers = _edge_number(one, ends[0]), _edge_number(two, ends[1])
+    return numbers, (share[found], part[found]), ends
 
 
-def _edge_number(begin: Integers, end: Integers) -> Integers:
+def _edge_number(feature: _Feature, ends: _Pair) -> Integers:
     """The same for the same two corners, whichever comes first."""
+    begin, end = feature.numbers[ends[0]], feature.numbers[ends[1]]
     low, high = np.minimum(begin, end), np.maximum(begin, end)
     return high * (high - 1) // 2 + low
 
