@@ -14,7 +14,7 @@ import numpy as np
 from ...rotations import Floats
 from ...rotations.scalars import Vector
 from ...rotations.small_batches import skew
-from ..puppet import Figure, PlasticLaw
+from ..puppet import Figure, PlasticLaw, part_of
 from .bodies import Bodies
 from .constraint_rows import Rows
 from .joint_stops import JointStops, Stops
@@ -187,6 +187,8 @@ def carried_inertias(figure: Figure) -> Floats:
 
 
 def typical_size(figure: Figure) -> float:
-    """Of a bone, metres."""
+    """Of a bone, metres; of several figures and things, as the first has it."""
+    if figure.owners:
+        figure = part_of(figure, 0)
     lengths = figure.lengths[figure.lengths > 0.0]
     return float(np.median(lengths)) if len(lengths) else float(np.max(figure.radii, initial=1e-3))

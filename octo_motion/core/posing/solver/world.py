@@ -103,8 +103,7 @@ class World:
         """The solver's answer in the last step."""
         self.contacts: Contacts | None = None
         """What touched, or nearly, in the last step."""
-        # Of several figures and things, as the first has it.
-        self._size = typical_size(part_of(figure, 0)) if len(figure) else 1.0
+        self._size = typical_size(figure)
         self._springs: list[HandSpring] = []
         self._pins: dict[int, Hold] = {}
         self._yielding: Flags | None = None
